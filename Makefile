@@ -1,0 +1,60 @@
+# One command each: `make help` lists them. Everything runs in a virtual environment of its own.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
+FORMATTED := $(filter-out %.txt,$(NATIVE))
+
+.PHONY: help install test bench lint demo lock clean
+
+help:
+	@echo "make demo      render a small built-in scene to a turntable in results/demo"
+	@echo "make test      run all tests; ARGS='-k name' picks some"
+	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
+	@echo "make lint      ruff, mypy, clang-format and the import layers"
+	@echo "make install   compile what has changed and install it, without running anything"
+	@echo "make lock      resolve requirements.lock anew"
+	@echo "make clean     remove the environment and everything built"
+	@echo "The first of them creates $(VENV) with $(PYTHON) (3.11 to 3.13) and compiles the native library."
+
+install: $(VENV)/installed
+
+test: $(VENV)/installed
+	$(BIN)/python -m pytest $(ARGS)
+
+bench: $(VENV)/installed
+	$(BIN)/python -m benchmarks $(ARGS)
+
+demo: $(VENV)/installed
+	$(BIN)/texgs demo $(ARGS)
+
+lint: $(VENV)/dependencies
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/clang-format --dry-run -Werror $(FORMATTED)
+	$(BIN)/mypy
+	$(BIN)/python -m pytest tests/test_layers.py
+
+$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt $(NATIVE)
+	@echo "Compiling the native library (a minute, with CUDA some more) and installing texgs"
+	@$(PIP) install --no-build-isolation --no-deps --editable .
+	@touch $@
+
+$(VENV)/dependencies: requirements.lock
+	@$(PYTHON) tools/check_python.py
+	@echo "Creating $(VENV)"
+	@$(PYTHON) -m venv $(VENV)
+	@echo "Installing the packages of requirements.lock (torch alone is 200 MB, several GB with CUDA)"
+	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements.lock
+	@touch $@
+
+lock: $(VENV)/dependencies
+	@echo "Resolving pyproject.toml"
+	@$(BIN)/python tools/lock.py > requirements.lock.new
+	@mv requirements.lock.new requirements.lock
+	@echo "Wrote requirements.lock"
+
+clean:
+	rm -rf $(VENV) build dist texgs/raster/_native .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	find texgs tests benchmarks tools -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,64 @@
+from math import radians, tan
+
+import pytest
+import torch
+
+from texgs.core.camera import Camera, intrinsics, look_at, orbit, orbit_direction
+from texgs.core.errors import ArgumentError, ShapeError
+
+
+def project(camera, point):
+    x, y, z = camera.viewmat[:3, :3] @ torch.tensor(point) + camera.viewmat[:3, 3]
+    u, v, w = camera.K @ torch.stack([x, y, z])
+    return float(u / w), float(v / w), float(z)
+
+
+def test_look_at_along_minus_z_flips_y_and_z():
+    viewmat = look_at(torch.tensor([0.0, 0.0, 2.0]), torch.zeros(3))
+    torch.testing.assert_close(viewmat[:3, :3], torch.diag(torch.tensor([1.0, -1.0, -1.0])))
+    torch.testing.assert_close(viewmat[:3, 3], torch.tensor([0.0, 0.0, 2.0]))
+
+
+def test_orbit_sees_the_origin_in_the_middle_and_up_above():
+    camera = orbit(-90, 0, radius=3, fov_y=40, width=200, height=100)
+    torch.testing.assert_close(camera.position, torch.tensor([0.0, 0.0, 3.0]))
+    assert project(camera, [0.0, 0.0, 0.0]) == pytest.approx((100, 50, 3), abs=1e-4)
+    # The top edge is at half the field of view, and +x is on the right.
+    assert project(camera, [0.0, 3 * tan(radians(20)), 0.0]) == pytest.approx((100, 0, 3), abs=1e-4)
+    assert project(camera, [0.1, 0.0, 0.0])[0] > 100
+
+
+@pytest.mark.parametrize("polar", [-90, -30, 0, 89.99, 90])
+def test_orbit_is_a_rotation_everywhere(polar):
+    camera = orbit(123, polar, radius=2, fov_y=30, width=8, height=8)
+    R_cw = camera.viewmat[:3, :3]
+    torch.testing.assert_close(R_cw @ R_cw.T, torch.eye(3), atol=1e-6, rtol=0)
+    assert torch.linalg.det(R_cw) == pytest.approx(1, abs=1e-6)
+    torch.testing.assert_close(camera.position, 2 * orbit_direction(123, polar).float(), atol=1e-6, rtol=0)
+
+
+def test_orbit_direction_follows_the_test_path():
+    expected = torch.tensor([0.0, 0.5, -(0.75**0.5)], dtype=torch.float64)
+    torch.testing.assert_close(orbit_direction(90, 30), expected, atol=1e-15, rtol=0)
+
+
+def test_look_at_is_differentiable_in_the_position():
+    position = torch.tensor([1.0, 2.0, 3.0], dtype=torch.float64, requires_grad=True)
+    assert torch.autograd.gradcheck(lambda p: look_at(p, torch.zeros(3, dtype=torch.float64)), position)
+
+
+def test_mistakes_are_named():
+    with pytest.raises(ArgumentError, match="position and target to differ"):
+        look_at(torch.zeros(3), torch.zeros(3))
+    with pytest.raises(ArgumentError, match="not along up"):
+        look_at(torch.tensor([0.0, 1.0, 0.0]), torch.zeros(3))
+    with pytest.raises(ArgumentError, match="polar: expected degrees from -90 to 90, got 91"):
+        orbit(0, 91, 1, 40, 8, 8)
+    with pytest.raises(ArgumentError, match="radius: expected more than 0, got 0"):
+        orbit(0, 0, 0, 40, 8, 8)
+    with pytest.raises(ArgumentError, match="fov_y: expected degrees between 0 and 180, got 180"):
+        intrinsics(180, 8, 8)
+    with pytest.raises(ArgumentError, match="height: expected at least 1 pixel, got 0"):
+        Camera(torch.eye(4), torch.eye(3), 8, 0)
+    with pytest.raises(ShapeError, match=r"viewmat: expected \[4, 4\], got \[3, 4\]"):
+        Camera(torch.eye(4)[:3], torch.eye(3), 8, 8)

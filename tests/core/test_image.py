@@ -1,0 +1,49 @@
+import pytest
+import torch
+from PIL import Image
+
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.image import read_png, to_pillow, write_png
+
+
+def test_values_are_rounded_and_clamped(tmp_path):
+    color = torch.tensor([[[0.0, 0.5, 1.0], [-0.2, 1.7, 0.501]]])
+    write_png(tmp_path / "x.png", color)
+    with Image.open(tmp_path / "x.png") as picture:
+        assert picture.mode == "RGB"
+        assert [picture.getpixel((x, 0)) for x in range(2)] == [(0, 128, 255), (0, 255, 128)]
+
+
+def test_file_holds_straight_alpha(tmp_path):
+    color = torch.tensor([[[0.25, 0.5, 0.0], [0.0, 0.0, 0.0]]])
+    alpha = torch.tensor([[0.5, 0.0]])
+    write_png(tmp_path / "x.png", color, alpha)
+    with Image.open(tmp_path / "x.png") as picture:
+        assert [picture.getpixel((x, 0)) for x in range(2)] == [(128, 255, 0, 128), (0, 0, 0, 0)]
+
+
+def test_round_trip_is_within_rounding(tmp_path):
+    generator = torch.Generator().manual_seed(0)
+    alpha = torch.rand(9, 7, generator=generator)
+    color = torch.rand(9, 7, 3, generator=generator) * alpha[..., None]
+    write_png(tmp_path / "x.png", color, alpha)
+    color_read, alpha_read = read_png(tmp_path / "x.png")
+    # Half a level of the straight colour and half a level of alpha.
+    torch.testing.assert_close(color_read, color, atol=1.01 / 255, rtol=0)
+    torch.testing.assert_close(alpha_read, alpha, atol=0.51 / 255, rtol=0)
+
+
+def test_one_channel_is_grey():
+    assert to_pillow(torch.ones(2, 2, 1)).mode == "L"
+    assert to_pillow(torch.ones(2, 2, 1), torch.ones(2, 2)).mode == "RGBA"
+
+
+def test_mistakes_are_named(tmp_path):
+    with pytest.raises(ShapeError, match=r"color: expected \[H, W, 3\] or \[H, W, 1\], got \[3, 2, 2\]"):
+        to_pillow(torch.zeros(3, 2, 2))
+    with pytest.raises(ShapeError, match=r"alpha: expected \[2, 2\], got \[2, 3\]"):
+        to_pillow(torch.zeros(2, 2, 3), torch.zeros(2, 3))
+    with pytest.raises(ArgumentError, match="color: expected finite values"):
+        to_pillow(torch.full((1, 1, 3), float("nan")))
+    with pytest.raises(ArgumentError, match="expected an image"):
+        read_png(tmp_path / "none.png")

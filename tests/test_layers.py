@@ -1,0 +1,61 @@
+"""A module imports only from layers to its left: the rule of the design, checked on the source."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+# Package: the packages it may import from, besides itself.
+LEFT = {
+    "config": set(),
+    "core": set(),
+    "volume": {"config", "core"},
+    "raster": {"config", "core"},
+    "scene": {"config", "core", "volume", "raster"},
+    "models": {"config", "core", "volume", "raster"},
+}
+for name in ("fit", "edit", "metrics"):
+    LEFT[name] = {"config", "core", "volume", "raster", "scene", "models"}
+for name in ("report", "track", "viewer"):
+    LEFT[name] = LEFT["fit"] | {"fit", "edit", "metrics"}
+LEFT["cli"] = LEFT["report"] | {"report", "track", "viewer"}
+
+
+def package_of(path: Path) -> str:
+    """The layer a file belongs to; "" for texgs/__init__.py."""
+    parts = path.relative_to(ROOT / "texgs").parts
+    return parts[0].removesuffix(".py").replace("__init__", "")
+
+
+def imports(tree: ast.AST, module: str) -> set[str]:
+    """Absolute names of all modules imported anywhere in a file."""
+    names = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            parent = ".".join(module.split(".")[: -node.level]) + "." if node.level else ""
+            base = f"{parent}{node.module or ''}".rstrip(".")
+            names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
+    return names
+
+
+FILES = sorted((ROOT / "texgs").rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_imports_point_to_the_left(path):
+    package = package_of(path)
+    module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    found = {
+        name.split(".")[1]
+        for name in imports(ast.parse(path.read_text()), module)
+        if name.startswith("texgs.")
+    }
+    assert package == "" or package in LEFT, f"{package} is in no layer: add it to LEFT"
+    allowed = LEFT.get(package, set()) | {package, "__version__"}
+    assert found <= allowed, (
+        f"{path} imports {sorted(found - allowed)}; {package} may import {sorted(allowed)}"
+    )

@@ -1,0 +1,1 @@
+"""Ground layer: errors, checks, cameras, rotations, images and safe file output."""

@@ -1,0 +1,131 @@
+"""Pinhole cameras: OpenCV axes (x right, y down, z forward), world +y up, pixel centres at +0.5."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, isfinite, radians, sin, tan
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """One view: where the camera is and how it maps points to pixels.
+
+    Raises:
+        ShapeError, ArgumentError: if a matrix or the size is not as said below.
+    """
+
+    viewmat: Tensor  # [4, 4] world to camera
+    K: Tensor  # [3, 3] focal lengths and principal point, pixels
+    width: int  # pixels
+    height: int  # pixels
+
+    def __post_init__(self) -> None:
+        check.shape("viewmat", self.viewmat, "4 4")
+        check.shape("K", self.K, "3 3")
+        for name, size in (("width", self.width), ("height", self.height)):
+            if size < 1:
+                raise ArgumentError(f"{name}: expected at least 1 pixel, got {size}")
+
+    @property
+    def position(self) -> Tensor:
+        """Camera centre in the world, [3]."""
+        R_cw, t_cw = self.viewmat[:3, :3], self.viewmat[:3, 3]
+        return -R_cw.T @ t_cw
+
+    def to(self, device: torch.device | str) -> Camera:
+        """The same camera with its matrices on another device."""
+        return replace(self, viewmat=self.viewmat.to(device), K=self.K.to(device))
+
+
+def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
+    """World-to-camera matrix of a camera at `position` that looks at `target`.
+
+    Differentiable in `position` and `target`.
+
+    Args:
+        position: [3] world units.
+        target: [3] world units.
+        up: [3] direction that points up in the image; default the world's +y.
+
+    Returns:
+        viewmat [4, 4], dtype and device of `position`.
+
+    Raises:
+        ArgumentError: if the camera is at its target, or looks along `up`.
+    """
+    for name, vector in (("position", position), ("target", target)):
+        check.shape(name, vector, "3")
+    up = position.new_tensor([0.0, 1.0, 0.0]) if up is None else up
+    check.shape("up", up, "3")
+    view = target - position
+    distance = float(view.detach().norm())
+    if not isfinite(distance) or distance == 0:
+        raise ArgumentError("look_at: expected position and target to differ and be finite, got a distance "
+                            f"of {distance}")  # fmt: skip
+    forward = view / view.norm()
+    right = torch.linalg.cross(forward, up)
+    sine = float(right.detach().norm() / up.norm())
+    if not sine > 1e-6:
+        raise ArgumentError("look_at: expected a view that is not along up, got parallel; pass another `up`")
+    right = right / right.norm()
+    R_cw = torch.stack([right, torch.linalg.cross(forward, right), forward])  # [3, 3], rows are the axes
+    last_row = position.new_tensor([[0.0, 0.0, 0.0, 1.0]])
+    return torch.cat([torch.cat([R_cw, (-R_cw @ position)[:, None]], dim=1), last_row])
+
+
+def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
+    """K [3, 3], float32: square pixels, principal point in the middle.
+
+    Args:
+        fov_y: vertical field of view, degrees, above 0 and below 180.
+        width: pixels.
+        height: pixels.
+
+    Raises:
+        ArgumentError: if `fov_y` is out of range.
+    """
+    if not 0 < fov_y < 180:
+        raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
+    focal = 0.5 * height / tan(radians(0.5 * fov_y))
+    return torch.tensor([[focal, 0.0, 0.5 * width], [0.0, focal, 0.5 * height], [0.0, 0.0, 1.0]])
+
+
+def orbit_direction(azimuth: float, polar: float) -> Tensor:
+    """Unit vector [3], float64, from the origin to (azimuth, polar) in degrees.
+
+    Cameras and lights share it: (cos az cos pol, sin pol, -sin az cos pol), so azimuth 0 is +x, -90 is +z
+    and polar 90 is straight up.
+    """
+    a, p = radians(azimuth), radians(polar)
+    return torch.tensor([cos(a) * cos(p), sin(p), -sin(a) * cos(p)], dtype=torch.float64)
+
+
+def orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:
+    """Camera on a sphere around the origin that looks at the origin; float32.
+
+    Args:
+        azimuth: degrees, see `orbit_direction`.
+        polar: degrees above the horizon, -90 to 90; the poles are as good as any other place.
+        radius: world units, above 0.
+        fov_y: vertical field of view, degrees.
+        width: pixels.
+        height: pixels.
+
+    Raises:
+        ArgumentError: if an argument is out of range.
+    """
+    if not abs(polar) <= 90:
+        raise ArgumentError(f"polar: expected degrees from -90 to 90, got {polar}")
+    if not radius > 0:
+        raise ArgumentError(f"radius: expected more than 0, got {radius}")
+    a, p = radians(azimuth), radians(polar)
+    # The tangent towards growing polar angle: the projected +y where that exists, and defined at the poles.
+    up = torch.tensor([-cos(a) * sin(p), cos(p), sin(a) * sin(p)], dtype=torch.float64)
+    viewmat = look_at(radius * orbit_direction(azimuth, polar), torch.zeros(3, dtype=torch.float64), up)
+    return Camera(viewmat.float(), intrinsics(fov_y, width, height), width, height)

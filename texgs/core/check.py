@@ -1,0 +1,116 @@
+"""Checks at public borders: shapes, dtypes, devices and finite values, reported by argument name."""
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+
+
+def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
+    """Compare a tensor's shape with a spec such as ``"N 3"`` and return the sizes of its named axes.
+
+    Args:
+        name: argument name for the message.
+        tensor: tensor to check.
+        spec: one token per axis: an integer must be equal; a name binds, and must be equal where it
+            occurs twice or is in `known`. An empty spec is a scalar.
+        known: sizes of names that are bound already.
+
+    Returns:
+        The sizes of all names in `spec`.
+
+    Raises:
+        ArgumentError: if `tensor` is no tensor.
+        ShapeError: if the shape does not fit.
+
+    Example:
+        >>> shape("means", torch.zeros(5, 3), "N 3")
+        {'N': 5}
+    """
+    if not isinstance(tensor, Tensor):
+        raise ArgumentError(f"{name}: expected a torch.Tensor, got {type(tensor).__name__}")
+    sizes = bind(tensor.shape, spec, known)
+    if sizes is None:
+        expected = ", ".join(str(known.get(token, token)) for token in spec.split())
+        raise ShapeError(
+            f"{name}: expected [{expected}], got {list(tensor.shape)}{_hint(tensor, spec, known)}"
+        )
+    return sizes
+
+
+def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str, int] | None:
+    """Sizes of the names in `spec` for a shape, or None where the shape does not fit."""
+    tokens = spec.split()
+    if len(tokens) != len(actual):
+        return None
+    sizes: dict[str, int] = {}
+    for token, size in zip(tokens, actual, strict=True):
+        expected = int(token) if token.isdigit() else {**known, **sizes}.get(token, size)
+        if size != expected:
+            return None
+        if not token.isdigit():
+            sizes[token] = size
+    return sizes
+
+
+def _hint(tensor: Tensor, spec: str, known: dict[str, int]) -> str:
+    """What a user most likely did: a transpose, or a missing or superfluous axis."""
+    if tensor.ndim == 2 and bind(tensor.shape[::-1], spec, known) is not None:
+        return "; did you transpose?"
+    if (
+        tensor.ndim
+        and tensor.ndim + 1 == len(spec.split())
+        and bind((*tensor.shape, 1), spec, known) is not None
+    ):
+        return "; add the last axis with unsqueeze(-1)"
+    if tensor.ndim and tensor.shape[-1] == 1 and bind(tensor.shape[:-1], spec, known) is not None:
+        return "; drop the last axis with squeeze(-1)"
+    if tensor.ndim and tensor.shape[0] == 1 and bind(tensor.shape[1:], spec, known) is not None:
+        return "; batches are not supported, pass one element"
+    return ""
+
+
+def floating(name: str, tensor: Tensor) -> None:
+    """Require float32.
+
+    Raises:
+        ArgumentError: naming the dtype found.
+    """
+    if tensor.dtype != torch.float32:
+        found = str(tensor.dtype).removeprefix("torch.")
+        raise ArgumentError(f"{name}: expected float32, got {found}; convert it with .float()")
+
+
+def same_device(**tensors: Tensor | None) -> torch.device:
+    """Require that all tensors (None is skipped) are on one device, and return it.
+
+    Raises:
+        DeviceError: naming two tensors that differ.
+    """
+    present = {name: tensor for name, tensor in tensors.items() if tensor is not None}
+    if not present:
+        raise ArgumentError("same_device: expected at least one tensor, got none")
+    first, device = next((name, tensor.device) for name, tensor in present.items())
+    for name, tensor in present.items():
+        if tensor.device != device:
+            raise DeviceError(
+                f"{name}: expected device {device} as {first}, got {tensor.device}; move it there"
+            )
+    return device
+
+
+def finite(**tensors: Tensor | None) -> None:
+    """Require that no tensor (None is skipped) holds NaN or infinity. Waits for the device.
+
+    Raises:
+        ArgumentError: naming the tensor, the number of bad values and the index of the first.
+    """
+    for name, tensor in tensors.items():
+        if tensor is None or bool(torch.isfinite(tensor).all()):
+            continue
+        bad = (~torch.isfinite(tensor)).nonzero()  # [n_bad, ndim]
+        n_nan = int(torch.isnan(tensor).sum())
+        raise ArgumentError(
+            f"{name}: expected finite values, got {n_nan} NaN and {len(bad) - n_nan} infinite, "
+            f"the first at index {bad[0].tolist()}"
+        )

@@ -1,0 +1,25 @@
+"""Errors a user can do something about. Each message is one sentence: what, where, got, what to do."""
+
+
+class TexgsError(Exception):
+    """A user's mistake or a limit of the machine; the command line prints it without a traceback."""
+
+
+class ShapeError(TexgsError, ValueError):
+    """A tensor has the wrong shape."""
+
+
+class ArgumentError(TexgsError, ValueError):
+    """An argument has the wrong type, dtype or value."""
+
+
+class DeviceError(TexgsError, RuntimeError):
+    """Tensors are on different devices, or on one that cannot be used."""
+
+
+class OutOfMemoryError(TexgsError, MemoryError):
+    """The work would need more memory than there is."""
+
+
+class NativeError(TexgsError, RuntimeError):
+    """The native library is missing, does not fit this package or failed."""

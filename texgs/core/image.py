@@ -1,0 +1,61 @@
+"""Images as PNG files: straight alpha and 8 bits on disk, premultiplied floats [H, W, C] in memory."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.io import write_atomic
+
+
+def to_pillow(color: Tensor, alpha: Tensor | None = None) -> Image.Image:
+    """Round an image to 8 bits, clamped to [0, 1] first.
+
+    Args:
+        color: [H, W, 3] or [H, W, 1]; premultiplied where `alpha` is given. Any device and dtype.
+        alpha: [H, W]; colour is divided by it, so that the file holds straight alpha.
+
+    Raises:
+        ShapeError: if the shapes do not fit.
+        ArgumentError: if a value is NaN or infinite.
+    """
+    if color.ndim != 3 or color.shape[2] not in (1, 3):
+        raise ShapeError(f"color: expected [H, W, 3] or [H, W, 1], got {list(color.shape)}")
+    check.finite(color=color, alpha=alpha)
+    planes = color.detach().float().cpu()
+    if alpha is not None:
+        check.shape("alpha", alpha, "H W", H=color.shape[0], W=color.shape[1])
+        cover = alpha.detach().float().cpu()[..., None]
+        planes = torch.where(cover > 0, planes / cover.clamp_min(1e-12), 0.0)
+        planes = torch.cat([planes.expand(-1, -1, 3), cover], dim=2)
+    pixels = (planes.clamp(0, 1) * 255).round().to(torch.uint8).numpy()
+    return Image.fromarray(pixels[..., 0] if pixels.shape[2] == 1 else pixels)
+
+
+def write_png(path: str | Path, color: Tensor, alpha: Tensor | None = None) -> Path:
+    """Write an image as PNG in one step; arguments as for `to_pillow`."""
+    picture = to_pillow(color, alpha)
+    return write_atomic(path, lambda file: picture.save(file, format="PNG"))
+
+
+def read_png(path: str | Path) -> tuple[Tensor, Tensor]:
+    """Read an 8-bit image.
+
+    Returns:
+        Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; alpha is 1 in a file without it.
+
+    Raises:
+        ArgumentError: if the file is missing or no image.
+    """
+    try:
+        with Image.open(path) as picture:
+            pixels = np.asarray(picture.convert("RGBA"), dtype=np.float32) / 255
+    except OSError as error:
+        raise ArgumentError(f"{path}: expected an image, got {error}") from error
+    image = torch.from_numpy(pixels)
+    alpha = image[..., 3]
+    return image[..., :3] * alpha[..., None], alpha

@@ -1,0 +1,84 @@
+"""Files that are never seen half written: write beside the target, then rename."""
+
+import json
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from texgs.core.errors import ArgumentError
+
+
+def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
+    """Create or replace a file in one step; folders on the way are created.
+
+    Args:
+        path: target file.
+        write: gets a binary file opened for writing. If it raises, the target is left as it was.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if the folder cannot be created or written to.
+    """
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        scratch = Path(name)
+    except OSError as error:
+        raise ArgumentError(
+            f"{path}: cannot write there ({error.strerror}); choose another folder"
+        ) from error
+    try:
+        with os.fdopen(handle, "wb") as file:
+            write(file)
+            file.flush()
+            os.fsync(file.fileno())
+        scratch.chmod(0o666 & ~_umask())
+        scratch.replace(path)
+    except BaseException:
+        scratch.unlink(missing_ok=True)
+        raise
+    return path
+
+
+def write_bytes(path: str | Path, data: bytes) -> Path:
+    """Create or replace a file with `data` in one step; see `write_atomic`."""
+    return write_atomic(path, lambda file: file.write(data))
+
+
+def write_json(path: str | Path, value: Any) -> Path:
+    """Create or replace a JSON file in one step: indented, keys in the order given, newline at the end.
+
+    Raises:
+        ArgumentError: if `value` holds something JSON has no word for, NaN and infinity included.
+    """
+    try:
+        text = json.dumps(value, indent=2, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{path}: cannot be written as JSON: {error}") from error
+    return write_bytes(path, text.encode() + b"\n")
+
+
+def read_json(path: str | Path) -> Any:
+    """Read a JSON file.
+
+    Raises:
+        ArgumentError: if the file is missing or no JSON, with the line.
+    """
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file") from error
+    except ValueError as error:
+        raise ArgumentError(f"{path}: expected JSON, got {error}") from error
+
+
+def _umask() -> int:
+    """The process's file mode mask; mkstemp ignores it and makes private files."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
