@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+// The C interface: checks, the pool of frames, and exceptions turned into status codes.
+#include <exception>
+#include <memory>
+#include <mutex>
+#include <new>
+#include <string>
+#include <vector>
+
+#include "../texgs.h"
+#include "dispatch.h"
+#include "frame.h"
+
+using namespace texgs;
+
+namespace {
+
+thread_local std::string error;
+thread_local int64_t bytes_needed = 0;
+
+struct InvalidArgument {
+    const char* what;
+};
+void require(bool condition, const char* what) {
+    if (!condition) throw InvalidArgument{what};
+}
+
+template <class Body>
+int32_t guarded(Body body) {
+    try {
+        body();
+        return TEXGS_OK;
+    } catch (const InvalidArgument& e) {
+        error = e.what;
+        return TEXGS_INVALID_ARGUMENT;
+    } catch (const OutOfMemory& e) {
+        bytes_needed = e.bytes;
+        error = "not enough memory: this needs " + std::to_string(e.bytes) + " bytes more";
+        return TEXGS_OUT_OF_MEMORY;
+    } catch (const std::bad_alloc&) {
+        error = "not enough memory";
+        return TEXGS_OUT_OF_MEMORY;
+    } catch (const std::exception& e) {
+        error = e.what();
+        return TEXGS_DEVICE_ERROR;
+    }
+}
+
+// Frames whose buffers wait to be used again. A few are enough; more would only hold memory.
+class FramePool {
+public:
+    std::unique_ptr<texgs_frame> take() {
+        std::lock_guard lock(mutex_);
+        if (idle_.empty()) return std::make_unique<texgs_frame>();
+        std::unique_ptr<texgs_frame> frame = std::move(idle_.back());
+        idle_.pop_back();
+        return frame;
+    }
+    void give(std::unique_ptr<texgs_frame> frame) {
+        std::lock_guard lock(mutex_);
+        if (idle_.size() < 2) idle_.push_back(std::move(frame));
+    }
+
+private:
+    std::mutex mutex_;
+    std::vector<std::unique_ptr<texgs_frame>> idle_;
+};
+FramePool& pool() {
+    static FramePool frames;
+    return frames;
+}
+
+void check(const texgs_surfels& s, const texgs_camera& c, const texgs_options& o) {
+    require(s.n >= 0 && s.n < (int64_t(1) << 31), "surfels: expected fewer than 2^31");
+    require(s.means && s.quats && s.scales && s.opacities, "surfels: means, quats, scales and opacities are needed");
+    require((s.features != nullptr) != (s.base != nullptr), "surfels: give either features or a texture");
+    require(s.channels >= 1 && s.channels <= TEXGS_MAX_CHANNELS, "channels: expected 1 to 32");
+    require(!s.base || (s.channels == 3 && s.gain && s.texels && s.sizes && s.offsets),
+            "texture: base, gain, texels, sizes and offsets are needed, with 3 channels");
+    require(c.viewmat && c.K, "camera: viewmat and K are needed");
+    require(c.width >= 1 && c.height >= 1 && c.width < (1 << 20) && c.height < (1 << 20),
+            "image: width and height must be 1 to 2^20 - 1");
+    require(o.low_pass > 0, "low_pass: expected above 0");
+    require(o.filter_sigma >= 0, "filter_sigma: expected 0 or more");
+    require(o.alpha_min > 0 && o.alpha_min < 1, "alpha_min: expected between 0 and 1, without them");
+    require(o.transmittance_min >= 0 && o.transmittance_min < 1, "transmittance_min: expected 0 to 1, without 1");
+    require(o.near_plane > 0 && o.far_plane > o.near_plane, "near, far: expected 0 < near < far");
+}
+
+}  // namespace
+
+int32_t texgs_abi_version(void) { return TEXGS_ABI_VERSION; }
+const char* texgs_error(void) { return error.c_str(); }
+int64_t texgs_bytes_needed(void) { return bytes_needed; }
+int64_t texgs_memory(int32_t reset) { return memory_peak(reset != 0); }
+
+const char* texgs_instruction_set(void) {
+    const char* name = nullptr;
+    guarded([&] { name = isa_name(active_isa()); });
+    return name;
+}
+
+int32_t texgs_require_memory(int64_t bytes) {
+    return guarded([&] { require_memory(bytes); });
+}
+
+int32_t texgs_forward(const texgs_surfels* surfels, const texgs_camera* camera, const texgs_options* options,
+                      const texgs_image* image, texgs_frame** frame, void*) {
+    return guarded([&] {
+        check(*surfels, *camera, *options);
+        std::unique_ptr<texgs_frame> f = pool().take();
+        f->bin(*surfels, *camera, *options, *image);
+        if (image->color) f->render();
+        if (frame)
+            *frame = f.release();
+        else
+            pool().give(std::move(f));
+    });
+}
+
+int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const texgs_camera* camera,
+                       const texgs_options* options, const texgs_image* image, const texgs_image* grad,
+                       const texgs_gradients* out, void*) {
+    return guarded([&] {
+        frame->attach(*surfels, *camera, *options);
+        frame->differentiate(*image, *grad, *out);
+    });
+}
+
+int32_t texgs_contribute(texgs_frame* frame, const texgs_surfels* surfels, const texgs_camera* camera,
+                         const texgs_options* options, const texgs_contributions* out, void*) {
+    return guarded([&] {
+        require(!out->image || (out->channels >= 1 && out->channels <= TEXGS_MAX_CHANNELS),
+                "channels: expected 1 to 32");
+        frame->attach(*surfels, *camera, *options);
+        frame->contribute(*out);
+    });
+}
+
+void texgs_release(texgs_frame* frame) {
+    if (frame) pool().give(std::unique_ptr<texgs_frame>(frame));
+}

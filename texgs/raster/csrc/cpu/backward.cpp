@@ -1,0 +1,367 @@
+// SPDX-License-Identifier: Apache-2.0
+// Backward pass over one tile: gradient sums of each of its surfels into the pair's slot.
+//
+// A fragment adds w_i c_i to its pixel, so with q_i = dL/dw_i
+//     dL/dalpha_i = T_i q_i - (sum over j behind i of w_j q_j) / (1 - alpha_i).
+// The sum over all fragments is known from the rendered image; subtracting w_i q_i front to back leaves the rest. One
+// number per pixel is thus all that is carried besides the transmittance, whatever the number of channels.
+#include <cstddef>
+
+#include "isa.h"
+#include "replay.h"
+#include "texture.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kGeometrySums = 11;  // Moments without zc, zp and normal
+constexpr int kDepthSums = 2;      // zc, zp
+constexpr int kOwnChannels[2] = {16 - kGeometrySums, 16 - kGeometrySums - kDepthSums};  // in the first line of a slot
+
+// Gradients of the tile's pixels, and what else q depends on.
+struct alignas(64) PixelGradients {
+    float channels[kMaxChannels][kTilePixels];
+    float constant[kTilePixels];            // part of q common to all fragments
+    float remaining[kTilePixels];           // sum of w_j q_j over the fragments not yet visited
+};
+
+// The same of the depths.
+struct alignas(64) DepthGradients {
+    float depth[kTilePixels], median[kTilePixels], median_stop[kTilePixels];
+    float origin[kTilePixels], m[kTilePixels], m2[kTilePixels];  // q += m m' + m2 m'^2, m' = m - origin
+    float alpha[kTilePixels];               // blended so far
+};
+
+struct alignas(64) BackwardScratch {
+    Chunk chunk;
+    TextureTables textures;
+    Group group;
+    PixelGradients g;
+    DepthGradients d;
+    float transmittance[kTilePixels];
+    float alpha[kVectors][kLanes], u[kVectors][kLanes], v[kVectors][kLanes], r[kVectors][kLanes];
+    float rho[kVectors][kLanes];            // negative where the low-pass filter rules
+    float q[kVectors][kLanes], z[kVectors][kLanes], weight[kVectors][kLanes];
+    float texture_u[kVectors][kLanes], texture_v[kVectors][kLanes];  // dL/du, dL/dv per weight through the texture
+};
+
+// -- Per pixel ------------------------------------------------------------------------------------------------------
+
+void load_channels(const Raster& r, int tile, PixelGradients& g) {
+    const int64_t plane = int64_t(r.camera.width) * r.camera.height;
+    const int own = r.surfels.channels;
+    std::memset(g.channels, 0, r.channels * sizeof g.channels[0]);
+    float value[kTilePixels] = {};
+    for (int c = 0; c < r.channels; ++c) {
+        const float* grad = c < own ? r.grad.color : r.grad.normal;
+        if (!grad) continue;
+        const int64_t offset = (c < own ? c : c - own) * plane;
+        load_plane(r, tile, grad + offset, g.channels[c]);
+        load_plane(r, tile, (c < own ? r.image.color : r.image.normal) + offset, value);
+        const float background = c < own && r.options.background ? r.options.background[c] : 0.0f;
+        for (int i = 0; i < kTilePixels; i += kLanes) {
+            const vf gradient = load(g.channels[c] + i);
+            store(g.remaining + i, fma(gradient, load(value + i) - vf(background), load(g.remaining + i)));
+            store(g.constant + i, fnma(gradient, background, load(g.constant + i)));
+        }
+    }
+}
+
+// Expected depth is sum(w z) / alpha: its gradient splits into one by sum(w z), and one by alpha.
+void load_expected_depth(const Raster& r, int tile, PixelGradients& g, DepthGradients& d, const float* alpha) {
+    float depth[kTilePixels] = {}, grad[kTilePixels] = {};
+    load_plane(r, tile, r.image.depth, depth);
+    load_plane(r, tile, r.grad.depth, grad);
+    for (int i = 0; i < kTilePixels; i += kLanes) {
+        const vf a = load(alpha + i);
+        const vf by_sum = zero_unless(a > vf(0.0f), load(grad + i) / max(a, 1e-30f));
+        store(d.depth + i, by_sum);
+        store(g.constant + i, fnma(by_sum, load(depth + i), load(g.constant + i)));
+    }
+}
+
+// The distortion is A M2 - M1^2 with A = sum w, M1 = sum w m', M2 = sum w m'^2.
+void load_distortion(const Raster& r, int tile, PixelGradients& g, DepthGradients& d, const float* alpha) {
+    const float* moments = r.distortion_moments + int64_t(tile) * 3 * kTilePixels;
+    float grad[kTilePixels] = {};
+    load_plane(r, tile, r.grad.distortion, grad);
+    for (int i = 0; i < kTilePixels; i += kLanes) {
+        const vf gradient = load(grad + i), a = load(alpha + i), m1 = load(moments + i);
+        const vf m2 = load(moments + kTilePixels + i);
+        store(d.m + i, gradient * vf(-2.0f) * m1);
+        store(d.m2 + i, gradient * a);
+        store(d.origin + i, load(moments + 2 * kTilePixels + i));
+        store(g.constant + i, fma(gradient, m2, load(g.constant + i)));
+        store(g.remaining + i, fma(vf(2.0f) * gradient, fnma(m1, m1, a * m2), load(g.remaining + i)));
+    }
+}
+
+void load_gradients(const Raster& r, int tile, PixelGradients& g, DepthGradients* d) {
+    std::memset(g.constant, 0, sizeof g.constant);
+    std::memset(g.remaining, 0, sizeof g.remaining);
+    load_channels(r, tile, g);
+    float alpha[kTilePixels] = {};
+    if (r.grad.alpha || d) load_plane(r, tile, r.image.alpha, alpha);
+    if (r.grad.alpha) {
+        float grad[kTilePixels] = {};
+        load_plane(r, tile, r.grad.alpha, grad);
+        for (int i = 0; i < kTilePixels; i += kLanes) {
+            store(g.remaining + i, fma(load(grad + i), load(alpha + i), load(g.remaining + i)));
+            store(g.constant + i, load(g.constant + i) + load(grad + i));
+        }
+    }
+    if (!d) return;
+    std::memset(d, 0, sizeof *d);
+    if (r.grad.depth) load_expected_depth(r, tile, g, *d, alpha);
+    if (r.grad.distortion) load_distortion(r, tile, g, *d, alpha);
+    if (r.grad.median) {
+        load_plane(r, tile, r.grad.median, d->median);
+        std::memcpy(d->median_stop, r.median_stop + int64_t(tile) * kTilePixels, sizeof d->median_stop);
+    }
+}
+
+void prefetch_gradients(const Raster& r, int tile) {
+    const int own = r.surfels.channels;
+    prefetch_planes(r, tile, r.grad.color, own);
+    if (r.grad.color) prefetch_planes(r, tile, r.image.color, own);
+    prefetch_planes(r, tile, r.grad.normal, 3);
+    if (r.grad.normal) prefetch_planes(r, tile, r.image.normal, 3);
+    if (r.grad.alpha) prefetch_planes(r, tile, r.image.alpha, 1);
+    prefetch_planes(r, tile, r.grad.alpha, 1);
+}
+
+// -- Per entry, independent of each other -----------------------------------------------------------------------------
+
+template <bool Depth>
+TEXGS_INLINE void evaluate_entries(BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
+    for (int e = 0; e < s.group.entries; ++e)
+        for (int part = 0; part < kParts; ++part) {
+            const int place = s.group.surfel[e];
+            const Record& record = s.chunk.records[place];
+            const Fragments f = evaluate(record, s.chunk.flags[place], pixels.of(s.group.block[e], part), limits);
+            const int i = e * kParts + part;
+            store(s.alpha[i], f.alpha);
+            store(s.r[i], f.inverse_w);
+            store(s.u[i], f.u);
+            store(s.v[i], f.v);
+            store(s.rho[i], select(f.rho_surfel <= f.rho, f.rho, -1.0f));
+            if constexpr (Depth) store(s.z[i], depth_of(record, f));
+        }
+}
+
+// q = dL/dw of each entry from what does not fit into the first line of its slot: N channels at a time.
+template <int N>
+TEXGS_INLINE void weigh_channel_group(BackwardScratch& s, int first) {
+    for (int e = 0; e < s.group.entries; ++e) {
+        const float* value = s.chunk.channels + s.group.surfel[e] * s.chunk.stride + first;
+        for (int part = 0; part < kParts; ++part) {
+            const int pixel = s.group.block[e] * kBlockPixels + part * kLanes, i = e * kParts + part;
+            vf q = load(s.q[i]);
+            for (int c = 0; c < N; ++c) q = fma(load(s.g.channels[first + c] + pixel), value[c], q);
+            store(s.q[i], q);
+        }
+    }
+}
+TEXGS_INLINE void weigh_channels(const Raster& r, BackwardScratch& s, int first) {
+    std::memset(s.q, 0, s.group.entries * kParts * sizeof s.q[0]);
+    for (; r.channels - first >= 4; first += 4) weigh_channel_group<4>(s, first);
+    for (; first < r.channels; ++first) weigh_channel_group<1>(s, first);
+}
+
+TEXGS_INLINE void weigh_depth(const Raster& r, BackwardScratch& s) {
+    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
+    for (int e = 0; e < s.group.entries; ++e)
+        for (int part = 0; part < kParts; ++part) {
+            const int i = e * kParts + part, pixel = s.group.block[e] * kBlockPixels + part * kLanes;
+            const vf z = load(s.z[i]);
+            const vf m = fnma(vf(scale * r.options.near_plane), vf(1.0f) / z, scale) - load(s.d.origin + pixel);
+            vf q = fma(load(s.d.depth + pixel), z, load(s.q[i]));
+            q = fma(m, fma(load(s.d.m2 + pixel), m, load(s.d.m + pixel)), q);
+            // alpha 0 also marks entries that are not hit at all, with any z
+            store(s.q[i], select(load(s.alpha[i]) > vf(0.0f), q, 0.0f));
+        }
+}
+
+TEXGS_INLINE void weigh_texture(BackwardScratch& s) {
+    for (int e = 0; e < s.group.entries; ++e) {
+        const TextureTable& table = s.textures.of[s.group.surfel[e]];
+        for (int part = 0; part < kParts; ++part) {
+            const int i = e * kParts + part, pixel = s.group.block[e] * kBlockPixels + part * kLanes;
+            const TexelCoordinates at = texel_coordinates(table, load(s.u[i]), load(s.v[i]));
+            vf texel[3], by_u[3], by_v[3], q = 0.0f, gu = 0.0f, gv = 0.0f;
+            sample_with_slope(table, at, texel, by_u, by_v);
+            for (int c = 0; c < 3; ++c) {
+                const vf gradient = load(s.g.channels[c] + pixel) * vf(table.gain);
+                q = fma(gradient, texel[c], q), gu = fma(gradient, by_u[c], gu), gv = fma(gradient, by_v[c], gv);
+            }
+            store(s.q[i], load(s.q[i]) + q);
+            store(s.texture_u[i], gu), store(s.texture_v[i], gv);
+        }
+    }
+}
+
+// -- Per surfel, in order ---------------------------------------------------------------------------------------------
+
+struct Sums {
+    vf u_dx = 0.0f, u_dy = 0.0f, u = 0.0f, v_dx = 0.0f, v_dy = 0.0f, v = 0.0f, w_dx = 0.0f, w_dy = 0.0f;
+    vf disc_dx = 0.0f, disc_dy = 0.0f, e = 0.0f, zc = 0.0f, zp = 0.0f;
+};
+
+// dL/dz of fragments, from expected depth, distortion and median.
+TEXGS_INLINE vf depth_gradient(const Raster& r, DepthGradients& g, int pixel, vf z, vf w) {
+    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
+    const vf c1 = scale * r.options.near_plane, inverse = vf(1.0f) / z;
+    const vf m = fnma(c1, inverse, scale) - load(g.origin + pixel);
+    const vf by_m = fma(vf(2.0f) * load(g.m2 + pixel), m, load(g.m + pixel));
+    const vf before = load(g.alpha + pixel), after = before + w;
+    store(g.alpha + pixel, after);
+    // replayed bit for bit, the median is the fragment that brings alpha to where the forward pass took it
+    const vf stop = load(g.median_stop + pixel);
+    const vm is_median = (before < vf(0.5f)) & (after <= stop) & (after >= stop);
+    const vf gz = fma(w, fma(by_m, c1 * inverse * inverse, load(g.depth + pixel)),
+                      zero_unless(is_median, load(g.median + pixel)));
+    return zero_unless(w > vf(0.0f), gz);
+}
+
+// Adds the fragments of one vector of pixels; `q` is what their channels contribute to dL/dw. Returns the weights.
+template <bool Depth, bool Textured>
+TEXGS_INLINE vf add_entry(const Raster& r, BackwardScratch& s, const Limits& limits, unsigned flags, int i, int pixel,
+                          vf dx, vf dy, vf q, Sums& sums) {
+    const vf alpha = load(s.alpha[i]);
+    const Blend b = blend(alpha, s.transmittance + pixel, limits);
+    const vf remaining = fnma(b.weight, q, load(s.g.remaining + pixel));
+    store(s.g.remaining + pixel, remaining);
+    const vf by_alpha = fma(b.before, q, -(remaining / (vf(1.0f) - alpha)));
+    const vf e = zero_unless(b.counts & (alpha < vf(kLargestAlpha)), alpha * by_alpha);
+    sums.e += e;
+
+    const vf u = load(s.u[i]), v = load(s.v[i]), inverse = load(s.r[i]), rho = load(s.rho[i]);
+    vf t = e * inverse;
+    if (flags & kFiltered) {
+        const vm by_filter = rho < vf(0.0f);
+        const vf filtered = zero_unless(by_filter, e);
+        sums.disc_dx = fma(filtered, dx, sums.disc_dx);
+        sums.disc_dy = fma(filtered, dy, sums.disc_dy);
+        t = zero_unless(~by_filter, t);
+    }
+    vf gU = -(t * u), gV = -(t * v), gW = t * rho;
+    if constexpr (Depth) {
+        const vm by_surfel = rho >= vf(0.0f);
+        const vf z = load(s.z[i]), gz = depth_gradient(r, s.d, pixel, z, b.weight);
+        const vf by_zc = zero_unless(by_surfel, gz * inverse);
+        gW = fnma(by_zc, z, gW);
+        sums.zc += by_zc;
+        sums.zp += zero_unless(~by_surfel, gz);
+    }
+    if constexpr (Textured) {  // where a coordinate is clamped its gradient is 0, and u or v may not be finite
+        const vf gu = load(s.texture_u[i]), gv = load(s.texture_v[i]), scaled = b.weight * inverse;
+        const vm by_u = abs(gu * b.weight) > vf(0.0f), by_v = abs(gv * b.weight) > vf(0.0f);
+        gU = add_where(by_u, gU, scaled * gu);
+        gV = add_where(by_v, gV, scaled * gv);
+        gW = gW - zero_unless(by_u, scaled * gu * u) - zero_unless(by_v, scaled * gv * v);
+    }
+    sums.u_dx = fma(gU, dx, sums.u_dx), sums.u_dy = fma(gU, dy, sums.u_dy), sums.u += gU;
+    sums.v_dx = fma(gV, dx, sums.v_dx), sums.v_dy = fma(gV, dy, sums.v_dy), sums.v += gV;
+    sums.w_dx = fma(gW, dx, sums.w_dx), sums.w_dy = fma(gW, dy, sums.w_dy);
+    return b.weight;
+}
+
+// Sums over the surfel's entries, to its slot: geometry, then channels, N of which are in the first line.
+template <bool Depth, bool Textured, int N>
+TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits,
+                             int k) {
+    const int begin = s.group.first[k], end = s.group.first[k + 1], place = s.group.place[k];
+    const unsigned flags = s.chunk.flags[place];
+    const vf cx = s.chunk.records[place].cx, cy = s.chunk.records[place].cy;
+    const bool has_q = Depth || Textured || r.channels > N;  // besides the N channels
+    Sums a;
+    vf channels[N], values[N];
+    for (int c = 0; c < N; ++c) channels[c] = 0.0f, values[c] = s.chunk.channels[place * s.chunk.stride + c];
+    for (int e = begin; e < end; ++e)
+        for (int part = 0; part < kParts; ++part) {
+            const int block = s.group.block[e], i = e * kParts + part, pixel = block * kBlockPixels + part * kLanes;
+            const Pixels at = pixels.of(block, part);
+            vf q = load(s.g.constant + pixel);
+            for (int c = 0; c < N; ++c) q = fma(load(s.g.channels[c] + pixel), values[c], q);
+            if (has_q) q += load(s.q[i]);
+            const vf w = add_entry<Depth, Textured>(r, s, limits, flags, i, pixel, at.x - cx, at.y - cy, q, a);
+            for (int c = 0; c < N; ++c) channels[c] = fma(w, load(s.g.channels[c] + pixel), channels[c]);
+            if (r.channels > N) store(s.weight[i], w);
+        }
+    constexpr int used = kGeometrySums + (Depth ? kDepthSums : 0);
+    vf line[16] = {a.u_dx, a.u_dy, a.u, a.v_dx, a.v_dy, a.v, a.w_dx, a.w_dy, a.disc_dx, a.disc_dy, a.e};
+    if constexpr (Depth) line[kGeometrySums] = a.zc, line[kGeometrySums + 1] = a.zp;
+    for (int c = 0; c < N; ++c) line[used + c] = channels[c];
+    for (int c = used + N; c < 16; ++c) line[c] = 0.0f;
+    float* slot = r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride;
+    stream_sums(line, slot);
+    for (int c = N; c < r.channels; c += 16) {
+        slot += 16;
+        const int n = r.channels - c < 16 ? r.channels - c : 16;
+        weigh_up_to_16(s.group, begin, end, s.weight[0], s.g.channels[c], n, line);
+        stream_sums(line, slot);
+    }
+}
+
+template <bool Depth, bool Textured, int N>
+void add_group(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
+    for (int k = 0; k < s.group.surfels; ++k) add_surfel<Depth, Textured, N>(r, s, pixels, limits, k);
+}
+
+template <bool Depth, bool Textured>
+TEXGS_INLINE void add_surfels(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
+    constexpr int room = kOwnChannels[Depth];
+    switch (r.channels < room ? r.channels : room) {
+        case 1: return add_group<Depth, Textured, 1>(r, s, pixels, limits);
+        case 2: return add_group<Depth, Textured, 2>(r, s, pixels, limits);
+        case 3: return add_group<Depth, Textured, 3>(r, s, pixels, limits);
+        case 4: return add_group<Depth, Textured, room < 4 ? room : 4>(r, s, pixels, limits);
+        default: return add_group<Depth, Textured, room>(r, s, pixels, limits);
+    }
+}
+
+template <bool Depth, bool Textured>
+void replay_tile(const Raster& r, int tile, BackwardScratch& s) {
+    const TilePixels pixels(r, tile);
+    const Limits limits(r.options);
+    if (r.tile_begin[tile] == r.tile_begin[tile + 1]) return;
+    load_gradients(r, tile, s.g, Depth ? &s.d : nullptr);
+    prefetch_gradients(r, tile + 1);
+    uint32_t alive = start_tile(r, pixels, s.transmittance);
+    const uint32_t end = r.tile_begin[tile + 1];
+    uint32_t begin = r.tile_begin[tile];
+    for (; begin < end && alive; begin += kChunk) {
+        const int n = static_cast<int>(end - begin < kChunk ? end - begin : kChunk);
+        s.chunk.stage(r, begin, n);
+        if constexpr (Textured) s.textures.stage(r, s.chunk, n);
+        const auto skip = [&](int place) {
+            stream_zeros(r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride, r.slot_stride);
+        };
+        for (int next = 0; next < n;) {
+            next = s.group.fill(s.chunk, next, n, alive, skip);
+            evaluate_entries<Depth>(s, pixels, limits);
+            if (Depth || Textured || r.channels > kOwnChannels[Depth]) weigh_channels(r, s, kOwnChannels[Depth]);
+            if constexpr (Textured) weigh_texture(s);
+            if constexpr (Depth) weigh_depth(r, s);
+            add_surfels<Depth, Textured>(r, s, pixels, limits);
+            alive = still_alive(r, s.transmittance, alive);
+        }
+    }
+    for (; begin < end; ++begin) stream_zeros(r.slots + int64_t(r.pairs[begin].slot) * r.slot_stride, r.slot_stride);
+    stream_fence();
+}
+
+}  // namespace
+
+const int64_t kBackwardScratch = sizeof(BackwardScratch);
+
+void backward_tile(const Raster& r, int tile, void* scratch) {
+    BackwardScratch& s = *static_cast<BackwardScratch*>(scratch);
+    const bool textured = r.surfels.base != nullptr, depth = r.grad.depth || r.grad.median || r.grad.distortion;
+    if (depth && textured) replay_tile<true, true>(r, tile, s);
+    if (depth && !textured) replay_tile<true, false>(r, tile, s);
+    if (!depth && textured) replay_tile<false, true>(r, tile, s);
+    if (!depth && !textured) replay_tile<false, false>(r, tile, s);
+}
+
+}  // namespace texgs::TEXGS_ISA

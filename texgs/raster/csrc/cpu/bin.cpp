@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which blocks of which tiles a projected surfel reaches: exact tests of its ellipse and its low-pass disc against
+// the rectangles of pixel centres of all sixteen blocks of a tile at once.
+#include "isa.h"
+#include "kernels.h"
+#include "simd.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kParts = kBlocks / kLanes;
+constexpr float kBlockSpan = 3.0f;  // between the outer pixel centres of a block
+
+struct BlockCorners {
+    vf x[kParts], y[kParts];  // first pixel centre of each block, from the tile's origin
+};
+
+BlockCorners block_corners() {
+    BlockCorners c;
+    for (int p = 0; p < kParts; ++p) {
+        float x[kLanes], y[kLanes];
+        for (int i = 0; i < kLanes; ++i) {
+            const int block = p * kLanes + i;
+            x[i] = 4.0f * (block & 3) + 0.5f, y[i] = 4.0f * (block >> 2) + 0.5f;
+        }
+        c.x[p] = load(x), c.y[p] = load(y);
+    }
+    return c;
+}
+
+TEXGS_INLINE vf clamp(vf a, vf low, vf high) { return min(max(a, low), high); }
+
+// Constants of a surfel's test, spread over the lanes once.
+struct Test {
+    vf ex, ey, xx, xy, yy, slope_x, slope_y, cx, cy, disc;
+    TEXGS_INLINE Test(const Footprint& f)
+        : ex(f.ex), ey(f.ey), xx(f.xx), xy(f.xy), yy(f.yy), slope_x(f.xx > 0 ? -f.xy / f.xx : 0),
+          slope_y(f.yy > 0 ? -f.xy / f.yy : 0), cx(f.cx), cy(f.cy), disc(f.disc) {}
+
+    // The smallest value of the ellipse's form over a rectangle is on the edges that face its centre: on each, the
+    // unconstrained minimum along the edge, clamped to it.
+    TEXGS_INLINE vm ellipse(vf x0, vf y0, vf x1, vf y1) const {
+        const vf near_x = clamp(0.0f, x0, x1), near_y = clamp(0.0f, y0, y1);
+        const vf on_x = clamp(slope_y * near_x, y0, y1), on_y = clamp(slope_x * near_y, x0, x1);
+        const vf first = value(near_x, on_x), second = value(on_y, near_y);
+        return min(first, second) <= vf(1.0f);
+    }
+    TEXGS_INLINE vf value(vf x, vf y) const {
+        return fma(x, fma(xx, x, vf(2.0f) * xy * y), yy * y * y);
+    }
+};
+
+TEXGS_INLINE uint32_t block_mask(const Test& t, bool with_disc, const BlockCorners& corners, float left, float top) {
+    uint32_t mask = 0;
+    for (int p = 0; p < kParts; ++p) {
+        const vf x = corners.x[p] + vf(left), y = corners.y[p] + vf(top);
+        const vf x0 = x - t.ex, y0 = y - t.ey;
+        vm hit = t.ellipse(x0, y0, x0 + vf(kBlockSpan), y0 + vf(kBlockSpan));
+        if (with_disc) {
+            const vf dx = clamp(t.cx, x, x + vf(kBlockSpan)) - t.cx, dy = clamp(t.cy, y, y + vf(kBlockSpan)) - t.cy;
+            hit = hit | (fma(dx, dx, dy * dy) <= t.disc);
+        }
+        mask |= bits(hit) << (p * kLanes);
+    }
+    return mask;
+}
+
+}  // namespace
+
+int64_t bin_surfels(const Raster& r, const uint32_t* order, int64_t begin, int64_t end, Candidate* out,
+                    uint32_t* per_tile, uint32_t* per_surfel) {
+    const BlockCorners corners = block_corners();
+    Candidate* next = out;
+    for (int64_t i = begin; i < end; ++i) {
+        const uint32_t id = order[i];
+        const Footprint& foot = r.footprints[id];
+        const Test test(foot);
+        uint32_t rank = 0;
+        for (int y = foot.y0; y < foot.y1; ++y) {
+            for (int x = foot.x0; x < foot.x1; ++x) {
+                const uint32_t mask = block_mask(test, foot.disc >= 0, corners, float(x * kTile), float(y * kTile));
+                const uint32_t tile = static_cast<uint32_t>(y * r.tiles_x + x);
+                *next = {tile, id, rank, static_cast<uint16_t>(mask), foot.flags};
+                const uint32_t hit = mask != 0;  // no branch: misses are overwritten
+                next += hit, rank += hit, per_tile[tile] += hit;
+            }
+        }
+        per_surfel[id] = rank;
+    }
+    return next - out;
+}
+
+}  // namespace texgs::TEXGS_ISA

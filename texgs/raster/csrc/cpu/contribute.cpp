@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each surfel contributed to an image: the sum of its weights, the largest, the number of its pixels, and the sum
+// of weight times another image. The last is the adjoint of rendering, and the gradient of features when the
+// geometry is frozen.
+#include "isa.h"
+#include "replay.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kCounts = 3;  // sum, largest, pixels; then the channels
+
+struct alignas(64) ContributeScratch {
+    Chunk chunk;
+    Group group;
+    float image[TEXGS_MAX_CHANNELS][kTilePixels];
+    float transmittance[kTilePixels];
+    float weight[kVectors][kLanes];  // alpha before blending
+};
+
+TEXGS_INLINE void evaluate_entries(ContributeScratch& s, const TilePixels& pixels, const Limits& limits) {
+    for (int e = 0; e < s.group.entries; ++e)
+        for (int part = 0; part < kParts; ++part) {
+            const int place = s.group.surfel[e];
+            const Pixels at = pixels.of(s.group.block[e], part);
+            store(s.weight[e * kParts + part],
+                  evaluate(s.chunk.records[place], s.chunk.flags[place], at, limits).alpha);
+        }
+}
+
+void add_surfel(const Raster& r, ContributeScratch& s, const Limits& limits, int k) {
+    const int begin = s.group.first[k], end = s.group.first[k + 1];
+    vf sum_w = 0.0f, most = 0.0f, pixels = 0.0f;
+    for (int e = begin; e < end; ++e)
+        for (int part = 0; part < kParts; ++part) {
+            float* weight = s.weight[e * kParts + part];
+            const int pixel = s.group.block[e] * kBlockPixels + part * kLanes;
+            const vf w = blend(load(weight), s.transmittance + pixel, limits).weight;
+            store(weight, w);
+            sum_w += w;
+            most = max(most, w);
+            pixels += zero_unless(w > vf(0.0f), 1.0f);
+        }
+    float* slot = r.slots + int64_t(s.chunk.slots[s.group.place[k]]) * r.slot_stride;
+    float only_lane[kLanes] = {largest(most)};  // its sum is the largest
+    const int channels = r.contributions.channels, first = channels < 16 - kCounts ? channels : 16 - kCounts;
+    vf line[16 + kCounts] = {sum_w, load(only_lane), pixels};
+    weigh_up_to_16(s.group, begin, end, s.weight[0], s.image[0], first, line + kCounts);
+    stream_sums(line, slot);
+    for (int c = first; c < channels; c += 16) {
+        slot += 16;
+        weigh_up_to_16(s.group, begin, end, s.weight[0], s.image[c], channels - c < 16 ? channels - c : 16, line);
+        stream_sums(line, slot);
+    }
+}
+
+}  // namespace
+
+const int64_t kContributeScratch = sizeof(ContributeScratch);
+
+void contribute_tile(const Raster& r, int tile, void* scratch) {
+    ContributeScratch& s = *static_cast<ContributeScratch*>(scratch);
+    const TilePixels pixels(r, tile);
+    const Limits limits(r.options);
+    for (int c = 0; c < r.contributions.channels; ++c) {
+        std::memset(s.image[c], 0, sizeof s.image[c]);
+        load_plane(r, tile, r.contributions.image + int64_t(c) * r.camera.width * r.camera.height, s.image[c]);
+    }
+    uint32_t alive = start_tile(r, pixels, s.transmittance);
+    const uint32_t end = r.tile_begin[tile + 1];
+    uint32_t begin = r.tile_begin[tile];
+    for (; begin < end && alive; begin += kChunk) {
+        const int n = static_cast<int>(end - begin < kChunk ? end - begin : kChunk);
+        s.chunk.stage(r, begin, n);
+        for (int next = 0; next < n;) {
+            next = s.group.fill(s.chunk, next, n, alive, [&](int place) {
+                stream_zeros(r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride, r.slot_stride);
+            });
+            evaluate_entries(s, pixels, limits);
+            for (int k = 0; k < s.group.surfels; ++k) add_surfel(r, s, limits, k);
+            alive = still_alive(r, s.transmittance, alive);
+        }
+    }
+    for (; begin < end; ++begin) stream_zeros(r.slots + int64_t(r.pairs[begin].slot) * r.slot_stride, r.slot_stride);
+    stream_fence();
+}
+
+void reduce_contributions(const Raster& r, int64_t begin, int64_t end) {
+    const texgs_contributions& out = r.contributions;
+    for (int64_t i = begin; i < end; ++i) {
+        alignas(64) float sums[kCounts + TEXGS_MAX_CHANNELS + 16] = {};
+        for (uint32_t slot = r.slot_begin[i]; slot < r.slot_begin[i + 1]; ++slot) {
+            const float* from = r.slots + int64_t(slot) * r.slot_stride;
+            const float most = sums[1] > from[1] ? sums[1] : from[1];
+            for (int k = 0; k < r.slot_stride; k += kLanes) store(sums + k, load(sums + k) + load(from + k));
+            sums[1] = most;
+        }
+        if (out.weight_sum) out.weight_sum[i] = sums[0];
+        if (out.weight_max) out.weight_max[i] = sums[1];
+        if (out.pixels) out.pixels[i] = sums[2];
+        for (int c = 0; c < out.channels; ++c) out.sums[i * out.channels + c] = sums[kCounts + c];
+    }
+}
+
+}  // namespace texgs::TEXGS_ISA

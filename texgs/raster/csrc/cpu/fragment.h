@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// What forward, backward and contribute share: the records of a tile brought close, and a surfel's fragments in one
+// block.
+#pragma once
+#include "kernels.h"
+#include "surfels.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kParts = kBlockPixels / kLanes;  // vectors in a block
+constexpr int kChunk = 128;                    // surfels of a tile worked on at a time; their records stay in L1
+constexpr int kMaxChannels = TEXGS_MAX_CHANNELS + 3;
+
+// Pixel centres of a vector of pixels.
+struct Pixels {
+    vf x, y;
+};
+struct TilePixels {
+    vf lane_x[kParts], lane_y[kParts];
+    float block_x[kBlocks], block_y[kBlocks];
+
+    TilePixels(const Raster& r, int tile) {
+        const int left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile;
+        for (int b = 0; b < kBlocks; ++b) {
+            block_x[b] = static_cast<float>(left + 4 * (b & 3));
+            block_y[b] = static_cast<float>(top + 4 * (b >> 2));
+        }
+        for (int p = 0; p < kParts; ++p) {
+            float x[kLanes], y[kLanes];
+            for (int i = 0; i < kLanes; ++i) {
+                const int pixel = p * kLanes + i;
+                x[i] = 0.5f + (pixel & 3), y[i] = 0.5f + (pixel >> 2);
+            }
+            lane_x[p] = load(x), lane_y[p] = load(y);
+        }
+    }
+    TEXGS_INLINE Pixels of(int block, int part) const {
+        return {lane_x[part] + vf(block_x[block]), lane_y[part] + vf(block_y[block])};
+    }
+};
+
+// Options spread over the lanes. Kept by value: the compiler cannot know that no store changes them.
+struct Limits {
+    vf low_pass, alpha_min, transmittance_min, near_plane;
+
+    explicit Limits(const texgs_options& o)
+        : low_pass(o.low_pass), alpha_min(o.alpha_min), transmittance_min(o.transmittance_min),
+          near_plane(o.near_plane) {}
+};
+
+// A surfel's fragments in a vector of pixels, before blending.
+struct Fragments {
+    vf alpha;       // 0 where below alpha_min
+    vf u, v;        // intersection, standard deviations
+    vf inverse_w;   // 1 / W
+    vf rho_surfel, rho;
+};
+
+TEXGS_INLINE Fragments evaluate(const Record& s, unsigned flags, Pixels at, const Limits& limits) {
+    Fragments f;
+    const vf dx = at.x - vf(s.cx), dy = at.y - vf(s.cy);
+    const vf W = fma(s.wx, dx, fma(s.wy, dy, 1.0f));
+    f.inverse_w = vf(1.0f) / W;
+    f.u = fma(s.ux, dx, fma(s.uy, dy, s.u)) * f.inverse_w;
+    f.v = fma(s.vx, dx, fma(s.vy, dy, s.v)) * f.inverse_w;
+    f.rho_surfel = fma(f.u, f.u, f.v * f.v);
+    if (flags & kClipped) {  // rare, and the same for all of the surfel's fragments
+        const vm in_front = (W > vf(0.0f)) & (W * limits.near_plane < vf(s.zc));
+        f.rho_surfel = select(in_front, f.rho_surfel, 1e30f);
+    }
+    f.rho = f.rho_surfel;
+    if (flags & kFiltered) f.rho = min(f.rho, limits.low_pass * fma(dx, dx, dy * dy));
+    const vf alpha = min(exp2(fma(f.rho, -0.5f * kLog2E, s.log2_opacity)), kLargestAlpha);
+    f.alpha = zero_unless(alpha >= limits.alpha_min, alpha);
+    return f;
+}
+
+// Camera depth of fragments: of the ray-splat intersection, or of the surfel's mean where the low-pass filter rules.
+TEXGS_INLINE vf depth_of(const Record& s, const Fragments& f) {
+    return select(f.rho_surfel <= f.rho, vf(s.zc) * f.inverse_w, s.zp);
+}
+
+// A part of a tile's list, copied so that the passes over its blocks read a few contiguous kilobytes.
+struct alignas(64) Chunk {
+    Record records[kChunk];
+    uint32_t masks[kChunk];  // 0 beyond the pairs loaded
+    uint32_t slots[kChunk];
+    uint32_t surfels[kChunk];
+    uint8_t flags[kChunk];
+    const float* channels;   // of the first surfel; the next one's follow at `stride`
+    int stride;
+    float many_channels[kChunk * kMaxChannels];
+
+    // Loads pairs [begin, begin + n).
+    void stage(const Raster& r, uint32_t begin, int n) {
+        const uint32_t all = r.tile_begin[r.tiles_x * r.tiles_y];
+        for (int i = 0; i < n; ++i) {
+            // Records lie anywhere. Those of the next chunk, or of the next tile, are asked for now.
+            if (begin + i + kChunk < all) prefetch(&r.records[r.pairs[begin + i + kChunk].surfel]);
+            const Pair& pair = r.pairs[begin + i];
+            records[i] = r.records[pair.surfel];
+            masks[i] = pair.mask;
+            slots[i] = pair.slot;
+            surfels[i] = pair.surfel;
+            flags[i] = static_cast<uint8_t>(pair.flags);
+        }
+        for (int i = n; i < kChunk && i % 16; ++i) masks[i] = 0;
+        channels = records[0].color;
+        stride = sizeof(Record) / sizeof(float);
+        if (r.channels > kRecordChannels) stage_channels(r, n);
+    }
+
+private:
+    void stage_channels(const Raster& r, int n) {
+        const int own = r.surfels.channels;
+        const float* from = surfel_channels(r);
+        channels = many_channels;
+        stride = r.channels;
+        for (int i = 0; i < n; ++i) {
+            const int64_t id = surfels[i];
+            float* to = many_channels + i * stride;
+            for (int c = 0; c < own; ++c) to[c] = from[id * own + c];
+            for (int c = own; c < stride; ++c) to[c] = r.normals[3 * id + c - own];
+        }
+    }
+};
+
+// Indices of the surfels whose mask has the bit of `block`; `masks` is padded with zeros to a multiple of 16.
+TEXGS_INLINE int list_block(const uint32_t* masks, int n, int block, int32_t* list) {
+    int count = 0;
+#if defined(TEXGS_AVX512)
+    const __m512i bit = _mm512_set1_epi32(1 << block);
+    for (int i = 0; i < n; i += 16) {
+        const __mmask16 hit = _mm512_test_epi32_mask(_mm512_loadu_si512(masks + i), bit);
+        const __m512i index = _mm512_add_epi32(iota().v, _mm512_set1_epi32(i));
+        _mm512_storeu_si512(list + count, _mm512_maskz_compress_epi32(hit, index));
+        count += __builtin_popcount(hit);
+    }
+#else
+    for (int i = 0; i < n; ++i) {
+        list[count] = i;
+        count += masks[i] >> block & 1;
+    }
+#endif
+    return count;
+}
+
+// Pixels of a block that lie inside the image, as 1 and 0.
+TEXGS_INLINE vf inside_image(const Raster& r, Pixels at) {
+    const vm inside = (at.x < vf(float(r.camera.width))) & (at.y < vf(float(r.camera.height)));
+    return zero_unless(inside, 1.0f);
+}
+
+// Visits the rows of a tile's blocks that lie inside the image: pixel in the image plane [H, W], index in the
+// block-linear plane, number of pixels.
+template <class Visit>
+TEXGS_INLINE void for_rows(const Raster& r, int tile, Visit visit) {
+    const int left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile, width = r.camera.width;
+    const int columns = width - left < kTile ? width - left : kTile;
+    const int rows = r.camera.height - top < kTile ? r.camera.height - top : kTile;
+    const auto index = [](int x, int y) { return 16 * ((y >> 2) * 4 + (x >> 2)) + 4 * (y & 3); };
+    if (columns == kTile && rows == kTile) {
+        for (int y = 0; y < kTile; ++y)
+            for (int x = 0; x < kTile; x += 4) visit(int64_t(top + y) * width + left + x, index(x, y), 4);
+        return;
+    }
+    for (int y = 0; y < rows; ++y)
+        for (int x = 0; x < columns; x += 4)
+            visit(int64_t(top + y) * width + left + x, index(x, y), columns - x < 4 ? columns - x : 4);
+}
+TEXGS_INLINE void copy_row(float* to, const float* from, int n) {
+    if (n == 4)
+        std::memcpy(to, from, 4 * sizeof(float));
+    else
+        for (int i = 0; i < n; ++i) to[i] = from[i];
+}
+inline void save_plane(const Raster& r, int tile, const float* plane, float* image) {
+    for_rows(r, tile, [&](int64_t pixel, int index, int n) { copy_row(image + pixel, plane + index, n); });
+}
+inline void load_plane(const Raster& r, int tile, const float* image, float* plane) {
+    for_rows(r, tile, [&](int64_t pixel, int index, int n) { copy_row(plane + index, image + pixel, n); });
+}
+// Asks for a tile's part of `planes` image planes [H, W], so that it is there when the tile's turn comes.
+inline void prefetch_planes(const Raster& r, int tile, const float* image, int planes) {
+    if (!image || tile >= r.tiles_x * r.tiles_y) return;
+    const int left = tile % r.tiles_x * kTile, top = tile / r.tiles_x * kTile;
+    const int64_t plane = int64_t(r.camera.width) * r.camera.height;
+    for (int c = 0; c < planes; ++c)
+        for (int y = top; y < top + kTile && y < r.camera.height; ++y)
+            prefetch(image + c * plane + int64_t(y) * r.camera.width + left);
+}
+
+}  // namespace
+}  // namespace texgs::TEXGS_ISA

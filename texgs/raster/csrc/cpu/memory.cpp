@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "memory.h"
+
+#include <atomic>
+#include <cstdio>
+#include <new>
+
+#if defined(__linux__)
+#include <sys/mman.h>
+#elif defined(_WIN32)
+#include <windows.h>
+#endif
+
+namespace texgs {
+namespace {
+
+constexpr int64_t kAlign = 64;
+constexpr int64_t kLarge = int64_t(256) << 20;      // below, asking the system costs more than it can save
+constexpr int64_t kHugePages = int64_t(4) << 20;    // from here on 2 MiB pages save page faults
+std::atomic<int64_t> held{0}, peak{0};
+
+// Memory that can be had without swapping, or the largest number where the system does not say.
+int64_t available_memory() {
+#if defined(__linux__)
+    int64_t kib = INT64_MAX >> 10;
+    if (FILE* file = std::fopen("/proc/meminfo", "r")) {
+        char line[128];
+        while (std::fgets(line, sizeof line, file))
+            if (long long value; std::sscanf(line, "MemAvailable: %lld kB", &value) == 1) kib = value;
+        std::fclose(file);
+    }
+    return kib << 10;
+#elif defined(_WIN32)
+    MEMORYSTATUSEX status{};
+    status.dwLength = sizeof status;
+    return GlobalMemoryStatusEx(&status) ? static_cast<int64_t>(status.ullAvailPhys) : INT64_MAX;
+#else
+    return INT64_MAX;
+#endif
+}
+
+}  // namespace
+
+int64_t memory_held() { return held; }
+int64_t memory_peak(bool reset) {
+    const int64_t result = peak;
+    if (reset) peak = held.load();
+    return result;
+}
+
+void require_memory(int64_t bytes) {
+    if (bytes >= kLarge && bytes > available_memory()) throw OutOfMemory{bytes};
+}
+
+void Buffer::reset() {
+    if (!data_) return;
+    ::operator delete(data_, std::align_val_t(kAlign));
+    held -= capacity_;
+    data_ = nullptr;
+    capacity_ = 0;
+}
+
+void Buffer::reserve(int64_t bytes) {
+    if (bytes <= capacity_) return;
+    reset();
+    const int64_t wanted = (bytes + bytes / 8 + 4095) / 4096 * 4096;  // headroom: sizes creep up during training
+    require_memory(wanted);
+    data_ = ::operator new(static_cast<size_t>(wanted), std::align_val_t(kAlign), std::nothrow);
+    if (!data_) throw OutOfMemory{wanted};
+#if defined(__linux__)
+    if (wanted >= kHugePages) {
+        const auto first = (reinterpret_cast<uintptr_t>(data_) + 4095) / 4096 * 4096;
+        const auto last = (reinterpret_cast<uintptr_t>(data_) + wanted) / 4096 * 4096;
+        madvise(reinterpret_cast<void*>(first), last - first, MADV_HUGEPAGE);
+    }
+#endif
+    capacity_ = wanted;
+    const int64_t now = held += wanted;
+    int64_t most = peak;
+    while (now > most && !peak.compare_exchange_weak(most, now)) {
+    }
+}
+
+}  // namespace texgs

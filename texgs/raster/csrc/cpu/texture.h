@@ -1,0 +1,150 @@
+// SPDX-License-Identifier: Apache-2.0
+// Bilinear lookup in the texture of one surfel for a vector of fragments.
+//
+// A gather costs a load per lane and channel. With AVX-512, textures of up to 64 texels are looked up in registers
+// instead: one permute serves 16 texels of a channel for all lanes. They are brought into planes of 16 when their
+// tile is staged; larger textures, and other instruction sets, gather from the atlas.
+#pragma once
+#include "fragment.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+#if defined(TEXGS_AVX512)
+constexpr int kRegisterTexels = 64;
+#else
+constexpr int kRegisterTexels = 0;
+#endif
+
+// Vectors of 16 that a channel of so many texels takes; 0: it is gathered.
+TEXGS_INLINE int registers_for(int texels) {
+    return texels > kRegisterTexels ? 0 : texels <= 16 ? 1 : texels <= 32 ? 2 : 4;
+}
+
+struct TextureTable {
+    const float* texels;      // planes of 16 * registers per channel, or interleaved [n, 3]
+    int registers;            // 1, 2 or 4 per channel; 0: gather
+    int step_x, step_y;       // to the next texel; 0 where there is only one
+    float columns, rows, gain;
+};
+
+struct alignas(64) TextureTables {
+    TextureTable of[kChunk];
+    float planes[kChunk * 3 * kRegisterTexels + 16];
+
+    void stage(const Raster& r, const Chunk& chunk, int n);
+};
+
+#if defined(TEXGS_AVX512)
+// Splits 16 interleaved texels at `from`, `n` of them real, into three vectors.
+TEXGS_INLINE void deinterleave(const float* from, int n, float* x, float* y, float* z) {
+    const auto part = [&](int first) {
+        const int left = 3 * n - first;
+        const unsigned mask = left >= 16 ? 0xffffu : left > 0 ? (1u << left) - 1 : 0;
+        return _mm512_maskz_loadu_ps(static_cast<__mmask16>(mask), from + first);
+    };
+    const __m512 a = part(0), b = part(16), c = part(32);
+    const __m512i triple = _mm512_mullo_epi32(iota().v, _mm512_set1_epi32(3));
+    float* out[3] = {x, y, z};
+    for (int k = 0; k < 3; ++k) {
+        const __m512i index = _mm512_add_epi32(triple, _mm512_set1_epi32(k));
+        const __m512 low = _mm512_permutex2var_ps(a, index, b);  // positions 0 to 31; above, modulo 32
+        const __mmask16 high = _mm512_cmpge_epi32_mask(index, _mm512_set1_epi32(32));
+        _mm512_storeu_ps(out[k], _mm512_mask_permutexvar_ps(low, high, index, c));
+    }
+}
+#endif
+
+inline void TextureTables::stage(const Raster& r, const Chunk& chunk, int n) {
+    for (int i = 0; i < n; ++i) {
+        const int64_t id = chunk.surfels[i];
+        const int columns = r.surfels.sizes[2 * id], rows = r.surfels.sizes[2 * id + 1];
+        TextureTable& t = of[i];
+        t.texels = r.surfels.texels + 3 * r.surfels.offsets[id];
+        t.columns = static_cast<float>(columns), t.rows = static_cast<float>(rows), t.gain = r.surfels.gain[id];
+        t.step_x = columns > 1 ? 1 : 0, t.step_y = rows > 1 ? columns : 0;
+        t.registers = registers_for(columns * rows);
+#if defined(TEXGS_AVX512)
+        if (t.registers) {
+            const int count = columns * rows, plane = 16 * t.registers;
+            float* to = planes + i * 3 * kRegisterTexels;
+            for (int k = 0; k < count; k += 16)
+                deinterleave(t.texels + 3 * k, count - k, to + k, to + plane + k, to + 2 * plane + k);
+            t.texels = to;
+        }
+#endif
+    }
+}
+
+// Where fragments fall in a texture: the first of four texels, and the weights of its neighbours along x and y.
+struct TexelCoordinates {
+    vf x, y;            // in [0, columns - 1], [0, rows - 1]
+    vi first;
+    vf fx, fy;
+    vm free_x, free_y;  // not clamped at the border: coordinates still move with u and v
+};
+
+TEXGS_INLINE TexelCoordinates texel_coordinates(const TextureTable& t, vf u, vf v) {
+    TexelCoordinates c;
+    const float last_x = t.columns - 1.0f, last_y = t.rows - 1.0f;
+    const vf raw_x = fma(u, t.columns * (1.0f / 6.0f), 0.5f * last_x);
+    const vf raw_y = fma(v, t.rows * (1.0f / 6.0f), 0.5f * last_y);
+    const vf x = c.x = min(max(raw_x, 0.0f), last_x), y = c.y = min(max(raw_y, 0.0f), last_y);
+    c.free_x = (raw_x > vf(0.0f)) & (raw_x < vf(last_x));
+    c.free_y = (raw_y > vf(0.0f)) & (raw_y < vf(last_y));
+    const vf i = min(floor(x), last_x > 1.0f ? last_x - 1.0f : 0.0f);
+    const vf j = min(floor(y), last_y > 1.0f ? last_y - 1.0f : 0.0f);
+    c.fx = x - i, c.fy = y - j;
+    c.first = truncate(fma(j, t.columns, i));
+    return c;
+}
+
+// One channel at texels `index`.
+TEXGS_INLINE vf lookup(const TextureTable& t, int channel, vi index) {
+#if defined(TEXGS_AVX512)
+    if (t.registers) {
+        const float* plane = t.texels + channel * 16 * t.registers;
+        const __m512 a = _mm512_loadu_ps(plane);
+        if (t.registers == 1) return _mm512_permutexvar_ps(index.v, a);
+        const __m512 low = _mm512_permutex2var_ps(a, index.v, _mm512_loadu_ps(plane + 16));
+        if (t.registers == 2) return low;
+        const __mmask16 upper = _mm512_test_epi32_mask(index.v, _mm512_set1_epi32(32));
+        const __m512 high = _mm512_permutex2var_ps(_mm512_loadu_ps(plane + 32), index.v, _mm512_loadu_ps(plane + 48));
+        return _mm512_mask_mov_ps(low, upper, high);
+    }
+#endif
+    return gather(t.texels + channel, index * splat(3));
+}
+
+struct Taps {
+    vf t00, t10, t01, t11;
+};
+TEXGS_INLINE Taps taps(const TextureTable& t, int channel, vi first) {
+    const vi right = first + splat(t.step_x);
+    return {lookup(t, channel, first), lookup(t, channel, right), lookup(t, channel, first + splat(t.step_y)),
+            lookup(t, channel, right + splat(t.step_y))};
+}
+
+TEXGS_INLINE vf mix(vf a, vf b, vf f) { return fma(f, b - a, a); }
+
+TEXGS_INLINE void sample(const TextureTable& t, const TexelCoordinates& at, vf texel[3]) {
+    for (int c = 0; c < 3; ++c) {
+        const Taps k = taps(t, c, at.first);
+        texel[c] = mix(mix(k.t00, k.t10, at.fx), mix(k.t01, k.t11, at.fx), at.fy);
+    }
+}
+
+// The same with the derivatives of each channel by u and v.
+TEXGS_INLINE void sample_with_slope(const TextureTable& t, const TexelCoordinates& at, vf texel[3], vf by_u[3],
+                                    vf by_v[3]) {
+    for (int c = 0; c < 3; ++c) {
+        const Taps k = taps(t, c, at.first);
+        const vf top = mix(k.t00, k.t10, at.fx), bottom = mix(k.t01, k.t11, at.fx);
+        texel[c] = mix(top, bottom, at.fy);
+        by_u[c] = zero_unless(at.free_x, mix(k.t10 - k.t00, k.t11 - k.t01, at.fy) * vf(t.columns / 6.0f));
+        by_v[c] = zero_unless(at.free_y, (bottom - top) * vf(t.rows / 6.0f));
+    }
+}
+
+}  // namespace
+}  // namespace texgs::TEXGS_ISA
