@@ -1,0 +1,148 @@
+"""Wrong arguments give one clear sentence; unusual but right ones work."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.raster.agreement import gradients, images, random_cotangents
+from tests.raster.scenes import random_scene, textured
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
+from texgs.raster.api import rasterize, splat
+from texgs.raster.types import OUTPUTS, Options
+
+N = 200
+WRONG_SHAPES = {
+    "means": torch.rand(3, N),
+    "quats": torch.rand(N, 3),
+    "scales": torch.rand(N, 3),
+    "opacities": torch.rand(N, 1),
+    "features": torch.rand(N + 1, 3),
+    "viewmat": torch.eye(3),
+    "K": torch.eye(4),
+    "background": torch.rand(4),
+    "shift": torch.zeros(N, 3),
+}
+
+
+@pytest.mark.parametrize("name", WRONG_SHAPES)
+def test_wrong_shape(device, name):
+    scene = replace(random_scene(), **{name: WRONG_SHAPES[name]}).to(device)
+    with pytest.raises(ShapeError, match=rf"(?i)\b{name}: expected \[.*\], got \["):
+        scene.render(rasterize)
+
+
+@pytest.mark.parametrize("name", WRONG_SHAPES)
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float16, torch.int32])
+def test_wrong_dtype(device, name, dtype):
+    scene = replace(random_scene(), shift=torch.zeros(N, 2))
+    scene = replace(scene, **{name: getattr(scene, name).to(dtype)}).to(device)
+    with pytest.raises(ArgumentError, match=rf"\b{name}: expected float32, got {str(dtype)[6:]}"):
+        scene.render(rasterize)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "error"),
+    [
+        ("base", torch.rand(N, 4), r"base: expected \[200, 3\], got \[200, 4\]"),
+        ("gain", torch.rand(N, 1), r"gain: expected \[200\], got \[200, 1\]"),
+        ("texels", torch.rand(9000), r"texels: expected \[T, 3\]"),
+        ("sizes", torch.ones(N, 2), r"sizes: expected .*int32"),
+        ("sizes", torch.zeros(N, 2, dtype=torch.int32), r"sizes of at least 1"),
+        ("offsets", torch.zeros(N, dtype=torch.int32), r"offsets: expected .*int64"),
+        ("offsets", torch.full((N,), 10**9), r"within the \d+ texels"),
+        ("offsets", torch.full((N,), -1), r"within the \d+ texels"),
+    ],
+)
+def test_wrong_texture(name, value, error):
+    scene = textured(random_scene())
+    scene = replace(scene, texture=replace(scene.texture, **{name: value}))
+    with pytest.raises(TexgsError, match=error):
+        scene.render(rasterize)
+
+
+def test_texture_or_features():
+    scene = textured(random_scene())
+    with pytest.raises(ArgumentError, match="either features or texture, got both"):
+        replace(scene, features=torch.rand(N, 3)).render(rasterize)
+    with pytest.raises(ArgumentError, match="either features or texture, got neither"):
+        replace(scene, texture=None).render(rasterize)
+
+
+def test_wrong_device():
+    scene = random_scene()
+    with pytest.raises(DeviceError, match="features: expected device cpu"):
+        replace(scene, features=scene.features.to("meta")).render(rasterize)
+    with pytest.raises(DeviceError, match="cpu or cuda, got meta"):
+        scene.to("meta").render(rasterize)
+
+
+@pytest.mark.parametrize("size", [(0, 5), (5, -1), (2**31, 5)])
+def test_wrong_size(size):
+    with pytest.raises(ArgumentError, match="width, height: expected 1 to"):
+        replace(random_scene(), width=size[0], height=size[1]).render(rasterize)
+
+
+@pytest.mark.parametrize("channels", [0, 33])
+def test_wrong_number_of_channels(channels):
+    with pytest.raises(ArgumentError, match=f"1 to 32 channels, got {channels}"):
+        random_scene(channels=channels).render(rasterize)
+    scene = random_scene()
+    geometry = {
+        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
+    }
+    with pytest.raises(ArgumentError, match=f"1 to 32 channels, got {channels}"):
+        splat(torch.zeros(5, 5, channels), **geometry)
+
+
+def test_unknown_output():
+    with pytest.raises(ArgumentError, match="'depths'"):
+        random_scene().render(rasterize, ("depths",))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"alpha_min": -0.1},
+        {"alpha_min": 1.5},
+        {"transmittance_min": 1.0},
+        {"transmittance_min": -1e-3},
+        {"low_pass": 0.0},
+        {"low_pass": float("nan")},
+        {"filter_sigma": -1.0},
+        {"near": 0.0},
+        {"near": -1.0},
+        {"near": 5.0, "far": 2.0},
+    ],
+    ids=str,
+)
+def test_wrong_options(wrong):
+    with pytest.raises(ArgumentError, match=next(iter(wrong))):
+        random_scene().render(rasterize, options=Options(**wrong))
+
+
+def test_memory_layout_does_not_matter(device):
+    scene = replace(random_scene(), shift=torch.rand(N, 2)).to(device)
+    strided = scene.map(lambda x: x.repeat_interleave(2, 0)[::2] if x.ndim == 1 else x.T.contiguous().T)
+    assert not strided.means.is_contiguous()
+    expected, found = (images(s.render(rasterize, OUTPUTS)) for s in (scene, strided))
+    cotangents = random_cotangents(scene, ("color", "normal", "depth"))
+    expected |= gradients(rasterize, scene, cotangents)
+    found |= gradients(rasterize, strided, cotangents)
+    for name, value in expected.items():
+        assert torch.equal(found[name], value), name
+
+
+def test_expanded_gradients_and_tensors(device):
+    scene = random_scene().to(device)
+    expanded = replace(scene, opacities=torch.tensor(0.5, device=device).expand(N))
+    dense = replace(scene, opacities=torch.full((N,), 0.5, device=device))
+    assert torch.equal(expanded.render(rasterize).color, dense.render(rasterize).color)
+
+
+def test_inputs_are_left_alone(device):
+    scene = textured(random_scene()).to(device)
+    copy = scene.map(torch.clone)
+    gradients(rasterize, scene, random_cotangents(scene, ("color", "depth")))
+    for name, leaf in scene.leaves().items():
+        assert torch.equal(leaf, copy.leaves()[name])

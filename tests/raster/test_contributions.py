@@ -1,0 +1,86 @@
+"""Statistics of surfels, and the adjoint of rendering, against explicit sums over fragments."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.raster.agreement import decided, dense
+from tests.raster.scenes import HARD_CASES, random_scene
+from texgs.raster.api import rasterize, splat
+from texgs.raster.reference.render import statistics
+from texgs.raster.types import DEFAULT_OPTIONS, Options
+
+GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
+
+
+def explicit(scene, options=DEFAULT_OPTIONS):
+    """Blending weights [H W, N] by the definition, in the order of the inputs, and its statistics."""
+    scene = scene.double()
+    surfels, _, weights, _ = dense(scene, options)
+    n = len(scene.means)
+    ordered = weights.new_zeros(len(weights), n)
+    ordered[:, surfels.index] = weights
+    return ordered, statistics(weights, surfels, n, (scene.width, scene.height), options)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_statistics(device, seed):
+    scene = random_scene(seed, n=300)
+    expected = explicit(scene)[1]
+    found = scene.to(device).render(rasterize, ("statistics",)).statistics
+    unsure = int((~decided(scene)).sum())
+    # a pixel on a threshold gives or takes a fragment of 1/255, or what is left of the light at its end
+    torch.testing.assert_close(found.weight_sum.cpu().double(), expected.weight_sum, rtol=1e-4, atol=0.02)
+    torch.testing.assert_close(found.weight_max.cpu().double(), expected.weight_max, rtol=1e-3, atol=5e-3)
+    assert (found.pixels.cpu() - expected.pixels).abs().max() <= min(unsure, 10)
+    seen = expected.pixels > 0
+    assert (found.radii.cpu()[seen & (found.pixels.cpu() > 0)] > 0).all()
+    torch.testing.assert_close(found.radii.cpu().double()[seen], expected.radii[seen], rtol=1e-3, atol=0.5)
+
+
+@pytest.mark.parametrize("name", HARD_CASES)
+def test_statistics_of_hard_cases(device, name):
+    scene = HARD_CASES[name]()
+    render = scene.to(device).render(rasterize, ("statistics",))
+    found = render.statistics
+    for tensor in vars(found).values():
+        assert tensor.shape == (len(scene.means),)
+        assert tensor.isfinite().all()
+        assert (tensor >= 0).all()
+    torch.testing.assert_close(found.weight_sum.sum(), render.alpha.sum(), rtol=1e-4, atol=1e-4)
+    assert (found.radii[found.pixels > 0] > 0).all()
+    assert (found.weight_max <= found.weight_sum + 1e-6).all()
+    assert (found.weight_sum <= found.weight_max * found.pixels * (1 + 1e-5) + 1e-6).all()
+
+
+@pytest.mark.parametrize("channels", [1, 3, 8, 32])
+def test_splat_sums_the_image_by_weight(device, channels):
+    scene = random_scene(2, n=250)
+    image = torch.randn(scene.height, scene.width, channels, generator=torch.Generator().manual_seed(0))
+    image = image * decided(scene)[..., None]
+    weights, _ = explicit(scene)
+    sums, total = splat(image.to(device), **{name: getattr(scene.to(device), name) for name in GEOMETRY})
+    expected = weights.T @ image.double().reshape(-1, channels)
+    assert sums.shape == (250, channels)
+    torch.testing.assert_close(sums.cpu().double(), expected, rtol=1e-4, atol=1e-4)
+    torch.testing.assert_close(total.cpu().double(), weights.sum(0), rtol=1e-4, atol=0.02)
+
+
+def test_splat_is_the_adjoint_of_rendering(device):
+    scene = replace(random_scene(3), background=None).to(device)
+    options = Options(low_pass=6.0, filter_sigma=1.0)
+    image = torch.randn(scene.height, scene.width, 3, generator=torch.Generator().manual_seed(0)).to(device)
+    rendered = scene.render(rasterize, options=options).color
+    sums, _ = splat(image, **{name: getattr(scene, name) for name in GEOMETRY}, options=options)
+    forward, backward = (rendered.double() * image).sum(), (sums.double() * scene.features).sum()
+    assert float(forward) == pytest.approx(float(backward), rel=1e-5)
+
+
+def test_splat_of_ones_gives_the_weights(device):
+    scene = random_scene(4).to(device)
+    ones = torch.ones(scene.height, scene.width, 1, device=device)
+    sums, weights = splat(ones, **{name: getattr(scene, name) for name in GEOMETRY})
+    torch.testing.assert_close(sums[:, 0], weights, rtol=1e-5, atol=1e-6)
+    counted = scene.render(rasterize, ("statistics",)).statistics
+    torch.testing.assert_close(counted.weight_sum, weights, rtol=1e-5, atol=1e-6)

@@ -1,0 +1,69 @@
+"""Images, gradients, statistics and adjoint are the same bits in every run and for any number of threads."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from benchmarks.scenes import camera, surfels
+from tests.raster.agreement import IMAGES, gradients, images, random_cotangents
+from tests.raster.scenes import Scene, random_scene, textured
+from tests.raster.threads import with_threads
+from texgs.raster.api import rasterize, splat
+from texgs.raster.types import OUTPUTS
+
+
+def everything(scene):
+    """All that the rasterizer computes for a scene, by name."""
+    render = scene.render(rasterize, OUTPUTS)
+    found = images(render) | vars(render.statistics)
+    image = torch.linspace(-1, 1, scene.height * scene.width * 2, device=scene.means.device)
+    geometry = {
+        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
+    }
+    found["sums"], found["weights"] = splat(image.reshape(scene.height, scene.width, 2), **geometry)
+    cotangents = random_cotangents(scene, IMAGES)
+    return found | {f"gradient of {name}": x for name, x in gradients(rasterize, scene, cotangents).items()}
+
+
+def generated(n=8000, size=200):
+    """A scene of thousands of surfels and hundreds of tiles, so that threads meet."""
+    view = camera(size)
+    shift = torch.zeros(n, 2)
+    return Scene(**surfels("transl", n), viewmat=view.viewmat, K=view.K, width=size, height=size, shift=shift)
+
+
+SCENES = {
+    "plain": generated,
+    "32 channels": lambda: replace(generated(3000), features=torch.rand(3000, 32)),
+    "textured": lambda: textured(generated(3000)),
+    "small": random_scene,
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("count", [2, 7])
+def test_threads(name, count):
+    scene = SCENES[name]()
+    alone = with_threads(1, everything, scene)
+    for quantity, value in with_threads(count, everything, scene).items():
+        assert torch.equal(value, alone[quantity]), quantity
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_runs(device, name):
+    scene = SCENES[name]().to(device)
+    first = everything(scene)
+    for quantity, value in everything(scene).items():
+        assert torch.equal(value, first[quantity]), quantity
+
+
+def test_other_work_in_between_changes_nothing(device):
+    scene = random_scene().to(device)
+    means = scene.means.clone().requires_grad_()
+    first = scene.with_leaves({"means": means}).render(rasterize)
+    for seed in range(1, 6):  # takes and returns the library's buffers
+        random_scene(seed, n=500, width=90).to(device).render(rasterize)
+    gradient = torch.autograd.grad(first.color.sum(), means)[0]
+    again = scene.with_leaves({"means": means}).render(rasterize)
+    assert torch.equal(gradient, torch.autograd.grad(again.color.sum(), means)[0])

@@ -1,0 +1,97 @@
+"""Every image of the native rasterizer against the float64 definition."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.raster.agreement import IMAGES, decided, images
+from tests.raster.scenes import TEXTURE_SIZES, random_scene, textured
+from texgs.raster.api import rasterize
+from texgs.raster.reference import render as reference
+from texgs.raster.types import DEFAULT_OPTIONS, Options
+
+# Absolute tolerances. Colours and alpha are sums of numbers below 1 in float32, whose exponents carry the
+# rounding of the intersection; depths are around 3; the distortion is at most 0.003 in these scenes.
+TOLERANCE = {"color": 3e-5, "alpha": 3e-5, "depth": 3e-5, "median": 3e-5, "normal": 5e-5, "distortion": 1e-7}
+TEXEL = 2e-6  # more for each texel that the textures span, as their random colours change from texel to texel
+UNDECIDED = 0.15  # largest share of pixels that may sit on a threshold (or, textured, on a texel centre)
+
+
+def check(scene, device, options=DEFAULT_OPTIONS):
+    """Compare all images of a scene, pixel by pixel where the definition is sure."""
+    outputs = [name for name in IMAGES if name not in ("color", "alpha")]
+    found = images(scene.to(device).render(rasterize, outputs, options))
+    expected = images(scene.double().render(reference.rasterize, outputs, options))
+    sure = decided(scene, options)
+    assert 1 - sure.double().mean() < UNDECIDED
+    texels = 0 if scene.texture is None else int(scene.texture.sizes.max())
+    for name in IMAGES:
+        assert found[name].shape == expected[name].shape
+        assert found[name].dtype == torch.float32
+        error = (found[name].cpu() - expected[name]).abs()
+        tolerance = TOLERANCE[name] + (TEXEL * texels if name == "color" else 0)
+        assert float(error[sure].max()) < tolerance, name
+        assert sure.all() or (error[~sure] < 0.02).double().mean() > 0.9, name  # a weak fragment more or less
+
+
+@pytest.mark.parametrize(
+    ("seed", "n", "width", "height"), [(0, 150, 53, 37), (1, 300, 64, 48), (2, 400, 33, 71), (3, 200, 17, 1)]
+)
+def test_random_scenes(device, seed, n, width, height):
+    check(random_scene(seed, n, width, height), device)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        Options(low_pass=6.0),
+        Options(low_pass=64.0),
+        Options(low_pass=1e30),
+        Options(filter_sigma=1.0),
+        Options(filter_sigma=3.0),
+        Options(near=2.9),
+        Options(near=0.01, far=1e10),
+        Options(alpha_min=0.05),
+        Options(transmittance_min=0.3),
+    ],
+    ids=lambda options: ",".join(
+        f"{k}={v:g}" for k, v in vars(options).items() if v != vars(DEFAULT_OPTIONS)[k]
+    ),
+)
+def test_options(device, options):
+    check(random_scene(4), device, options)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4, 7, 16, 32])
+def test_channels(device, channels):
+    check(random_scene(5, channels=channels), device)
+
+
+@pytest.mark.parametrize("sizes", [*([size] for size in TEXTURE_SIZES), TEXTURE_SIZES], ids=str)
+def test_textures(device, sizes):
+    check(textured(random_scene(6), sizes), device)
+
+
+def test_texture_on_unfiltered_and_narrow_surfels(device):
+    check(textured(random_scene(7)), device, Options(low_pass=64.0, filter_sigma=1.0))
+
+
+def test_black_background_by_default(device):
+    check(replace(random_scene(8), background=None), device)
+    check(textured(replace(random_scene(8), background=None)), device)
+
+
+def test_shift(device):
+    shift = 3 * torch.randn(200, 2, generator=torch.Generator().manual_seed(0))
+    check(replace(random_scene(9), shift=shift), device)
+
+
+def test_only_what_is_asked_for(device):
+    render = random_scene().to(device).render(rasterize)
+    assert render.depth is render.median is render.normal is render.distortion is render.statistics is None
+    alone = random_scene().to(device).render(rasterize, ("depth",))
+    together = random_scene().to(device).render(rasterize, IMAGES[2:])
+    assert alone.normal is None
+    torch.testing.assert_close(alone.depth, together.depth)
+    torch.testing.assert_close(alone.color, together.color)

@@ -1,0 +1,87 @@
+"""Every instruction set that the library was built for and this machine has computes the same."""
+
+import os
+import subprocess
+import sys
+from functools import cache
+
+import pytest
+import torch
+
+from tests.raster.scenes import random_scene, textured
+from tests.raster.test_determinism import everything
+from tests.raster.threads import with_threads
+from texgs.raster import native
+
+CHILD = """
+import sys, torch
+from tests.raster.test_instruction_sets import computed
+from texgs.raster import native
+torch.save((native.instruction_set(), computed()), sys.argv[1])
+"""
+SETS = ("portable", "avx2", "avx512")
+SCENES = {
+    "plain": random_scene(1, n=300),
+    "textured": textured(random_scene(2)),
+    "16 channels": random_scene(3, channels=16),
+}
+
+
+def computed():
+    """Everything of each scene; bits must not depend on the number of threads."""
+    found = {}
+    for name, scene in SCENES.items():
+        found[name] = with_threads(1, everything, scene)
+        for quantity, value in with_threads(3, everything, scene).items():
+            assert torch.equal(value, found[name][quantity]), quantity
+    return found
+
+
+def run(instruction_set, folder):
+    """Compute in a process of its own, which reads TEXGS_ISA as it loads the library."""
+    file = folder / f"{instruction_set}.pt"
+    child = subprocess.run(
+        [sys.executable, "-c", CHILD, str(file)],
+        env={**os.environ, "TEXGS_ISA": instruction_set},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    return child, file
+
+
+@cache
+def portable(folder):
+    child, file = run("portable", folder)
+    assert child.returncode == 0, child.stderr
+    return torch.load(file)[1]
+
+
+@pytest.mark.parametrize("instruction_set", SETS)
+def test_instruction_set(instruction_set, tmp_path_factory):
+    folder = tmp_path_factory.getbasetemp()
+    child, file = run(instruction_set, folder)
+    if "this machine does not have it" in child.stderr:
+        pytest.skip(f"this machine has no {instruction_set}")
+    assert child.returncode == 0, child.stderr
+    used, found = torch.load(file)
+    assert used == instruction_set
+    for name, expected in portable(folder).items():
+        for quantity, value in expected.items():
+            # thresholds fall the other way here and there; test_forward.py and test_gradients.py bound them
+            scale = value.abs().max().clamp(min=1)
+            same = (found[name][quantity] - value).abs() <= 1e-3 * scale
+            assert same.double().mean() > 0.995, (name, quantity)
+
+
+def test_the_best_instruction_set_is_used_by_default():
+    if "TEXGS_ISA" in os.environ:
+        pytest.skip("TEXGS_ISA is set")
+    assert native.instruction_set() in SETS
+
+
+def test_unknown_instruction_set_is_reported(tmp_path):
+    child, _ = run("altivec", tmp_path)
+    assert child.returncode != 0
+    assert "TEXGS_ISA=altivec: expected avx512, avx2 or portable" in child.stderr

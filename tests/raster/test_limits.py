@@ -1,0 +1,70 @@
+"""Large scenes work within bounded memory, and those that cannot fit say how much they would need."""
+
+import re
+from dataclasses import replace
+
+import pytest
+import torch
+
+from benchmarks.scenes import camera, surfels
+from tests.raster.scenes import Scene, random_scene
+from texgs.core.errors import OutOfMemoryError
+from texgs.raster import native
+from texgs.raster.api import rasterize
+
+GB = 1e9
+
+
+def generated(kind, n, width, height):
+    """A benchmark scene; the view is as high as wide and cropped or padded to the size."""
+    view = camera(height)
+    K = view.K.clone()
+    K[0, 2] = width / 2
+    return Scene(**surfels(kind, n), viewmat=view.viewmat, K=K, width=width, height=height)
+
+
+def test_a_million_surfels(device):
+    scene = generated("light", 1_000_000, 1920, 1080).to(device)
+    leaves = {name: leaf.requires_grad_() for name, leaf in scene.leaves().items()}
+    if device.type == "cpu":
+        native.peak_memory(reset=True)
+    render = scene.with_leaves(leaves).render(rasterize)
+    gradients = torch.autograd.grad(render.color.square().sum(), list(leaves.values()))
+    assert (render.alpha > 0.9).double().mean() > 0.2
+    assert all(gradient.isfinite().all() for gradient in gradients)
+    if device.type == "cpu":
+        assert native.peak_memory() < 4 * GB
+
+
+def test_memory_of_a_usual_scene():
+    scene = generated("opaque", 60_000, 800, 800)
+    leaves = {name: leaf.requires_grad_() for name, leaf in scene.leaves().items()}
+    native.peak_memory(reset=True)
+    torch.autograd.grad(scene.with_leaves(leaves).render(rasterize).color.sum(), list(leaves.values()))
+    assert native.peak_memory() < 0.5 * GB
+
+
+@pytest.mark.parametrize("size", [(1_000_000, 1_000_000), (1_048_575, 1_048_575)])
+def test_images_that_cannot_fit(device, size):
+    with pytest.raises(OutOfMemoryError, match=r"\d+ bytes") as raised:
+        replace(random_scene(), width=size[0], height=size[1]).to(device).render(rasterize)
+    needed = int(re.search(r"(\d+) bytes", str(raised.value))[1])
+    assert needed >= 4 * 4 * size[0] * size[1]  # colour and alpha alone
+
+
+def test_surfels_that_cannot_fit():
+    many = 10**12  # tensors of no memory: one surfel repeated
+
+    def repeated(*row):
+        return torch.tensor(row).expand(many, len(row))
+
+    scene = random_scene()
+    with pytest.raises(OutOfMemoryError, match=r"\d+ bytes"):
+        replace(
+            scene,
+            means=repeated(0.0, 0, 0),
+            quats=repeated(1.0, 0, 0, 0),
+            scales=repeated(0.1, 0.1),
+            opacities=torch.tensor(0.5).expand(many),
+            features=repeated(1.0, 1, 1),
+        ).render(rasterize)

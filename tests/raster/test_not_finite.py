@@ -1,0 +1,92 @@
+"""NaN, infinite and absurd inputs: named when checks are on, never a crash or a hang."""
+
+from contextlib import suppress
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.raster.agreement import IMAGES, gradients, random_cotangents
+from tests.raster.scenes import random_scene, textured
+from texgs.core.errors import ArgumentError
+from texgs.raster.api import rasterize, splat
+from texgs.raster.types import OUTPUTS, Options
+
+TENSORS = ("means", "quats", "scales", "opacities", "shift", "features", "viewmat", "K", "background")
+BAD = (float("nan"), float("inf"), -float("inf"))
+ABSURD = (0.0, -1.0, 1e38, -1e38, 1e-38, 1e20)
+
+
+def spoiled(name, value, everywhere=False):
+    """A scene in which one number, or all, of one tensor is `value`."""
+    scene = replace(random_scene(), shift=torch.zeros(200, 2))
+    tensor = getattr(scene, name).clone()
+    tensor.view(-1)[slice(None) if everywhere else 2] = value
+    return replace(scene, **{name: tensor})
+
+
+@pytest.mark.parametrize("value", BAD)
+@pytest.mark.parametrize("name", TENSORS)
+def test_reported_by_name(device, name, value):
+    kind = "1 NaN and 0 infinite" if value != value else "0 NaN and 1 infinite"
+    with pytest.raises(ArgumentError, match=f"{name}: expected finite values, got {kind}"):
+        spoiled(name, value).to(device).render(rasterize, options=Options(check_finite=True))
+
+
+@pytest.mark.parametrize("name", ["base", "gain", "texels"])
+def test_reported_by_name_in_textures(device, name):
+    scene = textured(random_scene())
+    tensor = getattr(scene.texture, name).clone()
+    tensor.view(-1)[5] = float("nan")
+    scene = replace(scene, texture=replace(scene.texture, **{name: tensor})).to(device)
+    with pytest.raises(ArgumentError, match=f"{name}: expected finite values, got 1 NaN"):
+        scene.render(rasterize, options=Options(check_finite=True))
+    scene.render(rasterize)
+
+
+def test_image_to_splat_is_checked(device):
+    scene = random_scene().to(device)
+    image = torch.full((37, 53, 1), float("nan"), device=device)
+    geometry = {
+        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
+    }
+    with pytest.raises(ArgumentError, match="image: expected finite values"):
+        splat(image, **geometry, options=Options(check_finite=True))
+
+
+def test_finite_inputs_pass_the_check(device):
+    scene = random_scene().to(device)
+    checked = scene.render(rasterize, options=Options(check_finite=True))
+    assert torch.equal(checked.color, scene.render(rasterize).color)
+
+
+@pytest.mark.parametrize("everywhere", [False, True], ids=["one", "all"])
+@pytest.mark.parametrize("name", TENSORS)
+def test_no_crash(device, name, everywhere):
+    for value in BAD + ABSURD:
+        scene = spoiled(name, value, everywhere)
+        with suppress(ArgumentError):  # a skewed K is refused
+            scene.to(device).render(rasterize, OUTPUTS)
+            gradients(rasterize, scene.to(device), random_cotangents(scene, IMAGES))
+            gradients(rasterize, textured(scene).to(device), random_cotangents(textured(scene), ("color",)))
+
+
+def test_no_crash_on_spoiled_gradients(device):
+    scene = random_scene().to(device)
+    for value in BAD:
+        cotangents = {name: torch.full_like(x, value) for name, x in random_cotangents(scene, IMAGES).items()}
+        gradients(rasterize, scene, cotangents)
+
+
+@pytest.mark.parametrize("name", ["means", "quats", "scales", "opacities"])
+@pytest.mark.parametrize("value", BAD)
+def test_one_bad_surfel_does_not_spoil_the_others(device, name, value):
+    if (name, value) == ("opacities", float("inf")):
+        pytest.skip("an infinite opacity is as good as 0.99 and hides what lies behind")
+    scene = spoiled(name, value).to(device)
+    bad = 2 // (getattr(scene, name)[0].numel())
+    others = [i for i in range(200) if i != bad]
+    alone = scene.with_leaves({tensor: leaf[others] for tensor, leaf in scene.leaves().items()})
+    torch.testing.assert_close(
+        scene.render(rasterize).color, alone.render(rasterize).color, rtol=0, atol=1e-6
+    )

@@ -1,0 +1,151 @@
+"""What must hold for every scene, whatever the rasterizer's arithmetic."""
+
+from dataclasses import replace
+
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.raster.agreement import gradients, images, random_cotangents
+from tests.raster.scenes import random_scene, textured
+from texgs.raster.api import rasterize
+from texgs.raster.types import OUTPUTS, Options, Texture
+
+scenes = st.builds(
+    random_scene,
+    seed=st.integers(0, 10_000),
+    n=st.integers(0, 120),
+    width=st.integers(1, 70),
+    height=st.integers(1, 50),
+)
+examples = settings(max_examples=25, deadline=None, derandomize=True)
+CLOSE = {"rtol": 0, "atol": 2e-5}  # float32 sums in another order
+UNENDED = Options(transmittance_min=0.0)
+
+
+def select(scene, index):
+    """Some surfels of a scene, in a new order."""
+    return scene.with_leaves({name: leaf[index] for name, leaf in scene.leaves().items()})
+
+
+@examples
+@given(scene=scenes, seed=st.integers(0, 100))
+def test_order_of_the_surfels_does_not_matter(device, scene, seed):
+    n = len(scene.means)
+    order = torch.randperm(n, generator=torch.Generator().manual_seed(seed))
+    first = images(scene.to(device).render(rasterize, OUTPUTS))
+    second = images(select(scene, order).to(device).render(rasterize, OUTPUTS))
+    for name, image in first.items():
+        assert torch.equal(image, second[name]), name  # depths differ, so the order of blending does not
+    cotangents = random_cotangents(scene, ("color", "normal"))
+    first = gradients(rasterize, scene.to(device), cotangents)
+    second = gradients(rasterize, select(scene, order).to(device), cotangents)
+    for name, gradient in first.items():
+        torch.testing.assert_close(gradient[order.to(device)], second[name], rtol=1e-4, atol=1e-4)
+
+
+@examples
+@given(scene=scenes, width=st.integers(1, 9), height=st.integers(1, 40))
+def test_constant_texture_is_a_constant_colour(device, scene, width, height):
+    n = len(scene.means)
+    base, gain = torch.rand(n, 3), torch.rand(n)
+    textured_scene = textured(scene, [(width, height)])
+    texture = Texture(
+        base=base,
+        gain=gain,
+        texels=scene.features.repeat_interleave(width * height, 0),
+        sizes=textured_scene.texture.sizes,
+        offsets=torch.arange(n) * width * height,
+    )
+    plain = (
+        replace(scene, features=base + gain[:, None] * scene.features).to(device).render(rasterize, OUTPUTS)
+    )
+    found = replace(textured_scene, texture=texture).to(device).render(rasterize, OUTPUTS)
+    for name, image in images(plain).items():
+        torch.testing.assert_close(getattr(found, name), image, **CLOSE)
+
+
+@examples
+@given(front=scenes, seed=st.integers(0, 10_000), n=st.integers(0, 120))
+def test_union_of_a_front_and_a_back_set_is_their_composite(device, front, seed, n):
+    back = replace(
+        random_scene(seed, n), **{name: getattr(front, name) for name in ("viewmat", "K", "width", "height")}
+    )
+    back = replace(back, means=back.means + 2 * front.viewmat[2, :3])  # both balls have a radius of 0.6
+    both = front.with_leaves(
+        {name: torch.cat([leaf, back.leaves()[name]]) for name, leaf in front.leaves().items()}
+    )
+    over, under, union = (
+        replace(scene, background=None).to(device).render(rasterize, ("normal",), UNENDED)
+        for scene in (front, back, both)
+    )
+    light = (1 - over.alpha)[..., None]
+    torch.testing.assert_close(union.color, over.color + light * under.color, **CLOSE)
+    torch.testing.assert_close(union.normal, over.normal + light * under.normal, **CLOSE)
+    torch.testing.assert_close(union.alpha, over.alpha + light[..., 0] * under.alpha, **CLOSE)
+
+
+@examples
+@given(scene=scenes, opaque=st.booleans())
+def test_ranges(device, scene, opaque):
+    if opaque:
+        scene = replace(scene, opacities=torch.ones_like(scene.opacities))
+    render = scene.to(device).render(rasterize, OUTPUTS)
+    depth = scene.means @ scene.viewmat[2, :3] + 3
+    assert (render.alpha >= 0).all()
+    assert (render.alpha <= 1).all()
+    assert (render.color >= -1e-6).all()
+    assert (render.color <= 1 + 1e-5).all()  # features and background lie in [0, 1]
+    assert (render.normal.norm(dim=-1) <= render.alpha + 1e-5).all()
+    assert (render.distortion >= -1e-6).all()
+    reach = 4 * 0.3  # the farthest that a fragment of the largest surfel lies from its mean
+    for image in (render.depth, render.median):
+        seen = image != 0
+        assert (image[seen] > 0.2).all()
+        assert not seen.any() or (image[seen] < float(depth.max()) + reach).all()
+    assert ((render.depth > 0) == (render.alpha > 0)).all()
+
+
+@examples
+@given(scene=scenes)
+def test_background_shows_through(device, scene):
+    scene = scene.to(device)
+    black = replace(scene, background=None).render(rasterize)
+    over = scene.render(rasterize)
+    torch.testing.assert_close(
+        over.color, black.color + (1 - over.alpha)[..., None] * scene.background, **CLOSE
+    )
+
+
+@examples
+@given(scene=scenes, factor=st.sampled_from([-1.0, 3.0, 1e-3]))
+def test_length_and_sign_of_quaternions_do_not_matter(device, scene, factor):
+    first = images(scene.to(device).render(rasterize, OUTPUTS))
+    second = images(replace(scene, quats=factor * scene.quats).to(device).render(rasterize, OUTPUTS))
+    differ = sum(((image - second[name]).abs() > 1e-4).sum() for name, image in first.items())
+    assert differ <= 0.02 * sum(image.numel() for image in first.values())  # thresholds
+
+
+@examples
+@given(scene=scenes, channels=st.integers(2, 32))
+def test_channels_do_not_influence_each_other(device, scene, channels):
+    features = torch.rand(len(scene.means), channels)
+    scene = replace(scene, background=None)
+    together = replace(scene, features=features).to(device).render(rasterize)
+    last = replace(scene, features=features[:, -1:]).to(device).render(rasterize)
+    torch.testing.assert_close(together.color[..., -1:], last.color, **CLOSE)
+    torch.testing.assert_close(together.alpha, last.alpha, **CLOSE)
+
+
+@examples
+@given(scene=scenes)
+def test_same_shift_of_all_moves_the_principal_point(device, scene):
+    pixels = torch.tensor([2.0, -3.0])
+    K = scene.K.clone()
+    K[:2, 2] += pixels
+    shifted = images(
+        replace(scene, shift=pixels.expand(len(scene.means), 2)).to(device).render(rasterize, OUTPUTS)
+    )
+    moved = images(replace(scene, K=K).to(device).render(rasterize, OUTPUTS))
+    for name, image in shifted.items():
+        assert ((image - moved[name]).abs() > 1e-4).double().mean() < 0.02  # thresholds

@@ -1,0 +1,168 @@
+"""The definition against closed forms: one surfel."""
+
+import math
+
+import pytest
+import torch
+
+from tests.raster.closed_form import CENTRE, FOCAL, offsets, view
+from texgs.core.errors import ArgumentError
+from texgs.core.rotation import quats_to_matrices
+from texgs.raster.reference.projection import project
+from texgs.raster.reference.render import rasterize
+from texgs.raster.types import OUTPUTS, Options, Texture
+
+UNFILTERED = Options(low_pass=1e30)
+SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
+
+
+def test_frontal_surfel_is_a_gaussian_on_screen():
+    x, y = offsets()
+    sigma_x, sigma_y = FOCAL * 0.2 / 2, FOCAL * 0.1 / 2  # 4 and 2 px
+    alpha = 0.8 * torch.exp(-0.5 * ((x / sigma_x) ** 2 + (y / sigma_y) ** 2))
+    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
+    color, background = torch.tensor([0.2, 0.5, 0.9]).double(), torch.tensor([1.0, 0.0, 0.5]).double()
+    image = rasterize(
+        **view(means=[[0, 0, 2]], scales=[[0.2, 0.1]], opacities=[0.8]),
+        features=color[None],
+        background=background,
+        outputs=OUTPUTS,
+    )
+    torch.testing.assert_close(image.alpha, alpha)
+    torch.testing.assert_close(image.color, alpha[..., None] * color + (1 - alpha[..., None]) * background)
+    torch.testing.assert_close(image.depth, 2 * (alpha > 0).double())
+    torch.testing.assert_close(image.median, 2 * (alpha > 0).double())
+    torch.testing.assert_close(image.normal, alpha[..., None] * torch.tensor([0.0, 0, -1]).double())
+    torch.testing.assert_close(image.distortion, torch.zeros_like(alpha))
+    counted = image.statistics
+    torch.testing.assert_close(counted.weight_sum, alpha.sum()[None])
+    torch.testing.assert_close(counted.weight_max, alpha.max()[None])
+    assert counted.pixels.item() == (alpha > 0).sum()
+    torch.testing.assert_close(
+        counted.radii, sigma_x * torch.tensor([2 * math.log(0.8 * 255)]).double().sqrt()
+    )
+
+
+def test_tilted_surfel_is_hit_where_the_ray_meets_its_plane():
+    angle, scale = 1.1, 0.3  # about y, so that the plane is n . x = n . mean with n = (sin, 0, cos)
+    x, y = offsets()
+    ray = torch.stack([x / FOCAL, y / FOCAL, torch.ones_like(x)], -1)
+    mean, normal = (
+        torch.tensor([0.1, -0.05, 2.0]).double(),
+        torch.tensor([math.sin(angle), 0, math.cos(angle)]).double(),
+    )
+    z = (mean @ normal) / (ray @ normal)
+    point = z[..., None] * ray - mean
+    u, v = (
+        point @ torch.tensor([math.cos(angle), 0, -math.sin(angle)]).double() / scale,
+        point[..., 1] / scale,
+    )
+    alpha = torch.where(z > 0.2, 0.9 * torch.exp(-0.5 * (u**2 + v**2)), 0)
+    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
+    tilted = view(
+        means=[mean.tolist()],
+        scales=[[scale, scale]],
+        opacities=[0.9],
+        quats=[[2 * math.cos(angle / 2), 0, 2 * math.sin(angle / 2), 0]],  # length 2 does not matter
+    )
+    image = rasterize(**tilted, features=torch.ones(1, 1).double(), outputs=OUTPUTS, options=UNFILTERED)
+    torch.testing.assert_close(image.alpha, alpha)
+    torch.testing.assert_close(image.depth, torch.where(alpha > 0, z, 0))
+    torch.testing.assert_close(image.normal, alpha[..., None] * -normal)
+
+
+@pytest.mark.parametrize("low_pass", [2.0, 6.0])
+def test_low_pass_widens_a_surfel_smaller_than_a_pixel(low_pass):
+    x, y = offsets()
+    alpha = 0.8 * torch.exp(-0.5 * low_pass * (x**2 + y**2))
+    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
+    tiny = view(means=[[0, 0, 2]], scales=[[1e-4, 1e-4]], opacities=[0.8])
+    image = rasterize(**tiny, features=torch.ones(1, 1).double(), options=Options(low_pass=low_pass))
+    torch.testing.assert_close(image.alpha, alpha)
+
+
+@pytest.mark.parametrize("sigma", [1.0, 3.0])
+def test_filter_sits_in_the_middle_of_the_projected_box(sigma):
+    tilted = view(means=[[0.2, 0.1, 2]], scales=[[0.3, 0.2]], opacities=[0.5], quats=[[0.8, 0.3, 0.5, 0.1]])
+    angle = torch.linspace(0, 2 * math.pi, 100_001).double()
+    circle = sigma * torch.stack([0.3 * angle.cos(), 0.2 * angle.sin()], -1)
+    points = tilted["means"] + circle @ quats_to_matrices(tilted["quats"])[0, :, :2].T
+    pixels = FOCAL * points[:, :2] / points[:, 2:] + torch.tensor(CENTRE).double()
+    middle = (pixels.amin(0) + pixels.amax(0)) / 2
+    names = ("means", "quats", "scales", "opacities", "viewmat", "K")
+    centre = project(*(tilted[name] for name in names), None, Options(filter_sigma=sigma)).centre[0]
+    torch.testing.assert_close(centre, middle, atol=1e-6, rtol=0)
+
+
+def test_alpha_is_capped_and_the_cap_blocks_the_gradient():
+    surfel = view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[1.0])
+    surfel["opacities"].requires_grad_()
+    alpha = rasterize(**surfel, features=torch.ones(1, 1).double()).alpha[12, 15]
+    assert alpha == 0.99
+    assert torch.autograd.grad(alpha, surfel["opacities"])[0] == 0
+
+
+def test_known_texels():
+    # 6 sigma = 24 px wide and high: texels of 4 x 6 px, whose centres fall on pixel centres
+    texels = torch.rand(5 + 6 * 4, 3).double()
+    texture = Texture(
+        base=torch.tensor([[0.1, 0.2, 0.3]]).double(),
+        gain=torch.tensor([0.7]).double(),
+        texels=texels,
+        sizes=torch.tensor([[6, 4]], dtype=torch.int32),
+        offsets=torch.tensor([5]),
+    )
+    surfel = view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[0.8])
+    image = rasterize(**surfel, texture=texture, options=SMOOTH)
+    color = (image.color / image.alpha[..., None] - texture.base) / 0.7
+    texel = texels[5:].reshape(4, 6, 3)  # [along v, along u, 3]
+    centres = color[12 - 9 : 12 + 10 : 6, 15 - 10 : 15 + 11 : 4]
+    torch.testing.assert_close(centres, texel)
+    torch.testing.assert_close(color[12 - 9, 15 - 8], (texel[0, 0] + texel[0, 1]) / 2)
+    torch.testing.assert_close(color[12 - 6, 15 - 9], bilinear(texel, 0.25, 0.5))
+    torch.testing.assert_close(color[0, 0], texel[0, 0])  # beyond the outermost centres: replicated
+
+
+def bilinear(texel, x, y):
+    """Value [3] between the first two texels along each axis."""
+    top = (1 - x) * texel[0, 0] + x * texel[0, 1]
+    return (1 - y) * top + y * ((1 - x) * texel[1, 0] + x * texel[1, 1])
+
+
+def test_shift_moves_the_projection():
+    surfels = view(means=[[0.1, 0, 2]], scales=[[0.3, 0.1]], opacities=[0.8], quats=[[0.8, 0.3, 0.5, 0.1]])
+    shifted = rasterize(
+        **surfels,
+        features=torch.ones(1, 1).double(),
+        shift=torch.tensor([[1.5, -0.75]]).double(),
+        outputs=OUTPUTS,
+    )
+    surfels["K"][:2, 2] += torch.tensor([1.5, -0.75])
+    moved = rasterize(**surfels, features=torch.ones(1, 1).double(), outputs=OUTPUTS)
+    for name in ("color", "alpha", "depth", "median", "normal", "distortion"):
+        torch.testing.assert_close(getattr(shifted, name), getattr(moved, name))
+
+
+def test_edge_on_surfel_is_drawn_by_the_low_pass_filter_alone():
+    x, y = offsets()
+    half_turn = math.sqrt(0.5)
+    surfel = view(
+        means=[[0, 0, 2]], scales=[[0.3, 0.2]], opacities=[0.8], quats=[[half_turn, 0, half_turn, 0]]
+    )
+    for name in ("means", "quats", "scales", "opacities"):
+        surfel[name].requires_grad_()
+    image = rasterize(**surfel, features=torch.ones(1, 1).double(), outputs=OUTPUTS)
+    off_plane = x != 0
+    alpha = 0.8 * torch.exp(-(x**2 + y**2))
+    torch.testing.assert_close(image.alpha[off_plane], torch.where(alpha >= 1 / 255, alpha, 0)[off_plane])
+    total = image.color.sum() + image.depth.sum() + image.normal.sum() + image.distortion.sum()
+    for gradient in torch.autograd.grad(
+        total, [surfel[n] for n in ("means", "quats", "scales", "opacities")]
+    ):
+        assert gradient.isfinite().all()
+
+
+@pytest.mark.parametrize("color", [{}, {"features": torch.ones(1, 3), "texture": "a texture"}])
+def test_exactly_one_kind_of_colour(color):
+    with pytest.raises(ArgumentError, match=r"either features or texture, got (both|neither)"):
+        rasterize(**view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[0.8]), **color)

@@ -1,0 +1,87 @@
+"""The definition against closed forms: several surfels, and none."""
+
+import torch
+
+from tests.raster.closed_form import HEIGHT, WIDTH, view
+from texgs.raster.reference.render import rasterize, splat
+from texgs.raster.types import OUTPUTS, Options
+
+SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
+
+
+def test_two_layers():
+    front, back = 0.6, 0.5  # alpha at the principal point; the back one is listed first
+    layers = view(means=[[0, 0, 4], [0, 0, 2]], scales=[[0.5, 0.5]] * 2, opacities=[back, front])
+    features = torch.tensor([[1.0, 0.0], [0.0, 1.0]]).double()
+    image = rasterize(**layers, features=features, outputs=OUTPUTS)
+    w_front, w_back = front, (1 - front) * back
+    m_front, m_back = (100 / 99.8 * (1 - 0.2 / z) for z in (2, 4))
+    at = (12, 15)
+    torch.testing.assert_close(image.color[at], torch.tensor([w_back, w_front]).double())
+    torch.testing.assert_close(image.alpha[at].item(), w_front + w_back)
+    torch.testing.assert_close(image.depth[at].item(), (w_front * 2 + w_back * 4) / (w_front + w_back))
+    torch.testing.assert_close(image.distortion[at].item(), w_front * w_back * (m_front - m_back) ** 2)
+    assert image.median[at] == 2  # only 0.4 of the light reaches the second
+    torch.testing.assert_close(image.statistics.weight_max, torch.tensor([w_back, w_front]).double())
+
+
+def test_median_is_the_last_depth_that_half_of_the_light_reaches():
+    layers = view(
+        means=[[0, 0, z] for z in (2, 3, 4, 5)], scales=[[1, 1]] * 4, opacities=[0.3, 0.25, 0.2, 0.9]
+    )
+    image = rasterize(**layers, features=torch.ones(4, 1).double(), outputs=("median",))
+    assert image.median[12, 15] == 4  # light before each: 1, 0.7, 0.525, 0.42
+
+
+def test_pixel_ends_before_the_fragment_that_takes_the_last_light():
+    layers = view(means=[[0, 0, 2 + i] for i in range(6)], scales=[[1, 1]] * 6, opacities=[0.95] * 6)
+    image = rasterize(**layers, features=torch.ones(6, 1).double(), outputs=("statistics",))
+    torch.testing.assert_close(image.alpha[12, 15].item(), 1 - 0.05**3)  # 0.05^4 < 1e-4
+    unended = rasterize(**layers, features=torch.ones(6, 1).double(), options=SMOOTH)
+    torch.testing.assert_close(unended.alpha[12, 15].item(), 1 - 0.05**6)
+
+
+def test_surfels_too_near_or_too_weak_are_skipped():
+    surfels = view(
+        means=[[0, 0, 0.2], [0, 0, -2], [0, 0, 2], [0, 0, 2]],
+        scales=[[0.2, 0.2]] * 4,
+        opacities=[0.9, 0.9, 0.0, 0.003],
+    )
+    image = rasterize(**surfels, features=torch.ones(4, 1).double(), outputs=OUTPUTS)
+    assert image.alpha.count_nonzero() == 0
+    assert image.statistics.radii.count_nonzero() == 0
+
+
+def test_coincident_depths_keep_the_order_of_the_inputs():
+    pair = view(means=[[0, 0, 2]] * 2, scales=[[0.2, 0.2]] * 2, opacities=[0.5, 0.5])
+    image = rasterize(**pair, features=torch.eye(2).double())
+    torch.testing.assert_close(image.color[12, 15], torch.tensor([0.5, 0.25]).double())
+
+
+def test_no_surfels_show_the_background():
+    empty = {name: torch.zeros(0, size) for name, size in (("means", 3), ("quats", 4), ("scales", 2))}
+    image = rasterize(
+        **empty,
+        opacities=torch.zeros(0),
+        viewmat=torch.eye(4),
+        K=torch.eye(3),
+        width=3,
+        height=2,
+        features=torch.zeros(0, 4),
+        background=torch.tensor([1.0, 2.0, 3.0, 4.0]),
+        outputs=OUTPUTS,
+    )
+    assert (image.color == torch.tensor([1.0, 2.0, 3.0, 4.0])).all()
+    assert image.alpha.count_nonzero() == image.depth.count_nonzero() == image.median.count_nonzero() == 0
+
+
+def test_splat_is_the_adjoint():
+    surfels = view(means=[[0, 0, 2], [0.1, 0, 3]], scales=[[0.2, 0.1]] * 2, opacities=[0.8, 0.7])
+    features = torch.rand(2, 3).double().requires_grad_()
+    image = torch.rand(HEIGHT, WIDTH, 3).double()
+    rendered = rasterize(**surfels, features=features, outputs=("statistics",))
+    sums, weights = splat(
+        image, *(surfels[n] for n in ("means", "quats", "scales", "opacities", "viewmat", "K"))
+    )
+    torch.testing.assert_close(sums, torch.autograd.grad((rendered.color * image).sum(), features)[0])
+    torch.testing.assert_close(weights, rendered.statistics.weight_sum)

@@ -1,0 +1,6 @@
+"""Surfel rasterizer: one function renders, one splats back, on CPU and CUDA tensors alike."""
+
+from texgs.raster.api import rasterize, splat
+from texgs.raster.types import Options, Render, Statistics, Texture
+
+__all__ = ["Options", "Render", "Statistics", "Texture", "rasterize", "splat"]

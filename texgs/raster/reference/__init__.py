@@ -1,0 +1,1 @@
+"""The rasterizer and the losses as definitions in plain torch, readable and slow."""

@@ -1,0 +1,72 @@
+"""The definitions of the image losses in plain torch: any floating-point type, gradients by autograd."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+from torch.nn.functional import conv2d, normalize, pad
+
+WINDOW_RADIUS, WINDOW_SIGMA = 5, 1.5
+C1, C2 = 0.01**2, 0.03**2
+
+
+def ssim(image: Tensor, target: Tensor) -> Tensor:
+    """Mean structural similarity of [H, W, C] images; see `texgs.raster.ssim`."""
+    k = torch.arange(-WINDOW_RADIUS, WINDOW_RADIUS + 1, dtype=image.dtype, device=image.device)
+    weights = torch.exp(-0.5 * (k / WINDOW_SIGMA) ** 2)
+    weights = weights / weights.sum()
+    x, y = (image.permute(2, 0, 1)[:, None], target.permute(2, 0, 1)[:, None])  # [C, 1, H, W]
+
+    def blur(a: Tensor) -> Tensor:
+        rows = conv2d(a, weights[None, None, None], padding=(0, WINDOW_RADIUS))
+        return conv2d(rows, weights[None, None, :, None], padding=(WINDOW_RADIUS, 0))
+
+    mean_x, mean_y = blur(x), blur(y)
+    var_x, var_y = blur(x * x) - mean_x**2, blur(y * y) - mean_y**2
+    cov = blur(x * y) - mean_x * mean_y
+    luminance = (2 * mean_x * mean_y + C1) / (mean_x**2 + mean_y**2 + C1)
+    structure = (2 * cov + C2) / (var_x + var_y + C2)
+    return (luminance * structure).mean()
+
+
+def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor:
+    """(1 - lambda) mean |image - target| + lambda (1 - SSIM) of [H, W, C] images."""
+    return (1 - lambda_dssim) * (image - target).abs().mean() + lambda_dssim * (1 - ssim(image, target))
+
+
+def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """World normals [H, W, 3] of a depth map [H, W]; see `texgs.raster.normals`."""
+    height, width = depth.shape
+    y, x = torch.meshgrid(
+        torch.arange(height, dtype=depth.dtype, device=depth.device) + 0.5,
+        torch.arange(width, dtype=depth.dtype, device=depth.device) + 0.5,
+        indexing="ij",
+    )
+    rays = torch.stack([(x - K[0, 2]) / K[0, 0], (y - K[1, 2]) / K[1, 1], torch.ones_like(x)], -1)
+    points = depth[..., None] * rays  # [H, W, 3] camera axes
+    along_x = points[1:-1, 2:] - points[1:-1, :-2]
+    along_y = points[2:, 1:-1] - points[:-2, 1:-1]
+    seen = torch.stack([depth[1:-1, 2:], depth[1:-1, :-2], depth[2:, 1:-1], depth[:-2, 1:-1]]).amin(0) > 0
+    facing = torch.where(seen[..., None], torch.linalg.cross(along_y, along_x), 0)
+    normal = normalize(facing, dim=-1) @ viewmat[:3, :3]  # the transpose of R_cw, applied to rows
+    return pad(normal, (0, 0, 1, 1, 1, 1)) if min(height, width) > 2 else torch.zeros_like(points)
+
+
+def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """Mean over pixels of 1 - alpha * normal . depth_to_normal(depth), alpha without gradient."""
+    agreement = (normal * depth_to_normal(depth, viewmat, K)).sum(-1)  # [H, W]
+    return (1 - alpha.detach() * agreement).mean()
+
+
+def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
+    """Mean of alpha * exp(-g(grey)) * g(attribute); see `texgs.raster.smoothness`."""
+    channels = attribute[None] if attribute.ndim == 2 else attribute.permute(2, 0, 1)  # [C, H, W]
+    weight = alpha * torch.exp(-edges(guide.mean(-1)[None]))  # [1, H, W]
+    return (weight * edges(channels)).mean()
+
+
+def edges(planes: Tensor) -> Tensor:
+    """|Sobel x| + |Sobel y| of [C, H, W], zeros outside the image."""
+    sobel_x = planes.new_tensor([[-1, 0, 1], [-2, 0, 2], [-1, 0, 1]])
+    kernels = torch.stack([sobel_x, sobel_x.T])[:, None]  # [2, 1, 3, 3]
+    return conv2d(planes[:, None], kernels, padding=1).abs().sum(1)

@@ -1,0 +1,96 @@
+"""What the rasterizer takes and gives besides plain tensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from torch import Tensor
+
+OUTPUTS = ("depth", "median", "normal", "distortion", "statistics")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How surfels become fragments; the defaults are those of 2DGS (Huang et al. 2024) and its successors.
+
+    The first two fields belong to the model: a scene fitted with one low-pass filter looks different under
+    another.
+    """
+
+    low_pass: float = 2.0
+    """k in rho = min(u^2 + v^2, k |pixel - centre|^2): no surfel looks narrower than a Gaussian of variance
+    1/k px^2."""
+    filter_sigma: float = 0.0
+    """Centre of the low-pass filter: the middle of the projected box of so many sigma. 0 is the projected
+    mean, 1 what gsplat does, 3 what the release of 2DGS does."""
+    alpha_min: float = 1 / 255
+    """Fragments with less alpha are skipped, and surfels with less opacity altogether."""
+    transmittance_min: float = 1e-4
+    """A pixel ends before the fragment that would leave less light than this."""
+    near: float = 0.2
+    """What is not farther than this camera z is skipped: surfels by their mean, fragments by their
+    intersection (the low-pass filter may still draw them). World units."""
+    far: float = 100.0
+    """Camera z that maps to 1 in the normalised depth of the distortion; it clips nothing. World units."""
+    check_finite: bool = False
+    """Look for NaN and infinite inputs first and report them by name; costs a pass over the inputs."""
+
+
+DEFAULT_OPTIONS = Options()
+
+
+@dataclass(frozen=True)
+class Texture:
+    """Colours that vary over each surfel: fragment colour = base + gain * bilinear(texel).
+
+    The texture of a surfel spans +-3 sigma along its two tangents. Texel (i, j), i along u and j along v, is
+    `texels[offsets[n] + j * sizes[n, 0] + i]` and lies at u = 6 (i + 0.5) / sizes[n, 0] - 3 sigma; beyond the
+    outermost texel centres the edge texel is replicated.
+    """
+
+    base: Tensor
+    """[N, 3] colour added to every texel, such as an offset and a specular term."""
+    gain: Tensor
+    """[N] factor on every texel, such as ambient plus diffuse shading."""
+    texels: Tensor
+    """[T, 3] colours of all surfels, one surfel after the other."""
+    sizes: Tensor
+    """[N, 2] int32, texels along u and along v, each at least 1."""
+    offsets: Tensor
+    """[N] int64, index of each surfel's first texel."""
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What each surfel contributed to one image; without gradient."""
+
+    weight_sum: Tensor
+    """[N] sum of its blending weights over all pixels."""
+    weight_max: Tensor
+    """[N] largest of its blending weights, 0 where it is not seen."""
+    pixels: Tensor
+    """[N] number of pixels that it was blended into."""
+    radii: Tensor
+    """[N] half of the longer side, in pixels, of the box on screen in which its alpha can reach `alpha_min`;
+    at most the image's diagonal; 0 where the surfel is skipped or that box misses the image."""
+
+
+@dataclass(frozen=True)
+class Render:
+    """One view of the surfels. What was not asked for in `outputs` is None."""
+
+    color: Tensor
+    """[H, W, C] blended colour or features over the background."""
+    alpha: Tensor
+    """[H, W] in [0, 1], sum of the blending weights."""
+    depth: Tensor | None = None
+    """[H, W] expected camera z of the ray-splat intersections, world units; 0 where alpha is 0."""
+    median: Tensor | None = None
+    """[H, W] camera z of the last fragment that more than half of the light reaches; 0 where none is."""
+    normal: Tensor | None = None
+    """[H, W, 3] blended unit normals in world axes, facing the camera; as long as alpha at most."""
+    distortion: Tensor | None = None
+    """[H, W] sum over pairs of fragments of w_i w_j (m_i - m_j)^2 with m the depth mapped to 0 (near) to
+    1 (far)."""
+    statistics: Statistics | None = None
+    """Contribution of each surfel."""
