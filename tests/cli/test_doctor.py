@@ -1,0 +1,62 @@
+import subprocess
+
+import pytest
+
+from texgs.cli import probes
+from texgs.cli.doctor import examine, show
+from texgs.cli.main import main
+from texgs.cli.probes import Finding
+
+
+def test_report_has_a_line_per_probe_and_all_is_well_here(capsys):
+    assert main(["doctor"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(probes.PROBES)
+    assert {line.split()[0] for line in lines} <= {"ok", "warning", "missing"}
+
+
+def test_only_a_required_thing_fails(capsys):
+    optional = Finding("weights", "missing", "none", "download them")
+    required = Finding("torch", "missing", "not installed", "pip install torch", is_required=True)
+    assert show([optional]) == 0
+    assert "weights          none -> download them" in capsys.readouterr().out
+    assert show([optional, required]) == 1
+    assert "texgs cannot work yet: torch" in capsys.readouterr().err
+
+
+def test_a_broken_probe_does_not_stop_the_others():
+    def broken():
+        raise AttributeError("undefined symbol")
+
+    finding = examine(broken)
+    assert finding.state == "missing"
+    assert "AttributeError: undefined symbol" in finding.found
+    assert finding.is_required
+
+
+def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
+    died = subprocess.CompletedProcess([], returncode=-11, stdout="", stderr="")
+    monkeypatch.setattr(subprocess, "run", lambda *_args, **_kwargs: died)
+    finding = probes.opengl()
+    assert finding.state == "missing"
+    assert "signal 11" in finding.found
+    assert "libegl1" in finding.advice
+
+
+def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
+    file = tmp_path / "file"
+    file.touch()
+    monkeypatch.setenv("TEXGS_CACHE", str(file / "cache"))
+    finding = probes.cache()
+    assert finding.state == "missing"
+    assert "TEXGS_CACHE" in finding.advice
+
+
+@pytest.mark.parametrize("names", [[], ["a.safetensors", "b.pt"]])
+def test_weights_are_listed(monkeypatch, tmp_path, names):
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path))
+    for name in names:
+        (tmp_path / name).touch()
+    finding = probes.weights()
+    assert finding.state == ("ok" if names else "missing")
+    assert all(name in finding.found for name in names)

@@ -1,0 +1,150 @@
+"""The questions `texgs doctor` asks the machine. No probe raises; an answer is a `Finding`."""
+
+import os
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from typing import Literal
+
+from texgs.core.errors import TexgsError
+from texgs.core.folders import cache_folder, weights_folder
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report."""
+
+    name: str
+    state: Literal["ok", "warning", "missing"]
+    found: str
+    advice: str = ""  # what to do; empty where nothing has to be done
+    is_required: bool = False  # texgs cannot work without it
+
+
+def python() -> Finding:
+    """Whether this Python is one texgs is tested with."""
+    found = f"{platform.python_version()} on {platform.machine()} {platform.system()}"
+    if (3, 11) <= sys.version_info[:2] <= (3, 13):
+        return Finding("Python", "ok", found)
+    return Finding("Python", "missing", found, "install Python 3.11 to 3.13", is_required=True)
+
+
+def compiler() -> Finding:
+    """The C++ compiler: needed to build from source only."""
+    candidates = [os.environ.get("CXX", ""), "c++", "g++", "clang++", "cl"]
+    path = next((found for name in candidates if name and (found := shutil.which(name))), None)
+    if path is None:
+        advice = "install g++ 11, clang++ 14 or Visual Studio 2022 to build texgs from source"
+        return Finding("C++ compiler", "warning", "not found", advice)
+    return Finding("C++ compiler", "ok", path)
+
+
+def native() -> Finding:
+    """The native library: whether it loads, and the instruction set it uses here."""
+    try:
+        from texgs.raster import native
+
+        found = f"{native.instruction_set()}, {native.library_path()}"
+    except ImportError as error:
+        return Finding("native library", "missing", _sentence(error), "see torch below", is_required=True)
+    except TexgsError as error:
+        what, _, advice = str(error).partition("; ")
+        return Finding("native library", "missing", what, advice, is_required=True)
+    return Finding("native library", "ok", found)
+
+
+def threads() -> Finding:
+    """How many threads the native library uses, of how many processors."""
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        from texgs.raster import native
+
+        used = native.threads()
+    except (ImportError, TexgsError) as error:
+        return Finding("threads", "warning", f"unknown, {_sentence(error)}")
+    found = f"{used} of {available} processors"
+    if used < available:
+        return Finding("threads", "warning", found, "set OMP_NUM_THREADS or torch.set_num_threads to use all")
+    return Finding("threads", "ok", found)
+
+
+def torch() -> Finding:
+    """The version of torch, and the GPU it sees."""
+    try:
+        import torch
+    except (ImportError, OSError) as error:
+        advice = "pip install torch"
+        return Finding("torch", "missing", _sentence(error), advice, is_required=True)
+    if torch.cuda.is_available():
+        return Finding("torch", "ok", f"{torch.__version__}, {torch.cuda.get_device_name()}")
+    if shutil.which("nvidia-smi"):
+        advice = "install a CUDA build of torch to use this machine's GPU, see pytorch.org"
+        return Finding("torch", "warning", f"{torch.__version__} does not see the GPU", advice)
+    return Finding("torch", "ok", f"{torch.__version__}, no GPU, everything runs on the CPU")
+
+
+def cuda() -> Finding:
+    """The CUDA library: only of use with a GPU that torch sees."""
+    advice = "only needed for a GPU: put nvcc (CUDA 12 or newer) on the PATH and install texgs again"
+    try:
+        from texgs.raster import native
+
+        path = native.library_path("cuda")
+        if not path.exists():
+            return Finding("CUDA library", "missing", "not built", advice)
+        return Finding("CUDA library", "ok", f"{native.instruction_set('cuda')}, {path}")
+    except (ImportError, TexgsError) as error:
+        return Finding("CUDA library", "missing", _sentence(error), advice)
+
+
+def opengl() -> Finding:
+    """Offscreen OpenGL, tried in a child process: where drivers are incomplete it dies instead of failing."""
+    advice = (
+        "only needed to render volumes: install libegl1, libegl-mesa0 and libgl1-mesa-dri, or libosmesa6 "
+        "with VTK_DEFAULT_OPENGL_WINDOW=vtkOSOpenGLRenderWindow"
+    )
+    command = [sys.executable, "-m", "texgs.cli.opengl"]
+    try:
+        child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    except subprocess.TimeoutExpired:
+        return Finding("offscreen OpenGL", "missing", "no answer within 60 s", advice)
+    lines = (child.stdout if child.returncode == 0 else child.stderr).strip().splitlines()
+    if child.returncode == 0 and lines:
+        return Finding("offscreen OpenGL", "ok", lines[-1])
+    crash = f"the probe died of signal {-child.returncode}" if child.returncode < 0 else "the probe failed"
+    return Finding("offscreen OpenGL", "missing", lines[-1] if lines else crash, advice)
+
+
+def cache() -> Finding:
+    """Whether the cache folder can be written to."""
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        advice = "set TEXGS_CACHE to a folder you can write to"
+        return Finding("cache", "missing", f"{folder}: {error.strerror}", advice, is_required=True)
+    return Finding("cache", "ok", str(folder))
+
+
+def weights() -> Finding:
+    """The files with weights of pretrained models; without them their offline counterparts are used."""
+    folder = weights_folder()
+    suffixes = {".safetensors", ".pt", ".pth"}
+    names = sorted(path.name for path in folder.glob("*") if path.suffix in suffixes)
+    if not names:
+        advice = "optional: put weights there or set TEXGS_WEIGHTS to the folder that holds them"
+        return Finding("weights", "missing", f"none in {folder}", advice)
+    return Finding("weights", "ok", f"{', '.join(names)} in {folder}")
+
+
+def _sentence(error: BaseException) -> str:
+    """The first line of an error's message."""
+    return (str(error) or type(error).__name__).splitlines()[0]
+
+
+PROBES = (python, compiler, native, threads, torch, cuda, opengl, cache, weights)
