@@ -149,7 +149,8 @@ def _collect(
     for name, tensor in tensors.items():
         if tensor is not None:
             check.floating(name, tensor)
-    check.same_device(**tensors)
+    device = check.same_device(**tensors)
+    native.require_memory(BYTES_PER_SURFEL * sizes["N"], device)
     return {name: None if x is None else x.contiguous() for name, x in tensors.items()}
 
 
@@ -203,7 +204,7 @@ def _view(
     if options.check_finite:
         check.finite(**surfels, **camera)
     planes = channels + 3 * len(outputs) + 2
-    native.require_memory(4 * planes * width * height + BYTES_PER_SURFEL * len(means), means.device)
+    native.require_memory(4 * planes * width * height, means.device)
     layout = (None, None) if texture is None else (texture.sizes.contiguous(), texture.offsets.contiguous())
     dense = {name: x.detach().contiguous() for name, x in camera.items()}
     return View(

@@ -1,50 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// The C interface: checks, the pool of frames, and exceptions turned into status codes.
-#include <exception>
+// The C interface: checks, and the pool of frames.
 #include <memory>
 #include <mutex>
-#include <new>
-#include <string>
 #include <vector>
 
-#include "../texgs.h"
 #include "dispatch.h"
 #include "frame.h"
+#include "status.h"
 
 using namespace texgs;
 
 namespace {
-
-thread_local std::string error;
-thread_local int64_t bytes_needed = 0;
-
-struct InvalidArgument {
-    const char* what;
-};
-void require(bool condition, const char* what) {
-    if (!condition) throw InvalidArgument{what};
-}
-
-template <class Body>
-int32_t guarded(Body body) {
-    try {
-        body();
-        return TEXGS_OK;
-    } catch (const InvalidArgument& e) {
-        error = e.what;
-        return TEXGS_INVALID_ARGUMENT;
-    } catch (const OutOfMemory& e) {
-        bytes_needed = e.bytes;
-        error = "not enough memory: this needs " + std::to_string(e.bytes) + " bytes more";
-        return TEXGS_OUT_OF_MEMORY;
-    } catch (const std::bad_alloc&) {
-        error = "not enough memory";
-        return TEXGS_OUT_OF_MEMORY;
-    } catch (const std::exception& e) {
-        error = e.what();
-        return TEXGS_DEVICE_ERROR;
-    }
-}
 
 // Frames whose buffers wait to be used again. A few are enough; more would only hold memory.
 class FramePool {
@@ -72,8 +38,10 @@ FramePool& pool() {
 
 void check(const texgs_surfels& s, const texgs_camera& c, const texgs_options& o) {
     require(s.n >= 0 && s.n < (int64_t(1) << 31), "surfels: expected fewer than 2^31");
-    require(s.means && s.quats && s.scales && s.opacities, "surfels: means, quats, scales and opacities are needed");
-    require((s.features != nullptr) != (s.base != nullptr), "surfels: give either features or a texture");
+    const bool some = s.n > 0;  // memory of no elements may have no address
+    require(!some || (s.means && s.quats && s.scales && s.opacities),
+            "surfels: means, quats, scales and opacities are needed");
+    require(!some || (s.features != nullptr) != (s.base != nullptr), "surfels: give either features or a texture");
     require(s.channels >= 1 && s.channels <= TEXGS_MAX_CHANNELS, "channels: expected 1 to 32");
     require(!s.base || (s.channels == 3 && s.gain && s.texels && s.sizes && s.offsets),
             "texture: base, gain, texels, sizes and offsets are needed, with 3 channels");
@@ -90,8 +58,8 @@ void check(const texgs_surfels& s, const texgs_camera& c, const texgs_options& o
 }  // namespace
 
 int32_t texgs_abi_version(void) { return TEXGS_ABI_VERSION; }
-const char* texgs_error(void) { return error.c_str(); }
-int64_t texgs_bytes_needed(void) { return bytes_needed; }
+const char* texgs_error(void) { return last_error.c_str(); }
+int64_t texgs_bytes_needed(void) { return last_bytes_needed; }
 int64_t texgs_memory(int32_t reset) { return memory_peak(reset != 0); }
 
 const char* texgs_instruction_set(void) {

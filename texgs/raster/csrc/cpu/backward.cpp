@@ -16,7 +16,11 @@ namespace {
 
 constexpr int kGeometrySums = 11;  // Moments without zc, zp and normal
 constexpr int kDepthSums = 2;      // zc, zp
-constexpr int kOwnChannels[2] = {16 - kGeometrySums, 16 - kGeometrySums - kDepthSums};  // in the first line of a slot
+constexpr int kTakenAlong = 16 - kGeometrySums;  // channels in the first line of a slot
+
+bool takes_channels_along(const Raster& r, bool more_than_channels) {
+    return !more_than_channels && r.channels <= kTakenAlong;
+}
 
 // Gradients of the tile's pixels, and what else q depends on.
 struct alignas(64) PixelGradients {
@@ -128,6 +132,8 @@ void prefetch_gradients(const Raster& r, int tile) {
     if (r.grad.normal) prefetch_planes(r, tile, r.image.normal, 3);
     if (r.grad.alpha) prefetch_planes(r, tile, r.image.alpha, 1);
     prefetch_planes(r, tile, r.grad.alpha, 1);
+    prefetch_planes(r, tile, r.grad.depth, 1);
+    if (r.grad.depth) prefetch_planes(r, tile, r.image.depth, 1);
 }
 
 // -- Per entry, independent of each other -----------------------------------------------------------------------------
@@ -149,37 +155,42 @@ TEXGS_INLINE void evaluate_entries(BackwardScratch& s, const TilePixels& pixels,
         }
 }
 
-// q = dL/dw of each entry from what does not fit into the first line of its slot: N channels at a time.
-template <int N>
-TEXGS_INLINE void weigh_channel_group(BackwardScratch& s, int first) {
-    for (int e = 0; e < s.group.entries; ++e) {
-        const float* value = s.chunk.channels + s.group.surfel[e] * s.chunk.stride + first;
-        for (int part = 0; part < kParts; ++part) {
-            const int pixel = s.group.block[e] * kBlockPixels + part * kLanes, i = e * kParts + part;
-            vf q = load(s.q[i]);
-            for (int c = 0; c < N; ++c) q = fma(load(s.g.channels[first + c] + pixel), value[c], q);
-            store(s.q[i], q);
-        }
-    }
-}
-TEXGS_INLINE void weigh_channels(const Raster& r, BackwardScratch& s, int first) {
-    std::memset(s.q, 0, s.group.entries * kParts * sizeof s.q[0]);
-    for (; r.channels - first >= 4; first += 4) weigh_channel_group<4>(s, first);
-    for (; first < r.channels; ++first) weigh_channel_group<1>(s, first);
+// Depth in normalised device coordinates, 0 at the near and 1 at the far plane, from `origin`.
+TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) {
+    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
+    return fnma(vf(scale * r.options.near_plane), vf(1.0f) / z, scale) - origin;
 }
 
-TEXGS_INLINE void weigh_depth(const Raster& r, BackwardScratch& s) {
-    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
-    for (int e = 0; e < s.group.entries; ++e)
-        for (int part = 0; part < kParts; ++part) {
-            const int i = e * kParts + part, pixel = s.group.block[e] * kBlockPixels + part * kLanes;
-            const vf z = load(s.z[i]);
-            const vf m = fnma(vf(scale * r.options.near_plane), vf(1.0f) / z, scale) - load(s.d.origin + pixel);
-            vf q = fma(load(s.d.depth + pixel), z, load(s.q[i]));
-            q = fma(m, fma(load(s.d.m2 + pixel), m, load(s.d.m + pixel)), q);
-            // alpha 0 also marks entries that are not hit at all, with any z
-            store(s.q[i], select(load(s.alpha[i]) > vf(0.0f), q, 0.0f));
-        }
+// q = dL/dw of each entry from its channels, sixteen at a time: `constant` plus gradient times channel.
+void weigh_channels(const Raster& r, BackwardScratch& s) {
+    for (int first = 0; first < r.channels; first += 16)
+        with_constant<16>(r.channels - first < 16 ? r.channels - first : 16, [&](auto width) {
+            for (int i = 0; i < s.group.entries * kParts; ++i) {
+                const float* value = s.chunk.channels + s.group.surfel[i / kParts] * s.chunk.stride + first;
+                const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
+                vf q = load(first ? s.q[i] : s.g.constant + pixel);
+                for (int c = 0; c < decltype(width)::value; ++c)
+                    q = fma(load(s.g.channels[first + c] + pixel), value[c], q);
+                store(s.q[i], q);
+            }
+        });
+}
+
+// ... and from its depths. Entries with alpha 0 may not be hit at all: their depth is anything.
+TEXGS_INLINE void weigh_depth(BackwardScratch& s) {
+    for (int i = 0; i < s.group.entries * kParts; ++i) {
+        const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
+        const vm hit = load(s.alpha[i]) > vf(0.0f);
+        store(s.q[i], fma_where(hit, load(s.z[i]), load(s.d.depth + pixel), load(s.q[i])));
+    }
+}
+TEXGS_INLINE void weigh_distortion(const Raster& r, BackwardScratch& s) {
+    for (int i = 0; i < s.group.entries * kParts; ++i) {
+        const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
+        const vm hit = load(s.alpha[i]) > vf(0.0f);
+        const vf m = centred_ndc(r, load(s.z[i]), load(s.d.origin + pixel));
+        store(s.q[i], fma_where(hit, m, fma(load(s.d.m2 + pixel), m, load(s.d.m + pixel)), load(s.q[i])));
+    }
 }
 
 TEXGS_INLINE void weigh_texture(BackwardScratch& s) {
@@ -207,23 +218,26 @@ struct Sums {
     vf disc_dx = 0.0f, disc_dy = 0.0f, e = 0.0f, zc = 0.0f, zp = 0.0f;
 };
 
-// dL/dz of fragments, from expected depth, distortion and median.
-TEXGS_INLINE vf depth_gradient(const Raster& r, DepthGradients& g, int pixel, vf z, vf w) {
-    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
-    const vf c1 = scale * r.options.near_plane, inverse = vf(1.0f) / z;
-    const vf m = fnma(c1, inverse, scale) - load(g.origin + pixel);
-    const vf by_m = fma(vf(2.0f) * load(g.m2 + pixel), m, load(g.m + pixel));
-    const vf before = load(g.alpha + pixel), after = before + w;
-    store(g.alpha + pixel, after);
-    // replayed bit for bit, the median is the fragment that brings alpha to where the forward pass took it
-    const vf stop = load(g.median_stop + pixel);
-    const vm is_median = (before < vf(0.5f)) & (after <= stop) & (after >= stop);
-    const vf gz = fma(w, fma(by_m, c1 * inverse * inverse, load(g.depth + pixel)),
-                      zero_unless(is_median, load(g.median + pixel)));
+// dL/dz of fragments, from distortion, median and expected depth.
+TEXGS_INLINE vf depth_gradient(const Raster& r, DepthGradients& d, int pixel, vf z, vf w) {
+    vf by_w = load(d.depth + pixel);
+    if (r.grad.distortion) {
+        const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
+        const vf m = centred_ndc(r, z, load(d.origin + pixel));
+        const vf by_m = fma(vf(2.0f) * load(d.m2 + pixel), m, load(d.m + pixel));
+        by_w = fma(by_m, vf(scale * r.options.near_plane) / (z * z), by_w);
+    }
+    vf gz = w * by_w;
+    if (r.grad.median) {
+        // replayed bit for bit, the median is the fragment that brings alpha to where the forward pass took it
+        const vf before = load(d.alpha + pixel), after = before + w, stop = load(d.median_stop + pixel);
+        store(d.alpha + pixel, after);
+        gz = add_where((before < vf(0.5f)) & (after <= stop) & (after >= stop), gz, load(d.median + pixel));
+    }
     return zero_unless(w > vf(0.0f), gz);
 }
 
-// Adds the fragments of one vector of pixels; `q` is what their channels contribute to dL/dw. Returns the weights.
+// Adds the fragments of one vector of pixels; `q` is dL/dw. Returns the weights.
 template <bool Depth, bool Textured>
 TEXGS_INLINE vf add_entry(const Raster& r, BackwardScratch& s, const Limits& limits, unsigned flags, int i, int pixel,
                           vf dx, vf dy, vf q, Sums& sums) {
@@ -266,58 +280,52 @@ TEXGS_INLINE vf add_entry(const Raster& r, BackwardScratch& s, const Limits& lim
     return b.weight;
 }
 
-// Sums over the surfel's entries, to its slot: geometry, then channels, N of which are in the first line.
+// Sums over the surfel's entries, to its slot: geometry, then channels. Up to five channels can be taken along in
+// the loop over the entries (N of them; all the surfel has). More would not leave registers for the geometry: their q
+// is there already, and their sums follow.
 template <bool Depth, bool Textured, int N>
 TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits,
                              int k) {
     const int begin = s.group.first[k], end = s.group.first[k + 1], place = s.group.place[k];
     const unsigned flags = s.chunk.flags[place];
     const vf cx = s.chunk.records[place].cx, cy = s.chunk.records[place].cy;
-    const bool has_q = Depth || Textured || r.channels > N;  // besides the N channels
+    const float* value = s.chunk.channels + place * s.chunk.stride;
     Sums a;
-    vf channels[N], values[N];
-    for (int c = 0; c < N; ++c) channels[c] = 0.0f, values[c] = s.chunk.channels[place * s.chunk.stride + c];
+    vf channels[N + 1];
+    for (int c = 0; c < N; ++c) channels[c] = 0.0f;
     for (int e = begin; e < end; ++e)
         for (int part = 0; part < kParts; ++part) {
             const int block = s.group.block[e], i = e * kParts + part, pixel = block * kBlockPixels + part * kLanes;
             const Pixels at = pixels.of(block, part);
-            vf q = load(s.g.constant + pixel);
-            for (int c = 0; c < N; ++c) q = fma(load(s.g.channels[c] + pixel), values[c], q);
-            if (has_q) q += load(s.q[i]);
+            vf q = load(N ? s.g.constant + pixel : s.q[i]);
+            for (int c = 0; c < N; ++c) q = fma(load(s.g.channels[c] + pixel), value[c], q);
             const vf w = add_entry<Depth, Textured>(r, s, limits, flags, i, pixel, at.x - cx, at.y - cy, q, a);
             for (int c = 0; c < N; ++c) channels[c] = fma(w, load(s.g.channels[c] + pixel), channels[c]);
-            if (r.channels > N) store(s.weight[i], w);
+            if constexpr (N == 0) store(s.weight[i], w);
         }
-    constexpr int used = kGeometrySums + (Depth ? kDepthSums : 0);
+    constexpr int used = kGeometrySums + (Depth ? kDepthSums : 0), room = 16 - used;
     vf line[16] = {a.u_dx, a.u_dy, a.u, a.v_dx, a.v_dy, a.v, a.w_dx, a.w_dy, a.disc_dx, a.disc_dy, a.e};
     if constexpr (Depth) line[kGeometrySums] = a.zc, line[kGeometrySums + 1] = a.zp;
-    for (int c = 0; c < N; ++c) line[used + c] = channels[c];
-    for (int c = used + N; c < 16; ++c) line[c] = 0.0f;
+    for (int c = 0; c < room; ++c) line[used + c] = c < N ? channels[c] : vf(0.0f);
     float* slot = r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride;
-    stream_sums(line, slot);
-    for (int c = N; c < r.channels; c += 16) {
-        slot += 16;
-        const int n = r.channels - c < 16 ? r.channels - c : 16;
-        weigh_up_to_16(s.group, begin, end, s.weight[0], s.g.channels[c], n, line);
-        stream_sums(line, slot);
+    if constexpr (N == 0) {
+        const int first = r.channels < room ? r.channels : room;
+        with_constant<room>(first, [&](auto width) {
+            weigh_planes<decltype(width)::value>(s.group, begin, end, s.weight[0], s.g.channels[0], line + used);
+        });
+        stream_planes(s.group, begin, end, s.weight[0], s.g.channels[first], r.channels - first, slot + 16);
     }
-}
-
-template <bool Depth, bool Textured, int N>
-void add_group(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
-    for (int k = 0; k < s.group.surfels; ++k) add_surfel<Depth, Textured, N>(r, s, pixels, limits, k);
+    stream_sums(line, slot);
 }
 
 template <bool Depth, bool Textured>
 TEXGS_INLINE void add_surfels(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
-    constexpr int room = kOwnChannels[Depth];
-    switch (r.channels < room ? r.channels : room) {
-        case 1: return add_group<Depth, Textured, 1>(r, s, pixels, limits);
-        case 2: return add_group<Depth, Textured, 2>(r, s, pixels, limits);
-        case 3: return add_group<Depth, Textured, 3>(r, s, pixels, limits);
-        case 4: return add_group<Depth, Textured, room < 4 ? room : 4>(r, s, pixels, limits);
-        default: return add_group<Depth, Textured, room>(r, s, pixels, limits);
-    }
+    const auto add_all = [&](auto taken_along) {
+        for (int k = 0; k < s.group.surfels; ++k)
+            add_surfel<Depth, Textured, decltype(taken_along)::value>(r, s, pixels, limits, k);
+    };
+    if (!takes_channels_along(r, Depth || Textured)) return add_all(Constant<0>{});
+    if constexpr (!Depth && !Textured) with_constant<kTakenAlong>(r.channels, add_all);
 }
 
 template <bool Depth, bool Textured>
@@ -340,9 +348,10 @@ void replay_tile(const Raster& r, int tile, BackwardScratch& s) {
         for (int next = 0; next < n;) {
             next = s.group.fill(s.chunk, next, n, alive, skip);
             evaluate_entries<Depth>(s, pixels, limits);
-            if (Depth || Textured || r.channels > kOwnChannels[Depth]) weigh_channels(r, s, kOwnChannels[Depth]);
+            if (!takes_channels_along(r, Depth || Textured)) weigh_channels(r, s);
             if constexpr (Textured) weigh_texture(s);
-            if constexpr (Depth) weigh_depth(r, s);
+            if constexpr (Depth) weigh_depth(s);
+            if (r.grad.distortion) weigh_distortion(r, s);
             add_surfels<Depth, Textured>(r, s, pixels, limits);
             alive = still_alive(r, s.transmittance, alive);
         }

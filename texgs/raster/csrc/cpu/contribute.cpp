@@ -44,14 +44,13 @@ void add_surfel(const Raster& r, ContributeScratch& s, const Limits& limits, int
     float* slot = r.slots + int64_t(s.chunk.slots[s.group.place[k]]) * r.slot_stride;
     float only_lane[kLanes] = {largest(most)};  // its sum is the largest
     const int channels = r.contributions.channels, first = channels < 16 - kCounts ? channels : 16 - kCounts;
-    vf line[16 + kCounts] = {sum_w, load(only_lane), pixels};
-    weigh_up_to_16(s.group, begin, end, s.weight[0], s.image[0], first, line + kCounts);
+    vf line[16] = {sum_w, load(only_lane), pixels};
+    for (int c = kCounts + first; c < 16; ++c) line[c] = 0.0f;
+    with_constant<16 - kCounts>(first, [&](auto width) {
+        weigh_planes<decltype(width)::value>(s.group, begin, end, s.weight[0], s.image[0], line + kCounts);
+    });
     stream_sums(line, slot);
-    for (int c = first; c < channels; c += 16) {
-        slot += 16;
-        weigh_up_to_16(s.group, begin, end, s.weight[0], s.image[c], channels - c < 16 ? channels - c : 16, line);
-        stream_sums(line, slot);
-    }
+    stream_planes(s.group, begin, end, s.weight[0], s.image[first], channels - first, slot + 16);
 }
 
 }  // namespace

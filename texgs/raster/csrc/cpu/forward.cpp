@@ -59,57 +59,69 @@ TEXGS_INLINE bool weights(ForwardScratch& s, Batch batch, int pixel, vf limit) {
     return any(T >= limit);
 }
 
-// Expected and median depth, and the moments of the distortion. The fragment before which more than half of the light
-// is left sets the median.
-TEXGS_INLINE void blend_depth(const Raster& r, ForwardScratch& s, Batch batch, int pixel, vf alpha) {
+// -- Depths: each only where it is asked for -------------------------------------------------------------------------
+
+TEXGS_INLINE void blend_expected_depth(ForwardScratch& s, Batch batch, int pixel) {
+    vf depth = load(s.z.depth + pixel);
+    for (int j = 0; j < batch.n; ++j) {
+        const vf w = load(s.weight[j]);
+        depth = fma_where(w > vf(0.0f), load(s.depth[j]), w, depth);  // without weight, depth may not be finite
+    }
+    store(s.z.depth + pixel, depth);
+}
+
+// The fragment before which more than half of the light is left sets the median; `alpha` is that before the batch.
+TEXGS_INLINE void take_median(ForwardScratch& s, Batch batch, int pixel, vf alpha) {
+    vf median = load(s.z.median + pixel), stop = load(s.z.stop + pixel);
+    for (int j = 0; j < batch.n; ++j) {
+        const vf w = load(s.weight[j]);
+        const vm above_half = (w > vf(0.0f)) & (alpha < vf(0.5f));
+        alpha += w;
+        median = select(above_half, load(s.depth[j]), median);
+        stop = select(above_half, alpha, stop);
+    }
+    store(s.z.median + pixel, median), store(s.z.stop + pixel, stop);
+}
+
+// Moments of the depth in normalised device coordinates, about that of the pixel's first fragment: no cancellation.
+TEXGS_INLINE void add_distortion(const Raster& r, ForwardScratch& s, Batch batch, int pixel, vf alpha) {
     const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
-    vf depth = load(s.z.depth + pixel), median = load(s.z.median + pixel), stop = load(s.z.stop + pixel);
     vf m1 = load(s.z.moments[0] + pixel), m2 = load(s.z.moments[1] + pixel), origin = load(s.z.moments[2] + pixel);
     for (int j = 0; j < batch.n; ++j) {
-        const vf w = load(s.weight[j]), z = load(s.depth[j]);
-        const vm counts = w > vf(0.0f), above_half = counts & (alpha < vf(0.5f));
-        const vf m = fnma(vf(scale * r.options.near_plane), vf(1.0f) / z, scale);
-        origin = select(counts & (alpha <= vf(0.0f)), m, origin);  // moments about the first fragment: no cancellation
-        depth = fma_where(counts, z, w, depth);
+        const vf w = load(s.weight[j]);
+        const vm counts = w > vf(0.0f);
+        const vf m = fnma(vf(scale * r.options.near_plane), vf(1.0f) / load(s.depth[j]), scale);
+        origin = select(counts & (alpha <= vf(0.0f)), m, origin);
         const vf centred = m - origin, wm = w * centred;
         m1 = add_where(counts, m1, wm);
         m2 = fma_where(counts, wm, centred, m2);
-        median = select(above_half, z, median);
         alpha += w;
-        stop = select(above_half, alpha, stop);
     }
-    store(s.z.depth + pixel, depth), store(s.z.median + pixel, median), store(s.z.stop + pixel, stop);
     store(s.z.moments[0] + pixel, m1), store(s.z.moments[1] + pixel, m2), store(s.z.moments[2] + pixel, origin);
 }
 
-// Adds weight * channel for N channels that are constant over a surfel.
-template <int N>
-TEXGS_INLINE void blend_group(const ForwardScratch& s, Batch batch, const float* channels, int stride, float* color) {
-    vf sum[N];
-    for (int c = 0; c < N; ++c) sum[c] = load(color + c * kTilePixels);
-    for (int j = 0; j < batch.n; ++j) {
-        const vf w = load(s.weight[j]);
-        const float* value = channels + batch.list[j] * stride;
-        for (int c = 0; c < N; ++c) sum[c] = fma(w, value[c], sum[c]);
-    }
-    for (int c = 0; c < N; ++c) store(color + c * kTilePixels, sum[c]);
+TEXGS_INLINE void blend_depths(const Raster& r, ForwardScratch& s, Batch batch, int pixel, vf alpha) {
+    if (r.image.depth) blend_expected_depth(s, batch, pixel);
+    if (r.image.median) take_median(s, batch, pixel, alpha);
+    if (r.image.distortion) add_distortion(r, s, batch, pixel, alpha);
 }
 
+// -- Channels --------------------------------------------------------------------------------------------------------
+
+// Adds weight * channel for the channels that are constant over a surfel, sixteen at a time.
 TEXGS_INLINE void blend_channels(const Raster& r, ForwardScratch& s, Batch batch, int pixel) {
-    const int n = r.channels, stride = s.chunk.stride;
-    int c = 0;
-    for (; n - c >= 8; c += 8) blend_group<8>(s, batch, s.chunk.channels + c, stride, s.color[c] + pixel);
-    if (n - c >= 4) {
-        blend_group<4>(s, batch, s.chunk.channels + c, stride, s.color[c] + pixel);
-        c += 4;
-    }
-    const float* channels = s.chunk.channels + c;
-    switch (n - c) {
-        case 1: return blend_group<1>(s, batch, channels, stride, s.color[c] + pixel);
-        case 2: return blend_group<2>(s, batch, channels, stride, s.color[c] + pixel);
-        case 3: return blend_group<3>(s, batch, channels, stride, s.color[c] + pixel);
-        default: return;
-    }
+    for (int first = 0; first < r.channels; first += 16)
+        with_constant<16>(r.channels - first < 16 ? r.channels - first : 16, [&](auto width) {
+            constexpr int N = decltype(width)::value;
+            vf sum[N];
+            for (int c = 0; c < N; ++c) sum[c] = load(s.color[first + c] + pixel);
+            for (int j = 0; j < batch.n; ++j) {
+                const vf w = load(s.weight[j]);
+                const float* value = s.chunk.channels + batch.list[j] * s.chunk.stride + first;
+                for (int c = 0; c < N; ++c) sum[c] = fma(w, value[c], sum[c]);
+            }
+            for (int c = 0; c < N; ++c) store(s.color[first + c] + pixel, sum[c]);
+        });
 }
 
 TEXGS_INLINE void blend_texture(ForwardScratch& s, Batch batch, int pixel) {
@@ -137,7 +149,7 @@ TEXGS_INLINE bool blend_part(const Raster& r, ForwardScratch& s, int n, Pixels a
         alive = weights(s, batch, pixel, limits.transmittance_min);
         blend_channels(r, s, batch, pixel);
         if constexpr (Textured) blend_texture(s, batch, pixel);
-        if constexpr (Depth) blend_depth(r, s, batch, pixel, alpha_before);
+        if constexpr (Depth) blend_depths(r, s, batch, pixel, alpha_before);
     }
     return alive;
 }

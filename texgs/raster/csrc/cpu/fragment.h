@@ -108,16 +108,22 @@ struct alignas(64) Chunk {
         for (int i = n; i < kChunk && i % 16; ++i) masks[i] = 0;
         channels = records[0].color;
         stride = sizeof(Record) / sizeof(float);
-        if (r.channels > kRecordChannels) stage_channels(r, n);
+        if (r.channels > kRecordChannels) stage_channels(r, begin, n);
     }
 
 private:
-    void stage_channels(const Raster& r, int n) {
+    void stage_channels(const Raster& r, uint32_t begin, int n) {
         const int own = r.surfels.channels;
+        const uint32_t all = r.tile_begin[r.tiles_x * r.tiles_y];
         const float* from = surfel_channels(r);
         channels = many_channels;
         stride = r.channels;
         for (int i = 0; i < n; ++i) {
+            if (begin + i + kChunk < all) {
+                const int64_t later = r.pairs[begin + i + kChunk].surfel;
+                prefetch(from + later * own);
+                if (r.with_normal) prefetch(r.normals + 3 * later);
+            }
             const int64_t id = surfels[i];
             float* to = many_channels + i * stride;
             for (int c = 0; c < own; ++c) to[c] = from[id * own + c];

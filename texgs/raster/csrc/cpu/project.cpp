@@ -112,7 +112,7 @@ void project_lanes(const Raster& r, const View& view, int64_t first, int n) {
     const Bounds b = bound(q, safe_cut, cx, cy, o.low_pass);
 
     const unsigned visible_bits = bits(visible), behind_bits = bits(b.behind & clip), clip_bits = bits(clip);
-    const unsigned filter_bits = bits(may_be_filtered(b, f, o));
+    const unsigned filter_bits = bits(clip | may_be_filtered(b, f, o));
     // A surfel seen edge-on is its disc: forms so steep that rho_surfel never wins.
     const vm edge_on = q.scale * q.scale <= vf(0.0f);
     const vf steep = vf(1e4f) * sqrt(vf(o.low_pass));

@@ -126,7 +126,18 @@ TEXGS_INLINE void stream_zeros(float* out, int n) {
     for (int k = 0; k < n; k += kLanes) stream(out + k, 0.0f);
 }
 
-// Sum over a surfel's entries of weight * plane for N planes; `weights` holds a vector per entry and part.
+// Calls body with n, 1 to Most, as a constant: loops over channels unroll, and their sums stay in registers.
+template <int N>
+struct Constant {
+    static constexpr int value = N;
+};
+template <int Most, class Body>
+TEXGS_INLINE void with_constant(int n, Body body) {
+    if (n == Most) return body(Constant<Most>{});
+    if constexpr (Most > 1) with_constant<Most - 1>(n, body);
+}
+
+// Sums over a surfel's entries of weight * plane for N planes; `weights` holds a vector per entry and part.
 template <int N>
 TEXGS_INLINE void weigh_planes(const Group& group, int begin, int end, const float* weights, const float* planes,
                                vf sums[N]) {
@@ -139,14 +150,17 @@ TEXGS_INLINE void weigh_planes(const Group& group, int begin, int end, const flo
         }
 }
 
-// The same for n <= 16 planes, the rest of `sums` zero.
-TEXGS_INLINE void weigh_up_to_16(const Group& group, int begin, int end, const float* weights, const float* planes,
-                                 int n, vf sums[16]) {
-    for (int c = 0; c < 16; ++c) sums[c] = 0.0f;
-    int c = 0;
-    for (; n - c >= 4; c += 4)
-        weigh_planes<4>(group, begin, end, weights, planes + c * kTilePixels, sums + c);
-    for (; c < n; ++c) weigh_planes<1>(group, begin, end, weights, planes + c * kTilePixels, sums + c);
+// The sums for n planes, 16 to a line of the slot at `out`.
+TEXGS_INLINE void stream_planes(const Group& group, int begin, int end, const float* weights, const float* planes,
+                                int n, float* out) {
+    for (; n > 0; n -= 16, planes += 16 * kTilePixels, out += 16)
+        with_constant<16>(n < 16 ? n : 16, [&](auto width) {
+            constexpr int N = decltype(width)::value;
+            vf line[16];
+            weigh_planes<N>(group, begin, end, weights, planes, line);
+            for (int c = N; c < 16; ++c) line[c] = 0.0f;
+            stream_sums(line, out);
+        });
 }
 
 }  // namespace

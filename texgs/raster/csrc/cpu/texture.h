@@ -32,6 +32,9 @@ struct alignas(64) TextureTables {
     TextureTable of[kChunk];
     float planes[kChunk * 3 * kRegisterTexels + 16];
 
+    // Sizes and gains of the chunk's first n surfels.
+    void stage_layout(const Raster& r, const Chunk& chunk, int n);
+    // The same and the texels.
     void stage(const Raster& r, const Chunk& chunk, int n);
 };
 
@@ -55,7 +58,7 @@ TEXGS_INLINE void deinterleave(const float* from, int n, float* x, float* y, flo
 }
 #endif
 
-inline void TextureTables::stage(const Raster& r, const Chunk& chunk, int n) {
+inline void TextureTables::stage_layout(const Raster& r, const Chunk& chunk, int n) {
     for (int i = 0; i < n; ++i) {
         const int64_t id = chunk.surfels[i];
         const int columns = r.surfels.sizes[2 * id], rows = r.surfels.sizes[2 * id + 1];
@@ -64,16 +67,25 @@ inline void TextureTables::stage(const Raster& r, const Chunk& chunk, int n) {
         t.columns = static_cast<float>(columns), t.rows = static_cast<float>(rows), t.gain = r.surfels.gain[id];
         t.step_x = columns > 1 ? 1 : 0, t.step_y = rows > 1 ? columns : 0;
         t.registers = registers_for(columns * rows);
-#if defined(TEXGS_AVX512)
-        if (t.registers) {
-            const int count = columns * rows, plane = 16 * t.registers;
-            float* to = planes + i * 3 * kRegisterTexels;
-            for (int k = 0; k < count; k += 16)
-                deinterleave(t.texels + 3 * k, count - k, to + k, to + plane + k, to + 2 * plane + k);
-            t.texels = to;
-        }
-#endif
     }
+}
+
+inline void TextureTables::stage(const Raster& r, const Chunk& chunk, int n) {
+    stage_layout(r, chunk, n);
+#if defined(TEXGS_AVX512)
+    constexpr int ahead = 8;  // texels lie anywhere
+    for (int i = 0; i < n; ++i) {
+        TextureTable& t = of[i];
+        if (i + ahead < n)
+            for (int k = 0; k < 3 * of[i + ahead].registers; ++k) prefetch(of[i + ahead].texels + 16 * k);
+        if (!t.registers) continue;
+        const int count = static_cast<int>(t.columns * t.rows), plane = 16 * t.registers;
+        float* to = planes + i * 3 * kRegisterTexels;
+        for (int k = 0; k < count; k += 16)
+            deinterleave(t.texels + 3 * k, count - k, to + k, to + plane + k, to + 2 * plane + k);
+        t.texels = to;
+    }
+#endif
 }
 
 // Where fragments fall in a texture: the first of four texels, and the weights of its neighbours along x and y.
@@ -99,18 +111,17 @@ TEXGS_INLINE TexelCoordinates texel_coordinates(const TextureTable& t, vf u, vf 
     return c;
 }
 
-// One channel at texels `index`.
+// One channel at texels `index`, from so many registers; 0: gathered.
+template <int Registers>
 TEXGS_INLINE vf lookup(const TextureTable& t, int channel, vi index) {
 #if defined(TEXGS_AVX512)
-    if (t.registers) {
-        const float* plane = t.texels + channel * 16 * t.registers;
-        const __m512 a = _mm512_loadu_ps(plane);
-        if (t.registers == 1) return _mm512_permutexvar_ps(index.v, a);
-        const __m512 low = _mm512_permutex2var_ps(a, index.v, _mm512_loadu_ps(plane + 16));
-        if (t.registers == 2) return low;
-        const __mmask16 upper = _mm512_test_epi32_mask(index.v, _mm512_set1_epi32(32));
-        const __m512 high = _mm512_permutex2var_ps(_mm512_loadu_ps(plane + 32), index.v, _mm512_loadu_ps(plane + 48));
-        return _mm512_mask_mov_ps(low, upper, high);
+    const float* plane = t.texels + channel * 16 * Registers;
+    if constexpr (Registers == 1) return _mm512_permutexvar_ps(index.v, load(plane).v);
+    if constexpr (Registers == 2) return _mm512_permutex2var_ps(load(plane).v, index.v, load(plane + 16).v);
+    if constexpr (Registers == 4) {
+        const __m512 low = _mm512_permutex2var_ps(load(plane).v, index.v, load(plane + 16).v);
+        const __m512 high = _mm512_permutex2var_ps(load(plane + 32).v, index.v, load(plane + 48).v);
+        return _mm512_mask_mov_ps(low, _mm512_test_epi32_mask(index.v, _mm512_set1_epi32(32)), high);
     }
 #endif
     return gather(t.texels + channel, index * splat(3));
@@ -119,31 +130,51 @@ TEXGS_INLINE vf lookup(const TextureTable& t, int channel, vi index) {
 struct Taps {
     vf t00, t10, t01, t11;
 };
+template <int Registers>
 TEXGS_INLINE Taps taps(const TextureTable& t, int channel, vi first) {
     const vi right = first + splat(t.step_x);
-    return {lookup(t, channel, first), lookup(t, channel, right), lookup(t, channel, first + splat(t.step_y)),
-            lookup(t, channel, right + splat(t.step_y))};
+    return {lookup<Registers>(t, channel, first), lookup<Registers>(t, channel, right),
+            lookup<Registers>(t, channel, first + splat(t.step_y)),
+            lookup<Registers>(t, channel, right + splat(t.step_y))};
 }
 
 TEXGS_INLINE vf mix(vf a, vf b, vf f) { return fma(f, b - a, a); }
 
-TEXGS_INLINE void sample(const TextureTable& t, const TexelCoordinates& at, vf texel[3]) {
-    for (int c = 0; c < 3; ++c) {
-        const Taps k = taps(t, c, at.first);
-        texel[c] = mix(mix(k.t00, k.t10, at.fx), mix(k.t01, k.t11, at.fx), at.fy);
+// Calls use(channel, taps) for the three channels.
+template <class Use>
+TEXGS_INLINE void for_taps(const TextureTable& t, vi first, Use use) {
+    switch (t.registers) {
+#if defined(TEXGS_AVX512)
+        case 1:
+            for (int c = 0; c < 3; ++c) use(c, taps<1>(t, c, first));
+            return;
+        case 2:
+            for (int c = 0; c < 3; ++c) use(c, taps<2>(t, c, first));
+            return;
+        case 4:
+            for (int c = 0; c < 3; ++c) use(c, taps<4>(t, c, first));
+            return;
+#endif
+        default:
+            for (int c = 0; c < 3; ++c) use(c, taps<0>(t, c, first));
     }
+}
+
+TEXGS_INLINE void sample(const TextureTable& t, const TexelCoordinates& at, vf texel[3]) {
+    for_taps(t, at.first, [&](int c, const Taps& k) {
+        texel[c] = mix(mix(k.t00, k.t10, at.fx), mix(k.t01, k.t11, at.fx), at.fy);
+    });
 }
 
 // The same with the derivatives of each channel by u and v.
 TEXGS_INLINE void sample_with_slope(const TextureTable& t, const TexelCoordinates& at, vf texel[3], vf by_u[3],
                                     vf by_v[3]) {
-    for (int c = 0; c < 3; ++c) {
-        const Taps k = taps(t, c, at.first);
+    for_taps(t, at.first, [&](int c, const Taps& k) {
         const vf top = mix(k.t00, k.t10, at.fx), bottom = mix(k.t01, k.t11, at.fx);
         texel[c] = mix(top, bottom, at.fy);
         by_u[c] = zero_unless(at.free_x, mix(k.t10 - k.t00, k.t11 - k.t01, at.fy) * vf(t.columns / 6.0f));
         by_v[c] = zero_unless(at.free_y, (bottom - top) * vf(t.rows / 6.0f));
-    }
+    });
 }
 
 }  // namespace

@@ -11,14 +11,20 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
+// The pixels of one surfel that got a weight: where they fall in its texture, and weight * gradient.
+struct Touches {
+    int n;
+    float x[kTilePixels + 16], y[kTilePixels + 16], g[3][kTilePixels + 16];
+};
+
 struct alignas(64) TextureScratch {
     Chunk chunk;
     TextureTables textures;
     Group group;
+    Touches touches;
     float gradient[3][kTilePixels];
     float transmittance[kTilePixels];
     float alpha[kVectors][kLanes], x[kVectors][kLanes], y[kVectors][kLanes];
-    float weighted[kVectors][3][kLanes];  // weight * gradient
 };
 
 TEXGS_INLINE void evaluate_entries(TextureScratch& s, const TilePixels& pixels, const Limits& limits) {
@@ -43,32 +49,27 @@ TEXGS_INLINE float* take(TexelArena& arena, int64_t floats) {
     return part;
 }
 
-// Blends the surfel's entries; returns whether any pixel got a weight.
-TEXGS_INLINE bool weigh_surfel(TextureScratch& s, const Limits& limits, int begin, int end) {
-    vf most = 0.0f;
+// Blends the surfel's entries and gathers the pixels that show it.
+TEXGS_INLINE void blend_surfel(TextureScratch& s, const Limits& limits, int begin, int end) {
+    Touches& t = s.touches;
+    int n = 0;
     for (int e = begin; e < end; ++e)
         for (int part = 0; part < kParts; ++part) {
             const int i = e * kParts + part, pixel = s.group.block[e] * kBlockPixels + part * kLanes;
             const vf w = blend(load(s.alpha[i]), s.transmittance + pixel, limits).weight;
-            most = max(most, w);
-            store(s.alpha[i], w);
-            for (int c = 0; c < 3; ++c) store(s.weighted[i][c], w * load(s.gradient[c] + pixel));
+            const vm hit = w > vf(0.0f);
+            store_chosen(t.x + n, load(s.x[i]), hit);
+            store_chosen(t.y + n, load(s.y[i]), hit);
+            for (int c = 0; c < 3; ++c) store_chosen(t.g[c] + n, w * load(s.gradient[c] + pixel), hit);
+            n += count(hit);
         }
-    return any(most > vf(0.0f));
-}
-
-// Calls visit(vector, lane) for every pixel with a weight.
-template <class Visit>
-TEXGS_INLINE void for_pixels(const TextureScratch& s, int begin, int end, Visit visit) {
-    for (int i = begin * kParts; i < end * kParts; ++i)
-        for (unsigned hit = bits(load(s.alpha[i]) > vf(0.0f)); hit; hit &= hit - 1)
-            visit(i, __builtin_ctz(hit));
+    t.n = n;
 }
 
 #if defined(TEXGS_AVX512)
 // Small textures live in registers, a lane per texel: a pixel's bilinear weights are a product of two tents.
 template <int Registers>
-TEXGS_INLINE void add_to_registers(const TextureScratch& s, const TextureTable& table, int begin, int end, float* out) {
+TEXGS_INLINE void add_to_registers(const Touches& t, const TextureTable& table, float* out) {
     vf column[Registers], row[Registers], sum[3][Registers];
     for (int k = 0; k < Registers; ++k) {
         const vf texel = to_float(iota()) + vf(16.0f * k);
@@ -76,91 +77,123 @@ TEXGS_INLINE void add_to_registers(const TextureScratch& s, const TextureTable& 
         column[k] = fnma(row[k], table.columns, texel);
         for (int c = 0; c < 3; ++c) sum[c][k] = 0.0f;
     }
-    for_pixels(s, begin, end, [&](int i, int lane) {
-        const vf x = s.x[i][lane], y = s.y[i][lane];
-        const vf gx = s.weighted[i][0][lane], gy = s.weighted[i][1][lane], gz = s.weighted[i][2][lane];
+    for (int i = 0; i < t.n; ++i) {
+        const vf x = t.x[i], y = t.y[i], g[3] = {t.g[0][i], t.g[1][i], t.g[2][i]};
         for (int k = 0; k < Registers; ++k) {
             const vf tent = max(vf(1.0f) - abs(x - column[k]), 0.0f) * max(vf(1.0f) - abs(y - row[k]), 0.0f);
-            sum[0][k] = fma(tent, gx, sum[0][k]);
-            sum[1][k] = fma(tent, gy, sum[1][k]);
-            sum[2][k] = fma(tent, gz, sum[2][k]);
+            for (int c = 0; c < 3; ++c) sum[c][k] = fma(tent, g[c], sum[c][k]);
         }
-    });
+    }
     for (int c = 0; c < 3; ++c)
         for (int k = 0; k < Registers; ++k) stream(out + 16 * (c * Registers + k), sum[c][k]);
 }
 #endif
 
 // Bounds of the texels that the surfel's pixels in this tile touch.
-TEXGS_INLINE TexelPart touched_part(const TextureScratch& s, const TextureTable& table, int begin, int end) {
-    vf low_x = 1e9f, low_y = 1e9f, high_x = 0.0f, high_y = 0.0f;
-    for (int i = begin * kParts; i < end * kParts; ++i) {
-        const vm hit = load(s.alpha[i]) > vf(0.0f);
-        const vf x = load(s.x[i]), y = load(s.y[i]);
-        low_x = select(hit, min(low_x, x), low_x), high_x = select(hit, max(high_x, x), high_x);
-        low_y = select(hit, min(low_y, y), low_y), high_y = select(hit, max(high_y, y), high_y);
+TexelPart touched_part(const Touches& t, const TextureTable& table) {
+    float low_x = t.x[0], low_y = t.y[0], high_x = t.x[0], high_y = t.y[0];
+    for (int i = 1; i < t.n; ++i) {
+        low_x = t.x[i] < low_x ? t.x[i] : low_x, high_x = t.x[i] > high_x ? t.x[i] : high_x;
+        low_y = t.y[i] < low_y ? t.y[i] : low_y, high_y = t.y[i] > high_y ? t.y[i] : high_y;
     }
+    const int columns = static_cast<int>(table.columns), rows = static_cast<int>(table.rows);
+    const int right = static_cast<int>(high_x) + 2, bottom = static_cast<int>(high_y) + 2;
     TexelPart part{};
-    part.column = static_cast<int32_t>(-largest(-low_x)), part.row = static_cast<int32_t>(-largest(-low_y));
-    const int last_column = static_cast<int>(largest(high_x)) + 1, last_row = static_cast<int>(largest(high_y)) + 1;
-    part.columns = (last_column < table.columns ? last_column + 1 : static_cast<int>(table.columns)) - part.column;
-    part.rows = (last_row < table.rows ? last_row + 1 : static_cast<int>(table.rows)) - part.row;
+    part.column = static_cast<int>(low_x), part.row = static_cast<int>(low_y);
+    part.columns = (right < columns ? right : columns) - part.column;
+    part.rows = (bottom < rows ? bottom : rows) - part.row;
     return part;
 }
 
 // Larger ones are scattered to memory: four floats a texel.
-void add_to_memory(const TextureScratch& s, const TexelPart& part, int begin, int end) {
+void add_to_memory(const Touches& t, const TexelPart& part) {
     std::memset(part.sums, 0, sizeof(float) * 4 * part.columns * part.rows);
-    for_pixels(s, begin, end, [&](int i, int lane) {
-        const float x = s.x[i][lane] - part.column, y = s.y[i][lane] - part.row;
+    for (int i = 0; i < t.n; ++i) {
+        const float x = t.x[i] - part.column, y = t.y[i] - part.row;
         const int column = static_cast<int>(x), row = static_cast<int>(y);
         const float fx = x - column, fy = y - row;
-        const float g[4] = {s.weighted[i][0][lane], s.weighted[i][1][lane], s.weighted[i][2][lane], 0.0f};
+        const float g[4] = {t.g[0][i], t.g[1][i], t.g[2][i], 0.0f};
         const auto add = [&](int right, int down, float weight) {
-            if (column + right >= part.columns || row + down >= part.rows) return;  // weight 0 at the border
             float* texel = part.sums + 4 * ((row + down) * part.columns + column + right);
             for (int c = 0; c < 4; ++c) texel[c] += weight * g[c];
         };
-        add(0, 0, (1 - fx) * (1 - fy)), add(1, 0, fx * (1 - fy));
-        add(0, 1, (1 - fx) * fy), add(1, 1, fx * fy);
-    });
+        // at the border there is no neighbour, and its weight is 0
+        const int right = column + 1 < part.columns, down = row + 1 < part.rows;
+        add(0, 0, (1 - fx) * (1 - fy)), add(right, 0, fx * (1 - fy));
+        add(0, down, (1 - fx) * fy), add(right, down, fx * fy);
+    }
 }
 
 void add_surfel(const Raster& r, TextureScratch& s, const Limits& limits, TexelArena& arena, int k) {
     const int begin = s.group.first[k], end = s.group.first[k + 1], place = s.group.place[k];
-    if (!weigh_surfel(s, limits, begin, end)) return;
+    blend_surfel(s, limits, begin, end);
+    if (!s.touches.n) return;
     const TextureTable& table = s.textures.of[place];
     TexelPart part{};
 #if defined(TEXGS_AVX512)
     if (table.registers) {
         part.sums = take(arena, 48 * table.registers);
         if (!part.sums) return;
-        if (table.registers == 1) add_to_registers<1>(s, table, begin, end, part.sums);
-        if (table.registers == 2) add_to_registers<2>(s, table, begin, end, part.sums);
-        if (table.registers == 4) add_to_registers<4>(s, table, begin, end, part.sums);
+        if (table.registers == 1) add_to_registers<1>(s.touches, table, part.sums);
+        if (table.registers == 2) add_to_registers<2>(s.touches, table, part.sums);
+        if (table.registers == 4) add_to_registers<4>(s.touches, table, part.sums);
     }
 #endif
     if (!table.registers) {
-        part = touched_part(s, table, begin, end);
+        part = touched_part(s.touches, table);
         part.sums = take(arena, 4 * part.columns * part.rows);
         if (!part.sums) return;
-        add_to_memory(s, part, begin, end);
+        add_to_memory(s.touches, part);
     }
     r.texel_parts[s.chunk.slots[place]] = part;
 }
 
-// Adds one pair's texels to `out` [columns * rows, 3].
-void add_part(const TexelPart& part, int registers, int columns, int count, float* out) {
-    if (registers) {
-        for (int c = 0; c < 3; ++c)
-            for (int k = 0; k < count; ++k) out[3 * k + c] += part.sums[16 * registers * c + k];
-        return;
+#if defined(TEXGS_AVX512)
+// Sums the planes of pairs [begin, end), interleaved to `out` [count, 3].
+template <int Registers>
+TEXGS_INLINE void sum_registers(const TexelPart* parts, uint32_t begin, uint32_t end, int count, float* out) {
+    constexpr int n = 3 * Registers;
+    vf sums[n];
+    for (int k = 0; k < n; ++k) sums[k] = 0.0f;
+    for (uint32_t slot = begin; slot < end; ++slot)
+        if (const float* from = parts[slot].sums)
+            for (int k = 0; k < n; ++k) sums[k] += load(from + 16 * k);
+    float planes[16 * n];
+    for (int k = 0; k < n; ++k) store(planes + 16 * k, sums[k]);
+    for (int k = 0; k < count; ++k)
+        for (int c = 0; c < 3; ++c) out[3 * k + c] = planes[16 * Registers * c + k];
+}
+#endif
+
+TEXGS_INLINE void sum_memory(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out) {
+    std::memset(out, 0, sizeof(float) * 3 * count);
+    for (uint32_t slot = begin; slot < end; ++slot) {
+        const TexelPart& part = parts[slot];
+        if (!part.sums) continue;
+        for (int y = 0; y < part.rows; ++y) {
+            float* to = out + 3 * (int64_t(part.row + y) * columns + part.column);
+            const float* from = part.sums + 4 * int64_t(y) * part.columns;
+            for (int x = 0; x < part.columns; ++x)
+                for (int c = 0; c < 3; ++c) to[3 * x + c] += from[4 * x + c];
+        }
     }
-    for (int y = 0; y < part.rows; ++y)
-        for (int x = 0; x < part.columns; ++x)
-            for (int c = 0; c < 3; ++c)
-                out[3 * (int64_t(part.row + y) * columns + part.column + x) + c] +=
-                    part.sums[4 * (y * part.columns + x) + c];
+}
+
+TEXGS_INLINE void sum_parts(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out) {
+    switch (registers_for(count)) {
+#if defined(TEXGS_AVX512)
+        case 1: return sum_registers<1>(parts, begin, end, count, out);
+        case 2: return sum_registers<2>(parts, begin, end, count, out);
+        case 4: return sum_registers<4>(parts, begin, end, count, out);
+#endif
+        default: return sum_memory(parts, begin, end, columns, count, out);
+    }
+}
+
+// Asks for the sums of the surfels to come: they lie in the order of the tiles.
+TEXGS_INLINE void prefetch_part(const Raster& r, uint32_t slot, int lines) {
+    if (slot >= r.slot_begin[r.surfels.n] || !r.texel_parts[slot].sums) return;
+    for (int k = 0; k < lines; ++k) prefetch(r.texel_parts[slot].sums + 16 * k);
 }
 
 }  // namespace
@@ -180,7 +213,7 @@ void texture_backward_tile(const Raster& r, int tile, void* scratch, TexelArena&
     for (uint32_t begin = r.tile_begin[tile]; begin < end && alive; begin += kChunk) {
         const int n = static_cast<int>(end - begin < kChunk ? end - begin : kChunk);
         s.chunk.stage(r, begin, n);
-        s.textures.stage(r, s.chunk, n);
+        s.textures.stage_layout(r, s.chunk, n);
         for (int next = 0; next < n;) {
             next = s.group.fill(s.chunk, next, n, alive, [](int) {});
             evaluate_entries(s, pixels, limits);
@@ -192,20 +225,22 @@ void texture_backward_tile(const Raster& r, int tile, void* scratch, TexelArena&
 }
 
 void reduce_textures(const Raster& r, int64_t begin, int64_t end, float* sums) {
+    constexpr uint32_t ahead = 24;
     for (int64_t i = begin; i < end; ++i) {
         const int columns = r.surfels.sizes[2 * i], count = columns * r.surfels.sizes[2 * i + 1];
         const int64_t offset = 3 * r.surfels.offsets[i];
         float* texels = r.out.texels ? r.out.texels + offset : sums;
-        std::memset(texels, 0, sizeof(float) * 3 * count);
         for (uint32_t slot = r.slot_begin[i]; slot < r.slot_begin[i + 1]; ++slot)
-            if (const TexelPart& part = r.texel_parts[slot]; part.sums)
-                add_part(part, registers_for(count), columns, count, texels);
+            prefetch_part(r, slot + ahead, count > 16 ? 12 : 3);
+        sum_parts(r.texel_parts, r.slot_begin[i], r.slot_begin[i + 1], columns, count, texels);
         float base[3] = {}, gain = 0.0f;
-        for (int k = 0; k < 3 * count; ++k) {
-            base[k % 3] += texels[k];
-            gain += texels[k] * r.surfels.texels[offset + k];
-            texels[k] *= r.surfels.gain[i];
-        }
+        const float* from = r.surfels.texels + offset;
+        for (int k = 0; k < count; ++k)
+            for (int c = 0; c < 3; ++c) {
+                base[c] += texels[3 * k + c];
+                gain += texels[3 * k + c] * from[3 * k + c];
+                texels[3 * k + c] *= r.surfels.gain[i];
+            }
         if (r.out.base)
             for (int c = 0; c < 3; ++c) r.out.base[3 * i + c] = base[c];
         if (r.out.gain) r.out.gain[i] = gain;

@@ -1,0 +1,108 @@
+"""gsplat's 2DGS functions in plain torch, made to run without a GPU: `rasterize` with the signature of ours.
+
+gsplat's torch functions get the list of fragments from a CUDA kernel and blend with nerfacc, which has no CPU
+code. Here both are replaced by dense loops over all surfels and pixels; projection, intersection, filter and
+colours remain gsplat's. Its import is told that there is no CUDA compiler, lest it builds its kernels.
+"""
+
+import os
+import shutil
+import sys
+from types import SimpleNamespace
+from unittest.mock import patch
+
+import pytest
+import torch
+
+from texgs.raster.types import Render
+
+
+def load():
+    """gsplat's module of torch functions for 2DGS; skips the calling test where gsplat is not installed."""
+    compiler = shutil.which("nvcc")
+    folders = [
+        f for f in os.environ["PATH"].split(os.pathsep) if not (compiler and shutil.which("nvcc", path=f))
+    ]
+    path = patch.dict(os.environ, PATH=os.pathsep.join(folders), CUDA_HOME="", CUDA_PATH="")
+    with path, patch("torch.utils.cpp_extension._find_cuda_home", lambda: None):
+        pytest.importorskip(
+            "gsplat", reason="gsplat is not installed (optional group `bench`)", exc_type=ImportError
+        )
+        from gsplat.cuda import _torch_impl_2dgs
+
+    return _torch_impl_2dgs
+
+
+def rasterize(
+    means, quats, scales, opacities, viewmat, K, width, height, *, features, background=None, options, **_
+):
+    """Render with gsplat: colour, alpha and normal; `options` with the filter that gsplat has."""
+    gsplat = load()
+    assert options.low_pass == 2.0
+    assert options.filter_sigma == 1.0
+    thickness = torch.ones_like(scales[:, :1])
+    _, centres, depths, homographies, normals = gsplat._fully_fused_projection_2dgs(
+        means, quats, torch.cat([scales, thickness], 1), viewmat[None], K[None], width, height, options.near
+    )
+    surfels, pixels = fragments(centres[0], homographies[0], depths[0], opacities, (width, height), options)
+    blending = SimpleNamespace(render_weight_from_alpha=weights_by_ray, accumulate_along_rays=sum_by_ray)
+    with patch.dict(sys.modules, nerfacc=blending):
+        color, alpha, normal = gsplat.accumulate_2dgs(
+            centres,
+            homographies,
+            opacities[None],
+            features[None],
+            normals,
+            surfels,
+            pixels,
+            torch.zeros_like(pixels),
+            width,
+            height,
+        )
+    color, alpha, normal = (
+        color[0],
+        alpha[0],
+        normal[0] @ viewmat[:3, :3],
+    )  # normals from camera to world axes
+    if background is not None:
+        color = color + (1 - alpha) * background
+    return Render(color=color, alpha=alpha[..., 0], normal=normal)
+
+
+@torch.no_grad()
+def fragments(centres, homographies, depths, opacities, size, options):
+    """Surfel and pixel of each fragment that counts, [F] each, pixel by pixel and front to back."""
+    width, height = size
+    order = torch.argsort(depths, stable=True)
+    order = order[(depths[order] > options.near) & (opacities[order] >= options.alpha_min)]
+    pixel = torch.arange(width * height)
+    x, y = (pixel % width + 0.5)[:, None], (pixel // width + 0.5)[:, None]
+    Tu, Tv, Tw = (homographies[order, row][None] for row in range(3))
+    p, q = (
+        Tw * x[..., None] - Tu,
+        Tw * y[..., None] - Tv,
+    )  # [P, N, 3] planes through the pixel, in surfel space
+    hit = torch.linalg.cross(p, q)
+    rho = ((hit[..., :2] / hit[..., 2:]) ** 2).sum(-1)
+    centre = centres[order]
+    rho = torch.minimum(rho, 2 * ((x - centre[:, 0]) ** 2 + (y - centre[:, 1]) ** 2))
+    alpha = opacities[order] * torch.exp(-rho / 2)
+    alpha = torch.where(alpha >= options.alpha_min, alpha, 0)
+    kept = (alpha > 0) & (torch.cumprod(1 - alpha, 1) >= options.transmittance_min)
+    pixels, surfels = kept.nonzero(as_tuple=True)
+    return order[surfels], pixels
+
+
+def weights_by_ray(alphas, ray_indices, n_rays):
+    """Blending weight and light [F] of fragments sorted by ray."""
+    logs = torch.log1p(-alphas)
+    before = torch.cumsum(logs, 0) - logs
+    first = torch.searchsorted(ray_indices, torch.arange(n_rays)).clamp(max=max(len(alphas) - 1, 0))
+    light = torch.exp(before - before[first][ray_indices])
+    return alphas * light, light
+
+
+def sum_by_ray(weights, values, ray_indices, n_rays):
+    """Sums [R, C] of weight times value over the fragments of each ray."""
+    weighted = weights[:, None] if values is None else weights[:, None] * values
+    return weighted.new_zeros(n_rays, weighted.shape[1]).index_add(0, ray_indices, weighted)

@@ -1,0 +1,32 @@
+"""The tests of losses and shading, once more on every other instruction set of the library."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from texgs.raster import native
+
+FILES = [
+    str(Path(__file__).with_name(f"test_{name}.py")) for name in ("ssim", "normals", "smoothness", "shading")
+]
+
+
+@pytest.mark.parametrize("instruction_set", ["portable", "avx2", "avx512"])
+def test_losses_on(instruction_set):
+    if instruction_set == native.instruction_set():
+        pytest.skip("the tests themselves run on it")
+    child = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-k", "not definition_by_finite", *FILES],
+        env={**os.environ, "TEXGS_ISA": instruction_set},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    if "this machine does not have it" in child.stdout:
+        pytest.skip(f"this machine has no {instruction_set}")
+    assert child.returncode == 0, child.stdout[-4000:]

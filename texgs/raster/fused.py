@@ -1,0 +1,53 @@
+"""Losses whose library function returns the gradient along with the value."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+
+# Inputs, and for each whether its gradient is wanted, to the value [] and those gradients.
+Evaluate = Callable[[Sequence[Tensor], Sequence[bool]], tuple[Tensor, Sequence[Tensor | None]]]
+
+
+def fused_loss(evaluate: Evaluate, *inputs: Tensor) -> Tensor:
+    """Value [] of a loss, differentiable once in `inputs`."""
+    wanted = [torch.is_grad_enabled() and x.requires_grad for x in inputs]
+    return _FusedLoss.apply(evaluate, wanted, *inputs)
+
+
+def require_constant(**tensors: Tensor | None) -> None:
+    """Refuse tensors that expect a gradient where none is computed.
+
+    Raises:
+        ArgumentError: naming the tensor.
+    """
+    for name, tensor in tensors.items():
+        if tensor is not None and tensor.requires_grad:
+            raise ArgumentError(
+                f"{name}: not differentiable here, but it requires a gradient; pass {name}.detach()"
+            )
+
+
+class _FusedLoss(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, evaluate: Evaluate, wanted: list[bool], *inputs: Tensor) -> Tensor:
+        value, ctx.gradients = evaluate(inputs, wanted)
+        ctx.evaluate, ctx.wanted = evaluate, wanted
+        ctx.save_for_backward(*inputs)
+        return value
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
+        # Autograd may accumulate into what it is handed: another pass through a retained graph computes anew.
+        gradients = ctx.gradients or ctx.evaluate(ctx.saved_tensors, ctx.wanted)[1]
+        ctx.gradients = None
+        # A weight of 1 is common and scaling a pass over the image; looking at it would make a GPU wait.
+        if upstream.device.type != "cpu" or upstream.item() != 1.0:
+            gradients = [g if g is None else g.mul_(upstream) for g in gradients]
+        return None, None, *gradients

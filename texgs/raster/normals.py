@@ -1,0 +1,113 @@
+"""Surface normals from a depth map, and their agreement with the blended normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ShapeError
+from texgs.raster.fused import fused_loss, require_constant
+from texgs.raster.losses_abi import call
+from texgs.raster.ssim import planar
+
+
+def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """Unit normals of the surface that a depth map samples.
+
+    The cross product of central differences of the unprojected pixels (Huang et al. 2024, section 5); it
+    faces the camera. Differentiable in `depth`.
+
+    Args:
+        depth: [H, W] camera z, world units; 0 or less where there is no surface.
+        viewmat: [4, 4] world to camera, a rigid motion, OpenCV axes.
+        K: [3, 3] intrinsics in pixels, without skew.
+
+    Returns:
+        [H, W, 3] in world axes; 0 at the border of the image and where one of the four neighbours has no
+        depth (2DGS takes such a neighbour to lie at the camera).
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    _check(depth, viewmat, K)
+    normal = _DepthToNormal.apply(depth.contiguous(), viewmat.contiguous(), K.contiguous())
+    return normal.permute(1, 2, 0)
+
+
+def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """Normal consistency loss of 2DGS: mean over pixels of 1 - alpha * normal . depth_to_normal(depth).
+
+    Surfels are pulled into the surface that they form together (Huang et al. 2024, eq. 14). Differentiable in
+    `normal` and `depth`; alpha is a weight without a gradient, whether it requires one or not.
+
+    Args:
+        normal: [H, W, 3] blended world normals, as rendered.
+        depth: [H, W] camera z, world units; 0 or less where there is no surface.
+        alpha: [H, W] in [0, 1].
+        viewmat: [4, 4] world to camera, a rigid motion, OpenCV axes.
+        K: [3, 3] intrinsics in pixels, without skew.
+
+    Returns:
+        [] between 0 and 2.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    sizes = _check(depth, viewmat, K)
+    check.shape("normal", normal, "H W 3", **sizes)
+    check.shape("alpha", alpha, "H W", **sizes)
+    check.floating("normal", normal)
+    check.floating("alpha", alpha)
+    check.same_device(depth=depth, normal=normal, alpha=alpha)
+    constants = (alpha.detach().contiguous(), viewmat.contiguous(), K.contiguous())
+
+    def evaluate(inputs: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
+        value = depth.new_empty(())
+        gradients = [torch.empty_like(x) if want else None for x, want in zip(inputs, wanted, strict=True)]
+        call(
+            "texgs_normal_consistency",
+            *inputs,
+            *constants,
+            *depth.shape,
+            value,
+            *gradients,
+            device=depth.device,
+        )
+        return value, gradients
+
+    return fused_loss(evaluate, planar(normal), depth.contiguous())
+
+
+def _check(depth: Tensor, viewmat: Tensor, K: Tensor) -> dict[str, int]:
+    sizes = check.shape("depth", depth, "H W")
+    if depth.numel() == 0:
+        raise ShapeError(f"depth: expected at least one pixel, got {list(depth.shape)}")
+    check.shape("viewmat", viewmat, "4 4")
+    check.shape("K", K, "3 3")
+    for name, tensor in (("depth", depth), ("viewmat", viewmat), ("K", K)):
+        check.floating(name, tensor)
+    check.same_device(depth=depth, viewmat=viewmat, K=K)
+    require_constant(viewmat=viewmat, K=K)
+    return sizes
+
+
+class _DepthToNormal(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+        normal = depth.new_empty(3, *depth.shape)
+        call("texgs_depth_to_normal", depth, viewmat, K, *depth.shape, normal, device=depth.device)
+        ctx.save_for_backward(depth, viewmat, K)
+        return normal
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
+        depth, viewmat, K = ctx.saved_tensors
+        gradient = torch.empty_like(depth)
+        arguments = (depth, viewmat, K, *depth.shape, upstream.contiguous(), gradient)
+        call("texgs_depth_to_normal_backward", *arguments, device=depth.device)
+        return gradient, None, None
