@@ -146,13 +146,14 @@ TEXGS_INLINE void evaluate_entries(BackwardScratch& s, const TilePixels& pixels,
             const Record& record = s.chunk.records[place];
             const Fragments f = evaluate(record, s.chunk.flags[place], pixels.of(s.group.block[e], part), limits);
             const int i = e * kParts + part;
-            store(s.alpha[i], f.alpha);
+            store(s.alpha[i], f.log2_alpha);
             store(s.r[i], f.inverse_w);
             store(s.u[i], f.u);
             store(s.v[i], f.v);
             store(s.rho[i], select(f.rho_surfel <= f.rho, f.rho, -1.0f));
             if constexpr (Depth) store(s.z[i], depth_of(record, f));
         }
+    for (int i = 0; i < s.group.entries * kParts; ++i) store(s.alpha[i], alpha_of(load(s.alpha[i]), limits));
 }
 
 // Depth in normalised device coordinates, 0 at the near and 1 at the far plane, from `origin`.

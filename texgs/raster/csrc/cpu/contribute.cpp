@@ -24,8 +24,9 @@ TEXGS_INLINE void evaluate_entries(ContributeScratch& s, const TilePixels& pixel
             const int place = s.group.surfel[e];
             const Pixels at = pixels.of(s.group.block[e], part);
             store(s.weight[e * kParts + part],
-                  evaluate(s.chunk.records[place], s.chunk.flags[place], at, limits).alpha);
+                  evaluate(s.chunk.records[place], s.chunk.flags[place], at, limits).log2_alpha);
         }
+    for (int i = 0; i < s.group.entries * kParts; ++i) store(s.weight[i], alpha_of(load(s.weight[i]), limits));
 }
 
 void add_surfel(const Raster& r, ContributeScratch& s, const Limits& limits, int k) {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forward pass over one tile: block by block, so that a block's transmittance and colours stay in registers.
 //
-// The work on a batch of surfels is split in two loops. The first computes alphas, which do not depend on each other;
-// the second carries the transmittance from one to the next. Fused, the long dependency chain would fill the
-// scheduler and nothing would overlap.
+// The work on a batch of surfels is split in loops. The first intersects, and its fragments do not depend on each other;
+// the second carries the transmittance from one to the next; the third blends.
 #include "isa.h"
 #include "replay.h"
 #include "texture.h"
@@ -32,11 +31,11 @@ struct Batch {
 };
 
 template <bool Depth, bool Textured>
-TEXGS_INLINE void alphas(ForwardScratch& s, Batch batch, Pixels at, const Limits& limits) {
+TEXGS_INLINE void intersect(ForwardScratch& s, Batch batch, Pixels at, const Limits& limits) {
     for (int j = 0; j < batch.n; ++j) {
         const Record& record = s.chunk.records[batch.list[j]];
         const Fragments f = evaluate(record, s.chunk.flags[batch.list[j]], at, limits);
-        store(s.weight[j], f.alpha);
+        store(s.weight[j], f.log2_alpha);
         if constexpr (Depth) store(s.depth[j], depth_of(record, f));
         if constexpr (Textured) store(s.u[j], f.u), store(s.v[j], f.v);
     }
@@ -44,19 +43,19 @@ TEXGS_INLINE void alphas(ForwardScratch& s, Batch batch, Pixels at, const Limits
 
 // Turns alphas into weights. A pixel that has ended keeps multiplying: its transmittance only falls, so that
 // `remaining >= transmittance_min` alone tells whether a fragment counts.
-TEXGS_INLINE bool weights(ForwardScratch& s, Batch batch, int pixel, vf limit) {
+TEXGS_INLINE bool weigh(ForwardScratch& s, Batch batch, int pixel, const Limits& limits) {
     vf T = load(s.transmittance + pixel), alpha = load(s.alpha + pixel);
     for (int j = 0; j < batch.n; ++j) {
-        const vf a = load(s.weight[j]);
+        const vf a = alpha_of(load(s.weight[j]), limits);
         const vf remaining = fnma(a, T, T);
-        const vf w = zero_unless(remaining >= limit, a * T);
+        const vf w = zero_unless(remaining >= limits.transmittance_min, a * T);
         alpha += w;
         T = remaining;
         store(s.weight[j], w);
     }
     store(s.transmittance + pixel, T);
     store(s.alpha + pixel, alpha);
-    return any(T >= limit);
+    return any(T >= limits.transmittance_min);
 }
 
 // -- Depths: each only where it is asked for -------------------------------------------------------------------------
@@ -144,9 +143,9 @@ TEXGS_INLINE bool blend_part(const Raster& r, ForwardScratch& s, int n, Pixels a
     bool alive = true;
     for (int j = 0; j < n && alive; j += kBatch) {
         const Batch batch{s.list + j, n - j < kBatch ? n - j : kBatch};
-        alphas<Depth, Textured>(s, batch, at, limits);
+        intersect<Depth, Textured>(s, batch, at, limits);
         [[maybe_unused]] const vf alpha_before = load(s.alpha + pixel);
-        alive = weights(s, batch, pixel, limits.transmittance_min);
+        alive = weigh(s, batch, pixel, limits);
         blend_channels(r, s, batch, pixel);
         if constexpr (Textured) blend_texture(s, batch, pixel);
         if constexpr (Depth) blend_depths(r, s, batch, pixel, alpha_before);

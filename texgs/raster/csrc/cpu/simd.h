@@ -105,6 +105,8 @@ TEXGS_INLINE vf gather(const float* p, vi i) { return _mm512_i32gather_ps(i.v, p
 TEXGS_INLINE float sum(vf a) { return _mm512_reduce_add_ps(a.v); }
 TEXGS_INLINE float largest(vf a) { return _mm512_reduce_max_ps(a.v); }
 TEXGS_INLINE vf round(vf a) { return _mm512_roundscale_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+// x 2^k for whole numbers k in [-126, 127].
+TEXGS_INLINE vf scale_by_power(vf x, vf k) { return _mm512_scalef_ps(x.v, k.v); }
 TEXGS_INLINE vf exponent(vf a) { return _mm512_getexp_ps(a.v); }
 TEXGS_INLINE vf mantissa(vf a) { return _mm512_getmant_ps(a.v, _MM_MANT_NORM_1_2, _MM_MANT_SIGN_src); }
 
@@ -331,25 +333,18 @@ TEXGS_INLINE vm operator>(vf a, vf b) { return b < a; }
 TEXGS_INLINE vm operator>=(vf a, vf b) { return b <= a; }
 TEXGS_INLINE bool any(vm m) { return bits(m) != 0; }
 
-// 2^x, relative error below 3e-7; 0 far below the range of floats. The polynomial (degree 5, least relative error on
+// 2^x, relative error below 3e-7 for x in [-126, 127]; below that 2^-126. The polynomial (degree 5, least relative error on
 // an interval of length 1) is evaluated in pairs: its latency, not its operations, is what a loop waits for.
 TEXGS_INLINE vf polynomial(vf x, vf c0, vf c1, vf c2, vf c3, vf c4, vf c5) {
     const vf x2 = x * x;
     return fma(fma(fma(c5, x, c4), x2, fma(c3, x, c2)), x2, fma(c1, x, c0));
 }
 TEXGS_INLINE vf exp2(vf x) {
-#if defined(TEXGS_AVX512)
-    const vf f = _mm512_reduce_ps(x.v, _MM_FROUND_TO_NEG_INF | _MM_FROUND_NO_EXC);  // in [0, 1)
-    const vf p = polynomial(f, 9.999999250635262e-1f, 6.931530732001692e-1f, 2.401536170443749e-1f,
-                            5.582631805327673e-2f, 8.989340090523107e-3f, 1.877576675178266e-3f);
-    return _mm512_scalef_ps(p.v, x.v);  // p 2^floor(x)
-#else
     x = max(x, -126.0f);
-    const vf k = round(x), f = x - k;  // in [-0.5, 0.5]
+    const vf k = round(x), f = x - k;  // f in [-0.5, 0.5]
     const vf p = polynomial(f, 1.0000000716546849f, 6.931469670647613e-1f, 2.402211972384010e-1f,
                             5.550713273496898e-2f, 9.675541334449414e-3f, 1.327647199285195e-3f);
     return scale_by_power(p, k);
-#endif
 }
 
 // log2(x) for normal x > 0, absolute error below 4e-7.

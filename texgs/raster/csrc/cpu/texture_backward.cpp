@@ -34,9 +34,10 @@ TEXGS_INLINE void evaluate_entries(TextureScratch& s, const TilePixels& pixels, 
             const Pixels pixel = pixels.of(s.group.block[e], part);
             const Fragments f = evaluate(s.chunk.records[place], s.chunk.flags[place], pixel, limits);
             const TexelCoordinates at = texel_coordinates(s.textures.of[place], f.u, f.v);
-            store(s.alpha[i], f.alpha);
+            store(s.alpha[i], f.log2_alpha);
             store(s.x[i], at.x), store(s.y[i], at.y);
         }
+    for (int i = 0; i < s.group.entries * kParts; ++i) store(s.alpha[i], alpha_of(load(s.alpha[i]), limits));
 }
 
 // Floats, aligned to cache lines; NULL when memory is exhausted.

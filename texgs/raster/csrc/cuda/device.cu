@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "device.cuh"
+
+#include <stdexcept>
+#include <string>
+
+namespace texgs::cuda {
+
+void check(cudaError_t status, const char* what) {
+    if (status != cudaSuccess)
+        throw std::runtime_error(std::string("CUDA, ") + what + ": " + cudaGetErrorString(status));
+}
+
+DeviceScope::DeviceScope(int device) : device_(device) {
+    check(cudaGetDevice(&before_), "asking for the current device");
+    if (device_ != before_) check(cudaSetDevice(device_), "choosing a device");
+}
+
+DeviceScope::~DeviceScope() {
+    if (device_ != before_) cudaSetDevice(before_);
+}
+
+int device_of(const void* pointer) {
+    cudaPointerAttributes found{};
+    check(cudaPointerGetAttributes(&found, pointer), "looking up a pointer");
+    if (found.type != cudaMemoryTypeDevice && found.type != cudaMemoryTypeManaged)
+        throw std::runtime_error("expected tensors in the memory of a CUDA device");
+    return found.device;
+}
+
+}  // namespace texgs::cuda

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// The shared geometry with one surfel per thread.
+#pragma once
+#include <cuda_runtime.h>
+
+#define TEXGS_ISA cuda
+
+namespace texgs::cuda {
+
+__host__ __device__ inline float fma(float a, float b, float c) { return ::fmaf(a, b, c); }
+__host__ __device__ inline float sqrt(float a) { return ::sqrtf(a); }
+__host__ __device__ inline float abs(float a) { return ::fabsf(a); }
+__host__ __device__ inline float select(bool condition, float yes, float no) { return condition ? yes : no; }
+__device__ inline float clamp(float a, float low, float high) { return fminf(fmaxf(a, low), high); }
+
+}  // namespace texgs::cuda
+
+#include "../maths.h"
