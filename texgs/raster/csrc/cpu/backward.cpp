@@ -16,17 +16,19 @@ namespace {
 
 constexpr int kGeometrySums = 11;  // Moments without zc, zp and normal
 constexpr int kDepthSums = 2;      // zc, zp
-constexpr int kTakenAlong = 16 - kGeometrySums;  // channels in the first line of a slot
+constexpr int kFirstLineChannels = 16 - kGeometrySums;
 
-bool takes_channels_along(const Raster& r, bool more_than_channels) {
-    return !more_than_channels && r.channels <= kTakenAlong;
-}
+// What the loops keep per pixel, in planes one after the other so that one pointer reaches all of them.
+enum Plane {
+    kTransmittance,
+    kRemaining,  // sum of w_j q_j over the fragments not yet visited
+    kConstant,   // part of q common to all fragments
+    kGradient    // by channel, to the end
+};
+struct alignas(64) PixelPlanes {
+    float data[(kGradient + kMaxChannels) * kTilePixels];
 
-// Gradients of the tile's pixels, and what else q depends on.
-struct alignas(64) PixelGradients {
-    float channels[kMaxChannels][kTilePixels];
-    float constant[kTilePixels];            // part of q common to all fragments
-    float remaining[kTilePixels];           // sum of w_j q_j over the fragments not yet visited
+    TEXGS_INLINE float* operator[](int plane) { return data + plane * kTilePixels; }
 };
 
 // The same of the depths.
@@ -40,39 +42,41 @@ struct alignas(64) BackwardScratch {
     Chunk chunk;
     TextureTables textures;
     Group group;
-    PixelGradients g;
+    PixelPlanes p;
     DepthGradients d;
-    float transmittance[kTilePixels];
-    float alpha[kVectors][kLanes], u[kVectors][kLanes], v[kVectors][kLanes], r[kVectors][kLanes];
-    float rho[kVectors][kLanes];            // negative where the low-pass filter rules
-    float q[kVectors][kLanes], z[kVectors][kLanes], weight[kVectors][kLanes];
+    // Per vector of pixels of an entry: alpha, later e = alpha dL/dalpha; the derivatives of log(alpha) by U, V, W.
+    float alpha[kVectors][kLanes], by_U[kVectors][kLanes], by_V[kVectors][kLanes], by_W[kVectors][kLanes];
+    float filtered[kVectors][kLanes];       // 1 where the low-pass filter rules, else 0; only of kFiltered surfels
+    float q[kVectors][kLanes], weight[kVectors][kLanes];
+    float inverse_w[kVectors][kLanes], z[kVectors][kLanes];          // with depths or a texture
+    float u[kVectors][kLanes], v[kVectors][kLanes];                  // with a texture
     float texture_u[kVectors][kLanes], texture_v[kVectors][kLanes];  // dL/du, dL/dv per weight through the texture
 };
 
 // -- Per pixel ------------------------------------------------------------------------------------------------------
 
-void load_channels(const Raster& r, int tile, PixelGradients& g) {
+void load_channels(const Raster& r, int tile, PixelPlanes& p) {
     const int64_t plane = int64_t(r.camera.width) * r.camera.height;
     const int own = r.surfels.channels;
-    std::memset(g.channels, 0, r.channels * sizeof g.channels[0]);
+    std::memset(p[kGradient], 0, r.channels * sizeof(float) * kTilePixels);
     float value[kTilePixels] = {};
     for (int c = 0; c < r.channels; ++c) {
         const float* grad = c < own ? r.grad.color : r.grad.normal;
         if (!grad) continue;
         const int64_t offset = (c < own ? c : c - own) * plane;
-        load_plane(r, tile, grad + offset, g.channels[c]);
+        load_plane(r, tile, grad + offset, p[kGradient + c]);
         load_plane(r, tile, (c < own ? r.image.color : r.image.normal) + offset, value);
         const float background = c < own && r.options.background ? r.options.background[c] : 0.0f;
         for (int i = 0; i < kTilePixels; i += kLanes) {
-            const vf gradient = load(g.channels[c] + i);
-            store(g.remaining + i, fma(gradient, load(value + i) - vf(background), load(g.remaining + i)));
-            store(g.constant + i, fnma(gradient, background, load(g.constant + i)));
+            const vf gradient = load(p[kGradient + c] + i);
+            store(p[kRemaining] + i, fma(gradient, load(value + i) - vf(background), load(p[kRemaining] + i)));
+            store(p[kConstant] + i, fnma(gradient, background, load(p[kConstant] + i)));
         }
     }
 }
 
 // Expected depth is sum(w z) / alpha: its gradient splits into one by sum(w z), and one by alpha.
-void load_expected_depth(const Raster& r, int tile, PixelGradients& g, DepthGradients& d, const float* alpha) {
+void load_expected_depth(const Raster& r, int tile, PixelPlanes& p, DepthGradients& d, const float* alpha) {
     float depth[kTilePixels] = {}, grad[kTilePixels] = {};
     load_plane(r, tile, r.image.depth, depth);
     load_plane(r, tile, r.grad.depth, grad);
@@ -80,12 +84,12 @@ void load_expected_depth(const Raster& r, int tile, PixelGradients& g, DepthGrad
         const vf a = load(alpha + i);
         const vf by_sum = zero_unless(a > vf(0.0f), load(grad + i) / max(a, 1e-30f));
         store(d.depth + i, by_sum);
-        store(g.constant + i, fnma(by_sum, load(depth + i), load(g.constant + i)));
+        store(p[kConstant] + i, fnma(by_sum, load(depth + i), load(p[kConstant] + i)));
     }
 }
 
 // The distortion is A M2 - M1^2 with A = sum w, M1 = sum w m', M2 = sum w m'^2.
-void load_distortion(const Raster& r, int tile, PixelGradients& g, DepthGradients& d, const float* alpha) {
+void load_distortion(const Raster& r, int tile, PixelPlanes& p, DepthGradients& d, const float* alpha) {
     const float* moments = r.distortion_moments + int64_t(tile) * 3 * kTilePixels;
     float grad[kTilePixels] = {};
     load_plane(r, tile, r.grad.distortion, grad);
@@ -95,29 +99,29 @@ void load_distortion(const Raster& r, int tile, PixelGradients& g, DepthGradient
         store(d.m + i, gradient * vf(-2.0f) * m1);
         store(d.m2 + i, gradient * a);
         store(d.origin + i, load(moments + 2 * kTilePixels + i));
-        store(g.constant + i, fma(gradient, m2, load(g.constant + i)));
-        store(g.remaining + i, fma(vf(2.0f) * gradient, fnma(m1, m1, a * m2), load(g.remaining + i)));
+        store(p[kConstant] + i, fma(gradient, m2, load(p[kConstant] + i)));
+        store(p[kRemaining] + i, fma(vf(2.0f) * gradient, fnma(m1, m1, a * m2), load(p[kRemaining] + i)));
     }
 }
 
-void load_gradients(const Raster& r, int tile, PixelGradients& g, DepthGradients* d) {
-    std::memset(g.constant, 0, sizeof g.constant);
-    std::memset(g.remaining, 0, sizeof g.remaining);
-    load_channels(r, tile, g);
+void load_gradients(const Raster& r, int tile, PixelPlanes& p, DepthGradients* d) {
+    std::memset(p[kRemaining], 0, sizeof(float) * kTilePixels);
+    std::memset(p[kConstant], 0, sizeof(float) * kTilePixels);
+    load_channels(r, tile, p);
     float alpha[kTilePixels] = {};
     if (r.grad.alpha || d) load_plane(r, tile, r.image.alpha, alpha);
     if (r.grad.alpha) {
         float grad[kTilePixels] = {};
         load_plane(r, tile, r.grad.alpha, grad);
         for (int i = 0; i < kTilePixels; i += kLanes) {
-            store(g.remaining + i, fma(load(grad + i), load(alpha + i), load(g.remaining + i)));
-            store(g.constant + i, load(g.constant + i) + load(grad + i));
+            store(p[kRemaining] + i, fma(load(grad + i), load(alpha + i), load(p[kRemaining] + i)));
+            store(p[kConstant] + i, load(p[kConstant] + i) + load(grad + i));
         }
     }
     if (!d) return;
     std::memset(d, 0, sizeof *d);
-    if (r.grad.depth) load_expected_depth(r, tile, g, *d, alpha);
-    if (r.grad.distortion) load_distortion(r, tile, g, *d, alpha);
+    if (r.grad.depth) load_expected_depth(r, tile, p, *d, alpha);
+    if (r.grad.distortion) load_distortion(r, tile, p, *d, alpha);
     if (r.grad.median) {
         load_plane(r, tile, r.grad.median, d->median);
         std::memcpy(d->median_stop, r.median_stop + int64_t(tile) * kTilePixels, sizeof d->median_stop);
@@ -138,21 +142,31 @@ void prefetch_gradients(const Raster& r, int tile) {
 
 // -- Per entry, independent of each other -----------------------------------------------------------------------------
 
-template <bool Depth>
+template <bool Depth, bool Textured>
 TEXGS_INLINE void evaluate_entries(BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
-    for (int e = 0; e < s.group.entries; ++e)
-        for (int part = 0; part < kParts; ++part) {
-            const int place = s.group.surfel[e];
-            const Record& record = s.chunk.records[place];
-            const Fragments f = evaluate(record, s.chunk.flags[place], pixels.of(s.group.block[e], part), limits);
-            const int i = e * kParts + part;
-            store(s.alpha[i], f.log2_alpha);
-            store(s.r[i], f.inverse_w);
-            store(s.u[i], f.u);
-            store(s.v[i], f.v);
-            store(s.rho[i], select(f.rho_surfel <= f.rho, f.rho, -1.0f));
-            if constexpr (Depth) store(s.z[i], depth_of(record, f));
+    for (int i = 0; i < s.group.entries * kParts; ++i) {
+        const int place = s.group.surfel[i / kParts];
+        const Record& record = s.chunk.records[place];
+        const unsigned flags = s.chunk.flags[place];
+        const Fragments f = evaluate(record, flags, pixels.of(s.group.block[i / kParts], i % kParts), limits);
+        const vf minus_inverse = -f.inverse_w;
+        vf by_U = f.u * minus_inverse, by_V = f.v * minus_inverse, by_W = f.rho * f.inverse_w;
+        if (flags & kFiltered) {
+            const vm by_surfel = f.rho_surfel <= f.rho;
+            by_U = zero_unless(by_surfel, by_U);
+            by_V = zero_unless(by_surfel, by_V);
+            by_W = zero_unless(by_surfel, by_W);
+            store(s.filtered[i], zero_unless(~by_surfel, 1.0f));
         }
+        store(s.alpha[i], f.log2_alpha);
+        store(s.by_U[i], by_U), store(s.by_V[i], by_V), store(s.by_W[i], by_W);
+        if constexpr (Depth || Textured) store(s.inverse_w[i], f.inverse_w);
+        if constexpr (Depth) store(s.z[i], depth_of(record, f));
+        if constexpr (Textured) store(s.u[i], f.u), store(s.v[i], f.v);
+    }
+}
+
+TEXGS_INLINE void compute_alphas(BackwardScratch& s, const Limits& limits) {
     for (int i = 0; i < s.group.entries * kParts; ++i) store(s.alpha[i], alpha_of(load(s.alpha[i]), limits));
 }
 
@@ -169,9 +183,9 @@ void weigh_channels(const Raster& r, BackwardScratch& s) {
             for (int i = 0; i < s.group.entries * kParts; ++i) {
                 const float* value = s.chunk.channels + s.group.surfel[i / kParts] * s.chunk.stride + first;
                 const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
-                vf q = load(first ? s.q[i] : s.g.constant + pixel);
+                vf q = load(first ? s.q[i] : s.p[kConstant] + pixel);
                 for (int c = 0; c < decltype(width)::value; ++c)
-                    q = fma(load(s.g.channels[first + c] + pixel), value[c], q);
+                    q = fma(load(s.p[kGradient + first + c] + pixel), value[c], q);
                 store(s.q[i], q);
             }
         });
@@ -203,7 +217,7 @@ TEXGS_INLINE void weigh_texture(BackwardScratch& s) {
             vf texel[3], by_u[3], by_v[3], q = 0.0f, gu = 0.0f, gv = 0.0f;
             sample_with_slope(table, at, texel, by_u, by_v);
             for (int c = 0; c < 3; ++c) {
-                const vf gradient = load(s.g.channels[c] + pixel) * vf(table.gain);
+                const vf gradient = load(s.p[kGradient + c] + pixel) * vf(table.gain);
                 q = fma(gradient, texel[c], q), gu = fma(gradient, by_u[c], gu), gv = fma(gradient, by_v[c], gv);
             }
             store(s.q[i], load(s.q[i]) + q);
@@ -212,7 +226,31 @@ TEXGS_INLINE void weigh_texture(BackwardScratch& s) {
     }
 }
 
-// -- Per surfel, in order ---------------------------------------------------------------------------------------------
+// -- Per entry, in order ----------------------------------------------------------------------------------------------
+
+// Blends all entries: weights, and e = alpha dL/dalpha in place of alpha. N > 0: the surfels have N channels, few enough
+// to compute alpha and q on the way; otherwise both are there.
+template <int N>
+TEXGS_INLINE void blend_entries(BackwardScratch& s, const Limits& limits) {
+    const float* channels = s.chunk.channels;
+    const int stride = N <= kRecordChannels ? Chunk::kRecordStride : s.chunk.stride;
+    for (int i = 0; i < s.group.entries * kParts; ++i) {
+        float* at = s.p.data + s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
+        const float* value = channels + s.group.surfel[i / kParts] * stride;
+        const vf alpha = N ? alpha_of(load(s.alpha[i]), limits) : load(s.alpha[i]);
+        vf q = load(N ? at + kConstant * kTilePixels : s.q[i]);
+        for (int c = 0; c < N; ++c) q = fma(load(at + (kGradient + c) * kTilePixels), value[c], q);
+        const Blend b = blend(alpha, at + kTransmittance * kTilePixels, limits);
+        const vf remaining = fnma(b.weight, q, load(at + kRemaining * kTilePixels));
+        store(at + kRemaining * kTilePixels, remaining);
+        const vf by_alpha = fma(b.before, q, -(remaining / (vf(1.0f) - alpha)));
+        const vm live = (b.weight > vf(0.0f)) & (alpha < vf(kLargestAlpha));
+        store(s.alpha[i], zero_unless(live, alpha * by_alpha));
+        store(s.weight[i], b.weight);
+    }
+}
+
+// -- Per surfel -------------------------------------------------------------------------------------------------------
 
 struct Sums {
     vf u_dx = 0.0f, u_dy = 0.0f, u = 0.0f, v_dx = 0.0f, v_dy = 0.0f, v = 0.0f, w_dx = 0.0f, w_dy = 0.0f;
@@ -238,59 +276,52 @@ TEXGS_INLINE vf depth_gradient(const Raster& r, DepthGradients& d, int pixel, vf
     return zero_unless(w > vf(0.0f), gz);
 }
 
-// Adds the fragments of one vector of pixels; `q` is dL/dw. Returns the weights.
+// Adds the fragments of one vector of pixels of weights `w`.
 template <bool Depth, bool Textured>
-TEXGS_INLINE vf add_entry(const Raster& r, BackwardScratch& s, const Limits& limits, unsigned flags, int i, int pixel,
-                          vf dx, vf dy, vf q, Sums& sums) {
-    const vf alpha = load(s.alpha[i]);
-    const Blend b = blend(alpha, s.transmittance + pixel, limits);
-    const vf remaining = fnma(b.weight, q, load(s.g.remaining + pixel));
-    store(s.g.remaining + pixel, remaining);
-    const vf by_alpha = fma(b.before, q, -(remaining / (vf(1.0f) - alpha)));
-    const vf e = zero_unless(b.counts & (alpha < vf(kLargestAlpha)), alpha * by_alpha);
+TEXGS_INLINE void add_entry(const Raster& r, BackwardScratch& s, unsigned flags, int i, int pixel, vf dx, vf dy, vf w,
+                            Sums& sums) {
+    const vf e = load(s.alpha[i]);
     sums.e += e;
-
-    const vf u = load(s.u[i]), v = load(s.v[i]), inverse = load(s.r[i]), rho = load(s.rho[i]);
-    vf t = e * inverse;
+    const vm live = abs(e) > vf(0.0f);  // elsewhere U / W may not be finite
+    vf gU = zero_unless(live, e * load(s.by_U[i]));
+    vf gV = zero_unless(live, e * load(s.by_V[i]));
+    vf gW = zero_unless(live, e * load(s.by_W[i]));
     if (flags & kFiltered) {
-        const vm by_filter = rho < vf(0.0f);
-        const vf filtered = zero_unless(by_filter, e);
+        const vf filtered = e * load(s.filtered[i]);
         sums.disc_dx = fma(filtered, dx, sums.disc_dx);
         sums.disc_dy = fma(filtered, dy, sums.disc_dy);
-        t = zero_unless(~by_filter, t);
     }
-    vf gU = -(t * u), gV = -(t * v), gW = t * rho;
     if constexpr (Depth) {
-        const vm by_surfel = rho >= vf(0.0f);
-        const vf z = load(s.z[i]), gz = depth_gradient(r, s.d, pixel, z, b.weight);
-        const vf by_zc = zero_unless(by_surfel, gz * inverse);
-        gW = fnma(by_zc, z, gW);
+        const vf z = load(s.z[i]);
+        vf gz = depth_gradient(r, s.d, pixel, z, w);
+        if (flags & kFiltered) {
+            const vf of_mean = gz * load(s.filtered[i]);
+            sums.zp += of_mean;
+            gz = gz - of_mean;
+        }
+        const vf by_zc = zero_unless(w > vf(0.0f), gz * load(s.inverse_w[i]));
+        gW = gW - zero_unless(w > vf(0.0f), by_zc * z);
         sums.zc += by_zc;
-        sums.zp += zero_unless(~by_surfel, gz);
     }
     if constexpr (Textured) {  // where a coordinate is clamped its gradient is 0, and u or v may not be finite
-        const vf gu = load(s.texture_u[i]), gv = load(s.texture_v[i]), scaled = b.weight * inverse;
-        const vm by_u = abs(gu * b.weight) > vf(0.0f), by_v = abs(gv * b.weight) > vf(0.0f);
+        const vf gu = load(s.texture_u[i]), gv = load(s.texture_v[i]), scaled = w * load(s.inverse_w[i]);
+        const vm by_u = abs(gu * w) > vf(0.0f), by_v = abs(gv * w) > vf(0.0f);
         gU = add_where(by_u, gU, scaled * gu);
         gV = add_where(by_v, gV, scaled * gv);
-        gW = gW - zero_unless(by_u, scaled * gu * u) - zero_unless(by_v, scaled * gv * v);
+        gW = gW - zero_unless(by_u, scaled * gu * load(s.u[i])) - zero_unless(by_v, scaled * gv * load(s.v[i]));
     }
     sums.u_dx = fma(gU, dx, sums.u_dx), sums.u_dy = fma(gU, dy, sums.u_dy), sums.u += gU;
     sums.v_dx = fma(gV, dx, sums.v_dx), sums.v_dy = fma(gV, dy, sums.v_dy), sums.v += gV;
     sums.w_dx = fma(gW, dx, sums.w_dx), sums.w_dy = fma(gW, dy, sums.w_dy);
-    return b.weight;
 }
 
-// Sums over the surfel's entries, to its slot: geometry, then channels. Up to five channels can be taken along in
-// the loop over the entries (N of them; all the surfel has). More would not leave registers for the geometry: their q
-// is there already, and their sums follow.
+// Sums over the surfel's entries, to its slot: geometry, then channels. N > 0: all channels fit into the first line and
+// are summed on the way; more would not leave registers for the geometry.
 template <bool Depth, bool Textured, int N>
-TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits,
-                             int k) {
+TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixels& pixels, int k) {
     const int begin = s.group.first[k], end = s.group.first[k + 1], place = s.group.place[k];
     const unsigned flags = s.chunk.flags[place];
     const vf cx = s.chunk.records[place].cx, cy = s.chunk.records[place].cy;
-    const float* value = s.chunk.channels + place * s.chunk.stride;
     Sums a;
     vf channels[N + 1];
     for (int c = 0; c < N; ++c) channels[c] = 0.0f;
@@ -298,11 +329,10 @@ TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixe
         for (int part = 0; part < kParts; ++part) {
             const int block = s.group.block[e], i = e * kParts + part, pixel = block * kBlockPixels + part * kLanes;
             const Pixels at = pixels.of(block, part);
-            vf q = load(N ? s.g.constant + pixel : s.q[i]);
-            for (int c = 0; c < N; ++c) q = fma(load(s.g.channels[c] + pixel), value[c], q);
-            const vf w = add_entry<Depth, Textured>(r, s, limits, flags, i, pixel, at.x - cx, at.y - cy, q, a);
-            for (int c = 0; c < N; ++c) channels[c] = fma(w, load(s.g.channels[c] + pixel), channels[c]);
-            if constexpr (N == 0) store(s.weight[i], w);
+            const vf w = load(s.weight[i]);
+            add_entry<Depth, Textured>(r, s, flags, i, pixel, at.x - cx, at.y - cy, w, a);
+            for (int c = 0; c < N; ++c)
+                channels[c] = fma(w, load(s.p.data + (kGradient + c) * kTilePixels + pixel), channels[c]);
         }
     constexpr int used = kGeometrySums + (Depth ? kDepthSums : 0), room = 16 - used;
     vf line[16] = {a.u_dx, a.u_dy, a.u, a.v_dx, a.v_dy, a.v, a.w_dx, a.w_dy, a.disc_dx, a.disc_dy, a.e};
@@ -312,31 +342,36 @@ TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixe
     if constexpr (N == 0) {
         const int first = r.channels < room ? r.channels : room;
         with_constant<room>(first, [&](auto width) {
-            weigh_planes<decltype(width)::value>(s.group, begin, end, s.weight[0], s.g.channels[0], line + used);
+            weigh_planes<decltype(width)::value>(s.group, begin, end, s.weight[0], s.p[kGradient], line + used);
         });
-        stream_planes(s.group, begin, end, s.weight[0], s.g.channels[first], r.channels - first, slot + 16);
+        stream_planes(s.group, begin, end, s.weight[0], s.p[kGradient + first], r.channels - first, slot + 16);
     }
     stream_sums(line, slot);
 }
 
-template <bool Depth, bool Textured>
-TEXGS_INLINE void add_surfels(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
-    const auto add_all = [&](auto taken_along) {
-        for (int k = 0; k < s.group.surfels; ++k)
-            add_surfel<Depth, Textured, decltype(taken_along)::value>(r, s, pixels, limits, k);
-    };
-    if (!takes_channels_along(r, Depth || Textured)) return add_all(Constant<0>{});
-    if constexpr (!Depth && !Textured) with_constant<kTakenAlong>(r.channels, add_all);
+// The group's entries are evaluated: blends them and sums over each surfel.
+template <bool Depth, bool Textured, int N>
+TEXGS_INLINE void add_group(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
+    if constexpr (N == 0) {
+        compute_alphas(s, limits);
+        weigh_channels(r, s);
+        if constexpr (Textured) weigh_texture(s);
+        if constexpr (Depth) weigh_depth(s);
+        if (r.grad.distortion) weigh_distortion(r, s);
+    }
+    blend_entries<N>(s, limits);
+    for (int k = 0; k < s.group.surfels; ++k) add_surfel<Depth, Textured, N>(r, s, pixels, k);
 }
 
-template <bool Depth, bool Textured>
+// N: the number of channels where they fit into the first line of a slot and nothing else does, else 0.
+template <bool Depth, bool Textured, int N>
 void replay_tile(const Raster& r, int tile, BackwardScratch& s) {
     const TilePixels pixels(r, tile);
     const Limits limits(r.options);
     if (r.tile_begin[tile] == r.tile_begin[tile + 1]) return;
-    load_gradients(r, tile, s.g, Depth ? &s.d : nullptr);
+    load_gradients(r, tile, s.p, Depth ? &s.d : nullptr);
     prefetch_gradients(r, tile + 1);
-    uint32_t alive = start_tile(r, pixels, s.transmittance);
+    uint32_t alive = start_tile(r, pixels, s.p[kTransmittance]);
     const uint32_t end = r.tile_begin[tile + 1];
     uint32_t begin = r.tile_begin[tile];
     for (; begin < end && alive; begin += kChunk) {
@@ -348,13 +383,9 @@ void replay_tile(const Raster& r, int tile, BackwardScratch& s) {
         };
         for (int next = 0; next < n;) {
             next = s.group.fill(s.chunk, next, n, alive, skip);
-            evaluate_entries<Depth>(s, pixels, limits);
-            if (!takes_channels_along(r, Depth || Textured)) weigh_channels(r, s);
-            if constexpr (Textured) weigh_texture(s);
-            if constexpr (Depth) weigh_depth(s);
-            if (r.grad.distortion) weigh_distortion(r, s);
-            add_surfels<Depth, Textured>(r, s, pixels, limits);
-            alive = still_alive(r, s.transmittance, alive);
+            evaluate_entries<Depth, Textured>(s, pixels, limits);
+            add_group<Depth, Textured, N>(r, s, pixels, limits);
+            alive = still_alive(r, s.p[kTransmittance], alive);
         }
     }
     for (; begin < end; ++begin) stream_zeros(r.slots + int64_t(r.pairs[begin].slot) * r.slot_stride, r.slot_stride);
@@ -368,10 +399,13 @@ const int64_t kBackwardScratch = sizeof(BackwardScratch);
 void backward_tile(const Raster& r, int tile, void* scratch) {
     BackwardScratch& s = *static_cast<BackwardScratch*>(scratch);
     const bool textured = r.surfels.base != nullptr, depth = r.grad.depth || r.grad.median || r.grad.distortion;
-    if (depth && textured) replay_tile<true, true>(r, tile, s);
-    if (depth && !textured) replay_tile<true, false>(r, tile, s);
-    if (!depth && textured) replay_tile<false, true>(r, tile, s);
-    if (!depth && !textured) replay_tile<false, false>(r, tile, s);
+    if (depth && textured) return replay_tile<true, true, 0>(r, tile, s);
+    if (depth) return replay_tile<true, false, 0>(r, tile, s);
+    if (textured) return replay_tile<false, true, 0>(r, tile, s);
+    if (r.channels > kFirstLineChannels) return replay_tile<false, false, 0>(r, tile, s);
+    with_constant<kFirstLineChannels>(r.channels, [&](auto n) {
+        replay_tile<false, false, decltype(n)::value>(r, tile, s);
+    });
 }
 
 }  // namespace texgs::TEXGS_ISA

@@ -9,6 +9,7 @@ namespace texgs::TEXGS_ISA {
 namespace {
 
 constexpr int kParts = kBlocks / kLanes;
+constexpr int kAhead = 12;
 constexpr float kBlockSpan = 3.0f;  // between the outer pixel centres of a block
 
 struct BlockCorners {
@@ -73,6 +74,7 @@ int64_t bin_surfels(const Raster& r, const uint32_t* order, int64_t begin, int64
     Candidate* next = out;
     for (int64_t i = begin; i < end; ++i) {
         const uint32_t id = order[i];
+        prefetch(&r.footprints[order[i + kAhead < end ? i + kAhead : i]]);  // in the order of depth they lie anywhere
         const Footprint& foot = r.footprints[id];
         const Test test(foot);
         uint32_t rank = 0;

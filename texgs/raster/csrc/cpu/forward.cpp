@@ -21,6 +21,7 @@ struct alignas(64) ForwardScratch {
         float depth[kTilePixels], median[kTilePixels], stop[kTilePixels], moments[3][kTilePixels];
     } z;
     float weight[kBatch][kLanes], depth[kBatch][kLanes], u[kBatch][kLanes], v[kBatch][kLanes];
+    int32_t texel[kBatch][kLanes];
     int32_t list[kChunk + 16];
 };
 
@@ -41,10 +42,13 @@ TEXGS_INLINE void intersect(ForwardScratch& s, Batch batch, Pixels at, const Lim
     }
 }
 
-// Turns alphas into weights. A pixel that has ended keeps multiplying: its transmittance only falls, so that
-// `remaining >= transmittance_min` alone tells whether a fragment counts.
+// Turns alphas into weights and blends the first N channels, which lie in the records. A pixel that has ended keeps
+// multiplying: its transmittance only falls, so that `remaining >= transmittance_min` alone tells whether a fragment
+// counts. Returns whether any pixel goes on.
+template <int N>
 TEXGS_INLINE bool weigh(ForwardScratch& s, Batch batch, int pixel, const Limits& limits) {
-    vf T = load(s.transmittance + pixel), alpha = load(s.alpha + pixel);
+    vf T = load(s.transmittance + pixel), alpha = load(s.alpha + pixel), color[N + 1];
+    for (int c = 0; c < N; ++c) color[c] = load(s.color[c] + pixel);
     for (int j = 0; j < batch.n; ++j) {
         const vf a = alpha_of(load(s.weight[j]), limits);
         const vf remaining = fnma(a, T, T);
@@ -52,9 +56,11 @@ TEXGS_INLINE bool weigh(ForwardScratch& s, Batch batch, int pixel, const Limits&
         alpha += w;
         T = remaining;
         store(s.weight[j], w);
+        for (int c = 0; c < N; ++c) color[c] = fma(w, s.chunk.records[batch.list[j]].color[c], color[c]);
     }
     store(s.transmittance + pixel, T);
     store(s.alpha + pixel, alpha);
+    for (int c = 0; c < N; ++c) store(s.color[c] + pixel, color[c]);
     return any(T >= limits.transmittance_min);
 }
 
@@ -124,36 +130,41 @@ TEXGS_INLINE void blend_channels(const Raster& r, ForwardScratch& s, Batch batch
 }
 
 TEXGS_INLINE void blend_texture(ForwardScratch& s, Batch batch, int pixel) {
+    for (int j = 0; j < batch.n; ++j) {
+        const TexelCoordinates at = texel_coordinates(s.textures.of[batch.list[j]], load(s.u[j]), load(s.v[j]));
+        store(s.u[j], at.fx), store(s.v[j], at.fy);
+        store(s.texel[j], at.first);
+    }
     vf sum[3];
     for (int c = 0; c < 3; ++c) sum[c] = load(s.color[c] + pixel);
     for (int j = 0; j < batch.n; ++j) {
-        const vf w = load(s.weight[j]);
-        if (!any(w > vf(0.0f))) continue;
         const TextureTable& table = s.textures.of[batch.list[j]];
+        const vf w = load(s.weight[j]) * vf(table.gain);
         vf texel[3];
-        sample(table, texel_coordinates(table, load(s.u[j]), load(s.v[j])), texel);
-        for (int c = 0; c < 3; ++c) sum[c] = fma(w * vf(table.gain), texel[c], sum[c]);
+        sample(table, load(s.texel[j]), load(s.u[j]), load(s.v[j]), texel);
+        for (int c = 0; c < 3; ++c) sum[c] = fma(w, texel[c], sum[c]);
     }
     for (int c = 0; c < 3; ++c) store(s.color[c] + pixel, sum[c]);
 }
 
 // Blends the chunk's surfels into one vector of a block; returns whether any of its pixels goes on.
-template <bool Depth, bool Textured>
+template <bool Depth, bool Textured, int N>
 TEXGS_INLINE bool blend_part(const Raster& r, ForwardScratch& s, int n, Pixels at, int pixel, const Limits& limits) {
     bool alive = true;
     for (int j = 0; j < n && alive; j += kBatch) {
         const Batch batch{s.list + j, n - j < kBatch ? n - j : kBatch};
         intersect<Depth, Textured>(s, batch, at, limits);
         [[maybe_unused]] const vf alpha_before = load(s.alpha + pixel);
-        alive = weigh(s, batch, pixel, limits);
-        blend_channels(r, s, batch, pixel);
+        alive = weigh<N>(s, batch, pixel, limits);
+        if constexpr (N == 0) blend_channels(r, s, batch, pixel);
         if constexpr (Textured) blend_texture(s, batch, pixel);
         if constexpr (Depth) blend_depths(r, s, batch, pixel, alpha_before);
     }
     return alive;
 }
 
-template <bool Depth, bool Textured>
+// N: the number of channels where the records hold them, else 0.
+template <bool Depth, bool Textured, int N>
 void blend_tile(const Raster& r, int tile, ForwardScratch& s) {
     const TilePixels pixels(r, tile);
     const Limits limits(r.options);
@@ -168,11 +179,19 @@ void blend_tile(const Raster& r, int tile, ForwardScratch& s) {
             const int members = list_block(s.chunk.masks, n, block, s.list);
             bool goes_on = false;
             for (int part = 0; part < kParts; ++part)
-                goes_on |= blend_part<Depth, Textured>(r, s, members, pixels.of(block, part),
-                                                       block * kBlockPixels + part * kLanes, limits);
+                goes_on |= blend_part<Depth, Textured, N>(r, s, members, pixels.of(block, part),
+                                                          block * kBlockPixels + part * kLanes, limits);
             if (!goes_on) alive &= ~(1u << block);
         }
     }
+}
+
+template <bool Depth, bool Textured>
+void blend_tile_channels(const Raster& r, int tile, ForwardScratch& s) {
+    if (r.channels > kRecordChannels) return blend_tile<Depth, Textured, 0>(r, tile, s);
+    with_constant<kRecordChannels>(r.channels, [&](auto n) {
+        blend_tile<Depth, Textured, decltype(n)::value>(r, tile, s);
+    });
 }
 
 // Composites over the background and writes the tile's part of the images.
@@ -214,10 +233,10 @@ void forward_tile(const Raster& r, int tile, void* scratch) {
     std::memset(s.color, 0, r.channels * sizeof s.color[0]);
     if (r.with_depth) std::memset(&s.z, 0, sizeof s.z);
     const bool textured = r.surfels.base != nullptr;
-    if (r.with_depth && textured) blend_tile<true, true>(r, tile, s);
-    if (r.with_depth && !textured) blend_tile<true, false>(r, tile, s);
-    if (!r.with_depth && textured) blend_tile<false, true>(r, tile, s);
-    if (!r.with_depth && !textured) blend_tile<false, false>(r, tile, s);
+    if (r.with_depth && textured) blend_tile_channels<true, true>(r, tile, s);
+    if (r.with_depth && !textured) blend_tile_channels<true, false>(r, tile, s);
+    if (!r.with_depth && textured) blend_tile_channels<false, true>(r, tile, s);
+    if (!r.with_depth && !textured) blend_tile_channels<false, false>(r, tile, s);
     finish_color(r, tile, s);
     if (r.with_depth) finish_depth(r, tile, s);
 }

@@ -93,7 +93,8 @@ struct alignas(64) Chunk {
     uint32_t surfels[kChunk];
     uint8_t flags[kChunk];
     const float* channels;   // of the first surfel; the next one's follow at `stride`
-    int stride;
+    int stride;              // kRecordStride where the records hold them
+    static constexpr int kRecordStride = sizeof(Record) / sizeof(float);
     float many_channels[kChunk * kMaxChannels];
 
     // Loads pairs [begin, begin + n).
@@ -111,7 +112,7 @@ struct alignas(64) Chunk {
         }
         for (int i = n; i < kChunk && i % 16; ++i) masks[i] = 0;
         channels = records[0].color;
-        stride = sizeof(Record) / sizeof(float);
+        stride = kRecordStride;
         if (r.channels > kRecordChannels) stage_channels(r, begin, n);
     }
 

@@ -106,8 +106,9 @@ int threads() {
 void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
     if (n <= 0) return;
     Loop loop{n, grain, job, context};
-    const int wanted = static_cast<int>(std::min<int64_t>(threads(), (n + grain - 1) / grain));
-    if (wanted <= 1 || inside_loop) return loop.work();
+    const int wanted = threads();
+    if (wanted <= 1 || n <= grain || inside_loop) return loop.work();
+    // Always the whole team, even for fewer ranges: OpenMP ends the threads that a smaller team leaves over.
     inside_loop = true;
     if (const auto parallel = gomp_parallel.load()) {
         parallel(work_on, &loop, static_cast<unsigned>(wanted), 0);

@@ -15,7 +15,10 @@ inline const float* surfel_channels(const Raster& r) { return r.surfels.base ? r
 // Lanes p[0], p[stride], ...; beyond n the last one is repeated.
 inline vf load_strided(const float* p, int stride, int64_t n) {
     float lanes[kLanes];
-    for (int i = 0; i < kLanes; ++i) lanes[i] = p[stride * (i < n ? i : n - 1)];
+    if (n >= kLanes)
+        for (int i = 0; i < kLanes; ++i) lanes[i] = p[stride * i];
+    else
+        for (int i = 0; i < kLanes; ++i) lanes[i] = p[stride * (i < n ? i : n - 1)];
     return load(lanes);
 }
 

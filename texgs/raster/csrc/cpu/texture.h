@@ -21,11 +21,26 @@ TEXGS_INLINE int registers_for(int texels) {
     return texels > kRegisterTexels ? 0 : texels <= 16 ? 1 : texels <= 32 ? 2 : 4;
 }
 
+// Coordinates along one side of a texture: clamp(scale * u + offset, 0, last), between texels `cell` and `cell + 1`.
+struct Side {
+    float scale, offset, last;
+    float last_cell;  // of the cells between texel centres; 0 where there is only one texel
+    int32_t step;     // to the next texel; 0 where there is only one
+
+    void set(int texels, int stride) {
+        scale = static_cast<float>(texels) / 6.0f;  // the texture spans +-3 standard deviations
+        last = static_cast<float>(texels - 1);
+        offset = 0.5f * last;
+        last_cell = static_cast<float>(texels > 1 ? texels - 2 : 0);
+        step = texels > 1 ? stride : 0;
+    }
+};
+
 struct TextureTable {
-    const float* texels;      // planes of 16 * registers per channel, or interleaved [n, 3]
-    int registers;            // 1, 2 or 4 per channel; 0: gather
-    int step_x, step_y;       // to the next texel; 0 where there is only one
+    const float* texels;  // planes of 16 * registers per channel, or interleaved [n, 3]
+    int registers;        // 1, 2 or 4 per channel; 0: gather
     float columns, rows, gain;
+    Side x, y;
 };
 
 struct alignas(64) TextureTables {
@@ -65,7 +80,7 @@ inline void TextureTables::stage_layout(const Raster& r, const Chunk& chunk, int
         TextureTable& t = of[i];
         t.texels = r.surfels.texels + 3 * r.surfels.offsets[id];
         t.columns = static_cast<float>(columns), t.rows = static_cast<float>(rows), t.gain = r.surfels.gain[id];
-        t.step_x = columns > 1 ? 1 : 0, t.step_y = rows > 1 ? columns : 0;
+        t.x.set(columns, 1), t.y.set(rows, columns);
         t.registers = registers_for(columns * rows);
     }
 }
@@ -98,15 +113,12 @@ struct TexelCoordinates {
 
 TEXGS_INLINE TexelCoordinates texel_coordinates(const TextureTable& t, vf u, vf v) {
     TexelCoordinates c;
-    const float last_x = t.columns - 1.0f, last_y = t.rows - 1.0f;
-    const vf raw_x = fma(u, t.columns * (1.0f / 6.0f), 0.5f * last_x);
-    const vf raw_y = fma(v, t.rows * (1.0f / 6.0f), 0.5f * last_y);
-    const vf x = c.x = min(max(raw_x, 0.0f), last_x), y = c.y = min(max(raw_y, 0.0f), last_y);
-    c.free_x = (raw_x > vf(0.0f)) & (raw_x < vf(last_x));
-    c.free_y = (raw_y > vf(0.0f)) & (raw_y < vf(last_y));
-    const vf i = min(floor(x), last_x > 1.0f ? last_x - 1.0f : 0.0f);
-    const vf j = min(floor(y), last_y > 1.0f ? last_y - 1.0f : 0.0f);
-    c.fx = x - i, c.fy = y - j;
+    const vf raw_x = fma(u, t.x.scale, t.x.offset), raw_y = fma(v, t.y.scale, t.y.offset);
+    c.x = min(max(raw_x, 0.0f), t.x.last), c.y = min(max(raw_y, 0.0f), t.y.last);
+    c.free_x = (raw_x > vf(0.0f)) & (raw_x < vf(t.x.last));
+    c.free_y = (raw_y > vf(0.0f)) & (raw_y < vf(t.y.last));
+    const vf i = min(floor(c.x), t.x.last_cell), j = min(floor(c.y), t.y.last_cell);
+    c.fx = c.x - i, c.fy = c.y - j;
     c.first = truncate(fma(j, t.columns, i));
     return c;
 }
@@ -132,10 +144,10 @@ struct Taps {
 };
 template <int Registers>
 TEXGS_INLINE Taps taps(const TextureTable& t, int channel, vi first) {
-    const vi right = first + splat(t.step_x);
+    const vi right = first + splat(t.x.step);
     return {lookup<Registers>(t, channel, first), lookup<Registers>(t, channel, right),
-            lookup<Registers>(t, channel, first + splat(t.step_y)),
-            lookup<Registers>(t, channel, right + splat(t.step_y))};
+            lookup<Registers>(t, channel, first + splat(t.y.step)),
+            lookup<Registers>(t, channel, right + splat(t.y.step))};
 }
 
 TEXGS_INLINE vf mix(vf a, vf b, vf f) { return fma(f, b - a, a); }
@@ -160,10 +172,8 @@ TEXGS_INLINE void for_taps(const TextureTable& t, vi first, Use use) {
     }
 }
 
-TEXGS_INLINE void sample(const TextureTable& t, const TexelCoordinates& at, vf texel[3]) {
-    for_taps(t, at.first, [&](int c, const Taps& k) {
-        texel[c] = mix(mix(k.t00, k.t10, at.fx), mix(k.t01, k.t11, at.fx), at.fy);
-    });
+TEXGS_INLINE void sample(const TextureTable& t, vi first, vf fx, vf fy, vf texel[3]) {
+    for_taps(t, first, [&](int c, const Taps& k) { texel[c] = mix(mix(k.t00, k.t10, fx), mix(k.t01, k.t11, fx), fy); });
 }
 
 // The same with the derivatives of each channel by u and v.
@@ -172,8 +182,8 @@ TEXGS_INLINE void sample_with_slope(const TextureTable& t, const TexelCoordinate
     for_taps(t, at.first, [&](int c, const Taps& k) {
         const vf top = mix(k.t00, k.t10, at.fx), bottom = mix(k.t01, k.t11, at.fx);
         texel[c] = mix(top, bottom, at.fy);
-        by_u[c] = zero_unless(at.free_x, mix(k.t10 - k.t00, k.t11 - k.t01, at.fy) * vf(t.columns / 6.0f));
-        by_v[c] = zero_unless(at.free_y, (bottom - top) * vf(t.rows / 6.0f));
+        by_u[c] = zero_unless(at.free_x, mix(k.t10 - k.t00, k.t11 - k.t01, at.fy) * vf(t.x.scale));
+        by_v[c] = zero_unless(at.free_y, (bottom - top) * vf(t.y.scale));
     });
 }
 

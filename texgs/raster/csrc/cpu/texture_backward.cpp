@@ -64,6 +64,7 @@ TEXGS_INLINE void blend_surfel(TextureScratch& s, const Limits& limits, int begi
             for (int c = 0; c < 3; ++c) store_chosen(t.g[c] + n, w * load(s.gradient[c] + pixel), hit);
             n += count(hit);
         }
+    t.x[n] = t.y[n] = t.g[0][n] = t.g[1][n] = t.g[2][n] = 0.0f;  // pixels may be taken in pairs
     t.n = n;
 }
 
@@ -71,22 +72,27 @@ TEXGS_INLINE void blend_surfel(TextureScratch& s, const Limits& limits, int begi
 // Small textures live in registers, a lane per texel: a pixel's bilinear weights are a product of two tents.
 template <int Registers>
 TEXGS_INLINE void add_to_registers(const Touches& t, const TextureTable& table, float* out) {
-    vf column[Registers], row[Registers], sum[3][Registers];
+    constexpr int sets = Registers == 1 ? 2 : 1;  // of sums: one register alone would wait for its own additions
+    vf column[Registers], row[Registers], sum[sets][3][Registers];
     for (int k = 0; k < Registers; ++k) {
         const vf texel = to_float(iota()) + vf(16.0f * k);
         row[k] = floor((texel + vf(0.5f)) / vf(table.columns));
         column[k] = fnma(row[k], table.columns, texel);
-        for (int c = 0; c < 3; ++c) sum[c][k] = 0.0f;
     }
-    for (int i = 0; i < t.n; ++i) {
-        const vf x = t.x[i], y = t.y[i], g[3] = {t.g[0][i], t.g[1][i], t.g[2][i]};
-        for (int k = 0; k < Registers; ++k) {
-            const vf tent = max(vf(1.0f) - abs(x - column[k]), 0.0f) * max(vf(1.0f) - abs(y - row[k]), 0.0f);
-            for (int c = 0; c < 3; ++c) sum[c][k] = fma(tent, g[c], sum[c][k]);
+    for (int set = 0; set < sets; ++set)
+        for (int c = 0; c < 3; ++c)
+            for (int k = 0; k < Registers; ++k) sum[set][c][k] = 0.0f;
+    for (int i = 0; i < t.n; i += sets)
+        for (int set = 0; set < sets; ++set) {
+            const vf x = t.x[i + set], y = t.y[i + set];
+            for (int k = 0; k < Registers; ++k) {
+                const vf tent = max(vf(1.0f) - abs(x - column[k]), 0.0f) * max(vf(1.0f) - abs(y - row[k]), 0.0f);
+                for (int c = 0; c < 3; ++c) sum[set][c][k] = fma(tent, t.g[c][i + set], sum[set][c][k]);
+            }
         }
-    }
     for (int c = 0; c < 3; ++c)
-        for (int k = 0; k < Registers; ++k) stream(out + 16 * (c * Registers + k), sum[c][k]);
+        for (int k = 0; k < Registers; ++k)
+            stream(out + 16 * (c * Registers + k), sets == 1 ? sum[0][c][k] : sum[0][c][k] + sum[sets - 1][c][k]);
 }
 #endif
 
@@ -150,9 +156,10 @@ void add_surfel(const Raster& r, TextureScratch& s, const Limits& limits, TexelA
 }
 
 #if defined(TEXGS_AVX512)
-// Sums the planes of pairs [begin, end), interleaved to `out` [count, 3].
+// Sums the planes of pairs [begin, end), interleaved to `out` [count, 3]; `base` receives the sums over all texels.
 template <int Registers>
-TEXGS_INLINE void sum_registers(const TexelPart* parts, uint32_t begin, uint32_t end, int count, float* out) {
+TEXGS_INLINE void sum_registers(const TexelPart* parts, uint32_t begin, uint32_t end, int count, float* out,
+                                float base[3]) {
     constexpr int n = 3 * Registers;
     vf sums[n];
     for (int k = 0; k < n; ++k) sums[k] = 0.0f;
@@ -160,13 +167,21 @@ TEXGS_INLINE void sum_registers(const TexelPart* parts, uint32_t begin, uint32_t
         if (const float* from = parts[slot].sums)
             for (int k = 0; k < n; ++k) sums[k] += load(from + 16 * k);
     float planes[16 * n];
-    for (int k = 0; k < n; ++k) store(planes + 16 * k, sums[k]);
+    for (int c = 0; c < 3; ++c) {
+        vf all = 0.0f;
+        for (int k = 0; k < Registers; ++k) {
+            store(planes + 16 * (c * Registers + k), sums[c * Registers + k]);
+            all += sums[c * Registers + k];
+        }
+        base[c] = sum(all);
+    }
     for (int k = 0; k < count; ++k)
         for (int c = 0; c < 3; ++c) out[3 * k + c] = planes[16 * Registers * c + k];
 }
 #endif
 
-TEXGS_INLINE void sum_memory(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out) {
+TEXGS_INLINE void sum_memory(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out,
+                             float base[3]) {
     std::memset(out, 0, sizeof(float) * 3 * count);
     for (uint32_t slot = begin; slot < end; ++slot) {
         const TexelPart& part = parts[slot];
@@ -178,17 +193,33 @@ TEXGS_INLINE void sum_memory(const TexelPart* parts, uint32_t begin, uint32_t en
                 for (int c = 0; c < 3; ++c) to[3 * x + c] += from[4 * x + c];
         }
     }
+    base[0] = base[1] = base[2] = 0;
+    for (int k = 0; k < count; ++k)
+        for (int c = 0; c < 3; ++c) base[c] += out[3 * k + c];
 }
 
-TEXGS_INLINE void sum_parts(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out) {
+TEXGS_INLINE void sum_parts(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out,
+                            float base[3]) {
     switch (registers_for(count)) {
 #if defined(TEXGS_AVX512)
-        case 1: return sum_registers<1>(parts, begin, end, count, out);
-        case 2: return sum_registers<2>(parts, begin, end, count, out);
-        case 4: return sum_registers<4>(parts, begin, end, count, out);
+        case 1: return sum_registers<1>(parts, begin, end, count, out, base);
+        case 2: return sum_registers<2>(parts, begin, end, count, out, base);
+        case 4: return sum_registers<4>(parts, begin, end, count, out, base);
 #endif
-        default: return sum_memory(parts, begin, end, columns, count, out);
+        default: return sum_memory(parts, begin, end, columns, count, out, base);
     }
+}
+
+// Dot product of `texels` with `with`, and texels *= factor.
+TEXGS_INLINE float dot_and_scale(float* texels, const float* with, float factor, int n) {
+    vf sums = 0.0f;
+    for (int k = 0; k < n; k += kLanes) {
+        const int part = n - k < kLanes ? n - k : kLanes;
+        const vf a = load_part(texels + k, part);
+        sums = fma(a, load_part(with + k, part), sums);
+        store_part(texels + k, a * vf(factor), part);
+    }
+    return sum(sums);
 }
 
 // Asks for the sums of the surfels to come: they lie in the order of the tiles.
@@ -233,15 +264,9 @@ void reduce_textures(const Raster& r, int64_t begin, int64_t end, float* sums) {
         float* texels = r.out.texels ? r.out.texels + offset : sums;
         for (uint32_t slot = r.slot_begin[i]; slot < r.slot_begin[i + 1]; ++slot)
             prefetch_part(r, slot + ahead, count > 16 ? 12 : 3);
-        sum_parts(r.texel_parts, r.slot_begin[i], r.slot_begin[i + 1], columns, count, texels);
-        float base[3] = {}, gain = 0.0f;
-        const float* from = r.surfels.texels + offset;
-        for (int k = 0; k < count; ++k)
-            for (int c = 0; c < 3; ++c) {
-                base[c] += texels[3 * k + c];
-                gain += texels[3 * k + c] * from[3 * k + c];
-                texels[3 * k + c] *= r.surfels.gain[i];
-            }
+        float base[3];
+        sum_parts(r.texel_parts, r.slot_begin[i], r.slot_begin[i + 1], columns, count, texels, base);
+        const float gain = dot_and_scale(texels, r.surfels.texels + offset, r.surfels.gain[i], 3 * count);
         if (r.out.base)
             for (int c = 0; c < 3; ++c) r.out.base[3 * i + c] = base[c];
         if (r.out.gain) r.out.gain[i] = gain;
