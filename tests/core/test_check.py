@@ -37,6 +37,15 @@ def test_shape_message_names_the_likely_mistake(got, spec, message):
         check.shape("means", torch.zeros(got), spec)
 
 
+def test_constants_must_not_require_a_gradient():
+    learned = torch.zeros(3, requires_grad=True)
+    check.constant(first=torch.zeros(3), second=None, third=learned.detach())
+    with pytest.raises(ArgumentError, match=r"light: not differentiable here.*pass light\.detach\(\)"):
+        check.constant(first=torch.zeros(3), light=learned)
+    with torch.no_grad():
+        check.constant(light=learned)
+
+
 def test_shape_wants_a_tensor():
     with pytest.raises(ArgumentError, match=r"means: expected a torch\.Tensor, got list"):
         check.shape("means", [1.0], "N")

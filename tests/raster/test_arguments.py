@@ -9,7 +9,7 @@ from tests.raster.agreement import gradients, images, random_cotangents
 from tests.raster.scenes import random_scene, textured
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster.api import rasterize, splat
-from texgs.raster.types import OUTPUTS, Options
+from texgs.raster.types import OUTPUTS, Options, Texture
 
 N = 200
 WRONG_SHAPES = {
@@ -61,6 +61,29 @@ def test_wrong_texture(name, value, error):
         scene.render(rasterize)
 
 
+@pytest.mark.parametrize("order", ["one after the other", "mixed, with gaps"])
+def test_textures_must_not_overlap(order):
+    sizes = torch.tensor([(2, 3), (1, 1), (4, 4), (1, 5)], dtype=torch.int32)
+    offsets = torch.tensor([0, 6, 7, 23] if order == "one after the other" else [30, 0, 50, 5])
+    texture = Texture(torch.rand(4, 3), torch.rand(4), torch.rand(70, 3), sizes, offsets)
+    scene = replace(random_scene(n=4), features=None, texture=texture)
+    scene.render(rasterize)
+    for other, texel in ((2, offsets[2] + 15), (1, offsets[1])):
+        moved = torch.cat([offsets[:3], texel[None]])
+        with pytest.raises(ArgumentError, match=rf"surfels {other} and 3 sharing texel {texel}"):
+            replace(scene, texture=replace(texture, offsets=moved)).render(rasterize)
+
+
+@pytest.mark.parametrize("name", ["viewmat", "K", "background"])
+def test_camera_and_background_are_constants(device, name):
+    scene = random_scene().to(device)
+    scene = replace(scene, **{name: getattr(scene, name).clone().requires_grad_()})
+    with pytest.raises(ArgumentError, match=rf"{name}: not differentiable .* pass {name}.detach\(\)"):
+        scene.render(rasterize)
+    with torch.no_grad():
+        scene.render(rasterize)
+
+
 def test_texture_or_features():
     scene = textured(random_scene())
     with pytest.raises(ArgumentError, match="either features or texture, got both"):
@@ -77,7 +100,7 @@ def test_wrong_device():
         scene.to("meta").render(rasterize)
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, -1), (2**31, 5)])
+@pytest.mark.parametrize("size", [(0, 5), (5, -1), (2**31, 5), (2**20 - 15, 1), (1, 2**20 - 15)])
 def test_wrong_size(size):
     with pytest.raises(ArgumentError, match="width, height: expected 1 to"):
         replace(random_scene(), width=size[0], height=size[1]).render(rasterize)

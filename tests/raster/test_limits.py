@@ -1,5 +1,6 @@
 """Large scenes work within bounded memory, and those that cannot fit say how much they would need."""
 
+import math
 import re
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ from tests.raster.scenes import Scene, random_scene
 from texgs.core.errors import OutOfMemoryError
 from texgs.raster import native
 from texgs.raster.api import rasterize
+from texgs.raster.arguments import MAX_SIDE
 
 GB = 1e9
 
@@ -44,12 +46,36 @@ def test_memory_of_a_usual_scene():
     assert native.peak_memory() < 0.5 * GB
 
 
-@pytest.mark.parametrize("size", [(1_000_000, 1_000_000), (1_048_575, 1_048_575)])
+@pytest.mark.parametrize("size", [(1_000_000, 1_000_000), (MAX_SIDE, MAX_SIDE)])
 def test_images_that_cannot_fit(device, size):
     with pytest.raises(OutOfMemoryError, match=r"\d+ bytes") as raised:
         replace(random_scene(), width=size[0], height=size[1]).to(device).render(rasterize)
     needed = int(re.search(r"(\d+) bytes", str(raised.value))[1])
     assert needed >= 4 * 4 * size[0] * size[1]  # colour and alpha alone
+
+
+@pytest.mark.parametrize("axis", [0, 1], ids=["widest", "highest"])
+def test_the_longest_image(device, axis):
+    """Its tiles are the most that the library can count: one more, and the surfel would be nowhere."""
+    size, quarter = [1, 1], MAX_SIDE / 4  # of one standard deviation from the middle to an end
+    size[axis] = MAX_SIDE
+    scene = replace(
+        random_scene(n=1),
+        means=torch.tensor([[0.0, 0, 1]]),
+        quats=torch.tensor([[1.0, 0, 0, 0]]),
+        scales=torch.tensor([[2 * quarter, 2 * quarter]]),
+        opacities=torch.tensor([0.9]),
+        viewmat=torch.eye(4),
+        K=torch.tensor([[1.0, 0, size[0] / 2], [0, 1, size[1] / 2], [0, 0, 1]]),
+        width=size[0],
+        height=size[1],
+    )
+    alpha = scene.to(device).render(rasterize).alpha.flatten().cpu()
+    expected = 0.9 * math.exp(-0.5)
+    assert float(alpha[0]) == pytest.approx(expected, abs=1e-3)
+    assert float(alpha[-1]) == pytest.approx(expected, abs=1e-3)
+    assert float(alpha.min()) > 0.54
+    assert float(alpha[MAX_SIDE // 2]) == pytest.approx(0.9, abs=1e-3)
 
 
 def test_surfels_that_cannot_fit():

@@ -1,4 +1,4 @@
-"""Checks at public borders: shapes, dtypes, devices and finite values, reported by argument name."""
+"""Checks at public borders, reported by argument name: shapes, dtypes, devices, gradients, finite values."""
 
 import torch
 from torch import Tensor
@@ -114,3 +114,18 @@ def finite(**tensors: Tensor | None) -> None:
             f"{name}: expected finite values, got {n_nan} NaN and {len(bad) - n_nan} infinite, "
             f"the first at index {bad[0].tolist()}"
         )
+
+
+def constant(**tensors: Tensor | None) -> None:
+    """Refuse tensors (None is skipped) that expect a gradient where none is computed.
+
+    Under `torch.no_grad()` everything is constant.
+
+    Raises:
+        ArgumentError: naming the tensor.
+    """
+    for name, tensor in tensors.items():
+        if tensor is not None and tensor.requires_grad and torch.is_grad_enabled():
+            raise ArgumentError(
+                f"{name}: not differentiable here, but it requires a gradient; pass {name}.detach()"
+            )

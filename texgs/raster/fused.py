@@ -8,8 +8,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError
-
 # Inputs, and for each whether its gradient is wanted, to the value [] and those gradients.
 Evaluate = Callable[[Sequence[Tensor], Sequence[bool]], tuple[Tensor, Sequence[Tensor | None]]]
 
@@ -18,19 +16,6 @@ def fused_loss(evaluate: Evaluate, *inputs: Tensor) -> Tensor:
     """Value [] of a loss, differentiable once in `inputs`."""
     wanted = [torch.is_grad_enabled() and x.requires_grad for x in inputs]
     return _FusedLoss.apply(evaluate, wanted, *inputs)
-
-
-def require_constant(**tensors: Tensor | None) -> None:
-    """Refuse tensors that expect a gradient where none is computed.
-
-    Raises:
-        ArgumentError: naming the tensor.
-    """
-    for name, tensor in tensors.items():
-        if tensor is not None and tensor.requires_grad:
-            raise ArgumentError(
-                f"{name}: not differentiable here, but it requires a gradient; pass {name}.detach()"
-            )
 
 
 class _FusedLoss(torch.autograd.Function):

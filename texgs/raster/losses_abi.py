@@ -30,7 +30,8 @@ def _describe(device_type: str) -> None:
     """Tell ctypes the argument types once per library."""
     lib = native.library(device_type)
     for name, signature in SIGNATURES.items():
-        getattr(lib, name).argtypes = [TYPES[letter] for letter in signature if letter != " "] + [c_void_p]
+        arguments = [TYPES[letter] for letter in signature if letter != " "]
+        native.function(lib, name).argtypes = [*arguments, c_void_p]
 
 
 def call(name: str, *arguments: Tensor | float | None, device: torch.device) -> None:

@@ -1,16 +1,19 @@
 """The native libraries: found, opened and described to ctypes; calls with errors turned into exceptions.
 
-`libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h` and
-`csrc/texgs_losses.h`. They know raw pointers only, so that one build serves every version of torch and Python.
+`libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h`
+and `csrc/texgs_losses.h`. They know raw pointers only, so that one build serves every version of torch and
+Python.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
-from ctypes import POINTER, Structure, c_char_p, c_float, c_int32, c_int64, c_void_p
+from contextlib import nullcontext
+from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -19,8 +22,10 @@ from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemo
 
 ABI_VERSION = 1
 FOLDER = Path(__file__).parent / "_native"
+INSTALL = "install texgs again (pip install .)"
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError}
+PASSES = ("project", "sort", "bin", "forward", "backward", "reduce")  # in the order of `texgs_pass`
 
 
 def _fields(pointers: str, **numbers: type) -> list[tuple[str, type]]:
@@ -48,10 +53,8 @@ class RenderOptions(Structure):
 
     _fields_ = [
         ("background", c_void_p),
-        *(
-            (name, c_float)
-            for name in ("low_pass", "filter_sigma", "alpha_min", "transmittance_min", "near_plane", "far_plane")
-        ),
+        *((name, c_float) for name in ("low_pass", "filter_sigma", "alpha_min", "transmittance_min")),
+        *((name, c_float) for name in ("near_plane", "far_plane")),
     ]
 
 
@@ -79,6 +82,18 @@ PROTOTYPES = {
     "texgs_backward": [c_void_p, *SCENE, POINTER(Image), POINTER(Image), POINTER(Gradients), c_void_p],
     "texgs_contribute": [c_void_p, *SCENE, POINTER(Contributions), c_void_p],
     "texgs_require_memory": [c_int64],
+    "texgs_release": [c_void_p],
+    "texgs_use_openmp": [c_void_p],
+    "texgs_set_threads": [c_int32],
+    "texgs_memory": [c_int32],
+}
+RESULTS = {  # int32_t but for
+    "texgs_error": c_char_p,
+    "texgs_instruction_set": c_char_p,
+    "texgs_memory": c_int64,
+    "texgs_release": None,
+    "texgs_use_openmp": None,
+    "texgs_set_threads": None,
 }
 
 
@@ -97,37 +112,46 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
         NativeError: if it is missing, does not load, or was built from other sources than this package.
     """
     if device_type not in ("cpu", "cuda"):
-        raise DeviceError(f"texgs.raster: expected tensors on cpu or cuda, got {device_type}; move them there")
+        raise DeviceError(f"texgs.raster: expected tensors on cpu or cuda, got {device_type}; move them")
     path = library_path(device_type)
     if not path.exists():
         hint = "install a CUDA compiler and " if device_type == "cuda" else ""
-        raise NativeError(f"{path.name}: not found in {path.parent}; {hint}install texgs again (pip install .)")
+        raise NativeError(f"{path.name}: not found in {path.parent}; {hint}{INSTALL}")
     try:
         lib = ctypes.CDLL(str(path))
     except OSError as error:
-        raise NativeError(f"{path.name}: cannot be loaded: {error}; install texgs again (pip install .)") from error
-    if lib.texgs_abi_version() != ABI_VERSION:
-        raise NativeError(
-            f"{path.name}: interface version {ABI_VERSION} expected, got {lib.texgs_abi_version()}; "
-            "install texgs again (pip install .)"
-        )
+        raise NativeError(f"{path.name}: cannot be loaded: {error}; {INSTALL}") from error
+    found = function(lib, "texgs_abi_version")()
+    if found != ABI_VERSION:
+        raise NativeError(f"{path.name}: interface version {ABI_VERSION} expected, got {found}; {INSTALL}")
     for name, arguments in PROTOTYPES.items():
-        getattr(lib, name).argtypes = arguments
-    lib.texgs_error.restype = lib.texgs_instruction_set.restype = c_char_p
-    lib.texgs_memory.restype = c_int64
-    lib.texgs_release.argtypes, lib.texgs_release.restype = [c_void_p], None
+        function(lib, name).argtypes = arguments
+    for name, result in RESULTS.items():
+        function(lib, name).restype = result
     if device_type == "cpu":
-        lib.texgs_use_openmp.argtypes = [c_void_p]
         lib.texgs_use_openmp(_openmp_of_torch())
     if lib.texgs_instruction_set() is None:
         raise NativeError(lib.texgs_error().decode())
     return lib
 
 
+def function(lib: ctypes.CDLL, name: str) -> Any:
+    """A function of a library.
+
+    Raises:
+        NativeError: if the library lacks it, as one of other sources may.
+    """
+    try:
+        return getattr(lib, name)
+    except AttributeError:
+        raise NativeError(f"{Path(lib._name).name}: has no function {name}; {INSTALL}") from None
+
+
 def _openmp_of_torch() -> int | None:
     """Address of GOMP_parallel in the OpenMP runtime that torch uses; None where torch has none.
 
-    Two thread pools in one process spin against each other after every parallel loop; sharing torch's avoids it.
+    Two thread pools in one process spin against each other after every parallel loop; sharing torch's avoids
+    it.
     """
     path = Path(torch.__file__).parent / "lib" / "libtorch_cpu.so"
     try:
@@ -146,9 +170,16 @@ def threads() -> int:
     return torch.get_num_threads()
 
 
-def peak_memory(reset: bool = False) -> int:
-    """The most bytes of scratch memory that the CPU library held since the last reset."""
-    return int(library().texgs_memory(int(reset)))
+def peak_memory(reset: bool = False, device_type: str = "cpu") -> int:
+    """The most bytes of scratch memory that a library held since the last reset."""
+    return int(library(device_type).texgs_memory(int(reset)))
+
+
+def pass_seconds() -> dict[str, float]:
+    """Seconds that each of PASSES took in the calling thread's latest calls of the CPU library."""
+    seconds = (c_double * len(PASSES))()
+    function(library(), "texgs_pass_seconds")(seconds)
+    return dict(zip(PASSES, seconds, strict=True))
 
 
 def call(name: str, *arguments, device: torch.device) -> None:
@@ -163,16 +194,24 @@ def call(name: str, *arguments, device: torch.device) -> None:
         stream = None
     else:
         stream = torch.cuda.current_stream(device).cuda_stream
-    status = getattr(lib, name)(*arguments, stream)
-    if status:
-        raise ERRORS.get(status, NativeError)(f"texgs.raster: {lib.texgs_error().decode()}")
+    _require_success(function(lib, name)(*arguments, stream), lib, device)
 
 
 def require_memory(n_bytes: int, device: torch.device) -> None:
     """Raise OutOfMemoryError, naming `n_bytes`, where less memory than that is left."""
     lib = library(device.type)
-    if status := lib.texgs_require_memory(n_bytes):
-        raise ERRORS.get(status, NativeError)(f"texgs.raster: {lib.texgs_error().decode()}")
+    with torch.cuda.device(device) if device.type == "cuda" else nullcontext():
+        status = lib.texgs_require_memory(n_bytes)
+    _require_success(status, lib, device)
+
+
+def _require_success(status: int, lib: ctypes.CDLL, device: torch.device) -> None:
+    if not status:
+        return
+    error = ERRORS.get(status, NativeError)
+    kept_by_torch = error is OutOfMemoryError and device.type == "cuda"
+    hint = "; torch.cuda.empty_cache() gives back what torch keeps" if kept_by_torch else ""
+    raise error(f"texgs.raster: {lib.texgs_error().decode()}{hint}")
 
 
 def address(tensor: Tensor | None) -> int | None:

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster.fused import fused_loss, require_constant
+from texgs.raster.fused import fused_loss
 from texgs.raster.losses_abi import call
 from texgs.raster.ssim import planar
 
@@ -91,7 +91,7 @@ def _check(depth: Tensor, viewmat: Tensor, K: Tensor) -> dict[str, int]:
     for name, tensor in (("depth", depth), ("viewmat", viewmat), ("K", K)):
         check.floating(name, tensor)
     check.same_device(depth=depth, viewmat=viewmat, K=K)
-    require_constant(viewmat=viewmat, K=K)
+    check.constant(viewmat=viewmat, K=K)
     return sizes
 
 

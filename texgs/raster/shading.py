@@ -10,7 +10,6 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster.fused import require_constant
 from texgs.raster.losses_abi import call
 
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")
@@ -88,7 +87,7 @@ def blinn_phong_texture(
         if name in material and tensor.shape not in ((n,), (1,)):
             raise ShapeError(f"{name}: expected [{n}] or one for all [1], got {list(tensor.shape)}")
     check.same_device(**surfels, **lights)
-    require_constant(**lights)
+    check.constant(**lights)
     dense = [x.contiguous() for x in (*surfels.values(), *lights.values())]
     return _BlinnPhong.apply(*dense)
 

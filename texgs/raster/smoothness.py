@@ -9,7 +9,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster.fused import fused_loss, require_constant
+from texgs.raster.fused import fused_loss
 from texgs.raster.losses_abi import call
 from texgs.raster.ssim import planar
 
@@ -42,7 +42,7 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
     for name, tensor in (("attribute", attribute), ("guide", guide), ("alpha", alpha)):
         check.floating(name, tensor)
     check.same_device(attribute=attribute, guide=guide, alpha=alpha)
-    require_constant(guide=guide, alpha=alpha)
+    check.constant(guide=guide, alpha=alpha)
     constants = (planar(guide), alpha.contiguous())
 
     def evaluate(inputs: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:

@@ -9,7 +9,6 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster.fused import require_constant
 from texgs.raster.losses_abi import call
 
 DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # by number of coefficients
@@ -41,7 +40,7 @@ def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> T
     for name, tensor in (("sh", sh), ("means", means), ("camera_position", camera_position)):
         check.floating(name, tensor)
     check.same_device(sh=sh, means=means, camera_position=camera_position)
-    require_constant(camera_position=camera_position)
+    check.constant(camera_position=camera_position)
     return _SphericalHarmonics.apply(sh.contiguous(), means.contiguous(), camera_position.contiguous())
 
 

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.raster.fused import fused_loss, require_constant
+from texgs.raster.fused import fused_loss
 from texgs.raster.losses_abi import call
 
 
@@ -72,7 +72,7 @@ def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
     check.floating("image", image)
     check.floating("target", target)
     check.same_device(image=image, target=target)
-    require_constant(target=target)
+    check.constant(target=target)
     dense_target = planar(target)
 
     def evaluate(inputs: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:

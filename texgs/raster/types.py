@@ -46,6 +46,10 @@ class Texture:
     The texture of a surfel spans +-3 sigma along its two tangents. Texel (i, j), i along u and j along v, is
     `texels[offsets[n] + j * sizes[n, 0] + i]` and lies at u = 6 (i + 0.5) / sizes[n, 0] - 3 sigma; beyond the
     outermost texel centres the edge texel is replicated.
+
+    No two surfels may share a texel: the gradients of both would have one place. Textures may come in any
+    order, with gaps. It is checked on the CPU; a GPU would have to wait for the answer, but must not be given
+    such textures either.
     """
 
     base: Tensor

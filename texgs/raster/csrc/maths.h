@@ -102,12 +102,12 @@ template <class F>
 TEXGS_MATHS void axes_backward(F w, F x, F y, F z, F inverse_norm, const Axes<F>& g, F out[4]) {
     const F two = 2.0f;
     const F gw = two * (x * (g.v.z - g.n.y) + y * (g.n.x - g.u.z) + z * (g.u.y - g.v.x));
-    const F gx = two * (y * (g.v.x + g.u.y) + z * (g.n.x + g.u.z) + w * (g.v.z - g.n.y)) -
-                 (two + two) * x * (g.v.y + g.n.z);
-    const F gy = two * (x * (g.v.x + g.u.y) + z * (g.n.y + g.v.z) + w * (g.n.x - g.u.z)) -
-                 (two + two) * y * (g.u.x + g.n.z);
-    const F gz = two * (x * (g.n.x + g.u.z) + y * (g.n.y + g.v.z) + w * (g.u.y - g.v.x)) -
-                 (two + two) * z * (g.u.x + g.v.y);
+    const F gx =
+        two * (y * (g.v.x + g.u.y) + z * (g.n.x + g.u.z) + w * (g.v.z - g.n.y)) - (two + two) * x * (g.v.y + g.n.z);
+    const F gy =
+        two * (x * (g.v.x + g.u.y) + z * (g.n.y + g.v.z) + w * (g.n.x - g.u.z)) - (two + two) * y * (g.u.x + g.n.z);
+    const F gz =
+        two * (x * (g.n.x + g.u.z) + y * (g.n.y + g.v.z) + w * (g.u.y - g.v.x)) - (two + two) * z * (g.u.x + g.v.y);
     const F radial = gw * w + gx * x + gy * y + gz * z;
     out[0] = (gw - radial * w) * inverse_norm;
     out[1] = (gx - radial * x) * inverse_norm;
@@ -200,10 +200,10 @@ TEXGS_MATHS F facing(const View& view, const Surfel<F>& s, const Axes<F>& axes) 
 template <class F>
 struct Moments {
     F u_dx, u_dy, u, v_dx, v_dy, v, w_dx, w_dy;
-    F disc_dx, disc_dy;      // sum of e (dx, dy) over filtered fragments
-    F e;                     // over all fragments
-    F zc, zp;                // dL/d(depth of the plane at the centre), dL/d(depth of the mean), or 0
-    Vec3<F> normal;          // dL/d(normal facing the camera), or 0
+    F disc_dx, disc_dy;  // sum of e (dx, dy) over filtered fragments
+    F e;                 // over all fragments
+    F zc, zp;            // dL/d(depth of the plane at the centre), dL/d(depth of the mean), or 0
+    Vec3<F> normal;      // dL/d(normal facing the camera), or 0
 };
 
 // The affine forms as fragments use them: (U, V) = (ux, vx) dx + (uy, vy) dy + (u, v), W = wx dx + wy dy + 1.
@@ -214,8 +214,8 @@ struct Forms {
 template <class F>
 TEXGS_MATHS Forms<F> affine_forms(const Projection<F>& r) {
     const F s = r.scale;
-    return {s * r.A.x, s * r.B.x, s * r.C.x, s * r.A.y, s * r.B.y, s * r.C.y, s * r.A.z, s * r.B.z,
-            s * dot(r.M.w, r.C)};
+    return {s * r.A.x, s * r.B.x, s * r.C.x, s * r.A.y,          s * r.B.y,
+            s * r.C.y, s * r.A.z, s * r.B.z, s * dot(r.M.w, r.C)};
 }
 
 template <class F>
@@ -261,9 +261,7 @@ TEXGS_MATHS SurfelGradient<F> project_backward(const View& view, const Surfel<F>
 
     // M counts pixels from the centre: its rows u, v hold f a.x - c a.z and the like.
     const F fx = view.fx, fy = view.fy;
-    const auto from_rows = [&](F gu, F gv, F gw) -> Vec3<F> {
-        return {fx * gu, fy * gv, gw - r.cx * gu - r.cy * gv};
-    };
+    const auto from_rows = [&](F gu, F gv, F gw) -> Vec3<F> { return {fx * gu, fy * gv, gw - r.cx * gu - r.cy * gv}; };
     const Vec3<F> ga = from_rows(gM.u.x, gM.v.x, gM.w.x), gb = from_rows(gM.u.y, gM.v.y, gM.w.y);
     Vec3<F> gp = from_rows(gM.u.z, gM.v.z, gM.w.z);
     gp.z = gp.z + m.zp;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * The C interface of the native libraries. `libtexgs` (CPU) and `libtexgs_cuda` export the same functions; in the
- * second every pointer is a device pointer and `stream` the CUDA stream to work on (NULL on a CPU).
+ * The C interface of the native libraries. `libtexgs` (CPU) and `libtexgs_cuda` export the same functions, the latter
+ * without texgs_pass_seconds(); in it every pointer is a device pointer and `stream` the CUDA stream to work on (NULL
+ * on a CPU).
  *
  * Conventions
  * - Tensors are dense, row-major, 32-bit floats unless the type says otherwise; images are planar [C, H, W].
@@ -26,6 +27,7 @@ extern "C" {
 
 #define TEXGS_ABI_VERSION 1
 #define TEXGS_MAX_CHANNELS 32
+#define TEXGS_MAX_SIDE 1048560 /* 2^20 - 16 pixels: 65535 tiles, which 16 bits can count */
 
 typedef enum {
     TEXGS_OK = 0,
@@ -46,7 +48,7 @@ typedef struct {
     const float* features;  /* [N, C] */
     const float* base;      /* [N, 3]; fragment colour = base + gain * bilinear(texel) */
     const float* gain;      /* [N] */
-    const float* texels;    /* [T, 3] */
+    const float* texels;    /* [T, 3]; no two surfels share one */
     const int32_t* sizes;   /* [N, 2] texels along u and v; the texture spans +-3 standard deviations */
     const int64_t* offsets; /* [N] index of a surfel's first texel; texel (i, j) follows at i + j * sizes[0] */
     int64_t n_texels;       /* T */
@@ -54,9 +56,9 @@ typedef struct {
 
 /* A pinhole camera with OpenCV axes, pixel centres at +0.5, no skew. */
 typedef struct {
-    const float* viewmat; /* [4, 4] world to camera */
-    const float* K;       /* [3, 3] */
-    int32_t width, height;
+    const float* viewmat;  /* [4, 4] world to camera */
+    const float* K;        /* [3, 3] */
+    int32_t width, height; /* 1 to TEXGS_MAX_SIDE */
 } texgs_camera;
 
 typedef struct {
@@ -85,12 +87,12 @@ typedef struct {
 
 /* What each surfel contributed to an image. */
 typedef struct {
-    const float* image;  /* [C, H, W] to splat back, or NULL */
-    int32_t channels;    /* C of `image` */
-    float* sums;         /* [N, C] sum of weight * image */
-    float* weight_sum;   /* [N] */
-    float* weight_max;   /* [N] */
-    float* pixels;       /* [N] number of pixels with a weight above 0 */
+    const float* image; /* [C, H, W] to splat back, or NULL */
+    int32_t channels;   /* C of `image` */
+    float* sums;        /* [N, C] sum of weight * image */
+    float* weight_sum;  /* [N] */
+    float* weight_max;  /* [N] */
+    float* pixels;      /* [N] number of pixels with a weight above 0 */
 } texgs_contributions;
 
 /* Projected, sorted and binned surfels of one view: what forward leaves for backward. */
@@ -117,7 +119,7 @@ TEXGS_API int32_t texgs_backward(texgs_frame*, const texgs_surfels*, const texgs
 TEXGS_API int32_t texgs_contribute(texgs_frame*, const texgs_surfels*, const texgs_camera*, const texgs_options*,
                                    const texgs_contributions*, void* stream);
 TEXGS_API void texgs_release(texgs_frame*);
-/* Seconds that the passes of the calling thread's latest calls took, in the order of texgs_pass. */
+/* CPU: seconds that the passes of the calling thread's latest calls took, in the order of texgs_pass. */
 typedef enum {
     TEXGS_PROJECT,
     TEXGS_SORT,

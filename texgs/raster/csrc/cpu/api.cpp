@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The C interface: checks, and the pool of frames.
+// The C interface on CPUs, and the pool of frames.
 #include <memory>
 #include <mutex>
 #include <vector>
 
+#include "../checks.h"
 #include "dispatch.h"
 #include "frame.h"
-#include "status.h"
 
 using namespace texgs;
 
@@ -36,25 +36,6 @@ FramePool& pool() {
     return frames;
 }
 
-void check(const texgs_surfels& s, const texgs_camera& c, const texgs_options& o) {
-    require(s.n >= 0 && s.n < (int64_t(1) << 31), "surfels: expected fewer than 2^31");
-    const bool some = s.n > 0;  // memory of no elements may have no address
-    require(!some || (s.means && s.quats && s.scales && s.opacities),
-            "surfels: means, quats, scales and opacities are needed");
-    require(!some || (s.features != nullptr) != (s.base != nullptr), "surfels: give either features or a texture");
-    require(s.channels >= 1 && s.channels <= TEXGS_MAX_CHANNELS, "channels: expected 1 to 32");
-    require(!s.base || (s.channels == 3 && s.gain && s.texels && s.sizes && s.offsets),
-            "texture: base, gain, texels, sizes and offsets are needed, with 3 channels");
-    require(c.viewmat && c.K, "camera: viewmat and K are needed");
-    require(c.width >= 1 && c.height >= 1 && c.width < (1 << 20) && c.height < (1 << 20),
-            "image: width and height must be 1 to 2^20 - 1");
-    require(o.low_pass > 0, "low_pass: expected above 0");
-    require(o.filter_sigma >= 0, "filter_sigma: expected 0 or more");
-    require(o.alpha_min > 0 && o.alpha_min < 1, "alpha_min: expected between 0 and 1, without them");
-    require(o.transmittance_min >= 0 && o.transmittance_min < 1, "transmittance_min: expected 0 to 1, without 1");
-    require(o.near_plane > 0 && o.far_plane > o.near_plane, "near, far: expected 0 < near < far");
-}
-
 }  // namespace
 
 int32_t texgs_abi_version(void) { return TEXGS_ABI_VERSION; }
@@ -75,7 +56,7 @@ int32_t texgs_require_memory(int64_t bytes) {
 int32_t texgs_forward(const texgs_surfels* surfels, const texgs_camera* camera, const texgs_options* options,
                       const texgs_image* image, texgs_frame** frame, void*) {
     return guarded([&] {
-        check(*surfels, *camera, *options);
+        check_scene(*surfels, *camera, *options);
         std::unique_ptr<texgs_frame> f = pool().take();
         f->bin(*surfels, *camera, *options, *image);
         if (image->color) f->render();
@@ -90,6 +71,7 @@ int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const t
                        const texgs_options* options, const texgs_image* image, const texgs_image* grad,
                        const texgs_gradients* out, void*) {
     return guarded([&] {
+        check_gradients(*image, *grad, frame->raster.with_normal);
         frame->attach(*surfels, *camera, *options);
         frame->differentiate(*image, *grad, *out);
     });
@@ -98,8 +80,7 @@ int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const t
 int32_t texgs_contribute(texgs_frame* frame, const texgs_surfels* surfels, const texgs_camera* camera,
                          const texgs_options* options, const texgs_contributions* out, void*) {
     return guarded([&] {
-        require(!out->image || (out->channels >= 1 && out->channels <= TEXGS_MAX_CHANNELS),
-                "channels: expected 1 to 32");
+        check_contributions(*out);
         frame->attach(*surfels, *camera, *options);
         frame->contribute(*out);
     });

@@ -35,8 +35,16 @@ TEXGS_INLINE vf clamp(vf a, vf low, vf high) { return min(max(a, low), high); }
 struct Test {
     vf ex, ey, xx, xy, yy, slope_x, slope_y, cx, cy, disc;
     TEXGS_INLINE Test(const Footprint& f)
-        : ex(f.ex), ey(f.ey), xx(f.xx), xy(f.xy), yy(f.yy), slope_x(f.xx > 0 ? -f.xy / f.xx : 0),
-          slope_y(f.yy > 0 ? -f.xy / f.yy : 0), cx(f.cx), cy(f.cy), disc(f.disc) {}
+        : ex(f.ex),
+          ey(f.ey),
+          xx(f.xx),
+          xy(f.xy),
+          yy(f.yy),
+          slope_x(f.xx > 0 ? -f.xy / f.xx : 0),
+          slope_y(f.yy > 0 ? -f.xy / f.yy : 0),
+          cx(f.cx),
+          cy(f.cy),
+          disc(f.disc) {}
 
     // The smallest value of the ellipse's form over a rectangle is on the edges that face its centre: on each, the
     // unconstrained minimum along the edge, clamped to it.
@@ -46,9 +54,7 @@ struct Test {
         const vf first = value(near_x, on_x), second = value(on_y, near_y);
         return min(first, second) <= vf(1.0f);
     }
-    TEXGS_INLINE vf value(vf x, vf y) const {
-        return fma(x, fma(xx, x, vf(2.0f) * xy * y), yy * y * y);
-    }
+    TEXGS_INLINE vf value(vf x, vf y) const { return fma(x, fma(xx, x, vf(2.0f) * xy * y), yy * y * y); }
 };
 
 TEXGS_INLINE uint32_t block_mask(const Test& t, bool with_disc, const BlockCorners& corners, float left, float top) {

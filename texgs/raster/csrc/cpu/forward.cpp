@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Forward pass over one tile: block by block, so that a block's transmittance and colours stay in registers.
 //
-// The work on a batch of surfels is split in loops. The first intersects, and its fragments do not depend on each other;
-// the second carries the transmittance from one to the next; the third blends.
+// The work on a batch of surfels is split in loops. The first intersects, and its fragments do not depend on each
+// other; the second carries the transmittance from one to the next; the third blends.
 #include "isa.h"
 #include "replay.h"
 #include "texture.h"
@@ -189,9 +189,8 @@ void blend_tile(const Raster& r, int tile, ForwardScratch& s) {
 template <bool Depth, bool Textured>
 void blend_tile_channels(const Raster& r, int tile, ForwardScratch& s) {
     if (r.channels > kRecordChannels) return blend_tile<Depth, Textured, 0>(r, tile, s);
-    with_constant<kRecordChannels>(r.channels, [&](auto n) {
-        blend_tile<Depth, Textured, decltype(n)::value>(r, tile, s);
-    });
+    with_constant<kRecordChannels>(r.channels,
+                                   [&](auto n) { blend_tile<Depth, Textured, decltype(n)::value>(r, tile, s); });
 }
 
 // Composites over the background and writes the tile's part of the images.

@@ -12,6 +12,17 @@ constexpr int kParts = kBlockPixels / kLanes;  // vectors in a block
 constexpr int kChunk = 128;                    // surfels of a tile worked on at a time; their records stay in L1
 constexpr int kMaxChannels = TEXGS_MAX_CHANNELS + 3;
 
+// Calls body with n, 1 to Most, as a constant: loops over channels unroll, and their sums stay in registers.
+template <int N>
+struct Constant {
+    static constexpr int value = N;
+};
+template <int Most, class Body>
+TEXGS_INLINE void with_constant(int n, Body body) {
+    if (n == Most) return body(Constant<Most>{});
+    if constexpr (Most > 1) with_constant<Most - 1>(n, body);
+}
+
 // Pixel centres of a vector of pixels.
 struct Pixels {
     vf x, y;
@@ -45,7 +56,9 @@ struct Limits {
     vf low_pass, alpha_min, transmittance_min, near_plane;
 
     explicit Limits(const texgs_options& o)
-        : low_pass(o.low_pass), alpha_min(o.alpha_min), transmittance_min(o.transmittance_min),
+        : low_pass(o.low_pass),
+          alpha_min(o.alpha_min),
+          transmittance_min(o.transmittance_min),
           near_plane(o.near_plane) {}
 };
 
@@ -92,8 +105,8 @@ struct alignas(64) Chunk {
     uint32_t slots[kChunk];
     uint32_t surfels[kChunk];
     uint8_t flags[kChunk];
-    const float* channels;   // of the first surfel; the next one's follow at `stride`
-    int stride;              // kRecordStride where the records hold them
+    const float* channels;  // of the first surfel; the next one's follow at `stride`
+    int stride;             // kRecordStride where the records hold them
     static constexpr int kRecordStride = sizeof(Record) / sizeof(float);
     float many_channels[kChunk * kMaxChannels];
 
@@ -146,7 +159,7 @@ TEXGS_INLINE int list_block(const uint32_t* masks, int n, int block, int32_t* li
         const __mmask16 hit = _mm512_test_epi32_mask(_mm512_loadu_si512(masks + i), bit);
         const __m512i index = _mm512_add_epi32(iota().v, _mm512_set1_epi32(i));
         _mm512_storeu_si512(list + count, _mm512_maskz_compress_epi32(hit, index));
-        count += __builtin_popcount(hit);
+        count += static_cast<int>(_mm_popcnt_u32(hit));
     }
 #else
     for (int i = 0; i < n; ++i) {

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "../status.h"
 #include "parallel.h"
 
 using namespace texgs;
@@ -44,9 +45,7 @@ uint32_t* accumulate(const uint32_t* counts, int64_t n, uint32_t* begin) {
 
 }  // namespace
 
-void texgs_pass_seconds(double seconds[TEXGS_PASSES]) {
-    std::copy(pass_seconds, pass_seconds + TEXGS_PASSES, seconds);
-}
+void texgs_pass_seconds(double seconds[TEXGS_PASSES]) { std::copy(pass_seconds, pass_seconds + TEXGS_PASSES, seconds); }
 
 void texgs_frame::attach(const texgs_surfels& surfels, const texgs_camera& camera, const texgs_options& options) {
     raster.surfels = surfels;
@@ -104,8 +103,8 @@ void texgs_frame::bin_tiles(const uint32_t* order, int64_t visible, int64_t most
             most += int64_t(f.x1 - f.x0) * (f.y1 - f.y0);
         }
         part_begin[p] = candidates + reserved.fetch_add(most);
-        part_end[p] = part_begin[p] + kernels().bin(raster, order, begin, end, part_begin[p], per_tile + p * tiles,
-                                                    per_surfel);
+        part_end[p] =
+            part_begin[p] + kernels().bin(raster, order, begin, end, part_begin[p], per_tile + p * tiles, per_surfel);
     });
 
     uint32_t* tile_begin = tile_begin_.ensure<uint32_t>(tiles + 1);

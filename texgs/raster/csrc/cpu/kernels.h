@@ -15,27 +15,27 @@ constexpr int kTilePixels = kTile * kTile;
 constexpr int kBlocks = 16;       // per tile, 4 x 4
 constexpr int kBlockPixels = 16;  // 4 x 4
 constexpr int kRecordChannels = 3;
-constexpr int kSlotAlign = 16;    // floats in a cache line
+constexpr int kSlotAlign = 16;  // floats in a cache line
 
 // A projected surfel as fragments need it (maths.h): one cache line.
 struct alignas(64) Record {
-    float cx, cy;                            // low-pass centre, pixels
-    float ux, uy, u, vx, vy, v, wx, wy;      // affine forms about it
+    float cx, cy;                        // low-pass centre, pixels
+    float ux, uy, u, vx, vy, v, wx, wy;  // affine forms about it
     float log2_opacity;
-    float zc, zp;                            // depth of the plane at the centre, depth of the mean
-    float color[kRecordChannels];            // the channels, where there are no more: what most views need is one line
+    float zc, zp;                  // depth of the plane at the centre, depth of the mean
+    float color[kRecordChannels];  // the channels, where there are no more: what most views need is one line
 };
 static_assert(sizeof(Record) == 64);
 
 // What the fragments of a projected surfel have to look out for; most surfels have neither.
-constexpr uint16_t kClipped = 1;             // the near plane may cut it
-constexpr uint16_t kFiltered = 2;            // the low-pass filter may rule some of its fragments
+constexpr uint16_t kClipped = 1;   // the near plane may cut it
+constexpr uint16_t kFiltered = 2;  // the low-pass filter may rule some of its fragments
 
 // Where a projected surfel is visible: an ellipse (centre, inverse covariance scaled to level 1) and a disc.
 struct Footprint {
     float ex, ey, xx, xy, yy;
-    float cx, cy, disc;                      // disc: squared radius, negative where the ellipse covers it
-    uint16_t x0, y0, x1, y1;                 // tiles, half open; empty where culled
+    float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it
+    uint16_t x0, y0, x1, y1;  // tiles, half open; empty where culled
     uint16_t flags;
 };
 
@@ -47,7 +47,7 @@ struct Pair {
 
 // One surfel before sorting into tiles.
 struct Candidate {
-    uint32_t tile, surfel, rank;             // rank: how many of the surfel's tiles come before
+    uint32_t tile, surfel, rank;  // rank: how many of the surfel's tiles come before
     uint16_t mask, flags;
 };
 
@@ -71,26 +71,26 @@ struct Raster {
     texgs_camera camera;
     texgs_options options;
     int tiles_x, tiles_y;
-    int channels;                            // constant over a surfel: features (or base), then the normal
-    bool with_depth;                         // depth, median or distortion is wanted
+    int channels;     // constant over a surfel: features (or base), then the normal
+    bool with_depth;  // depth, median or distortion is wanted
     bool with_normal;
 
-    Record* records;                         // [N]
-    Footprint* footprints;                   // [N]
-    float* normals;                          // [N, 3] facing the camera
-    uint32_t* depth_keys;                    // [N] ordered as the depths; kCulled where invisible
+    Record* records;        // [N]
+    Footprint* footprints;  // [N]
+    float* normals;         // [N, 3] facing the camera
+    uint32_t* depth_keys;   // [N] ordered as the depths; kCulled where invisible
 
-    const uint32_t* tile_begin;              // [tiles + 1] into pairs
+    const uint32_t* tile_begin;  // [tiles + 1] into pairs
     const Pair* pairs;
-    const uint32_t* slot_begin;              // [N + 1] slots of a surfel, in surfel order
+    const uint32_t* slot_begin;  // [N + 1] slots of a surfel, in surfel order
 
     texgs_image image, grad;
-    float* median_stop;                      // [tiles, 256] transmittance at which a pixel's median was taken
-    float* distortion_moments;               // [tiles, 3, 256] sum w m', sum w m'^2, origin of m'
+    float* median_stop;         // [tiles, 256] transmittance at which a pixel's median was taken
+    float* distortion_moments;  // [tiles, 3, 256] sum w m', sum w m'^2, origin of m'
 
-    float* slots;                            // [slots, slot_stride]
+    float* slots;  // [slots, slot_stride]
     int slot_stride;
-    TexelPart* texel_parts;                  // [slots]
+    TexelPart* texel_parts;  // [slots]
     texgs_gradients out;
     texgs_contributions contributions;
 };
@@ -102,8 +102,8 @@ struct Kernels {
     int64_t (*scratch_bytes)();
     void (*project)(const Raster&, int64_t begin, int64_t end);
     // Appends the tiles of order[begin, end) to `out`, counts them per tile and per surfel; returns how many.
-    int64_t (*bin)(const Raster&, const uint32_t* order, int64_t begin, int64_t end, Candidate* out,
-                   uint32_t* per_tile, uint32_t* per_surfel);
+    int64_t (*bin)(const Raster&, const uint32_t* order, int64_t begin, int64_t end, Candidate* out, uint32_t* per_tile,
+                   uint32_t* per_surfel);
     void (*forward)(const Raster&, int tile, void* scratch);
     void (*backward)(const Raster&, int tile, void* scratch);
     void (*reduce)(const Raster&, int64_t begin, int64_t end);

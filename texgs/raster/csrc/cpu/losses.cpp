@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <vector>
 
+#include "../checks.h"
 #include "dispatch.h"
 #include "loss_kernels.h"
 #include "parallel.h"
-#include "status.h"
 
 namespace texgs {
 namespace {
@@ -63,10 +63,6 @@ double total(const std::vector<double>& sums) {
     return result;
 }
 
-void check_size(int64_t channels, int64_t height, int64_t width) {
-    require(channels >= 1 && height >= 1 && width >= 1, "image: expected at least one pixel, got none");
-}
-
 }  // namespace
 }  // namespace texgs
 
@@ -75,7 +71,7 @@ using namespace texgs;
 int32_t texgs_l1_dssim(const float* image, const float* target, int32_t channels, int32_t height, int32_t width,
                        float l1_weight, float dssim_weight, float* value, float* gradient, void*) {
     return guarded([&] {
-        check_size(channels, height, width);
+        check_image(channels, height, width);
         const LossKernels& kernels = loss_kernels();
         const double n = static_cast<double>(channels) * height * width;
         const float l1_scale = static_cast<float>(l1_weight / n), dssim_scale = static_cast<float>(dssim_weight / n);
@@ -92,7 +88,7 @@ int32_t texgs_l1_dssim(const float* image, const float* target, int32_t channels
 int32_t texgs_depth_to_normal(const float* depth, const float* viewmat, const float* K, int32_t height, int32_t width,
                               float* normal, void*) {
     return guarded([&] {
-        check_size(1, height, width);
+        check_image(1, height, width);
         const LossKernels& kernels = loss_kernels();
         NormalJob job{};
         job.depth = depth, job.viewmat = viewmat, job.K = K, job.height = height, job.width = width;
@@ -106,7 +102,7 @@ int32_t texgs_depth_to_normal(const float* depth, const float* viewmat, const fl
 int32_t texgs_depth_to_normal_backward(const float* depth, const float* viewmat, const float* K, int32_t height,
                                        int32_t width, const float* grad_normal, float* grad_depth, void*) {
     return guarded([&] {
-        check_size(1, height, width);
+        check_image(1, height, width);
         const LossKernels& kernels = loss_kernels();
         NormalJob job{};
         job.depth = depth, job.viewmat = viewmat, job.K = K, job.height = height, job.width = width;
@@ -121,7 +117,7 @@ int32_t texgs_normal_consistency(const float* normal, const float* depth, const 
                                  const float* K, int32_t height, int32_t width, float* value, float* grad_normal,
                                  float* grad_depth, void*) {
     return guarded([&] {
-        check_size(1, height, width);
+        check_image(1, height, width);
         const LossKernels& kernels = loss_kernels();
         const double n = static_cast<double>(height) * width;
         NormalJob job{};
@@ -137,7 +133,7 @@ int32_t texgs_normal_consistency(const float* normal, const float* depth, const 
 int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, const float* alpha, int32_t channels,
                                    int32_t height, int32_t width, float* value, float* gradient, void*) {
     return guarded([&] {
-        check_size(channels, height, width);
+        check_image(channels, height, width);
         const LossKernels& kernels = loss_kernels();
         const double n = static_cast<double>(channels) * height * width;
         const SmoothnessJob job{attribute, guide, alpha, channels, height, width, static_cast<float>(1.0 / n),
@@ -189,6 +185,7 @@ int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* a
 int32_t texgs_spherical_harmonics(int64_t n, int32_t degree, const float* sh, const float* means,
                                   const float* camera_position, float* color, void*) {
     return guarded([&] {
+        check_degree(degree);
         const LossKernels& kernels = loss_kernels();
         HarmonicsJob job{};
         job.degree = degree, job.sh = sh, job.means = means, job.camera_position = camera_position, job.color = color;
@@ -200,6 +197,7 @@ int32_t texgs_spherical_harmonics_backward(int64_t n, int32_t degree, const floa
                                            const float* camera_position, const float* color, const float* grad_color,
                                            float* grad_sh, float* grad_means, void*) {
     return guarded([&] {
+        check_degree(degree);
         const LossKernels& kernels = loss_kernels();
         const HarmonicsJob job{degree, sh, means, camera_position, nullptr, color, grad_color, grad_sh, grad_means};
         parallel_for(n, kSurfelRange,

@@ -5,6 +5,8 @@
 #include <cstdio>
 #include <new>
 
+#include "../status.h"
+
 #if defined(__linux__)
 #include <sys/mman.h>
 #elif defined(_WIN32)
@@ -15,8 +17,8 @@ namespace texgs {
 namespace {
 
 constexpr int64_t kAlign = 64;
-constexpr int64_t kLarge = int64_t(256) << 20;      // below, asking the system costs more than it can save
-constexpr int64_t kHugePages = int64_t(4) << 20;    // from here on 2 MiB pages save page faults
+constexpr int64_t kLarge = int64_t(256) << 20;    // below, asking the system costs more than it can save
+constexpr int64_t kHugePages = int64_t(4) << 20;  // from here on 2 MiB pages save page faults
 std::atomic<int64_t> held{0}, peak{0};
 
 // Memory that can be had without swapping, or the largest number where the system does not say.

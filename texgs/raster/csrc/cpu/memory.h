@@ -6,11 +6,6 @@
 
 namespace texgs {
 
-// Thrown before anything is allocated when `bytes` more than there is are asked for.
-struct OutOfMemory {
-    int64_t bytes;
-};
-
 class Buffer {
 public:
     Buffer() = default;

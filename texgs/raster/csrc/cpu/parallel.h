@@ -18,7 +18,8 @@ template <class Body>
 void parallel_for(int64_t n, int64_t grain, Body&& body) {
     using Plain = std::remove_reference_t<Body>;
     run_parallel(
-        n, grain, [](void* context, int64_t begin, int64_t end, int worker) {
+        n, grain,
+        [](void* context, int64_t begin, int64_t end, int worker) {
             (*static_cast<Plain*>(context))(begin, end, worker);
         },
         &body);

@@ -51,8 +51,8 @@ SurfelGradient<vf> visible_only(const Raster& r, int64_t first, int n, SurfelGra
     float visible[kLanes] = {};  // a surfel that is not drawn may have no finite projection
     for (int i = 0; i < n; ++i) visible[i] = r.slot_begin[first + i + 1] > r.slot_begin[first + i] ? 1.0f : 0.0f;
     const vm keep = load(visible) > vf(0.0f);
-    vf* const all[] = {&g.mean.x,  &g.mean.y,  &g.mean.z, &g.quat[0], &g.quat[1], &g.quat[2],
-                       &g.quat[3], &g.su,      &g.sv,     &g.opacity, &g.shift_x, &g.shift_y};
+    vf* const all[] = {&g.mean.x,  &g.mean.y, &g.mean.z, &g.quat[0], &g.quat[1], &g.quat[2],
+                       &g.quat[3], &g.su,     &g.sv,     &g.opacity, &g.shift_x, &g.shift_y};
     for (vf* x : all) *x = zero_unless(keep, *x);
     return g;
 }
@@ -69,7 +69,8 @@ void reduce_gradients(const Raster& r, int64_t begin, int64_t end) {
         s.gather(r, first, n);
         for (int c = 0; r.out.features && c < own; ++c)
             store_strided(r.out.features + own * first + c, own, n, s[channels + c]);
-        Moments<vf> m{s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], 0.0f, 0.0f, {0.0f, 0.0f, 0.0f}};
+        Moments<vf> m{s[0], s[1], s[2], s[3],  s[4], s[5], s[6],
+                      s[7], s[8], s[9], s[10], 0.0f, 0.0f, {0.0f, 0.0f, 0.0f}};
         if (depth) m.zc = s[11], m.zp = s[12];
         const int normal = channels + own;
         if (r.with_normal) m.normal = {s[normal], s[normal + 1], s[normal + 2]};

@@ -10,15 +10,15 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kGroupEntries = 64;                       // at least; the last surfel may add fifteen more
+constexpr int kGroupEntries = 64;  // at least; the last surfel may add fifteen more
 constexpr int kMaxEntries = kGroupEntries + kBlocks;
-constexpr int kVectors = kMaxEntries * kParts;          // vectors of pixels in a group
+constexpr int kVectors = kMaxEntries * kParts;  // vectors of pixels in a group
 
 struct alignas(64) Group {
     int32_t surfel[kMaxEntries + 16];  // place in the chunk
     int32_t block[kMaxEntries + 16];
-    int first[kChunk + 1];             // entries of the k-th surfel of the group: [first[k], first[k + 1])
-    int place[kChunk];                 // its place in the chunk
+    int first[kChunk + 1];  // entries of the k-th surfel of the group: [first[k], first[k + 1])
+    int place[kChunk];      // its place in the chunk
     int surfels, entries;
 
     // Takes surfels from place `next` on, as far as their blocks in `alive` fit; calls skip(place) for those that reach
@@ -45,7 +45,7 @@ private:
 #if defined(TEXGS_AVX512)
         _mm512_storeu_si512(block + entries, _mm512_maskz_compress_epi32(static_cast<__mmask16>(mask), iota().v));
         _mm512_storeu_si512(surfel + entries, _mm512_set1_epi32(next));
-        entries += __builtin_popcount(mask);
+        entries += static_cast<int>(_mm_popcnt_u32(mask));
 #else
         for (int b = 0; b < kBlocks; ++b) {
             block[entries] = b;
@@ -124,17 +124,6 @@ TEXGS_INLINE void stream_sums(const vf sums[16], float* out) {
 }
 TEXGS_INLINE void stream_zeros(float* out, int n) {
     for (int k = 0; k < n; k += kLanes) stream(out + k, 0.0f);
-}
-
-// Calls body with n, 1 to Most, as a constant: loops over channels unroll, and their sums stay in registers.
-template <int N>
-struct Constant {
-    static constexpr int value = N;
-};
-template <int Most, class Body>
-TEXGS_INLINE void with_constant(int n, Body body) {
-    if (n == Most) return body(Constant<Most>{});
-    if constexpr (Most > 1) with_constant<Most - 1>(n, body);
 }
 
 // Sums over a surfel's entries of weight * plane for N planes; `weights` holds a vector per entry and part.

@@ -25,8 +25,12 @@ inline vf load_strided(const float* p, int stride, int64_t n) {
 inline Surfel<vf> load_surfels(const texgs_surfels& s, int64_t first, int64_t n) {
     const float *mean = s.means + 3 * first, *quat = s.quats + 4 * first, *scale = s.scales + 2 * first;
     return {{load_strided(mean, 3, n), load_strided(mean + 1, 3, n), load_strided(mean + 2, 3, n)},
-            load_strided(quat, 4, n), load_strided(quat + 1, 4, n), load_strided(quat + 2, 4, n),
-            load_strided(quat + 3, 4, n), load_strided(scale, 2, n), load_strided(scale + 1, 2, n),
+            load_strided(quat, 4, n),
+            load_strided(quat + 1, 4, n),
+            load_strided(quat + 2, 4, n),
+            load_strided(quat + 3, 4, n),
+            load_strided(scale, 2, n),
+            load_strided(scale + 1, 2, n),
             load_strided(s.opacities + first, 1, n)};
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 #include <deque>
 
+#include "../status.h"
 #include "kernels.h"
 #include "memory.h"
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of textures over one tile. The image is linear in the texels: each pixel gives weight * gradient to the four
-// texels it was interpolated from. Base and gain need nothing more: the bilinear weights add up to one, so the sum over
-// a surfel's texels is the gradient of its base, and the sum weighted by the texels that of its gain.
+// Gradients of textures over one tile. The image is linear in the texels: each pixel gives weight * gradient to the
+// four texels it was interpolated from. Base and gain need nothing more: the bilinear weights add up to one, so the sum
+// over a surfel's texels is the gradient of its base, and the sum weighted by the texels that of its gain.
 //
 // Each (tile, surfel) pair collects its texels in memory of its own, which reduce_textures adds up in a fixed order.
 #include "isa.h"
@@ -39,6 +39,9 @@ TEXGS_INLINE void evaluate_entries(TextureScratch& s, const TilePixels& pixels, 
         }
     for (int i = 0; i < s.group.entries * kParts; ++i) store(s.alpha[i], alpha_of(load(s.alpha[i]), limits));
 }
+
+// Vectors of 16 in which the sums of a channel of so many texels are kept; 0: they are scattered to memory.
+TEXGS_INLINE int sums_in_registers(int texels) { return kLanes == 16 ? planes_for(texels) : 0; }
 
 // Floats, aligned to cache lines; NULL when memory is exhausted.
 TEXGS_INLINE float* take(TexelArena& arena, int64_t floats) {
@@ -136,22 +139,17 @@ void add_surfel(const Raster& r, TextureScratch& s, const Limits& limits, TexelA
     blend_surfel(s, limits, begin, end);
     if (!s.touches.n) return;
     const TextureTable& table = s.textures.of[place];
+    const int registers = sums_in_registers(static_cast<int>(table.columns * table.rows));
     TexelPart part{};
+    if (!registers) part = touched_part(s.touches, table);
+    part.sums = take(arena, registers ? 48 * registers : 4 * part.columns * part.rows);
+    if (!part.sums) return;
+    if (!registers) add_to_memory(s.touches, part);
 #if defined(TEXGS_AVX512)
-    if (table.registers) {
-        part.sums = take(arena, 48 * table.registers);
-        if (!part.sums) return;
-        if (table.registers == 1) add_to_registers<1>(s.touches, table, part.sums);
-        if (table.registers == 2) add_to_registers<2>(s.touches, table, part.sums);
-        if (table.registers == 4) add_to_registers<4>(s.touches, table, part.sums);
-    }
+    if (registers == 1) add_to_registers<1>(s.touches, table, part.sums);
+    if (registers == 2) add_to_registers<2>(s.touches, table, part.sums);
+    if (registers == 4) add_to_registers<4>(s.touches, table, part.sums);
 #endif
-    if (!table.registers) {
-        part = touched_part(s.touches, table);
-        part.sums = take(arena, 4 * part.columns * part.rows);
-        if (!part.sums) return;
-        add_to_memory(s.touches, part);
-    }
     r.texel_parts[s.chunk.slots[place]] = part;
 }
 
@@ -200,13 +198,17 @@ TEXGS_INLINE void sum_memory(const TexelPart* parts, uint32_t begin, uint32_t en
 
 TEXGS_INLINE void sum_parts(const TexelPart* parts, uint32_t begin, uint32_t end, int columns, int count, float* out,
                             float base[3]) {
-    switch (registers_for(count)) {
+    switch (sums_in_registers(count)) {
 #if defined(TEXGS_AVX512)
-        case 1: return sum_registers<1>(parts, begin, end, count, out, base);
-        case 2: return sum_registers<2>(parts, begin, end, count, out, base);
-        case 4: return sum_registers<4>(parts, begin, end, count, out, base);
+        case 1:
+            return sum_registers<1>(parts, begin, end, count, out, base);
+        case 2:
+            return sum_registers<2>(parts, begin, end, count, out, base);
+        case 4:
+            return sum_registers<4>(parts, begin, end, count, out, base);
 #endif
-        default: return sum_memory(parts, begin, end, columns, count, out, base);
+        default:
+            return sum_memory(parts, begin, end, columns, count, out, base);
     }
 }
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "../cpu/memory.h"
+#include "../status.h"
 
 using namespace texgs::cuda;
 using texgs::OutOfMemory;

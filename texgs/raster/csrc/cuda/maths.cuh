@@ -8,10 +8,12 @@
 namespace texgs::cuda {
 
 __host__ __device__ inline float fma(float a, float b, float c) { return ::fmaf(a, b, c); }
+__host__ __device__ inline float fnma(float a, float b, float c) { return ::fmaf(-a, b, c); }
 __host__ __device__ inline float sqrt(float a) { return ::sqrtf(a); }
 __host__ __device__ inline float abs(float a) { return ::fabsf(a); }
 __host__ __device__ inline float select(bool condition, float yes, float no) { return condition ? yes : no; }
 __device__ inline float clamp(float a, float low, float high) { return fminf(fmaxf(a, low), high); }
+using ::max, ::min;  // of every type: functions for float here would hide those for integers
 
 }  // namespace texgs::cuda
 

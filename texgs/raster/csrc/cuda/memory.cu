@@ -3,7 +3,7 @@
 
 #include <atomic>
 
-#include "../cpu/memory.h"
+#include "../status.h"
 
 namespace texgs::cuda {
 namespace {

@@ -7,6 +7,7 @@
 // which always faces the camera and needs no points.
 //
 // The gradient of a depth is gathered from the four normals that it takes part in: no atomics.
+#include "../checks.h"
 #include "../texgs_losses.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -121,10 +122,6 @@ __global__ __launch_bounds__(kBlock) void consistency_kernel(const Map map, cons
     if (threadIdx.x == 0) c.sums[blockIdx.x] = sum;
 }
 
-void check_size(int64_t height, int64_t width) {
-    require(height >= 1 && width >= 1, "image: expected at least one pixel, got none");
-}
-
 }  // namespace
 }  // namespace texgs::cuda
 
@@ -134,7 +131,7 @@ using namespace texgs::cuda;
 int32_t texgs_depth_to_normal(const float* depth, const float* viewmat, const float* K, int32_t height, int32_t width,
                               float* normal, void* on) {
     return on_device_of(viewmat, on, [&](cudaStream_t stream) {
-        check_size(height, width);
+        check_image(1, height, width);
         launch(normal_kernel, blocks_for(int64_t(height) * width, kBlock), kBlock, stream,
                Map{depth, viewmat, K, height, width}, normal);
     });
@@ -143,7 +140,7 @@ int32_t texgs_depth_to_normal(const float* depth, const float* viewmat, const fl
 int32_t texgs_depth_to_normal_backward(const float* depth, const float* viewmat, const float* K, int32_t height,
                                        int32_t width, const float* grad_normal, float* grad_depth, void* on) {
     return on_device_of(viewmat, on, [&](cudaStream_t stream) {
-        check_size(height, width);
+        check_image(1, height, width);
         launch(normal_backward_kernel, blocks_for(int64_t(height) * width, kBlock), kBlock, stream,
                Map{depth, viewmat, K, height, width}, grad_normal, grad_depth);
     });
@@ -153,7 +150,7 @@ int32_t texgs_normal_consistency(const float* normal, const float* depth, const 
                                  const float* K, int32_t height, int32_t width, float* value, float* grad_normal,
                                  float* grad_depth, void* on) {
     return with_workspace(viewmat, on, [&](Workspace& workspace, cudaStream_t stream) {
-        check_size(height, width);
+        check_image(1, height, width);
         const int64_t n = int64_t(height) * width, blocks = blocks_for(n, kBlock);
         double* sums = workspace.sums.ensure<double>(blocks);
         const Consistency c{normal, alpha, static_cast<float>(-1.0 / n), sums, grad_normal, grad_depth};

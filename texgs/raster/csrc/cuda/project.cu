@@ -1,31 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // Projects surfels, one per thread: record, footprint on screen, depth key.
-#include "bounds.cuh"
 #include "surfel.cuh"
+
+#include "../bounds.h"
 
 namespace texgs::cuda {
 namespace {
 
 constexpr int kBlock = 128;
 
-// The footprint's tiles; false where there are none.
-__device__ bool place_on_screen(const Raster& r, const Box& box, Footprint& foot) {
-    const int tiles_y = r.tiles / r.tiles_x;
-    foot.x0 = first_tile(box.x0, r.tiles_x), foot.x1 = last_tile(box.x1, r.tiles_x);
-    foot.y0 = first_tile(box.y0, tiles_y), foot.y1 = last_tile(box.y1, tiles_y);
-    return foot.x0 < foot.x1 && foot.y0 < foot.y1;
-}
-
-__device__ float half_extent(const texgs_camera& camera, const Box& box) {
-    const float diagonal = hypotf(static_cast<float>(camera.width), static_cast<float>(camera.height));
-    return 0.5f * fminf(fmaxf(box.x1 - box.x0, box.y1 - box.y0), 2 * diagonal);
-}
-
-// Forms of a surfel seen edge-on are so steep that rho_surfel never wins: it is its disc.
 __device__ Record make_record(const Projection<float>& q, float cx, float cy, float log2_opacity, bool clip,
                               float low_pass, int64_t id) {
-    Forms<float> f = affine_forms(q);
-    if (q.scale == 0.0f) f.ux = f.vy = 1e4f * sqrt(low_pass), f.zc = q.p.z;
+    const Forms<float> f = visible_forms(q, low_pass);
     return {cx,
             cy,
             f.ux,
@@ -51,25 +37,22 @@ __device__ bool project_surfel(const Raster& r, const View& view, const Surfel<f
     float x = view.cx, y = view.cy;
     if (r.surfels.shift) x += r.surfels.shift[2 * i], y += r.surfels.shift[2 * i + 1];
     const float cx = q.cx + x, cy = q.cy + y;
-    if (!(q.p.z > o.near_plane && s.opacity >= o.alpha_min && fabsf(cx) < 1e7f && fabsf(cy) < 1e7f &&
-          q.inverse_norm < 1e18f))
-        return false;
-    // Fragments at rho = cut have alpha = alpha_min; a little more covers rounding.
+    if (!is_visible(q, s.opacity, cx, cy, o)) return false;
     const float log2_opacity = log2f(s.opacity);
-    const float cut = fmaxf(fma(2.0f * kLn2 * 1.0001f, log2_opacity - log2f(o.alpha_min), 1e-3f), 1e-3f);
-    const float nearest = q.p.z - sqrt(cut * fma(q.a.z, q.a.z, q.b.z * q.b.z));
-    const bool clip = nearest <= o.near_plane;
-    Bounds b = bound(q, cut, cx, cy, o.low_pass);
+    const float cut = largest_rho(log2_opacity, log2f(o.alpha_min));
+    const bool clip = nearest_depth(q, cut) <= o.near_plane;
+    Bounds<float> b = bound(q, cut, cx, cy, o.low_pass);
     if (b.behind && clip) {
-        const float radius = sqrt(cut / o.low_pass);
-        b.box = {cx - radius, cy - radius, cx + radius, cy + radius};
-        include_clipped(view, x, y, q, sqrt(cut), o.near_plane, b.box);
+        b.box = clipped_box(view, x, y, {q.p, q.a, q.b}, cx, cy, cut, o);
         b.xx = b.xy = b.yy = 0;  // no ellipse: every block of the box
     }
     foot = {b.ex, b.ey, b.xx, b.xy, b.yy, cx, cy, b.disc, 0, 0, 0, 0};
     r.records[i] = make_record(q, cx, cy, log2_opacity, clip, o.low_pass, i);
-    if (!place_on_screen(r, b.box, foot)) return false;
-    if (r.image.radii) r.image.radii[i] = half_extent(r.camera, b.box);
+    if (!cover_tiles(b.box, r.tiles_x, r.tiles / r.tiles_x, foot)) return false;
+    if (r.image.radii) {
+        const float diagonal = hypotf(static_cast<float>(r.camera.width), static_cast<float>(r.camera.height));
+        r.image.radii[i] = half_extent(b.box, diagonal);
+    }
     return true;
 }
 

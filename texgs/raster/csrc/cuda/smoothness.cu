@@ -4,6 +4,7 @@
 //
 // One block per tile. The gradient of a pixel needs the edges of its neighbours, and those the values of theirs: shared
 // planes hold two more rows and columns on every side.
+#include "../checks.h"
 #include "../texgs_losses.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -97,7 +98,7 @@ using namespace texgs::cuda;
 int32_t texgs_bilateral_smoothness(const float* attribute, const float* guide, const float* alpha, int32_t channels,
                                    int32_t height, int32_t width, float* value, float* gradient, void* on) {
     return with_workspace(attribute, on, [&](Workspace& workspace, cudaStream_t stream) {
-        require(channels >= 1 && height >= 1 && width >= 1, "image: expected at least one pixel, got none");
+        check_image(channels, height, width);
         const double n = static_cast<double>(channels) * height * width;
         const int64_t blocks = blocks_for(width, kWidth) * blocks_for(height, kHeight);
         double* sums = workspace.sums.ensure<double>(blocks);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // View-dependent colour of surfels from real spherical harmonics of degree 0 to 3, in the order and with the signs of
 // 3DGS (Kerbl et al. 2023); one surfel per thread.
+#include "../checks.h"
 #include "../texgs_losses.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -115,7 +116,7 @@ using namespace texgs::cuda;
 int32_t texgs_spherical_harmonics(int64_t n, int32_t degree, const float* sh, const float* means,
                                   const float* camera_position, float* color, void* on) {
     return on_device_of(camera_position, on, [&](cudaStream_t stream) {
-        require(degree >= 0 && degree <= 3, "spherical harmonics: expected degree 0 to 3");
+        check_degree(degree);
         constexpr decltype(&color_kernel<0>) kernels[] = {color_kernel<0>, color_kernel<1>, color_kernel<2>,
                                                           color_kernel<3>};
         launch(kernels[degree], blocks_for(n, kBlock), kBlock, stream, Job{n, sh, means, camera_position}, color);
@@ -126,7 +127,7 @@ int32_t texgs_spherical_harmonics_backward(int64_t n, int32_t degree, const floa
                                            const float* camera_position, const float* color, const float* grad_color,
                                            float* grad_sh, float* grad_means, void* on) {
     return on_device_of(camera_position, on, [&](cudaStream_t stream) {
-        require(degree >= 0 && degree <= 3, "spherical harmonics: expected degree 0 to 3");
+        check_degree(degree);
         constexpr decltype(&color_backward_kernel<0>) kernels[] = {color_backward_kernel<0>, color_backward_kernel<1>,
                                                                    color_backward_kernel<2>, color_backward_kernel<3>};
         launch(kernels[degree], blocks_for(n, kBlock), kBlock, stream, Job{n, sh, means, camera_position}, color,

@@ -10,6 +10,7 @@
 // the images are alike, and is exactly 0, with a gradient of exactly 0, where d = 0 all over the window: tiles in which
 // the images do not differ are skipped. Variances are those of p - 1, which for values in [0, 1] loses less to
 // cancellation; the zeros outside the image are then -1.
+#include "../checks.h"
 #include "../texgs_losses.h"
 #include "workspace.cuh"
 
@@ -177,7 +178,7 @@ using namespace texgs::cuda;
 int32_t texgs_l1_dssim(const float* image, const float* target, int32_t channels, int32_t height, int32_t width,
                        float l1_weight, float dssim_weight, float* value, float* gradient, void* on) {
     return with_workspace(image, on, [&](Workspace& workspace, cudaStream_t stream) {
-        require(channels >= 1 && height >= 1 && width >= 1, "image: expected at least one pixel, got none");
+        check_image(channels, height, width);
         const int64_t n = int64_t(channels) * height * width;
         const int64_t tiles = blocks_for(width, kWidth) * blocks_for(height, kHeight) * channels;
         double* sums = workspace.sums.ensure<double>(tiles);

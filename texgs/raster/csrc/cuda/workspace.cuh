@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Scratch memory of a loss, and sums over thread blocks that do not depend on their order.
 #pragma once
-#include "../cpu/status.h"
+#include "../status.h"
 #include "pool.cuh"
 #include "warp.cuh"
 

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Exceptions turned into the status codes of the C interface.
+// Exceptions turned into the status codes of the C interface, the same in every library.
 #pragma once
 #include <cstdint>
 #include <exception>
 #include <new>
 #include <string>
 
-#include "../texgs.h"
-#include "memory.h"
+#include "texgs.h"
 
 namespace texgs {
 
@@ -20,6 +19,11 @@ struct InvalidArgument {
 inline void require(bool condition, const char* what) {
     if (!condition) throw InvalidArgument{what};
 }
+
+// Thrown before anything is allocated when `bytes` more than there is are asked for.
+struct OutOfMemory {
+    int64_t bytes;
+};
 
 template <class Body>
 int32_t guarded(const Body& body) {

@@ -1,0 +1,120 @@
+"""Checks of what the rasterizer is called with; what passes comes out dense."""
+
+from __future__ import annotations
+
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError
+from texgs.raster import native
+from texgs.raster.atlas import check_texture
+from texgs.raster.inputs import SurfelTensors, View
+from texgs.raster.types import OUTPUTS, Options, Texture
+
+MAX_CHANNELS = 32
+MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
+BYTES_PER_SURFEL = 512  # records, footprints, sorting, a few tiles: what no scene stays below
+AXES = {  # after N
+    "means": "3",
+    "quats": "4",
+    "scales": "2",
+    "opacities": "",
+    "shift": "2",
+    "features": "C",
+    "base": "3",
+    "gain": "",
+}
+
+
+def surfel_tensors(
+    geometry: dict[str, Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
+) -> SurfelTensors:
+    """All surfel tensors; `geometry` holds means, quats, scales and opacities.
+
+    Raises:
+        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
+        OutOfMemoryError: where there are more surfels than memory can hold.
+    """
+    tensors = geometry | _colors(features, texture)
+    if shift is not None:
+        tensors["shift"] = shift
+    sizes: dict[str, int] = {}
+    for name, axes in AXES.items():
+        if name in tensors:
+            sizes |= check.shape(name, tensors[name], f"N {axes}", **sizes)
+    if texture is not None:
+        check_texture(texture, sizes["N"])
+    else:
+        channels("features", sizes["C"])
+    for name, tensor in tensors.items():
+        check.floating(name, tensor)
+    device = check.same_device(**tensors)
+    native.require_memory(BYTES_PER_SURFEL * sizes["N"], device)
+    return SurfelTensors(**{name: x.contiguous() for name, x in tensors.items()})
+
+
+def _colors(features: Tensor | None, texture: Texture | None) -> dict[str, Tensor]:
+    if features is not None and texture is None:
+        return {"features": features}
+    if features is None and texture is not None:
+        return {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
+    given = "both" if texture is not None else "neither"
+    raise ArgumentError(f"rasterize: expected either features or texture, got {given}")
+
+
+def channels(name: str, n: int) -> None:
+    """Require a number of channels that the library can blend."""
+    if not 1 <= n <= MAX_CHANNELS:
+        raise ArgumentError(f"{name}: expected 1 to {MAX_CHANNELS} channels, got {n}")
+
+
+def view(
+    surfels: SurfelTensors,
+    camera: dict[str, Tensor],
+    size: tuple[int, int],
+    texture: Texture | None,
+    outputs: frozenset[str],
+    options: Options,
+) -> View:
+    """The rest of the arguments; `camera` holds viewmat, K and perhaps background, `size` is (width, height).
+
+    Raises:
+        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
+        OutOfMemoryError: where the images do not fit into memory.
+    """
+    width, height = size
+    _check_camera(camera, surfels)
+    if unknown := sorted(outputs - set(OUTPUTS)):
+        raise ArgumentError(f"outputs: expected any of {', '.join(OUTPUTS)}, got {unknown[0]!r}")
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
+        raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
+    if options.check_finite:
+        check.finite(**surfels._asdict(), **camera)
+    planes = surfels.channels + 3 * len(outputs) + 2
+    native.require_memory(4 * planes * width * height, surfels.means.device)
+    dense = {name: x.detach().contiguous() for name, x in camera.items()}
+    return View(
+        viewmat=dense["viewmat"],
+        K=dense["K"],
+        width=width,
+        height=height,
+        background=dense.get("background"),
+        sizes=None if texture is None else texture.sizes.contiguous(),
+        offsets=None if texture is None else texture.offsets.contiguous(),
+        outputs=outputs,
+        options=options,
+    )
+
+
+def _check_camera(camera: dict[str, Tensor], surfels: SurfelTensors) -> None:
+    check.shape("viewmat", camera["viewmat"], "4 4")
+    check.shape("K", camera["K"], "3 3")
+    if "background" in camera:
+        check.shape("background", camera["background"], "C", C=surfels.channels)
+    for name, tensor in camera.items():
+        check.floating(name, tensor)
+    check.same_device(means=surfels.means, **camera)
+    check.constant(**camera)
+    K = camera["K"]
+    if K.device.type == "cpu" and K[0, 1] != 0:  # elsewhere it would wait for the device
+        raise ArgumentError(f"K: expected no skew, got K[0, 1] = {float(K[0, 1])}")

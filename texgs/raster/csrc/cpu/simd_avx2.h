@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+// AVX2 with FMA: eight lanes, masks as vectors. Included by simd.h alone.
+#pragma once
+
+// clang-format off: a table, one operation a line
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kLanes = 8;
+struct vm {
+    __m256 v;
+};
+struct vi {
+    __m256i v;
+};
+struct vf {
+    __m256 v;
+    vf() = default;
+    TEXGS_INLINE vf(__m256 x) : v(x) {}
+    TEXGS_INLINE vf(float x) : v(_mm256_set1_ps(x)) {}
+};
+
+TEXGS_INLINE vf load(const float* p) { return _mm256_loadu_ps(p); }
+TEXGS_INLINE void store(float* p, vf a) { _mm256_storeu_ps(p, a.v); }
+TEXGS_INLINE void stream(float* p, vf a) { _mm256_stream_ps(p, a.v); }  // p: 32-byte aligned
+TEXGS_INLINE void stream_fence() { _mm_sfence(); }
+TEXGS_INLINE vi load(const int32_t* p) { return {_mm256_loadu_si256(reinterpret_cast<const __m256i*>(p))}; }
+TEXGS_INLINE void store(int32_t* p, vi a) { _mm256_storeu_si256(reinterpret_cast<__m256i*>(p), a.v); }
+TEXGS_INLINE __m256i first_lanes(int n) {
+    return _mm256_cmpgt_epi32(_mm256_set1_epi32(n), _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7));
+}
+TEXGS_INLINE vf load_part(const float* p, int n) { return _mm256_maskload_ps(p, first_lanes(n)); }
+TEXGS_INLINE void store_part(float* p, vf a, int n) {
+    if (n == 8) return store(p, a);  // masked stores are slow
+    _mm256_maskstore_ps(p, first_lanes(n), a.v);
+}
+
+TEXGS_INLINE vf operator+(vf a, vf b) { return _mm256_add_ps(a.v, b.v); }
+TEXGS_INLINE vf operator-(vf a, vf b) { return _mm256_sub_ps(a.v, b.v); }
+TEXGS_INLINE vf operator*(vf a, vf b) { return _mm256_mul_ps(a.v, b.v); }
+TEXGS_INLINE vf operator/(vf a, vf b) { return _mm256_div_ps(a.v, b.v); }
+TEXGS_INLINE vf fma(vf a, vf b, vf c) { return _mm256_fmadd_ps(a.v, b.v, c.v); }
+TEXGS_INLINE vf fnma(vf a, vf b, vf c) { return _mm256_fnmadd_ps(a.v, b.v, c.v); }
+TEXGS_INLINE vf min(vf a, vf b) { return _mm256_min_ps(a.v, b.v); }
+TEXGS_INLINE vf max(vf a, vf b) { return _mm256_max_ps(a.v, b.v); }
+TEXGS_INLINE vf sqrt(vf a) { return _mm256_sqrt_ps(a.v); }
+TEXGS_INLINE vf abs(vf a) { return _mm256_andnot_ps(_mm256_set1_ps(-0.0f), a.v); }
+TEXGS_INLINE vf floor(vf a) { return _mm256_floor_ps(a.v); }
+TEXGS_INLINE vf round(vf a) { return _mm256_round_ps(a.v, _MM_FROUND_TO_NEAREST_INT | _MM_FROUND_NO_EXC); }
+
+TEXGS_INLINE vm operator<(vf a, vf b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LT_OQ)}; }
+TEXGS_INLINE vm operator<=(vf a, vf b) { return {_mm256_cmp_ps(a.v, b.v, _CMP_LE_OQ)}; }
+TEXGS_INLINE vm operator&(vm a, vm b) { return {_mm256_and_ps(a.v, b.v)}; }
+TEXGS_INLINE vm operator|(vm a, vm b) { return {_mm256_or_ps(a.v, b.v)}; }
+TEXGS_INLINE vm operator~(vm a) { return {_mm256_xor_ps(a.v, _mm256_castsi256_ps(_mm256_set1_epi32(-1)))}; }
+TEXGS_INLINE unsigned bits(vm m) { return static_cast<unsigned>(_mm256_movemask_ps(m.v)); }
+TEXGS_INLINE int count(vm m) { return static_cast<int>(_mm_popcnt_u32(bits(m))); }
+TEXGS_INLINE vf select(vm m, vf a, vf b) { return _mm256_blendv_ps(b.v, a.v, m.v); }
+TEXGS_INLINE vf zero_unless(vm m, vf a) { return _mm256_and_ps(m.v, a.v); }
+TEXGS_INLINE vf add_where(vm m, vf acc, vf a) { return acc + zero_unless(m, a); }
+TEXGS_INLINE vf fma_where(vm m, vf a, vf b, vf acc) { return fma(zero_unless(m, a), b, acc); }
+
+TEXGS_INLINE vi truncate(vf a) { return {_mm256_cvttps_epi32(a.v)}; }
+TEXGS_INLINE vf to_float(vi a) { return _mm256_cvtepi32_ps(a.v); }
+TEXGS_INLINE vi splat(int32_t a) { return {_mm256_set1_epi32(a)}; }
+TEXGS_INLINE vi operator+(vi a, vi b) { return {_mm256_add_epi32(a.v, b.v)}; }
+TEXGS_INLINE vi operator*(vi a, vi b) { return {_mm256_mullo_epi32(a.v, b.v)}; }
+TEXGS_INLINE vi iota() { return {_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)}; }
+TEXGS_INLINE vf gather(const float* p, vi i) { return _mm256_i32gather_ps(p, i.v, 4); }
+TEXGS_INLINE float sum(vf a) {
+    __m128 s = _mm_add_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+    s = _mm_add_ps(s, _mm_movehl_ps(s, s));
+    return _mm_cvtss_f32(_mm_add_ss(s, _mm_movehdup_ps(s)));
+}
+TEXGS_INLINE float largest(vf a) {
+    __m128 s = _mm_max_ps(_mm256_castps256_ps128(a.v), _mm256_extractf128_ps(a.v, 1));
+    s = _mm_max_ps(s, _mm_movehl_ps(s, s));
+    return _mm_cvtss_f32(_mm_max_ss(s, _mm_movehdup_ps(s)));
+}
+TEXGS_INLINE vf scale_by_power(vf x, vf k) {  // k in [-126, 127]
+    const __m256i e = _mm256_slli_epi32(_mm256_add_epi32(_mm256_cvtps_epi32(k.v), _mm256_set1_epi32(127)), 23);
+    return _mm256_mul_ps(x.v, _mm256_castsi256_ps(e));
+}
+TEXGS_INLINE vf exponent(vf a) {  // a > 0, normal
+    const __m256i e = _mm256_srli_epi32(_mm256_castps_si256(a.v), 23);
+    return _mm256_cvtepi32_ps(_mm256_sub_epi32(e, _mm256_set1_epi32(127)));
+}
+TEXGS_INLINE vf mantissa(vf a) {
+    const __m256i m = _mm256_and_si256(_mm256_castps_si256(a.v), _mm256_set1_epi32(0x007fffff));
+    return _mm256_castsi256_ps(_mm256_or_si256(m, _mm256_set1_epi32(0x3f800000)));
+}
+
+// -- Tables in registers: up to kTableTexels floats, 16 to a plane ---------------------------------------------------
+
+constexpr int kTableTexels = 16;
+template <int Planes>
+TEXGS_INLINE vf table_lookup(const float* p, vi index) {
+    const __m256 low = _mm256_permutevar8x32_ps(load(p).v, index.v), high = _mm256_permutevar8x32_ps(load(p + 8).v, index.v);
+    return _mm256_blendv_ps(low, high, _mm256_castsi256_ps(_mm256_slli_epi32(index.v, 28)));  // bit 3 to the sign
+}
+// Splits n <= 16 interleaved triples into three planes of 16.
+TEXGS_INLINE void split_channels(const float* from, int n, float* x, float* y, float* z) {
+    for (int i = 0; i < n; ++i) x[i] = from[3 * i], y[i] = from[3 * i + 1], z[i] = from[3 * i + 2];
+}
+
+}  // namespace
+}  // namespace texgs::TEXGS_ISA
+// clang-format on
