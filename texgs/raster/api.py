@@ -66,7 +66,7 @@ def rasterize(
     geometry = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
     camera = {"viewmat": viewmat, "K": K} | ({} if background is None else {"background": background})
     surfels = arguments.surfel_tensors(geometry, shift, features, texture)
-    view = arguments.view(surfels, camera, (width, height), texture, frozenset(outputs), options)
+    view = arguments.view(surfels, camera, (width, height), texture, outputs, options)
     found: dict = {}
     images = RasterizeFunction.apply(view, found, *surfels)
     image = dict(zip(IMAGES, images, strict=True))
@@ -106,6 +106,7 @@ def splat(
         Sums [N, C] over all pixels of blending weight times image, and the sums [N] of the weights.
     """
     size = check.shape("image", image, "H W C")
+    n = check.shape("means", means, "N 3")["N"]
     check.floating("image", image)
     check.same_device(means=means, image=image)
     arguments.channels("image", size["C"])
@@ -114,8 +115,8 @@ def splat(
     geometry = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
     camera = {"viewmat": viewmat, "K": K}
     with torch.no_grad():
-        surfels = arguments.surfel_tensors(geometry, None, image.new_empty(len(means), 1), None)
-        view = arguments.view(surfels, camera, (size["W"], size["H"]), None, frozenset(), options)
+        surfels = arguments.surfel_tensors(geometry, None, image.new_zeros(n, 1), None)
+        view = arguments.view(surfels, camera, (size["W"], size["H"]), None, (), options)
         frame = bin_surfels(surfels, view, {})
         sums, weights, _, _ = contribute(frame, surfels, view, image.permute(2, 0, 1).contiguous())
     return sums, weights

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from math import isfinite
+from operator import index
+
 from torch import Tensor
 
 from texgs.core import check
@@ -13,6 +17,7 @@ from texgs.raster.types import OUTPUTS, Options, Texture
 
 MAX_CHANNELS = 32
 MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
+ROUNDING = 1e-4  # of a matrix that was inverted or multiplied
 BYTES_PER_SURFEL = 512  # records, footprints, sorting, a few tiles: what no scene stays below
 AXES = {  # after N
     "means": "3",
@@ -73,7 +78,7 @@ def view(
     camera: dict[str, Tensor],
     size: tuple[int, int],
     texture: Texture | None,
-    outputs: frozenset[str],
+    outputs: Collection[str],
     options: Options,
 ) -> View:
     """The rest of the arguments; `camera` holds viewmat, K and perhaps background, `size` is (width, height).
@@ -82,10 +87,17 @@ def view(
         ArgumentError, ShapeError, DeviceError: naming the argument at fault.
         OutOfMemoryError: where the images do not fit into memory.
     """
-    width, height = size
     _check_camera(camera, surfels)
-    if unknown := sorted(outputs - set(OUTPUTS)):
+    if isinstance(outputs, str):
+        raise ArgumentError(f"outputs: expected a collection of names, got a string; pass ({outputs!r},)")
+    if unknown := sorted(set(outputs) - set(OUTPUTS)):
         raise ArgumentError(f"outputs: expected any of {', '.join(OUTPUTS)}, got {unknown[0]!r}")
+    try:
+        width, height = (index(side) for side in size)
+    except TypeError:
+        raise ArgumentError(
+            f"width, height: expected whole numbers, got {size[0]!r} and {size[1]!r}"
+        ) from None
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
     if options.check_finite:
@@ -101,7 +113,7 @@ def view(
         background=dense.get("background"),
         sizes=None if texture is None else texture.sizes.contiguous(),
         offsets=None if texture is None else texture.offsets.contiguous(),
-        outputs=outputs,
+        outputs=frozenset(outputs),
         options=options,
     )
 
@@ -115,6 +127,24 @@ def _check_camera(camera: dict[str, Tensor], surfels: SurfelTensors) -> None:
         check.floating(name, tensor)
     check.same_device(means=surfels.means, **camera)
     check.constant(**camera)
-    K = camera["K"]
-    if K.device.type == "cpu" and K[0, 1] != 0:  # elsewhere it would wait for the device
-        raise ArgumentError(f"K: expected no skew, got K[0, 1] = {float(K[0, 1])}")
+    pinhole(camera["viewmat"], camera["K"])
+
+
+def pinhole(viewmat: Tensor, K: Tensor) -> None:
+    """Require the entries that the library takes for granted. On the CPU only: a GPU would have to wait.
+
+    Raises:
+        ArgumentError: naming the matrix and the row. NaN and infinity pass, they have a check of their own.
+    """
+    if K.device.type != "cpu":
+        return
+    rows = K.tolist()
+    if rows[0][1] != 0 and isfinite(rows[0][1]):
+        raise ArgumentError(f"K: expected no skew, got K[0, 1] = {rows[0][1]}")
+    for name, row, expected in (
+        ("K", [rows[1][0], *rows[2]], [0.0, 0.0, 0.0, 1.0]),
+        ("viewmat", viewmat[3].tolist(), [0.0, 0.0, 0.0, 1.0]),
+    ):
+        if any(isfinite(x) and abs(x - wanted) > ROUNDING for x, wanted in zip(row, expected, strict=True)):
+            what = "K[1, 0] and last row" if name == "K" else "last row"
+            raise ArgumentError(f"{name}: expected {what} 0, 0, 0, 1, got {row}; did you transpose?")

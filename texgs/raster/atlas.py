@@ -9,6 +9,8 @@ from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.raster.types import Texture
 
+MOST_TEXELS = 2**24  # of one surfel: the library counts them in 32-bit floats
+
 
 def check_texture(texture: Texture, n: int) -> None:
     """Require a layout for n surfels. Where textures lie is checked on the CPU only; a GPU would wait.
@@ -25,18 +27,22 @@ def check_texture(texture: Texture, n: int) -> None:
             raise ArgumentError(f"{name}: expected {dtype}, got {x.dtype}; convert it with .to({dtype})")
     check.same_device(**{"texture.texels": texture.texels}, **layout)
     if n and texture.sizes.device.type == "cpu":
-        ends = texture.offsets + texture.sizes.long().prod(1)  # [N]
-        _check_range(texture, ends)
+        counts = texture.sizes.long().prod(1)  # [N]
+        # An offset beyond the texels is wrong by whatever amount; clamped, the sum cannot overflow.
+        ends = texture.offsets.clamp(max=len(texture.texels)) + counts
+        _check_range(texture, counts, ends)
         _check_overlap(texture.offsets, ends)
 
 
-def _check_range(texture: Texture, ends: Tensor) -> None:
+def _check_range(texture: Texture, counts: Tensor, ends: Tensor) -> None:
     smallest, first, end = int(texture.sizes.min()), int(texture.offsets.min()), int(ends.max())
     if smallest < 1 or first < 0 or end > len(texture.texels):
         raise ArgumentError(
             f"texture: expected sizes of at least 1 and textures within the {len(texture.texels)} texels, "
             f"got sizes from {smallest}, offsets from {first} and a last texel at {end - 1}"
         )
+    if (most := int(counts.max())) > MOST_TEXELS:
+        raise ArgumentError(f"texture.sizes: expected at most 2^24 texels for one surfel, got {most}")
 
 
 def _check_overlap(offsets: Tensor, ends: Tensor) -> None:

@@ -68,7 +68,9 @@ class RasterizeFunction(torch.autograd.Function):
             _, weight_sum, weight_max, pixels = contribute(frame, surfels, view, None)
             found["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
         ctx.view, ctx.frame = view, frame
-        ctx.save_for_backward(*tensors, *(images.get(name) for name in IMAGES))
+        # `view` has what it needs of the camera and the layout; saved too, autograd sees where they were changed.
+        constants = (view.viewmat, view.K, view.background, view.sizes, view.offsets)
+        ctx.save_for_backward(*tensors, *(images.get(name) for name in IMAGES), *constants)
         ctx.set_materialize_grads(False)
         return tuple(images.get(name) for name in IMAGES)
 
@@ -79,7 +81,7 @@ class RasterizeFunction(torch.autograd.Function):
         saved = ctx.saved_tensors
         names = SurfelTensors._fields
         surfels = SurfelTensors(*saved[: len(names)])
-        images = dict(zip(IMAGES, saved[len(names) :], strict=True))
+        images = dict(zip(IMAGES, saved[len(names) : len(names) + len(IMAGES)], strict=True))
         wanted = zip(names, surfels, ctx.needs_input_grad[2:], strict=True)
         results = {name: torch.empty_like(x) for name, x, needed in wanted if needed and x is not None}
         dense = {name: None if g is None else g.contiguous() for name, g in zip(IMAGES, grads, strict=True)}

@@ -65,6 +65,6 @@ class View:
             o.alpha_min,
             o.transmittance_min,
             o.near,
-            o.far,
+            min(o.far, 1e30),  # infinite: far / (far - near) is 1
         )
         return scene, camera, options

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
+from texgs.raster import arguments
 from texgs.raster.fused import fused_loss
 from texgs.raster.losses_abi import call
 from texgs.raster.ssim import planar
@@ -92,6 +93,7 @@ def _check(depth: Tensor, viewmat: Tensor, K: Tensor) -> dict[str, int]:
         check.floating(name, tensor)
     check.same_device(depth=depth, viewmat=viewmat, K=K)
     check.constant(viewmat=viewmat, K=K)
+    arguments.pinhole(viewmat, K)
     return sizes
 
 

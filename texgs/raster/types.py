@@ -24,7 +24,8 @@ class Options:
     """Centre of the low-pass filter: the middle of the projected box of so many sigma. 0 is the projected
     mean, 1 what gsplat does, 3 what the release of 2DGS does."""
     alpha_min: float = 1 / 255
-    """Fragments with less alpha are skipped, and surfels with less opacity altogether."""
+    """Fragments with less alpha are skipped, and surfels with less opacity altogether. Above 0, except in the
+    reference."""
     transmittance_min: float = 1e-4
     """A pixel ends before the fragment that would leave less light than this."""
     near: float = 0.2
@@ -39,7 +40,7 @@ class Options:
 DEFAULT_OPTIONS = Options()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Texture:
     """Colours that vary over each surfel: fragment colour = base + gain * bilinear(texel).
 
@@ -59,12 +60,12 @@ class Texture:
     texels: Tensor
     """[T, 3] colours of all surfels, one surfel after the other."""
     sizes: Tensor
-    """[N, 2] int32, texels along u and along v, each at least 1."""
+    """[N, 2] int32, texels along u and along v, each at least 1; at most 2^24 texels for one surfel."""
     offsets: Tensor
     """[N] int64, index of each surfel's first texel."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Statistics:
     """What each surfel contributed to one image; without gradient."""
 
@@ -79,7 +80,7 @@ class Statistics:
     at most the image's diagonal; 0 where the surfel is skipped or that box misses the image."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Render:
     """One view of the surfels. What was not asked for in `outputs` is None."""
 

@@ -217,7 +217,8 @@ def median_depth(weights: Tensor, light: Tensor, depth: Tensor) -> Tensor:
 def distortion(weights: Tensor, depth: Tensor, options: Options) -> Tensor:
     """Sum over pairs of fragments [P] of w_i w_j (m_i - m_j)^2, as in 2DGS but of squared differences."""
     # m is the depth in normalised device coordinates, 0 at near and 1 at far
-    m = options.far / (options.far - options.near) * (1 - options.near / depth)
+    far = min(options.far, 1e30)  # infinite: far / (far - near) is 1
+    m = far / (far - options.near) * (1 - options.near / depth)
     return weights.sum(1) * (weights * m**2).sum(1) - (weights * m).sum(1) ** 2
 
 

@@ -58,10 +58,6 @@ TEXGS_INLINE void evaluate_entries(BackwardScratch& s, const TilePixels& pixels,
     }
 }
 
-TEXGS_INLINE void compute_alphas(BackwardScratch& s, const Limits& limits) {
-    for (int i = 0; i < s.group.entries * kParts; ++i) store(s.alpha[i], alpha_of(load(s.alpha[i]), limits));
-}
-
 // Depth in normalised device coordinates, 0 at the near and 1 at the far plane, from `origin`.
 TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) {
     const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
@@ -83,20 +79,15 @@ void weigh_channels(const Raster& r, BackwardScratch& s) {
         });
 }
 
-// ... and from its depths. Entries with alpha 0 may not be hit at all: their depth is anything.
-TEXGS_INLINE void weigh_depth(BackwardScratch& s) {
-    for (int i = 0; i < s.group.entries * kParts; ++i) {
-        const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
-        const vm hit = load(s.alpha[i]) > vf(0.0f);
-        store(s.q[i], fma_where(hit, load(s.z[i]), load(s.d.depth + pixel), load(s.q[i])));
-    }
-}
+// Fragments without alpha may not be hit at all: their depth is anything.
+TEXGS_INLINE vm may_be_hit(vf z) { return abs(z) < vf(1e30f); }
+
 TEXGS_INLINE void weigh_distortion(const Raster& r, BackwardScratch& s) {
     for (int i = 0; i < s.group.entries * kParts; ++i) {
         const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
-        const vm hit = load(s.alpha[i]) > vf(0.0f);
-        const vf m = centred_ndc(r, load(s.z[i]), load(s.d.origin + pixel));
-        store(s.q[i], fma_where(hit, m, fma(load(s.d.m2 + pixel), m, load(s.d.m + pixel)), load(s.q[i])));
+        const vf z = load(s.z[i]), m = centred_ndc(r, z, load(s.d.origin + pixel));
+        const vf by_w = m * fma(load(s.d.m2 + pixel), m, load(s.d.m + pixel));
+        store(s.q[i], add_where(may_be_hit(z), load(s.q[i]), by_w));
     }
 }
 
@@ -121,17 +112,18 @@ TEXGS_INLINE void weigh_texture(BackwardScratch& s) {
 // -- Per entry, in order ----------------------------------------------------------------------------------------------
 
 // Blends all entries: weights, and e = alpha dL/dalpha in place of alpha. N > 0: the surfels have N channels, few
-// enough to compute alpha and q on the way; otherwise both are there.
-template <int N>
+// enough to compute q on the way; otherwise it is there, but for the depth.
+template <bool Depth, int N>
 TEXGS_INLINE void blend_entries(BackwardScratch& s, const Limits& limits) {
     const float* channels = s.chunk.channels;
     const int stride = N <= kRecordChannels ? Chunk::kRecordStride : s.chunk.stride;
     for (int i = 0; i < s.group.entries * kParts; ++i) {
         float* at = s.p.data + s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
         const float* value = channels + s.group.surfel[i / kParts] * stride;
-        const vf alpha = N ? alpha_of(load(s.alpha[i]), limits) : load(s.alpha[i]);
+        const vf alpha = alpha_of(load(s.alpha[i]), limits);
         vf q = load(N ? at + kConstant * kTilePixels : s.q[i]);
         for (int c = 0; c < N; ++c) q = fma(load(at + (kGradient + c) * kTilePixels), value[c], q);
+        if constexpr (Depth) q = fma_where(alpha > vf(0.0f), load(s.z[i]), load(s.d.depth + (at - s.p.data)), q);
         const Blend b = blend(alpha, at + kTransmittance * kTilePixels, limits);
         const vf remaining = fnma(b.weight, q, load(at + kRemaining * kTilePixels));
         store(at + kRemaining * kTilePixels, remaining);
@@ -245,13 +237,11 @@ TEXGS_INLINE void add_surfel(const Raster& r, BackwardScratch& s, const TilePixe
 template <bool Depth, bool Textured, int N>
 TEXGS_INLINE void add_group(const Raster& r, BackwardScratch& s, const TilePixels& pixels, const Limits& limits) {
     if constexpr (N == 0) {
-        compute_alphas(s, limits);
         weigh_channels(r, s);
         if constexpr (Textured) weigh_texture(s);
-        if constexpr (Depth) weigh_depth(s);
         if (r.grad.distortion) weigh_distortion(r, s);
     }
-    blend_entries<N>(s, limits);
+    blend_entries<Depth, N>(s, limits);
     for (int k = 0; k < s.group.surfels; ++k) add_surfel<Depth, Textured, N>(r, s, pixels, k);
 }
 

@@ -32,7 +32,7 @@ constexpr uint16_t kClipped = 1;   // the near plane may cut it
 constexpr uint16_t kFiltered = 2;  // the low-pass filter may rule some of its fragments
 
 // Where a projected surfel is visible: an ellipse (centre, inverse covariance scaled to level 1) and a disc.
-struct Footprint {
+struct alignas(64) Footprint {
     float ex, ey, xx, xy, yy;
     float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it
     uint16_t x0, y0, x1, y1;  // tiles, half open; empty where culled
