@@ -51,6 +51,7 @@ def test_wrong_dtype(device, name, dtype):
         ("sizes", torch.zeros(N, 2, dtype=torch.int32), r"sizes of at least 1"),
         ("offsets", torch.zeros(N, dtype=torch.int32), r"offsets: expected .*int64"),
         ("offsets", torch.full((N,), 10**9), r"within the \d+ texels"),
+        ("offsets", torch.full((N,), 2**63 - 1), r"within the \d+ texels"),
         ("offsets", torch.full((N,), -1), r"within the \d+ texels"),
     ],
 )
@@ -169,3 +170,32 @@ def test_inputs_are_left_alone(device):
     gradients(rasterize, scene, random_cotangents(scene, ("color", "depth")))
     for name, leaf in scene.leaves().items():
         assert torch.equal(leaf, copy.leaves()[name])
+
+
+@pytest.mark.parametrize("name", ["viewmat", "K"])
+def test_transposed_matrix(name):
+    scene = random_scene()
+    with pytest.raises(ArgumentError, match=rf"{name}\[.*did you transpose\?"):
+        replace(scene, **{name: getattr(scene, name).T}).render(rasterize)
+
+
+def test_camera_changed_before_backward():
+    scene = random_scene()
+    scene = replace(scene, viewmat=scene.viewmat.clone(), means=scene.means.clone().requires_grad_())
+    color = scene.render(rasterize).color
+    scene.viewmat[0, 3] += 0.1
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        color.sum().backward()
+
+
+def test_outputs_as_a_string_and_fractional_sizes():
+    with pytest.raises(ArgumentError, match=r"outputs: .* got a string; pass \('depth',\)"):
+        random_scene().render(rasterize, "depth")
+    with pytest.raises(ArgumentError, match=r"width, height: expected whole numbers, got 5\.0"):
+        replace(random_scene(), width=5.0).render(rasterize)
+
+
+def test_infinitely_far_plane(device):
+    scene, far = random_scene().to(device), Options(far=float("inf"))
+    expected = scene.render(rasterize, ("distortion",), Options(far=1e9)).distortion
+    torch.testing.assert_close(scene.render(rasterize, ("distortion",), far).distortion, expected)

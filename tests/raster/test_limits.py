@@ -41,9 +41,17 @@ def test_a_million_surfels(device):
 def test_memory_of_a_usual_scene():
     scene = generated("opaque", 60_000, 800, 800)
     leaves = {name: leaf.requires_grad_() for name, leaf in scene.leaves().items()}
+    native.release_memory()  # what larger views left
     native.peak_memory(reset=True)
     torch.autograd.grad(scene.with_leaves(leaves).render(rasterize).color.sum(), list(leaves.values()))
     assert native.peak_memory() < 0.5 * GB
+
+
+def test_memory_is_given_back():
+    random_scene().render(rasterize)
+    native.release_memory()
+    native.peak_memory(reset=True)
+    assert native.peak_memory() == 0
 
 
 @pytest.mark.parametrize("size", [(1_000_000, 1_000_000), (MAX_SIDE, MAX_SIDE)])

@@ -90,7 +90,8 @@ def view(
     _check_camera(camera, surfels)
     if isinstance(outputs, str):
         raise ArgumentError(f"outputs: expected a collection of names, got a string; pass ({outputs!r},)")
-    if unknown := sorted(set(outputs) - set(OUTPUTS)):
+    wanted = frozenset(outputs)
+    if unknown := sorted(wanted - set(OUTPUTS)):
         raise ArgumentError(f"outputs: expected any of {', '.join(OUTPUTS)}, got {unknown[0]!r}")
     try:
         width, height = (index(side) for side in size)
@@ -102,7 +103,7 @@ def view(
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
     if options.check_finite:
         check.finite(**surfels._asdict(), **camera)
-    planes = surfels.channels + 3 * len(outputs) + 2
+    planes = surfels.channels + 3 * len(wanted) + 2
     native.require_memory(4 * planes * width * height, surfels.means.device)
     dense = {name: x.detach().contiguous() for name, x in camera.items()}
     return View(
@@ -113,7 +114,7 @@ def view(
         background=dense.get("background"),
         sizes=None if texture is None else texture.sizes.contiguous(),
         offsets=None if texture is None else texture.offsets.contiguous(),
-        outputs=frozenset(outputs),
+        outputs=wanted,
         options=options,
     )
 
@@ -138,13 +139,10 @@ def pinhole(viewmat: Tensor, K: Tensor) -> None:
     """
     if K.device.type != "cpu":
         return
-    rows = K.tolist()
-    if rows[0][1] != 0 and isfinite(rows[0][1]):
-        raise ArgumentError(f"K: expected no skew, got K[0, 1] = {rows[0][1]}")
-    for name, row, expected in (
-        ("K", [rows[1][0], *rows[2]], [0.0, 0.0, 0.0, 1.0]),
-        ("viewmat", viewmat[3].tolist(), [0.0, 0.0, 0.0, 1.0]),
-    ):
-        if any(isfinite(x) and abs(x - wanted) > ROUNDING for x, wanted in zip(row, expected, strict=True)):
-            what = "K[1, 0] and last row" if name == "K" else "last row"
-            raise ArgumentError(f"{name}: expected {what} 0, 0, 0, 1, got {row}; did you transpose?")
+    (_, skew, _), (tilt, _, _), last_row = K.tolist()
+    if skew != 0 and isfinite(skew):
+        raise ArgumentError(f"K: expected no skew, got K[0, 1] = {skew}")
+    for name, row in (("K[1, 0] and K[2]", [tilt, *last_row]), ("viewmat[3]", viewmat[3].tolist())):
+        errors = [abs(x - wanted) for x, wanted in zip(row, (0, 0, 0, 1), strict=True) if isfinite(x)]
+        if max(errors, default=0) > ROUNDING:
+            raise ArgumentError(f"{name}: expected 0, 0, 0, 1, got {row}; did you transpose?")

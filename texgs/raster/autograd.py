@@ -68,7 +68,7 @@ class RasterizeFunction(torch.autograd.Function):
             _, weight_sum, weight_max, pixels = contribute(frame, surfels, view, None)
             found["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
         ctx.view, ctx.frame = view, frame
-        # `view` has what it needs of the camera and the layout; saved too, autograd sees where they were changed.
+        # The view has them already; saved here too, autograd refuses a backward pass after they were changed.
         constants = (view.viewmat, view.K, view.background, view.sizes, view.offsets)
         ctx.save_for_backward(*tensors, *(images.get(name) for name in IMAGES), *constants)
         ctx.set_materialize_grads(False)

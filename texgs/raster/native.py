@@ -83,6 +83,7 @@ PROTOTYPES = {
     "texgs_contribute": [c_void_p, *SCENE, POINTER(Contributions), c_void_p],
     "texgs_require_memory": [c_int64],
     "texgs_release": [c_void_p],
+    "texgs_trim": [],
     "texgs_use_openmp": [c_void_p],
     "texgs_set_threads": [c_int32],
     "texgs_memory": [c_int32],
@@ -92,6 +93,7 @@ RESULTS = {  # int32_t but for
     "texgs_instruction_set": c_char_p,
     "texgs_memory": c_int64,
     "texgs_release": None,
+    "texgs_trim": None,
     "texgs_use_openmp": None,
     "texgs_set_threads": None,
 }
@@ -173,6 +175,11 @@ def threads() -> int:
 def peak_memory(reset: bool = False, device_type: str = "cpu") -> int:
     """The most bytes of scratch memory that a library held since the last reset."""
     return int(library(device_type).texgs_memory(int(reset)))
+
+
+def release_memory(device_type: str = "cpu") -> None:
+    """Free the scratch memory that a library keeps for the next views."""
+    library(device_type).texgs_trim()
 
 
 def pass_seconds() -> dict[str, float]:

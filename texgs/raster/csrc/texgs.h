@@ -74,7 +74,7 @@ typedef struct {
     float* color;      /* [C, H, W] with background */
     float* alpha;      /* [H, W] */
     float* depth;      /* [H, W] expected ray-splat depth, 0 where alpha is 0 */
-    float* median;     /* [H, W] depth of the fragment at which half the light is gone, 0 where none */
+    float* median;     /* [H, W] depth of the last fragment that more than half of the light reaches, else 0 */
     float* normal;     /* [3, H, W] blended world normals, facing the camera */
     float* distortion; /* [H, W] sum over fragment pairs of w_i w_j (m_i - m_j)^2, m = NDC depth */
     float* radii;      /* [N] half extent on screen in pixels, 0 where culled */
@@ -119,6 +119,8 @@ TEXGS_API int32_t texgs_backward(texgs_frame*, const texgs_surfels*, const texgs
 TEXGS_API int32_t texgs_contribute(texgs_frame*, const texgs_surfels*, const texgs_camera*, const texgs_options*,
                                    const texgs_contributions*, void* stream);
 TEXGS_API void texgs_release(texgs_frame*);
+/* Frees the memory of frames that were released: a few are kept, to be used again. */
+TEXGS_API void texgs_trim(void);
 /* CPU: seconds that the passes of the calling thread's latest calls took, in the order of texgs_pass. */
 typedef enum {
     TEXGS_PROJECT,

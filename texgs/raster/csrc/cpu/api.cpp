@@ -22,6 +22,10 @@ public:
         idle_.pop_back();
         return frame;
     }
+    void clear() {
+        std::lock_guard lock(mutex_);
+        idle_.clear();
+    }
     void give(std::unique_ptr<texgs_frame> frame) {
         std::lock_guard lock(mutex_);
         if (idle_.size() < 2) idle_.push_back(std::move(frame));
@@ -87,5 +91,11 @@ int32_t texgs_contribute(texgs_frame* frame, const texgs_surfels* surfels, const
 }
 
 void texgs_release(texgs_frame* frame) {
-    if (frame) pool().give(std::unique_ptr<texgs_frame>(frame));
+    guarded([&] {
+        if (frame) pool().give(std::unique_ptr<texgs_frame>(frame));
+    });
+}
+
+void texgs_trim(void) {
+    guarded([] { pool().clear(); });
 }

@@ -14,6 +14,7 @@ using namespace texgs;
 namespace {
 
 constexpr int64_t kSurfelGrain = 1024;
+constexpr int64_t kMostPairs = UINT32_MAX;  // they are counted in 32 bits
 
 thread_local double pass_seconds[TEXGS_PASSES];
 
@@ -84,7 +85,9 @@ void texgs_frame::bin_tiles(const uint32_t* order, int64_t visible, int64_t most
     const int tiles = tiles_of(raster);
     const int64_t n = raster.surfels.n;
     const int parts = static_cast<int>(std::clamp<int64_t>(visible / 4096, 1, 2 * threads()));
-    require_memory(most_candidates * static_cast<int64_t>(sizeof(Candidate) + sizeof(Pair)));
+    const int64_t bytes = most_candidates * static_cast<int64_t>(sizeof(Candidate) + sizeof(Pair));
+    if (most_candidates > kMostPairs) throw OutOfMemory{bytes};
+    require_memory(bytes);
     // A part writes one candidate past its last.
     Candidate* candidates = candidates_.ensure<Candidate>(most_candidates + parts);
     Candidate** part_begin = part_begin_.ensure<Candidate*>(2 * parts);

@@ -21,17 +21,30 @@ constexpr int64_t kLarge = int64_t(256) << 20;    // below, asking the system co
 constexpr int64_t kHugePages = int64_t(4) << 20;  // from here on 2 MiB pages save page faults
 std::atomic<int64_t> held{0}, peak{0};
 
+#if defined(__linux__)
+// The number in the first line of a file that `format` finds, or the largest one.
+int64_t read_number(const char* path, const char* format) {
+    long long value = INT64_MAX;
+    if (FILE* file = std::fopen(path, "r")) {
+        char line[128];
+        while (value == INT64_MAX && std::fgets(line, sizeof line, file))
+            if (std::sscanf(line, format, &value) != 1) value = INT64_MAX;
+        std::fclose(file);
+    }
+    return value;
+}
+#endif
+
 // Memory that can be had without swapping, or the largest number where the system does not say.
 int64_t available_memory() {
 #if defined(__linux__)
-    int64_t kib = INT64_MAX >> 10;
-    if (FILE* file = std::fopen("/proc/meminfo", "r")) {
-        char line[128];
-        while (std::fgets(line, sizeof line, file))
-            if (long long value; std::sscanf(line, "MemAvailable: %lld kB", &value) == 1) kib = value;
-        std::fclose(file);
-    }
-    return kib << 10;
+    const int64_t kib = read_number("/proc/meminfo", "MemAvailable: %lld kB");
+    const int64_t machine = kib < (INT64_MAX >> 10) ? kib << 10 : INT64_MAX;
+    // a container or a batch job may get less than the machine has
+    const int64_t limit = read_number("/sys/fs/cgroup/memory.max", "%lld");
+    if (limit == INT64_MAX) return machine;
+    const int64_t left = limit - read_number("/sys/fs/cgroup/memory.current", "%lld");
+    return left < machine ? (left > 0 ? left : 0) : machine;
 #elif defined(_WIN32)
     MEMORYSTATUSEX status{};
     status.dwLength = sizeof status;
@@ -43,7 +56,6 @@ int64_t available_memory() {
 
 }  // namespace
 
-int64_t memory_held() { return held; }
 int64_t memory_peak(bool reset) {
     const int64_t result = peak;
     if (reset) peak = held.load();

@@ -27,8 +27,7 @@ private:
     int64_t capacity_ = 0;
 };
 
-// Bytes held by all buffers now, and the most since `reset`.
-int64_t memory_held();
+// The most bytes held by all buffers together since `reset`.
 int64_t memory_peak(bool reset);
 // Throws OutOfMemory where the machine says that it has less than `bytes` left.
 void require_memory(int64_t bytes);

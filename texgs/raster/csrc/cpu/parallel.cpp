@@ -93,14 +93,13 @@ private:
 
 using GompParallel = void (*)(void (*)(void*), void*, unsigned threads, unsigned flags);
 std::atomic<GompParallel> gomp_parallel{nullptr};
-std::atomic<int> thread_count{0};
+thread_local int thread_count = 0;  // of the caller: two callers may want different numbers
 thread_local bool inside_loop = false;
 
 }  // namespace
 
 int threads() {
-    const int n = thread_count.load(std::memory_order_relaxed);
-    return n > 0 ? n : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+    return thread_count > 0 ? thread_count : std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
 }
 
 void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
@@ -109,7 +108,10 @@ void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
     const int wanted = threads();
     if (wanted <= 1 || n <= grain || inside_loop) return loop.work();
     // Always the whole team, even for fewer ranges: OpenMP ends the threads that a smaller team leaves over.
-    inside_loop = true;
+    struct Inside {
+        Inside() { inside_loop = true; }
+        ~Inside() { inside_loop = false; }
+    } inside;
     if (const auto parallel = gomp_parallel.load()) {
         parallel(work_on, &loop, static_cast<unsigned>(wanted), 0);
     } else {
@@ -118,7 +120,6 @@ void run_parallel(int64_t n, int64_t grain, Job job, void* context) {
         std::lock_guard lock(one_loop);
         pool.run(loop, wanted);
     }
-    inside_loop = false;
 }
 
 }  // namespace texgs

@@ -76,5 +76,11 @@ int32_t texgs_contribute(texgs_frame* frame, const texgs_surfels* surfels, const
 }
 
 void texgs_release(texgs_frame* frame) {
-    if (frame) pool<texgs_frame>().give(std::unique_ptr<texgs_frame>(frame));
+    guarded([&] {
+        if (frame) pool<texgs_frame>().give(std::unique_ptr<texgs_frame>(frame));
+    });
+}
+
+void texgs_trim(void) {
+    guarded([] { pool<texgs_frame>().clear(); });
 }

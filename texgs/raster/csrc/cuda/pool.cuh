@@ -25,11 +25,20 @@ public:
         return std::make_unique<T>(device);
     }
 
+    void clear() {
+        std::lock_guard lock(mutex_);
+        for (auto& object : idle_) {
+            const DeviceScope scope(object->device);
+            object.reset();
+        }
+        idle_.clear();
+    }
+
     // Keeps a few; more would only hold memory.
     void give(std::unique_ptr<T> object) {
         std::lock_guard lock(mutex_);
-        const DeviceScope scope(object->device);
-        idle_.push_back(std::move(object));
+        idle_.push_back(std::move(object));  // first: where the device fails, its memory is not freed
+        const DeviceScope scope(idle_.back()->device);
         if (idle_.size() > kMost) idle_.erase(idle_.begin());
     }
 
