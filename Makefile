@@ -24,7 +24,7 @@ test: $(VENV)/installed
 	$(BIN)/python -m pytest $(ARGS)
 
 bench: $(VENV)/installed
-	$(BIN)/python -m benchmarks $(ARGS)
+	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
 
 demo: $(VENV)/installed
 	$(BIN)/texgs demo $(ARGS)

@@ -1,0 +1,55 @@
+"""`python -m benchmarks`: measure speed and memory on this machine, print tables, write JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import asdict
+from importlib import import_module
+from pathlib import Path
+
+from benchmarks import machine, table
+from benchmarks.load import Load
+from benchmarks.settings import SECTIONS, Settings, parse
+from texgs.core.errors import TexgsError
+
+RESULTS = Path(__file__).parent / "results"
+
+
+def main() -> int:
+    """Run the sections in turn; what is measured so far is on disk after each."""
+    try:
+        settings = parse()
+        report = {"machine": machine.describe(settings.device), "settings": _plain(settings), "sections": {}}
+        path = settings.json or RESULTS / f"{report['machine']['date'][:10]}-{settings.device.type}.json"
+        for name in SECTIONS:
+            report["sections"][name] = _measure(name, settings)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
+    except TexgsError as error:
+        print(error, file=sys.stderr)
+        return 1
+    print(f"\nWrote {path}")
+    return 0
+
+
+def _measure(name: str, settings: Settings) -> dict:
+    """One section as JSON, shown on the screen as well."""
+    if name not in settings.sections:
+        return {"measurements": [], "skipped": [{"name": name, "reason": "not in --sections"}]}
+    with Load() as load:
+        section = import_module(f"benchmarks.{name}").run(settings)
+    table.show(name, section)
+    print(f"{name}: {load}")
+    return {"load": asdict(load)} | asdict(section)
+
+
+def _plain(settings: Settings) -> dict:
+    """The settings as JSON can hold them."""
+    return {
+        name: str(value) if name in ("device", "json") else value for name, value in vars(settings).items()
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

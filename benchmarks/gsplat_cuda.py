@@ -1,0 +1,82 @@
+"""gsplat's `rasterization_2dgs` on a GPU, at the same output."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import torch
+from torch.nn.functional import pad
+
+from benchmarks import workload
+from benchmarks.gsplat_cpu import LIKE_GSPLAT
+from benchmarks.report import Measurement, Section
+from benchmarks.settings import Settings
+from benchmarks.timing import Case, measure
+
+PEER = "gsplat rasterization_2dgs"
+OURS = "texgs, as gsplat"
+OUTPUTS = ("normal", "median")  # what gsplat always renders besides the colour
+
+
+class Peer(workload.Workload):
+    """A workload that gsplat renders."""
+
+    def image(self) -> SimpleNamespace:
+        """Render without gradients."""
+        with torch.no_grad():
+            return self._render()
+
+    def forward(self) -> None:
+        """Render for `backward`."""
+        for tensor in self.learned:
+            tensor.grad = None
+        self.render = self._render()
+
+    def _render(self) -> SimpleNamespace:
+        from gsplat import rasterization_2dgs
+
+        a = self.arguments
+        found = rasterization_2dgs(
+            means=a["means"],
+            quats=a["quats"],
+            scales=pad(a["scales"], (0, 1), value=1.0),
+            opacities=a["opacities"],
+            colors=a["features"],
+            viewmats=a["viewmat"][None],
+            Ks=a["K"][None],
+            width=a["width"],
+            height=a["height"],
+            near_plane=a["options"].near,
+            far_plane=a["options"].far,
+        )
+        color, _, normal, _, _, median, _ = found
+        return SimpleNamespace(color=color[0], normal=normal[0], median=median[0, ..., 0])
+
+
+def compare(settings: Settings, section: Section) -> None:
+    """Time forward, and forward + backward, of all scenes at the middle number of surfels."""
+    try:
+        from gsplat.cuda._backend import _C as compiled
+    except (ImportError, RuntimeError) as error:
+        section.skip(PEER, f"gsplat cannot be used: {error}; pip install '.[bench]'")
+        return
+    if compiled is None:
+        section.skip(PEER, "gsplat's CUDA code is not compiled; put nvcc on the PATH")
+        return
+    cases, differences = [], []
+    for scene in settings.scenes:
+        at = (scene, settings.size, settings.n_surfels, settings.device)
+        ours = workload.plain(*at, outputs=OUTPUTS, options=LIKE_GSPLAT)
+        theirs = Peer(ours.arguments, ours.learned, workload.interleaved(ours.cotangents))
+        for peer, made in ((PEER, theirs), (OURS, ours)):
+            where = settings.where(scene=scene, peer=peer)
+            cases.append(Case("forward", where, {"forward": made.image}))
+            cases.append(Case("forward+backward", where, made.forward_backward))
+        difference = float((theirs.image().color - ours.image().color).abs().mean())
+        where = settings.where(scene=scene, peer=PEER)
+        differences.append(Measurement.of("mean difference of images", where, "1", [difference]))
+    section.measurements += measure(cases, settings.rounds, settings.device, PEER) + differences
+    for scene in settings.scenes:
+        for name in ("forward", "forward+backward"):
+            theirs, ours = (section.find(name, peer=peer, scene=scene) for peer in (PEER, OURS))
+            section.measurements.append(theirs.over(ours, f"{name} / texgs"))

@@ -1,0 +1,117 @@
+"""The fused losses and shadings, forward and backward, against their definitions in torch and kornia."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from benchmarks import scenes, workload
+from benchmarks.report import Section
+from benchmarks.settings import Settings
+from benchmarks.timing import Case, measure
+from texgs.raster import normals, shading, smoothness, spherical_harmonics, ssim
+from texgs.raster.reference import losses as definition
+from texgs.raster.reference import shading as shading_definition
+
+NAME = "forward+backward"
+LAMBDA_DSSIM = 0.2
+
+
+@dataclass
+class Comparison:
+    """A function and what computes the same; called with the learned tensors, then the constants."""
+
+    name: str
+    functions: dict[str, Callable[..., Tensor]]  # by who wrote it; "texgs" first
+    learned: list[Tensor]
+    constants: tuple = ()
+
+
+def run(settings: Settings) -> Section:
+    """Time each function, and the others as ratios to ours."""
+    section, cases = Section(), []
+    kornia = _kornia(section)
+    for compared in (*images(settings, kornia), *surfels(settings)):
+        for writer, function in compared.functions.items():
+            where = settings.where(function=compared.name, by=writer)
+            cases.append(Case(NAME, where, {NAME: differentiated(function, compared)}))
+    section.measurements = measure(cases, settings.rounds, settings.device, "losses")
+    for m in [m for m in section.measurements if m.parameters["by"] != "texgs"]:
+        ours = section.find(NAME, function=m.parameters["function"], by="texgs")
+        section.measurements.append(m.over(ours, "time / texgs"))
+    return section
+
+
+def differentiated(function: Callable[..., Tensor], compared: Comparison) -> Callable[[], None]:
+    """Forward and backward from a gradient of ones, as that of a loss."""
+    learned = [
+        x.detach().clone(memory_format=torch.preserve_format).requires_grad_() for x in compared.learned
+    ]
+
+    def run() -> None:
+        for x in learned:
+            x.grad = None
+        value = function(*learned, *compared.constants)
+        torch.autograd.backward(value, torch.ones_like(value))
+
+    return run
+
+
+def images(settings: Settings, kornia: Callable[..., Tensor] | None) -> Iterator[Comparison]:
+    """Losses on a rendered scene whose target is the same scene, slightly moved."""
+    at = (settings.scene, settings.size, settings.n_surfels, settings.device)
+    made = workload.plain(*at, channels=4, outputs=("normal", "depth"))
+    render, camera = made.image(), scenes.camera(settings.size).to(settings.device)
+    color, attributes = render.color[..., :3].detach(), render.color.detach()
+    with torch.no_grad():
+        made.arguments["means"] += 0.003
+    target = made.image().color[..., :3]
+    l1_dssim = {"texgs": ssim.l1_dssim, "torch": definition.l1_dssim}
+    if kornia is not None:
+        l1_dssim["kornia"] = kornia
+    yield Comparison("l1_dssim", l1_dssim, [color], (target, LAMBDA_DSSIM))
+    noise = torch.rand(3, *target.shape[:2], generator=torch.Generator().manual_seed(3)).to(settings.device)
+    yield Comparison("l1_dssim, no pixel equal", l1_dssim, [color], (noise.permute(1, 2, 0), LAMBDA_DSSIM))
+    pair = {"texgs": normals.normal_consistency, "torch": definition.normal_consistency}
+    inputs = [render.normal, render.depth]
+    yield Comparison("normal_consistency", pair, inputs, (render.alpha, camera.viewmat, camera.K))
+    pair = {"texgs": smoothness.bilateral_smoothness, "torch": definition.bilateral_smoothness}
+    yield Comparison("bilateral_smoothness, 4 channels", pair, [attributes], (target, render.alpha))
+
+
+def surfels(settings: Settings) -> Iterator[Comparison]:
+    """Shading of the scene's surfels."""
+    made = scenes.surfels(settings.scene, settings.n_surfels)
+    n, device = settings.n_surfels, settings.device
+    made = {name: x.to(device) for name, x in made.items()}
+    position = scenes.camera(settings.size).to(device).position
+    generator = torch.Generator().manual_seed(4)
+    material = list(torch.rand(4, n, generator=generator).mul(0.5).to(device))
+    material[3] = 20 * material[3]
+    pair = {"texgs": shading.blinn_phong, "torch": shading_definition.blinn_phong}
+    learned = [made["features"], *material, made["means"], made["quats"]]
+    yield Comparison("blinn_phong", pair, learned, (position,))
+    sh = 0.2 * torch.randn(n, 16, 3, generator=generator).to(device)
+    pair = {
+        "texgs": spherical_harmonics.spherical_harmonics,
+        "torch": shading_definition.spherical_harmonics,
+    }
+    yield Comparison("spherical_harmonics, degree 3", pair, [sh, made["means"]], (position,))
+
+
+def _kornia(section: Section) -> Callable[..., Tensor] | None:
+    """L1 and D-SSIM with kornia's SSIM, which pads by reflection; None where kornia is not installed."""
+    try:
+        from kornia.metrics import ssim as kornia_ssim
+    except ImportError as error:
+        section.skip("kornia", f"{error}; pip install '.[bench]'")
+        return None
+
+    def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float) -> Tensor:
+        similarity = kornia_ssim(image.permute(2, 0, 1)[None], target.permute(2, 0, 1)[None], 11).mean()
+        return (1 - lambda_dssim) * (image - target).abs().mean() + lambda_dssim * (1 - similarity)
+
+    return l1_dssim

@@ -1,0 +1,125 @@
+"""The benchmark runs on a tiny scene, and its JSON holds every section or says why not."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+
+from benchmarks.growth import doubling, slope
+from benchmarks.report import Measurement, Section
+from benchmarks.settings import SECTIONS, parse
+from benchmarks.timing import Case, measure
+
+ROOT = Path(__file__).parents[1]
+TINY = ("--quick", "--sizes", "64", "--surfels", "500", "--scenes", "opaque", "--threads", "1")
+
+
+def run(*arguments):
+    command = [sys.executable, "-m", "benchmarks", *arguments]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+
+
+@pytest.fixture(scope="module")
+def everything(tmp_path_factory):
+    """What a run of all sections prints and writes."""
+    file = tmp_path_factory.mktemp("bench") / "new" / "results.json"
+    done = run(*TINY, "--json", str(file))
+    assert done.returncode == 0, done.stderr
+    return done.stdout, json.loads(file.read_text())
+
+
+def test_the_machine_is_described(everything):
+    machine = everything[1]["machine"]
+    wanted = {"date", "processor", "processors", "instruction_set", "torch", "texgs", "revision", "threads"}
+    assert wanted <= machine.keys()
+    assert all(machine[name] for name in wanted)
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_section(everything, name):
+    printed, report = everything
+    section = report["sections"][name]
+    assert section["measurements"]
+    assert name in printed
+    assert "average_before" in section["load"]
+    for measurement in section["measurements"]:
+        assert measurement.keys() == {"name", "parameters", "unit", "median", "min", "n"}
+        assert measurement["unit"] in ("ms", "MB", "ratio", "1")
+        assert all(math.isfinite(measurement[value]) for value in ("median", "min"))
+        assert measurement["n"] >= 1
+        assert measurement["parameters"]
+    assert all(skipped["name"] and skipped["reason"] for skipped in section["skipped"])
+
+
+def test_what_is_measured_of_rasterize(everything):
+    names = {m["name"] for m in everything[1]["sections"]["rasterize"]["measurements"]}
+    passes = {"project", "sort", "bin", "forward", "backward", "reduce"}
+    steps = {"step forward", "step backward", "step Adam"}
+    assert names == {"forward", "step"} | steps | {f"pass {name}" for name in passes}
+
+
+def test_every_peer_is_measured_or_skipped(everything):
+    section = everything[1]["sections"]["peers"]
+    peers = [m["parameters"]["peer"] for m in section["measurements"]] + [
+        s["name"] for s in section["skipped"]
+    ]
+    for peer in ("gsplat's torch functions", "scalar loop", "avx512", "avx2", "portable"):
+        assert any(peer in found for found in peers), peer
+
+
+def test_peers_render_the_same(everything):
+    measurements = everything[1]["sections"]["peers"]["measurements"]
+    differences = [m["median"] for m in measurements if m["name"] == "mean difference of images"]
+    assert all(difference < 1e-5 for difference in differences)
+
+
+def test_sections_can_be_left_out(tmp_path):
+    file = tmp_path / "results.json"
+    assert run(*TINY, "--sections", "rasterize", "--json", str(file)).returncode == 0
+    sections = json.loads(file.read_text())["sections"]
+    assert sections["rasterize"]["measurements"]
+    assert sections["losses"] == {
+        "measurements": [],
+        "skipped": [{"name": "losses", "reason": "not in --sections"}],
+    }
+
+
+def test_a_missing_gpu_is_reported():
+    if torch.cuda.is_available():
+        pytest.skip("this machine has a GPU")
+    done = run(*TINY, "--device", "cuda")
+    assert done.returncode == 1
+    assert done.stderr == "--device cuda: torch sees no GPU; leave it out to measure the CPU\n"
+
+
+def test_defaults_are_those_of_the_targets():
+    settings = parse([])
+    assert (settings.sizes, settings.surfels) == ((400, 800), (15_000, 60_000, 240_000))
+    assert (settings.scene, settings.size, settings.n_surfels) == ("opaque", 800, 60_000)
+
+
+def test_cases_take_turns():
+    order = []
+    cases = [Case(name, {"case": name}, {name: lambda name=name: order.append(name)}) for name in "ab"]
+    found = measure(cases, rounds=2, device=torch.device("cpu"), title="turns")
+    assert "".join(order) == 2 * (5 * "a" + 5 * "b")
+    assert [(m.name, m.n) for m in found] == [("a", 6), ("b", 6)]
+
+
+def test_phases_add_up():
+    phases = {"first": lambda: None, "second": lambda: None}
+    total, first, second = measure([Case("total", {}, phases)], 1, torch.device("cpu"), "sum")
+    assert total.min >= first.min + second.min - 1e-9
+
+
+def test_exponents_and_ratios():
+    assert slope([1, 2, 4, 8], [3, 12, 48, 192]) == pytest.approx(2)
+    assert doubling(15, 240) == [15, 30, 60, 120, 240]
+    a, b = (Measurement.of("time", {"by": by}, "ms", values) for by, values in (("a", [8, 6]), ("b", [2, 1])))
+    ratio = a.over(b, "a / b")
+    assert (ratio.unit, ratio.median, ratio.min) == ("ratio", pytest.approx(7 / 1.5), 6)
+    assert Section([a, b]).find("time", by="b") is b
