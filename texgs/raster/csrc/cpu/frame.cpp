@@ -33,6 +33,13 @@ private:
 
 int tiles_of(const Raster& r) { return r.tiles_x * r.tiles_y; }
 
+// Zeros `bytes` of memory, which costs as much as any other pass where it is fresh.
+void clear(void* memory, int64_t bytes) {
+    parallel_for(bytes, int64_t(1) << 18, [&](int64_t begin, int64_t end, int) {
+        std::memset(static_cast<char*>(memory) + begin, 0, static_cast<size_t>(end - begin));
+    });
+}
+
 // Exclusive prefix sums of n counts, with the total at the end.
 uint32_t* accumulate(const uint32_t* counts, int64_t n, uint32_t* begin) {
     uint32_t total = 0;
@@ -240,7 +247,7 @@ void texgs_frame::texture_gradients() {
         raster.grad.color = zeros;
     }
     raster.texel_parts = texel_parts_.ensure<TexelPart>(pairs);
-    std::memset(raster.texel_parts, 0, pairs * sizeof(TexelPart));
+    clear(raster.texel_parts, pairs * sizeof(TexelPart));
     while (arenas_.size() < static_cast<size_t>(threads())) arenas_.push_back(std::make_unique<BlockArena>());
     for (auto& arena : arenas_) arena->restart();
     backward_pass([&](int tile, void* scratch, int worker) {
@@ -249,11 +256,15 @@ void texgs_frame::texture_gradients() {
     for (const auto& arena : arenas_)
         if (arena->missing) throw OutOfMemory{arena->missing};
 
-    int64_t largest = 0;  // sums of a texture whose gradient nobody asked for
-    if (!raster.out.texels)
-        for (int64_t i = 0; i < n; ++i)
-            largest = std::max(largest, int64_t(raster.surfels.sizes[2 * i]) * raster.surfels.sizes[2 * i + 1]);
-    if (raster.out.texels) std::memset(raster.out.texels, 0, 3 * raster.surfels.n_texels * sizeof(float));
+    int64_t largest = 0, all = 0;
+    for (int64_t i = 0; i < n; ++i) {
+        const int64_t texels = int64_t(raster.surfels.sizes[2 * i]) * raster.surfels.sizes[2 * i + 1];
+        largest = std::max(largest, texels), all += texels;
+    }
+    if (raster.out.texels && all < raster.surfels.n_texels)  // some texels belong to no surfel
+        clear(raster.out.texels, 3 * raster.surfels.n_texels * sizeof(float));
+    // where nobody asked for texels, a worker needs room for the sums of one texture
+    if (raster.out.texels) largest = 0;
     float* sums = slots_.ensure<float>(3 * largest * threads());
     reduce_pass([&](int64_t begin, int64_t end, int worker) {
         kernels().reduce_textures(raster, begin, end, sums + 3 * largest * worker);
