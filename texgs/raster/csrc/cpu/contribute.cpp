@@ -15,10 +15,11 @@ struct alignas(64) ContributeScratch {
     Group group;
     float image[TEXGS_MAX_CHANNELS][kTilePixels];
     float transmittance[kTilePixels];
-    float weight[kVectors][kLanes];  // alpha before blending
+    float weight[kVectors][kLanes];
 };
 
-TEXGS_INLINE void evaluate_entries(ContributeScratch& s, const TilePixels& pixels, const Limits& limits) {
+// Weights of the group's entries.
+TEXGS_INLINE void blend_entries(ContributeScratch& s, const TilePixels& pixels, const Limits& limits) {
     for (int e = 0; e < s.group.entries; ++e)
         for (int part = 0; part < kParts; ++part) {
             const int place = s.group.surfel[e];
@@ -26,32 +27,43 @@ TEXGS_INLINE void evaluate_entries(ContributeScratch& s, const TilePixels& pixel
             store(s.weight[e * kParts + part],
                   evaluate(s.chunk.records[place], s.chunk.flags[place], at, limits).log2_alpha);
         }
-    for (int i = 0; i < s.group.entries * kParts; ++i) store(s.weight[i], alpha_of(load(s.weight[i]), limits));
+    for (int i = 0; i < s.group.entries * kParts; ++i) {
+        const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
+        const vf alpha = alpha_of(load(s.weight[i]), limits);
+        store(s.weight[i], blend(alpha, s.transmittance + pixel, limits).weight);
+    }
 }
 
-void add_surfel(const Raster& r, ContributeScratch& s, const Limits& limits, int k) {
+// Sums of one surfel, to its slot: the counts and the first N channels of the image in the first line.
+template <int N>
+TEXGS_INLINE void add_surfel(const Raster& r, const ContributeScratch& s, int k) {
     const int begin = s.group.first[k], end = s.group.first[k + 1];
-    vf sum_w = 0.0f, most = 0.0f, pixels = 0.0f;
+    vf sum_w = 0.0f, most = 0.0f, pixels = 0.0f, sums[N + 1];
+    for (int c = 0; c < N; ++c) sums[c] = 0.0f;
     for (int e = begin; e < end; ++e)
         for (int part = 0; part < kParts; ++part) {
-            float* weight = s.weight[e * kParts + part];
-            const int pixel = s.group.block[e] * kBlockPixels + part * kLanes;
-            const vf w = blend(load(weight), s.transmittance + pixel, limits).weight;
-            store(weight, w);
+            const vf w = load(s.weight[e * kParts + part]);
+            const float* at = s.image[0] + s.group.block[e] * kBlockPixels + part * kLanes;
             sum_w += w;
             most = max(most, w);
             pixels += zero_unless(w > vf(0.0f), 1.0f);
+            for (int c = 0; c < N; ++c) sums[c] = fma(w, load(at + c * kTilePixels), sums[c]);
         }
     float* slot = r.slots + int64_t(s.chunk.slots[s.group.place[k]]) * r.slot_stride;
     float only_lane[kLanes] = {largest(most)};  // its sum is the largest
-    const int channels = r.contributions.channels, first = channels < 16 - kCounts ? channels : 16 - kCounts;
     vf line[16] = {sum_w, load(only_lane), pixels};
-    for (int c = kCounts + first; c < 16; ++c) line[c] = 0.0f;
-    with_constant<16 - kCounts>(first, [&](auto width) {
-        weigh_planes<decltype(width)::value>(s.group, begin, end, s.weight[0], s.image[0], line + kCounts);
-    });
+    for (int c = kCounts; c < 16; ++c) line[c] = c < kCounts + N ? sums[c - kCounts] : vf(0.0f);
     stream_sums(line, slot);
-    stream_planes(s.group, begin, end, s.weight[0], s.image[first], channels - first, slot + 16);
+    stream_planes(s.group, begin, end, s.weight[0], s.image[N], r.contributions.channels - N, slot + 16);
+}
+
+void add_surfels(const Raster& r, const ContributeScratch& s) {
+    constexpr int most = 16 - kCounts;
+    const auto add = [&](auto first) {
+        for (int k = 0; k < s.group.surfels; ++k) add_surfel<decltype(first)::value>(r, s, k);
+    };
+    if (r.contributions.channels == 0) return add(Constant<0>{});
+    with_constant<most>(r.contributions.channels < most ? r.contributions.channels : most, add);
 }
 
 }  // namespace
@@ -59,6 +71,7 @@ void add_surfel(const Raster& r, ContributeScratch& s, const Limits& limits, int
 const int64_t kContributeScratch = sizeof(ContributeScratch);
 
 void contribute_tile(const Raster& r, int tile, void* scratch) {
+    if (r.tile_begin[tile] == r.tile_begin[tile + 1]) return;
     ContributeScratch& s = *static_cast<ContributeScratch*>(scratch);
     const TilePixels pixels(r, tile);
     const Limits limits(r.options);
@@ -66,6 +79,7 @@ void contribute_tile(const Raster& r, int tile, void* scratch) {
         std::memset(s.image[c], 0, sizeof s.image[c]);
         load_plane(r, tile, r.contributions.image + int64_t(c) * r.camera.width * r.camera.height, s.image[c]);
     }
+    prefetch_planes(r, tile + 1, r.contributions.image, r.contributions.channels);
     uint32_t alive = start_tile(r, pixels, s.transmittance);
     const uint32_t end = r.tile_begin[tile + 1];
     uint32_t begin = r.tile_begin[tile];
@@ -76,8 +90,8 @@ void contribute_tile(const Raster& r, int tile, void* scratch) {
             next = s.group.fill(s.chunk, next, n, alive, [&](int place) {
                 stream_zeros(r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride, r.slot_stride);
             });
-            evaluate_entries(s, pixels, limits);
-            for (int k = 0; k < s.group.surfels; ++k) add_surfel(r, s, limits, k);
+            blend_entries(s, pixels, limits);
+            add_surfels(r, s);
             alive = still_alive(r, s.transmittance, alive);
         }
     }

@@ -235,6 +235,7 @@ TEXGS_INLINE void prefetch_part(const Raster& r, uint32_t slot, int lines) {
 const int64_t kTextureScratch = sizeof(TextureScratch);
 
 void texture_backward_tile(const Raster& r, int tile, void* scratch, TexelArena& arena) {
+    if (r.tile_begin[tile] == r.tile_begin[tile + 1]) return;
     TextureScratch& s = *static_cast<TextureScratch*>(scratch);
     const TilePixels pixels(r, tile);
     const Limits limits(r.options);
@@ -242,6 +243,7 @@ void texture_backward_tile(const Raster& r, int tile, void* scratch, TexelArena&
         std::memset(s.gradient[c], 0, sizeof s.gradient[c]);
         load_plane(r, tile, r.grad.color + int64_t(c) * r.camera.width * r.camera.height, s.gradient[c]);
     }
+    prefetch_planes(r, tile + 1, r.grad.color, 3);
     uint32_t alive = start_tile(r, pixels, s.transmittance);
     const uint32_t end = r.tile_begin[tile + 1];
     for (uint32_t begin = r.tile_begin[tile]; begin < end && alive; begin += kChunk) {
