@@ -10,8 +10,7 @@
 
 namespace texgs {
 
-inline thread_local std::string last_error;         // what texgs_error() returns
-inline thread_local int64_t last_bytes_needed = 0;  // what texgs_bytes_needed() returns
+inline thread_local std::string last_error;  // what texgs_error() returns
 
 struct InvalidArgument {
     const char* what;
@@ -34,7 +33,6 @@ int32_t guarded(const Body& body) {
         last_error = e.what;
         return TEXGS_INVALID_ARGUMENT;
     } catch (const OutOfMemory& e) {
-        last_bytes_needed = e.bytes;
         last_error = "not enough memory: this needs " + std::to_string(e.bytes) + " bytes more";
         return TEXGS_OUT_OF_MEMORY;
     } catch (const std::bad_alloc&) {

@@ -32,7 +32,7 @@ extern "C" {
 typedef enum {
     TEXGS_OK = 0,
     TEXGS_INVALID_ARGUMENT = 1,
-    TEXGS_OUT_OF_MEMORY = 2, /* texgs_bytes_needed() tells how much was asked for */
+    TEXGS_OUT_OF_MEMORY = 2, /* the sentence says how many bytes were asked for */
     TEXGS_DEVICE_ERROR = 3,
 } texgs_status;
 
@@ -100,7 +100,6 @@ typedef struct texgs_frame texgs_frame;
 
 TEXGS_API int32_t texgs_abi_version(void);
 TEXGS_API const char* texgs_error(void);
-TEXGS_API int64_t texgs_bytes_needed(void);
 /* "avx512", "avx2", "portable" (CPU), or the compiled architectures (CUDA). */
 TEXGS_API const char* texgs_instruction_set(void);
 

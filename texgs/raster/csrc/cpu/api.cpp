@@ -44,7 +44,6 @@ FramePool& pool() {
 
 int32_t texgs_abi_version(void) { return TEXGS_ABI_VERSION; }
 const char* texgs_error(void) { return last_error.c_str(); }
-int64_t texgs_bytes_needed(void) { return last_bytes_needed; }
 int64_t texgs_memory(int32_t reset) { return memory_peak(reset != 0); }
 
 const char* texgs_instruction_set(void) {

@@ -11,7 +11,6 @@ using namespace texgs::cuda;
 
 int32_t texgs_abi_version(void) { return TEXGS_ABI_VERSION; }
 const char* texgs_error(void) { return last_error.c_str(); }
-int64_t texgs_bytes_needed(void) { return last_bytes_needed; }
 int64_t texgs_memory(int32_t reset) { return texgs::cuda::memory_peak(reset != 0); }
 void texgs_use_openmp(void*) {}
 void texgs_set_threads(int32_t) {}
