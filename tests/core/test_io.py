@@ -1,3 +1,4 @@
+import errno
 import os
 import stat
 
@@ -47,3 +48,12 @@ def test_mistakes_are_named(tmp_path):
         io.read_json(tmp_path / "bad.json")
     with pytest.raises(ArgumentError, match="cannot write there"):
         io.write_bytes(tmp_path / "bad.json" / "below", b"")
+
+
+def test_a_full_disk_is_one_sentence(tmp_path):
+    def fill(_file):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.raises(ArgumentError, match="no space left there"):
+        io.write_atomic(tmp_path / "a", fill)
+    assert list(tmp_path.iterdir()) == []

@@ -23,3 +23,7 @@ class OutOfMemoryError(TexgsError, MemoryError):
 
 class NativeError(TexgsError, RuntimeError):
     """The native library is missing, does not fit this package or failed."""
+
+
+class ConfigError(TexgsError, ValueError):
+    """A key of the configuration is unknown, or its value is not one that is possible."""

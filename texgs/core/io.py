@@ -1,5 +1,6 @@
 """Files that are never seen half written: write beside the target, then rename."""
 
+import errno
 import json
 import os
 import tempfile
@@ -21,7 +22,7 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
         The path.
 
     Raises:
-        ArgumentError: if the folder cannot be created or written to.
+        ArgumentError: if the folder cannot be created or written to, or the disk is full.
     """
     path = Path(path)
     try:
@@ -39,8 +40,10 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
             os.fsync(file.fileno())
         scratch.chmod(0o666 & ~_umask())
         scratch.replace(path)
-    except BaseException:
+    except BaseException as error:
         scratch.unlink(missing_ok=True)
+        if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+            raise ArgumentError(f"{path}: no space left there; free some or choose another folder") from error
         raise
     return path
 
@@ -73,6 +76,8 @@ def read_json(path: str | Path) -> Any:
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise ArgumentError(f"{path}: no such file") from error
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
     except ValueError as error:
         raise ArgumentError(f"{path}: expected JSON, got {error}") from error
 

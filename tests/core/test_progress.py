@@ -1,0 +1,98 @@
+import io
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from texgs.core import progress as module
+from texgs.core.progress import progress
+
+
+class Terminal(io.StringIO):
+    def isatty(self):
+        return True
+
+
+@pytest.fixture
+def clock(monkeypatch):
+    """Seconds that pass only where a test adds them."""
+    now = [100.0]
+    monkeypatch.setattr(module, "monotonic", lambda: now[0])
+    return now
+
+
+@pytest.fixture
+def log(capsys):
+    """Reads the lines on stderr, which is no terminal here."""
+    return lambda: capsys.readouterr().err.splitlines()
+
+
+def test_log_file_gets_a_line_every_five_seconds_and_a_last_one(clock, log):
+    for _ in progress(range(92), title="views engine/TF01", unit="view"):
+        clock[0] += 0.25
+    lines = log()
+    assert lines[0] == "views engine/TF01: 20 of 92 view, 4.0 view/s, 18 s left"
+    assert lines[1] == "views engine/TF01: 40 of 92 view, 4.0 view/s, 13 s left"
+    assert lines[-1] == "views engine/TF01: 92 of 92 view, 4.0 view/s, took 23 s"
+    assert len(lines) == 5  # at 5, 10, 15, 20 s and the end
+
+
+def test_slow_items_and_long_times(clock, log):
+    for _ in progress(range(200), title="fit", unit="step"):
+        clock[0] += 90
+    lines = log()
+    assert lines[0] == "fit: 1 of 200 step, 90.0 s/step, 4 h 58 min left"
+    assert lines[-2] == "fit: 199 of 200 step, 90.0 s/step, 1 min 30 s left"
+    assert lines[-1] == "fit: 200 of 200 step, 90.0 s/step, took 5 h 00 min"
+
+
+def test_unknown_length_is_counted_without_a_remaining_time(clock, log):
+    for _ in progress(iter(lambda: clock[0] >= 112, True), title="wait", unit="poll"):
+        clock[0] += 3
+    assert log() == [
+        "wait: 2 poll, 3.0 s/poll",
+        "wait: 4 poll, 3.0 s/poll",
+        "wait: 4 poll, 3.0 s/poll, took 12 s",
+    ]
+
+
+def test_given_total_wins_and_nothing_to_do_is_one_line(clock, log):
+    for _ in progress(iter("abc"), 3, title="a", unit="letter"):
+        clock[0] += 1
+    assert list(progress([], title="b", unit="view")) == []
+    assert log() == ["a: 3 of 3 letter, 1.0 letter/s, took 3 s", "b: 0 view, took 0 s"]
+
+
+def test_a_loop_left_early_says_how_far_it_came(clock, log):
+    def fail():
+        for index in progress(range(10), title="fit", unit="step"):
+            clock[0] += 1
+            if index == 4:
+                raise ValueError("NaN")
+
+    with pytest.raises(ValueError, match="NaN"):
+        fail()
+    assert log() == ["fit: 4 of 10 step, 1.2 s/step, stopped after 5 s"]
+
+
+def test_terminal_shows_a_bar(monkeypatch):
+    stream = Terminal()
+    monkeypatch.setattr(sys, "stderr", stream)
+    assert list(progress("abc", title="letters", unit="letter")) == ["a", "b", "c"]
+    assert "letters: 100%" in stream.getvalue()
+    assert "3/3" in stream.getvalue()
+    assert "letter/s" in stream.getvalue()
+
+
+def test_tqdm_is_not_imported_for_a_log_file():
+    code = (
+        "import sys\n"
+        "from texgs.core.progress import progress\n"
+        "list(progress(range(3), title='a', unit='b'))\n"
+        "sys.exit('tqdm' in sys.modules)"
+    )
+    command = [sys.executable, "-c", code]
+    root = Path(__file__).parents[2]
+    child = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    assert child.stderr.startswith("a: 3 of 3 b, ")

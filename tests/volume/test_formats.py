@@ -1,0 +1,191 @@
+import gzip
+
+import nibabel
+import nrrd
+import numpy as np
+import pytest
+import tifffile
+
+from tests.volume.volume_files import HAS_SPACING, SPACING, WRITERS, image_data, sample_values, write_vti
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.volume.sources import RawSource, open_source
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32"])
+@pytest.mark.parametrize("name", WRITERS)
+def test_round_trip(tmp_path, name, dtype):
+    values = sample_values(dtype)
+    WRITERS[name](tmp_path / name, values)
+    source = open_source(tmp_path / name)
+    assert (source.dims, source.dtype) == ((13, 12, 11), dtype)
+    assert source.name.startswith(name.split(".")[0])
+    assert source.spacing == (SPACING if name in HAS_SPACING else (1, 1, 1))
+    assert source.origin == (0, 0, 0)
+    np.testing.assert_array_equal(source.slices(0, 11), values)
+    np.testing.assert_array_equal(source.slices(4, 6), values[4:6])
+    moved = open_source(tmp_path / name, spacing=(7, 8, 9), origin=(1, 2, 3))
+    assert (moved.spacing, moved.origin) == ((7, 8, 9), (1, 2, 3))
+
+
+@pytest.mark.parametrize("name", ["plain.mha", "plain.mhd", "raw.nrrd", "raw.nhdr", "little.tif", "rows.npy"])
+def test_plain_samples_in_a_file_are_read_slab_by_slab(tmp_path, name):
+    WRITERS[name](tmp_path / name, sample_values())
+    assert isinstance(open_source(tmp_path / name), RawSource)
+
+
+@pytest.mark.parametrize("codes", ["RAS", "LPS", "SRA", "PIL"])
+@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
+def test_nifti_axes_become_right_anterior_superior(tmp_path, codes, suffix):
+    values = sample_values("int16").T  # [X, Y, Z]
+    affine = np.diag([2.0, 3.0, 4.0, 1.0])
+    affine[:3, 3] = 10, 20, 30
+    image = nibabel.Nifti1Image(values, affine)
+    turn = nibabel.orientations.ornt_transform(
+        nibabel.orientations.axcodes2ornt("RAS"), nibabel.orientations.axcodes2ornt(codes)
+    )
+    turned = image.as_reoriented(turn)
+    assert nibabel.aff2axcodes(turned.affine) == tuple(codes)
+    nibabel.save(turned, tmp_path / f"v{suffix}")
+    source = open_source(tmp_path / f"v{suffix}")
+    assert (source.spacing, source.origin) == ((2, 3, 4), (10, 20, 30))
+    np.testing.assert_array_equal(source.slices(0, 11), values.T)
+
+
+def test_nifti_scale_and_single_fourth_axis(tmp_path):
+    image = nibabel.Nifti1Image(sample_values("int16").T[..., None], np.eye(4))
+    image.header.set_slope_inter(0.5, -3)
+    nibabel.save(image, tmp_path / "v.nii")
+    source = open_source(tmp_path / "v.nii")
+    assert source.dtype == np.float32
+    np.testing.assert_allclose(source.slices(0, 11), sample_values() * 0.5 - 3)
+
+
+def test_nrrd_space_directions_and_byte_skip(tmp_path):
+    values = sample_values("uint8")
+    header = "NRRD0005\ntype: uchar\ndimension: 3\nspace dimension: 3\nsizes: 13 12 11\nencoding: raw\n"
+    header += "space directions: (3,4,0) (0,0,2) (1,0,0)\nspace origin: (1,2,3)\n"
+    (tmp_path / "v.nhdr").write_text(header + "data file: v.bin\nbyte skip: -1\n")
+    (tmp_path / "v.bin").write_bytes(b"some header" + values.tobytes())
+    source = open_source(tmp_path / "v.nhdr")
+    assert (source.spacing, source.origin) == ((5, 2, 1), (1, 2, 3))
+    np.testing.assert_array_equal(source.slices(0, 11), values)
+    (tmp_path / "v.nhdr").write_text(header + "data file: v.bin\nline skip: 1\nbyte skip: 2\n")
+    (tmp_path / "v.bin").write_bytes(b"line\n--" + values.tobytes())
+    np.testing.assert_array_equal(open_source(tmp_path / "v.nhdr").slices(0, 11), values)
+    (tmp_path / "v.bin").unlink()
+    with pytest.raises(ArgumentError, match=r"no such file with samples: .*v\.bin"):
+        open_source(tmp_path / "v.nhdr")
+
+
+def test_metaimage_header_size_and_byte_order(tmp_path):
+    values = sample_values(">i2")
+    text = "NDims = 3\nDimSize = 13 12 11\nElementType = MET_SHORT\nElementByteOrderMSB = True\n"
+    (tmp_path / "v.bin").write_bytes(b"some header" + values.tobytes())
+    (tmp_path / "v.mhd").write_text(f"{text}Position = 1 2 3\nHeaderSize = -1\nElementDataFile = v.bin\n")
+    source = open_source(tmp_path / "v.mhd")
+    assert (source.dtype, source.spacing, source.origin) == (np.int16, (1, 1, 1), (1, 2, 3))
+    np.testing.assert_array_equal(source.slices(0, 11), values)
+
+
+def test_folder_of_tiffs_in_natural_order(tmp_path):
+    values = sample_values()
+    for z, page in enumerate(values):
+        tifffile.imwrite(tmp_path / f"slice{z}.tif", page, compression="zlib" if z % 2 else None)
+    (tmp_path / "notes.txt").write_text("not a slice")
+    source = open_source(tmp_path, spacing=(1, 1, 2))
+    assert (source.dims, source.spacing) == ((13, 12, 11), (1, 1, 2))
+    np.testing.assert_array_equal(source.slices(8, 11), values[8:])
+    tifffile.imwrite(tmp_path / "slice4.tif", values[0, :5])
+    with pytest.raises(ArgumentError, match=r"slice4.tif: expected a page \[12, 13\] of uint16 as the first"):
+        source.slices(0, 11)
+
+
+def test_pages_written_one_by_one(tmp_path):
+    values = sample_values()
+    with tifffile.TiffWriter(tmp_path / "v.tif") as writer:
+        for page in values:
+            writer.write(page, compression="zlib", contiguous=False)
+    np.testing.assert_array_equal(open_source(tmp_path / "v.tif").slices(0, 11), values)
+
+
+def test_vti_with_an_extent_that_starts_elsewhere(tmp_path):
+    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
+
+    image = image_data(sample_values())
+    image.SetExtent(2, 14, 3, 14, 4, 14)
+    image.SetOrigin(10, 20, 30)
+    writer = vtkXMLImageDataWriter()
+    writer.SetInputData(image)
+    writer.SetFileName(str(tmp_path / "v.vti"))
+    writer.Write()
+    assert open_source(tmp_path / "v.vti").origin == (10 + 2 * 0.5, 20 + 3 * 2.0, 30 + 4 * 3.0)
+
+
+def test_more_than_one_component_is_refused(tmp_path):
+    colors = np.zeros((4, 5, 6, 3), np.uint8)
+    write_vti(tmp_path / "v.vti", colors)
+    tifffile.imwrite(tmp_path / "v.tif", colors, photometric="rgb")
+    tifffile.imwrite(tmp_path / "one.tif", colors[0], photometric="rgb")
+    nrrd.write(str(tmp_path / "v.nrrd"), colors, {"kinds": ["RGB-color"] + 3 * ["domain"]}, index_order="C")
+    pixel = np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")])
+    nibabel.save(nibabel.Nifti1Image(np.zeros((4, 5, 6), pixel), np.eye(4)), tmp_path / "v.nii")
+    np.save(tmp_path / "v.npy", colors)
+    (tmp_path / "v.mha").write_text(
+        "DimSize = 6 5 4\nElementNumberOfChannels = 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+    )
+    for path in sorted(tmp_path.iterdir()):
+        with pytest.raises((ArgumentError, ShapeError), match="3 components per sample"):
+            open_source(path)
+
+
+@pytest.mark.parametrize("shape", [(12, 13), (2, 11, 12, 13)])
+def test_other_than_three_axes_is_refused(tmp_path, shape):
+    values = np.zeros(shape, np.uint8)
+    nrrd.write(str(tmp_path / "v.nrrd"), values, index_order="C")
+    nibabel.save(nibabel.Nifti1Image(values.T, np.eye(4)), tmp_path / "v.nii")
+    tifffile.imwrite(tmp_path / "v.tif", values, photometric="minisblack")
+    np.save(tmp_path / "v.npy", values)
+    (tmp_path / "v.mha").write_text(
+        f"DimSize = {' '.join(map(str, shape))}\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+    )
+    for path in sorted(tmp_path.iterdir()):
+        with pytest.raises((ArgumentError, ShapeError), match=r"expected .*(axes|shape|samples along)"):
+            open_source(path)
+
+
+def test_spacing_of_a_file_that_makes_no_sense_can_be_replaced(tmp_path):
+    text = "DimSize = 3 2 2\nElementSpacing = 1 0 1\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+    (tmp_path / "v.mha").write_bytes(text.encode() + bytes(range(12)))
+    with pytest.raises(ArgumentError, match=r"v.mha: spacing: expected .*, got \[1.0, 0.0, 1.0\]; set the"):
+        open_source(tmp_path / "v.mha")
+    assert open_source(tmp_path / "v.mha", spacing=(1, 2, 1)).spacing == (1, 2, 1)
+
+
+def test_other_types_are_refused(tmp_path):
+    np.save(tmp_path / "v.npy", sample_values("complex64"))
+    with pytest.raises(ArgumentError, match="expected integers, floats or bool, got complex64"):
+        open_source(tmp_path / "v.npy")
+    nibabel.save(nibabel.Nifti1Image(sample_values("complex64"), np.eye(4)), tmp_path / "v.nii")
+    with pytest.raises(ArgumentError, match="expected integers, floats or bool, got complex64"):
+        open_source(tmp_path / "v.nii")
+    np.save(tmp_path / "pickle.npy", np.array([[[{}]]]), allow_pickle=True)
+    with pytest.raises(ArgumentError, match=r"expected a .npy file"):
+        open_source(tmp_path / "pickle.npy")
+
+
+def test_vtk_files_of_other_kinds_are_refused(tmp_path):
+    head = "# vtk DataFile Version 3.0\nname\nASCII\n"
+    (tmp_path / "mesh.vtk").write_text(head + "DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n")
+    with pytest.raises(ArgumentError, match=r"expected image data .*, got PolyData"):
+        open_source(tmp_path / "mesh.vtk")
+    lattice = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+    cells = "CELL_DATA 8\nSCALARS v float\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n"
+    (tmp_path / "cells.vtk").write_text(head + lattice + cells)
+    with pytest.raises(ArgumentError, match="expected point data, found none; convert cell data"):
+        open_source(tmp_path / "cells.vtk")
+
+
+def test_whole_file_compression_is_told_from_the_suffix(tmp_path):
+    WRITERS["plain.nii"](tmp_path / "plain.nii", sample_values())
+    (tmp_path / "V.NII.GZ").write_bytes(gzip.compress((tmp_path / "plain.nii").read_bytes()))
+    np.testing.assert_array_equal(open_source(tmp_path / "V.NII.GZ").slices(0, 11), sample_values())

@@ -1,0 +1,109 @@
+import io
+import subprocess
+import sys
+
+import nrrd
+import numpy as np
+import pytest
+
+from tests.volume.volume_files import SPACING, WRITERS, sample_values
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import ALIGNMENT, TYPES, open_grid, write_header
+from texgs.volume.prepare import KEPT_TYPES, prepare
+from texgs.volume.sources import ArraySource
+
+ORIGIN = (-1.5, 1e-9, 1 / 3)
+
+
+def written(path, dtype):
+    """A canonical file of the sample volume."""
+    prepare(ArraySource(Grid(sample_values(dtype), SPACING, ORIGIN)), path)
+    return path
+
+
+@pytest.mark.parametrize("dtype", KEPT_TYPES)
+def test_round_trip_is_exact_and_mapped(tmp_path, dtype):
+    grid = open_grid(written(tmp_path / "v.nrrd", dtype))
+    assert isinstance(grid.values, np.memmap)
+    assert not grid.values.flags.writeable
+    assert grid.values.offset % ALIGNMENT == 0
+    assert (grid.values.dtype, grid.spacing, grid.origin) == (dtype, SPACING, ORIGIN)
+    np.testing.assert_array_equal(grid.values, sample_values(dtype))
+
+
+@pytest.mark.parametrize("dtype", KEPT_TYPES)
+def test_other_readers_agree(tmp_path, dtype):
+    from vtkmodules.util.numpy_support import vtk_to_numpy
+    from vtkmodules.vtkIOImage import vtkNrrdReader
+
+    path = written(tmp_path / "v.nrrd", dtype)
+    values, header = nrrd.read(str(path), index_order="C")
+    np.testing.assert_array_equal(values, sample_values(dtype))
+    np.testing.assert_array_equal(header["space directions"], np.diag(SPACING))
+    np.testing.assert_array_equal(header["space origin"], ORIGIN)
+    reader = vtkNrrdReader()
+    reader.SetFileName(str(path))
+    reader.Update()
+    image = reader.GetOutput()
+    assert (image.GetDimensions(), image.GetSpacing()) == ((13, 12, 11), SPACING)
+    assert image.GetOrigin() == pytest.approx(ORIGIN)
+    found = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(11, 12, 13)
+    np.testing.assert_array_equal(found, sample_values(dtype))
+
+
+def test_header_is_padded_for_every_length():
+    for width in range(1, 130):
+        file = io.BytesIO()
+        length = write_header(file, (10**width, 2, 2), np.dtype("uint8"), SPACING, ORIGIN)
+        assert length == len(file.getvalue())
+        assert length % ALIGNMENT == 0
+        assert file.getvalue().endswith(b"\n\n")
+        assert file.getvalue().count(b"\n\n") == 1
+
+
+def test_every_word_for_a_type_is_known():
+    from nrrd.reader import _TYPEMAP_NRRD2NUMPY
+
+    for ours, theirs in TYPES.items():
+        for word in theirs:
+            assert np.dtype(_TYPEMAP_NRRD2NUMPY[word]) == ours
+    assert {word for words in TYPES.values() for word in words} == set(_TYPEMAP_NRRD2NUMPY) - {"block"}
+
+
+def test_mistakes_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match=r"none.nrrd: no such file; prepare the volume first"):
+        open_grid(tmp_path / "none.nrrd")
+    (tmp_path / "foreign.nrrd").write_bytes(bytes(1000))
+    with pytest.raises(ArgumentError, match=r"foreign.nrrd: expected an NRRD file, but it does not start"):
+        open_grid(tmp_path / "foreign.nrrd")
+    path = written(tmp_path / "v.nrrd", "uint16")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-1])
+    with pytest.raises(
+        ArgumentError, match=r"v.nrrd: the file is cut off: expected 13 x 12 x 11 x 2 \(uint16"
+    ):
+        open_grid(path)
+    path.write_bytes(whole[:100])
+    with pytest.raises(ArgumentError, match=r"v.nrrd: expected an NRRD file"):
+        open_grid(path)
+    WRITERS["gzip.nrrd"](tmp_path / "gzip.nrrd", sample_values())
+    with pytest.raises(ArgumentError, match="expected a prepared volume with raw encoding, got gzip"):
+        open_grid(tmp_path / "gzip.nrrd")
+
+
+def test_opening_reads_nothing_but_the_header(tmp_path):
+    path = tmp_path / "v.nrrd"
+    with path.open("wb") as file:
+        length = write_header(file, (2048, 2048, 2048), np.dtype("uint8"), SPACING, ORIGIN)
+        file.truncate(length + 2048**3)  # sparse: takes no room on the disk
+    grid = open_grid(path)
+    assert grid.dims == (2048, 2048, 2048)
+    assert grid.values[2047, 2047, 2047] == 0
+
+
+def test_import_is_light():
+    code = "import sys, texgs.volume.sources, texgs.volume.prepare; print(sorted(sys.modules))"
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    for heavy in ("torch", "vtkmodules", "pyvista", "nibabel", "tifffile", "nrrd"):
+        assert f"'{heavy}'" not in modules

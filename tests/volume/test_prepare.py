@@ -1,0 +1,224 @@
+import itertools
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from texgs.core.errors import ArgumentError
+from texgs.volume import slabs
+from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.orientation import TURNS
+from texgs.volume.prepare import prepare
+from texgs.volume.sources import ArraySource, open_source
+
+# World coordinates in those of the volume, written out by hand.
+WORLD = {
+    "+y": lambda x, y, z: (x, y, z),
+    "-y": lambda x, y, z: (x, -y, -z),
+    "+z": lambda x, y, z: (x, z, -y),
+    "-z": lambda x, y, z: (x, -z, y),
+    "+x": lambda x, y, z: (-y, x, z),
+    "-x": lambda x, y, z: (y, -x, z),
+}
+
+
+def source_of(values, spacing=(1.0, 1.0, 1.0), origin=(0.0, 0.0, 0.0)):
+    return ArraySource(Grid(np.asarray(values), spacing, origin))
+
+
+def reduced(values, factor, method):
+    """Oracle: block by block."""
+    ranges = [range(0, size, factor) for size in values.shape]
+    out = np.empty([len(r) for r in ranges], np.float64)
+    for index, (z, y, x) in zip(np.ndindex(*out.shape), itertools.product(*ranges), strict=True):
+        block = values[z : z + factor, y : y + factor, x : x + factor]
+        middle = tuple(size // 2 for size in block.shape)
+        out[index] = block.mean(dtype=np.float64) if method == "mean" else block[middle]
+    return (np.rint(out) if values.dtype.kind != "f" else out).astype(values.dtype)
+
+
+@st.composite
+def jobs(draw):
+    """A small volume with a crop, a reduction and an axis that points up; two samples are left."""
+    dims = draw(st.tuples(*[st.integers(2, 9)] * 3))
+    reduce = draw(st.integers(1, min(dims) - 1))
+    crop = []
+    for size in dims:
+        length = draw(st.integers(reduce + 1, size))
+        start = draw(st.integers(0, size - length))
+        crop += [start, start + length]
+    dtype = draw(st.sampled_from(["uint8", "int8", "uint16", "int16", "float32"]))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32)))
+    values = rng.integers(-128, 128, dims[::-1]).astype(dtype)
+    values.flat[0], values.flat[-1] = 0, 1
+    return values, tuple(crop), reduce
+
+
+@settings(max_examples=60, deadline=None)
+@given(job=jobs(), up=st.sampled_from(list(TURNS)), method=st.sampled_from(["mean", "sample"]))
+def test_any_job_agrees_with_numpy_at_world_positions(tmp_path_factory, job, up, method):
+    values, crop, reduce = job
+    x0, x1, y0, y1, z0, z1 = crop
+    expected = reduced(values[z0:z1, y0:y1, x0:x1], reduce, method)
+    if expected.min() == expected.max():
+        return
+    spacing, origin = (0.5, 2.0, 3.0), (1.0, -2.0, 4.0)
+    path = tmp_path_factory.mktemp("job") / "v.nrrd"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(slabs, "SLAB_BYTES", 1)  # as many slabs as there can be
+        summary = prepare(
+            source_of(values, spacing, origin), path, crop=crop, reduce=reduce, method=method, up=up
+        )
+    grid = open_grid(path)
+    assert (grid.dims, grid.values.dtype) == (summary.dims, values.dtype)
+    start = np.array(origin) + (np.array([x0, y0, z0]) + 0.5 * (reduce - 1)) * spacing
+    for z, y, x in np.ndindex(*expected.shape):
+        place = WORLD[up](*(start + np.array([x, y, z]) * reduce * spacing))
+        index = np.rint((np.array(place) - grid.origin) / grid.spacing).astype(int)
+        np.testing.assert_allclose(grid.origin + index * grid.spacing, place, atol=1e-9)
+        assert grid.values[tuple(index[::-1])] == expected[z, y, x]
+
+
+@pytest.mark.parametrize("up", TURNS)
+def test_up_is_a_rotation_that_points_up(up):
+    matrix = np.zeros((3, 3))
+    for row, (axis, sign) in enumerate(TURNS[up]):
+        matrix[row, axis] = sign
+    np.testing.assert_array_equal(matrix @ [1, 2, 3], WORLD[up](1, 2, 3))
+    assert np.linalg.det(matrix) == pytest.approx(1)
+    axis = np.zeros(3)
+    axis["xyz".index(up[1])] = 1 if up[0] == "+" else -1
+    np.testing.assert_array_equal(matrix @ axis, [0, 1, 0])
+
+
+def test_corners_of_a_volume_with_z_up(tmp_path):
+    values = np.zeros((2, 3, 4), np.uint8)
+    values[1, 0, 0] = 1  # top, y = 0
+    values[0, 2, 3] = 2  # bottom, y = 2, x = 3
+    prepare(source_of(values), tmp_path / "v.nrrd", up="+z")
+    turned = open_grid(tmp_path / "v.nrrd").values  # [Z, Y, X] = [3, 2, 4]
+    assert turned.shape == (3, 2, 4)
+    assert turned[2, 1, 0] == 1
+    assert turned[0, 0, 3] == 2
+
+
+@pytest.mark.parametrize(
+    ("dtype", "kept"),
+    [
+        *(("bool", "uint8"), ("int8", "int8"), (">u2", "uint16"), (">f4", "float32")),
+        *((wide, "float32") for wide in ("int32", "uint64", "float16", "float64")),
+    ],
+)
+def test_types(tmp_path, dtype, kept):
+    values = np.random.default_rng(0).integers(0, 2, (4, 5, 6)).astype(dtype)
+    assert prepare(source_of(values), tmp_path / "v.nrrd").dtype == kept
+    grid = open_grid(tmp_path / "v.nrrd")
+    assert grid.values.dtype == kept
+    np.testing.assert_array_equal(grid.values, values)
+
+
+@pytest.mark.parametrize("dtype", ["uint8", "int8", "uint16", "int16", "float32"])
+def test_summary(tmp_path, dtype):
+    values = (np.random.default_rng(0).normal(size=(20, 21, 22)) * 30 + 60).astype(dtype)
+    summary = prepare(source_of(values, (1.0, 2.0, 3.0)), tmp_path / "v.nrrd")
+    low, high = float(values.min()), float(values.max())
+    assert (summary.minimum, summary.maximum, summary.voxels) == (low, high, values.size)
+    assert (summary.dims, summary.spacing, summary.origin) == ((22, 21, 20), (1, 2, 3), (0, 0, 0))
+    np.testing.assert_array_equal(summary.histogram, np.histogram(values, 256, (low, high))[0])
+
+
+def test_values_that_are_not_finite(tmp_path):
+    values = np.arange(4 * 5 * 6, dtype=np.float64).reshape(4, 5, 6)
+    values[2, 3, 4], values[3, 0, 0] = np.nan, -np.inf
+    with pytest.raises(
+        ArgumentError, match=r"got 2 .* at \(x, y, z\) = \(4, 3, 2\); set nan_value to replace"
+    ):
+        prepare(source_of(values), tmp_path / "v.nrrd", crop=(0, 6, 0, 5, 1, 4), up="-z", reduce=2)
+    assert list(tmp_path.iterdir()) == []
+    prepare(source_of(values), tmp_path / "v.nrrd", nan_value=-7)
+    expected = np.where(np.isfinite(values), values, -7).astype(np.float32)
+    np.testing.assert_array_equal(open_grid(tmp_path / "v.nrrd").values, expected)
+
+
+def test_mistakes_are_named_and_leave_the_old_file(tmp_path):
+    target = tmp_path / "v.nrrd"
+    target.write_text("old")
+    ramp = np.arange(60).reshape(3, 4, 5)
+    for values, arguments, message in [
+        (np.full((3, 4, 5), 7), {}, "volume: expected a field that varies, but every sample is 7; choose"),
+        (ramp * 1e300, {}, r"expected samples that fit float32, got magnitudes up to 5.9e\+301; scale"),
+        (ramp, {"crop": (0, 5, 0, 5, 0, 3)}, "crop: expected 0 <= y0 < y1 <= 4, got 0 and 5"),
+        (ramp, {"crop": (2, 2, 0, 4, 0, 3)}, "crop: expected 0 <= x0 < x1 <= 5, got 2 and 2"),
+        (ramp, {"crop": (0, 5, 0, 4)}, "crop: expected six integers"),
+        (ramp, {"crop": (0, 5, 0, 4, 1, 2)}, "crop and reduce leave 5 x 4 x 1; crop or reduce less"),
+        (ramp, {"reduce": 3}, "crop and reduce leave 2 x 2 x 1"),
+        (ramp, {"reduce": 0}, "reduce: expected an integer of at least 1, got 0"),
+        (ramp, {"method": "median"}, "method: expected one of mean, sample, got 'median'"),
+        (ramp, {"up": "z"}, r"up: expected one of \+y, -y, .*, got 'z'"),
+        (ramp, {"nan_value": float("nan")}, "nan_value: expected a finite float32, got nan"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            prepare(source_of(values), target, **arguments)
+    with pytest.raises(ArgumentError, match=r"expected a target with the suffix .nrrd, got '.raw'"):
+        prepare(source_of(ramp), tmp_path / "v.raw")
+    assert target.read_text() == "old"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_progress_sees_every_slab_and_an_interrupt_leaves_nothing(tmp_path, monkeypatch):
+    monkeypatch.setattr(slabs, "SLAB_BYTES", 1)
+    seen = []
+
+    def progress(steps, total):
+        for step in steps:
+            seen.append((step, total))
+            yield step
+
+    source = source_of(np.arange(60).reshape(3, 4, 5))
+    prepare(source, tmp_path / "v.nrrd", progress=progress)
+    assert seen == [((0, 1), 3), ((1, 2), 3), ((2, 3), 3)]
+
+    def interrupt(steps, total):
+        yield steps[0]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        prepare(source, tmp_path / "w.nrrd", progress=interrupt)
+    assert [path.name for path in tmp_path.iterdir()] == ["v.nrrd"]
+
+
+def test_a_target_that_is_its_own_source(tmp_path):
+    values = np.arange(60, dtype=np.uint8).reshape(3, 4, 5)
+    prepare(source_of(values), tmp_path / "v.nrrd")
+    prepare(open_source(tmp_path / "v.nrrd"), tmp_path / "v.nrrd", up="-y")
+    np.testing.assert_array_equal(open_grid(tmp_path / "v.nrrd").values, values[::-1, ::-1])
+
+
+PEAK = """
+import sys
+from pathlib import Path
+from texgs.volume.sources import open_source
+from texgs.volume.prepare import prepare
+edge = int(sys.argv[2])
+source = open_source(sys.argv[1], dims=(edge, edge, edge), dtype="uint8")
+prepare(source, sys.argv[1] + ".nrrd", reduce=int(sys.argv[3]), up="+z")
+status = Path("/proc/self/status").read_text().split()
+print(status[status.index("VmHWM:") + 1])  # kB
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the peak is read from /proc")
+@pytest.mark.parametrize(("edge", "reduce"), [(640, 8), (640, 1)])
+def test_memory_does_not_grow_with_the_volume(tmp_path, edge, reduce):
+    path = tmp_path / "v.raw"
+    with path.open("wb") as file:
+        file.truncate(edge**3)  # sparse: takes no room on the disk
+        file.write(bytes([255]) * edge**2)
+    command = [sys.executable, "-c", PEAK, str(path), str(edge), str(reduce)]
+    peak = int(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    # Python and numpy take 40 MB, a slab of 8 MB and what is computed from it the rest.
+    assert peak < 150_000

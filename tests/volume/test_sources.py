@@ -1,0 +1,93 @@
+import numpy as np
+import pytest
+
+from tests.volume.volume_files import sample_values
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import Grid
+from texgs.volume.slabs import slab_bounds
+from texgs.volume.sources import ArraySource, open_source
+
+DIMS = (13, 12, 11)
+
+
+@pytest.mark.parametrize("endian", ["little", "big"])
+@pytest.mark.parametrize("dtype", ["uint8", "int16", "float32", "float64"])
+def test_plain_samples(tmp_path, dtype, endian):
+    values = sample_values(dtype)
+    order = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
+    (tmp_path / "v.RAW").write_bytes(b"header" + values.astype(order).tobytes())
+    source = open_source(tmp_path / "v.RAW", dims=DIMS, dtype=dtype, endian=endian, skip=6, spacing=(1, 2, 3))
+    assert (source.dims, source.dtype, source.spacing, source.origin) == (DIMS, dtype, (1, 2, 3), (0, 0, 0))
+    assert source.dtype.isnative
+    np.testing.assert_array_equal(source.slices(3, 7), values[3:7])
+
+
+def test_slabs_cover_the_range_in_multiples():
+    source = ArraySource(Grid(np.zeros((100, 512, 1024), np.float32)))  # 2 MiB a slice, 8 MiB a slab
+    assert slab_bounds(source, 3, 12) == [(3, 7), (7, 11), (11, 12)]
+    assert slab_bounds(source, 0, 13, multiple=3) == [(0, 3), (3, 6), (6, 9), (9, 12), (12, 13)]
+    assert slab_bounds(source, 0, 20, multiple=9) == [(0, 9), (9, 18), (18, 20)]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "no header; set dims and dtype, and endian"),
+        ({"dims": DIMS}, "set dtype, and endian"),
+        (
+            {"dims": DIMS, "dtype": "float32"},
+            r"expected 13 x 12 x 11 x 4 \(float32\) = 6864 bytes, found 3432; dtype uint16 would fit",
+        ),
+        (
+            {"dims": (13, 12, 10), "dtype": "uint16", "skip": 8},
+            r"\(uint16\) \+ 8 skipped = 3128 bytes, found 3432; correct dims, dtype or skip",
+        ),
+        ({"dims": DIMS, "dtype": "uint16", "skip": -1}, "skip: expected at least 0 bytes, got -1"),
+        (
+            {"dims": DIMS, "dtype": "uint16", "endian": "middle"},
+            "endian: expected little or big, got 'middle'",
+        ),
+        ({"dims": DIMS, "dtype": "short int"}, "dtype: expected a name such as uint8 or float32"),
+        ({"dims": (13, 12), "dtype": "uint16"}, r"dims: expected at least 2 .* got \[13, 12\]"),
+        ({"dims": (13, 132, 1), "dtype": "uint16"}, "dims: expected at least 2"),
+        ({"dims": (-13, -12, 11), "dtype": "uint16"}, "dims: expected at least 2"),
+        ({"dims": DIMS, "dtype": "complex64"}, "expected integers, floats or bool, got complex64"),
+        ({"dims": DIMS, "dtype": "S2"}, "expected integers, floats or bool"),
+        ({"dims": DIMS, "dtype": "uint16", "spacing": (1, 1, -1)}, "spacing: expected three finite numbers"),
+        ({"dims": DIMS, "dtype": "uint16", "spacing": (1, 1, float("nan"))}, "spacing: expected three"),
+    ],
+)
+def test_mistakes_in_the_description_of_plain_samples(tmp_path, arguments, message):
+    path = tmp_path / "v.raw"
+    path.write_bytes(sample_values("uint16").tobytes())
+    with pytest.raises(ArgumentError, match=message) as caught:
+        open_source(path, **arguments)
+    assert str(caught.value).startswith(f"{path}: ")
+
+
+def test_plain_file_that_shrinks_while_it_is_read(tmp_path):
+    path = tmp_path / "v.raw"
+    path.write_bytes(sample_values("uint8").tobytes())
+    source = open_source(path, dims=DIMS, dtype="uint8")
+    path.write_bytes(b"short")
+    with pytest.raises(ArgumentError, match="cut off while it was read"):
+        source.slices(0, 11)
+
+
+def test_mistakes_in_the_path(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        ArgumentError, match=f"none.vti: no such file or folder; looked for {tmp_path}/none.vti"
+    ):
+        open_source("none.vti")
+    (tmp_path / "v.dcm").touch()
+    with pytest.raises(ArgumentError, match=r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .*TIFFs"):
+        open_source("v.dcm")
+    (tmp_path / "v.raw.gz").touch()
+    with pytest.raises(ArgumentError, match=r"unknown suffix '.raw.gz'"):
+        open_source("v.raw.gz")
+    with pytest.raises(ArgumentError, match=r"expected a folder of TIFFs \(.tif, .tiff\), found none"):
+        open_source(tmp_path)
+    np.save(tmp_path / "v.npy", sample_values())
+    with pytest.raises(ArgumentError, match="this format has a header; leave them out"):
+        open_source("v.npy", dims=DIMS)

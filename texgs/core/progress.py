@@ -1,0 +1,85 @@
+"""Progress of a long loop: a bar on a terminal, a plain line now and then in a log file."""
+
+import sys
+from collections.abc import Iterable, Iterator
+from operator import length_hint
+from time import monotonic
+from typing import TypeVar
+
+T = TypeVar("T")
+
+SECONDS_BETWEEN_LINES = 5.0
+
+
+def progress(iterable: Iterable[T], total: int | None = None, *, title: str, unit: str) -> Iterator[T]:
+    """Yield the items of a loop; report on stderr how many are done, how fast, and the time left.
+
+    A terminal shows one moving bar. Anything else, such as the log file of a job, gets a plain line at most
+    every five seconds and one at the end, also where the loop was left early. The rates of these lines are
+    means since the start.
+
+    Args:
+        iterable: items of the loop.
+        total: number of items; by default the iterable's length where it has one.
+        title: what is being done, at the start of each line.
+        unit: name of one item, such as "view".
+
+    Yields:
+        The items, unchanged.
+
+    Example:
+        >>> list(progress("ab", title="letters", unit="letter"))
+        ['a', 'b']
+    """
+    if total is None:
+        total = length_hint(iterable) or None
+    if not sys.stderr.isatty():
+        yield from _lines(iterable, total, title, unit)
+        return
+    from tqdm import tqdm
+
+    yield from tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
+
+
+def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterator[T]:
+    """Yield the items and write the plain lines."""
+    start = last = monotonic()
+    done = 0
+    outcome = "stopped after"
+    try:
+        for item in iterable:
+            yield item
+            done += 1
+            now = monotonic()
+            if now - last >= SECONDS_BETWEEN_LINES and done != total:
+                left = f", {_duration((total - done) * (now - start) / done)} left" if total else ""
+                _write(f"{title}: {_state(done, total, unit, now - start)}{left}")
+                last = now
+        outcome = "took"
+    finally:
+        seconds = monotonic() - start
+        _write(f"{title}: {_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}")
+
+
+def _write(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+def _state(done: int, total: int | None, unit: str, seconds: float) -> str:
+    """Count and rate, such as "40 of 92 view, 5.1 view/s"; the rate is inverted where it is below one."""
+    count = f"{done} of {total} {unit}" if total else f"{done} {unit}"
+    if not done or seconds <= 0:
+        return count
+    rate = done / seconds
+    return f"{count}, {rate:.1f} {unit}/s" if rate >= 1 else f"{count}, {1 / rate:.1f} s/{unit}"
+
+
+def _duration(seconds: float) -> str:
+    """A time in its two largest units: "10 s", "3 min 05 s", "2 h 07 min"."""
+    whole = round(max(seconds, 0))
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60:02d} s"
+    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"

@@ -1,0 +1,1 @@
+"""Scalar volumes: files of many formats, prepared once into one canonical file, opened as a grid."""

@@ -1,0 +1,216 @@
+"""NRRD files: any as a source, and the canonical file of a prepared volume, mapped into memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isnan
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.volume.grid import Dims, Grid, Triple, byte_count, check_lattice
+from texgs.volume.slabs import ArraySource, RawSource, Source, reading_as
+
+ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
+# NRRD has many words for a type; sizes and signs are what they are in C on every machine of today.
+TYPES = {
+    "int8": ("signed char", "int8", "int8_t"),
+    "uint8": ("uchar", "unsigned char", "uint8", "uint8_t"),
+    "int16": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
+    "uint16": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
+    "int32": ("int", "signed int", "int32", "int32_t"),
+    "uint32": ("uint", "unsigned int", "uint32", "uint32_t"),
+    "int64": (
+        "longlong",
+        "long long",
+        "long long int",
+        "signed long long",
+        "signed long long int",
+        "int64",
+        "int64_t",
+    ),
+    "uint64": ("ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"),
+    "float32": ("float",),
+    "float64": ("double",),
+}
+
+
+@dataclass(frozen=True)
+class Header:
+    """What an NRRD header says about a scalar volume."""
+
+    fields: dict[str, Any]  # as parsed by pynrrd
+    data: Path  # file with the samples
+    offset: int  # bytes before the samples, as they are stored
+    dims: Dims
+    stored: np.dtype
+    spacing: Triple
+    origin: Triple
+
+
+def open_nrrd(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+    """Samples are read on demand, or as a whole where they are compressed or text.
+
+    Space directions give the spacing; oblique axes stay as they are stored.
+
+    Raises:
+        ArgumentError: if the file is damaged or no scalar volume.
+    """
+    import nrrd
+
+    header = _read_header(path)
+    lattice = (spacing or header.spacing, origin or header.origin)
+    if header.fields["encoding"] == "raw":
+        return RawSource(header.data, header.dims, header.stored, header.offset, *lattice)
+    check_lattice(header.dims, header.stored, *lattice)
+    with reading_as("an NRRD file"), header.data.open("rb") as file:
+        if header.data == path:
+            nrrd.read_header(file)
+        fields = {key: value for key, value in header.fields.items() if key not in ("data file", "datafile")}
+        values = nrrd.read_data(fields, file, str(header.data), index_order="C")
+    return ArraySource(Grid(values, *lattice), path.name)
+
+
+def open_grid(path: str | Path) -> Grid:
+    """Map a prepared volume into memory; samples are read when they are used.
+
+    Args:
+        path: .nrrd or .nhdr with raw encoding.
+
+    Raises:
+        ArgumentError, ShapeError: if the file is missing, cut off, or not such a volume.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ArgumentError(f"{path}: no such file; prepare the volume first")
+    try:
+        header = _read_header(path)
+        encoding = header.fields["encoding"]
+        if encoding != "raw":
+            raise ArgumentError(f"expected a prepared volume with raw encoding, got {encoding}; prepare it")
+        source = RawSource(
+            header.data, header.dims, header.stored, header.offset, header.spacing, header.origin
+        )
+    except (ArgumentError, ShapeError) as error:
+        raise type(error)(f"{path}: {error}") from error
+    values = np.memmap(source.path, source.stored, "r", source.offset, source.dims[::-1])
+    return Grid(values, source.spacing, source.origin)
+
+
+def write_header(file: BinaryIO, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> int:
+    """Write the header of a canonical file: raw samples follow, little endian.
+
+    Args:
+        file: at its start.
+        dims: samples along x, y, z.
+        dtype: one of those in `TYPES`.
+        spacing: x, y, z, physical units.
+        origin: x, y, z, physical units.
+
+    Returns:
+        Length of the header in bytes, a multiple of `ALIGNMENT`.
+    """
+    dx, dy, dz = spacing
+    directions = " ".join(_vector(step) for step in ((dx, 0, 0), (0, dy, 0), (0, 0, dz)))
+    lines = [
+        "NRRD0004",
+        f"type: {TYPES[dtype.name][0]}",
+        "dimension: 3",
+        "space: 3D-right-handed",
+        f"sizes: {dims[0]} {dims[1]} {dims[2]}",
+        f"space directions: {directions}",
+        "kinds: domain domain domain",
+        "endian: little",
+        "encoding: raw",
+        f"space origin: {_vector(origin)}",
+    ]
+    text = "\n".join(lines) + "\n#"
+    # The comment fills up; two line breaks end it and the header.
+    text += "-" * (-(len(text) + 2) % ALIGNMENT) + "\n\n"
+    return file.write(text.encode("ascii"))
+
+
+def _vector(numbers: Triple) -> str:
+    """Numbers as NRRD writes a vector, exact to the last bit."""
+    return "(" + ",".join(repr(float(number)) for number in numbers) + ")"
+
+
+def _read_header(path: Path) -> Header:
+    """Parse a header, attached or detached.
+
+    Raises:
+        ArgumentError: if it is no header of a scalar volume.
+    """
+    import nrrd
+
+    with reading_as("an NRRD file"), path.open("rb") as file:
+        if file.read(4) != b"NRRD":  # a foreign file may hold no line break for gigabytes
+            raise ArgumentError("expected an NRRD file, but it does not start with NRRD")
+        file.seek(0)
+        fields = nrrd.read_header(file)
+        end = file.tell()
+        dims = _dims(fields)
+        stored = _stored_type(fields)
+        data, offset = _data_file(path, fields, end, byte_count(dims, stored))
+        return Header(fields, data, offset, dims, stored, _spacing(fields), _origin(fields))
+
+
+def _dims(fields: dict[str, Any]) -> Dims:
+    """Samples along x, y, z."""
+    sizes = tuple(int(size) for size in fields["sizes"])
+    kinds = fields.get("kinds", [])
+    if len(sizes) == 4 and kinds and kinds[0] not in ("domain", "space", "time"):
+        raise ArgumentError(f"expected a scalar volume, got {sizes[0]} components per sample")
+    if len(sizes) != 3:
+        raise ArgumentError(f"expected 3 axes, got {len(sizes)}: sizes {list(sizes)}")
+    return sizes[0], sizes[1], sizes[2]
+
+
+def _stored_type(fields: dict[str, Any]) -> np.dtype:
+    """Sample type with byte order."""
+    name = fields["type"]
+    word = next((ours for ours, theirs in TYPES.items() if name in theirs), None)
+    if word is None:
+        raise ArgumentError(f"type: expected integers or floats, got {name}")
+    return np.dtype(word).newbyteorder(">" if fields.get("endian") == "big" else "<")
+
+
+def _data_file(path: Path, fields: dict[str, Any], end: int, n_bytes: int) -> tuple[Path, int]:
+    """File with the samples and where they start in it."""
+    name = fields.get("data file", fields.get("datafile"))
+    line_skip = int(fields.get("line skip", fields.get("lineskip", 0)))
+    byte_skip = int(fields.get("byte skip", fields.get("byteskip", 0)))
+    if name is None:
+        data, start = path, end
+    elif name.startswith("LIST") or "%" in name:
+        raise ArgumentError("expected one file of samples, got several; join them with `unu join`")
+    else:
+        data, start = path.parent / name, 0
+    if not data.is_file():
+        raise ArgumentError(f"no such file with samples: {data}")
+    if fields["encoding"] != "raw":
+        return data, start  # pynrrd skips
+    if byte_skip == -1:
+        return data, data.stat().st_size - n_bytes  # the samples end the file
+    with data.open("rb") as file:
+        file.seek(start)
+        for _ in range(line_skip):
+            file.readline()
+        return data, file.tell() + byte_skip
+
+
+def _spacing(fields: dict[str, Any]) -> Triple:
+    """Lengths of the space directions, or the spacings; 1 where nothing is said."""
+    directions = fields.get("space directions")
+    steps = fields.get("spacings", [1.0] * 3) if directions is None else np.linalg.norm(directions, axis=1)
+    x, y, z = (1.0 if isnan(step) else float(step) for step in steps)
+    return x, y, z
+
+
+def _origin(fields: dict[str, Any]) -> Triple:
+    """Place of the first sample; 0 where nothing is said."""
+    start = fields.get("space origin", fields.get("axis mins", fields.get("axismins", [0.0] * 3)))
+    x, y, z = (0.0 if isnan(place) else float(place) for place in start)
+    return x, y, z
