@@ -1,0 +1,210 @@
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, reject
+from hypothesis import strategies as st
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.transfer import TransferFunction, check_disjoint, split
+
+GREY = ((0, 0.5, 0.5, 0.5),)
+TENT = TransferFunction(opacity=((1, 0), (2, 0.8), (4, 0)), color=((1, 1, 0, 0), (4, 0, 0, 1)))
+STEPS = TransferFunction(
+    opacity=((0, 0.2), (1, 0.4), (1, 0.9), (3, 0.6)), color=((1, 1, 0, 0), (1, 0, 1, 0), (3, 0, 0, 1))
+)
+
+
+@st.composite
+def functions(draw):
+    """Functions with values on a grid of 1/4 in [-8, 8], so that points, steps and range ends meet."""
+
+    def points(channels, least):
+        values = sorted(draw(st.lists(st.integers(-32, 32), min_size=least, max_size=7)))
+        values = [value / 4 for i, value in enumerate(values) if i < 2 or value != values[i - 2]]
+        unit = st.floats(0, 1, allow_subnormal=False)
+        return tuple((value, *(draw(unit) for _ in range(channels))) for value in values)
+
+    opacity, color = points(1, 2), points(3, 1)
+    try:
+        return TransferFunction(opacity, color)
+    except ArgumentError:  # transparent everywhere
+        return reject()
+
+
+class TestEvaluation:
+    def test_values_of_a_tent(self):
+        expected = [[1, 0, 0, 0], [5 / 6, 0, 1 / 6, 0.4], [2 / 3, 0, 1 / 3, 0.8], [0, 0, 1, 0]]
+        np.testing.assert_allclose(TENT([1, 1.5, 2, 99]), expected, atol=1e-15)
+
+    @given(functions(), st.lists(st.floats(-9, 9), min_size=1))
+    def test_equals_numpys_interpolation(self, tf, values):
+        opacity, color = np.array(tf.opacity), np.array(tf.color)
+        expected = [np.interp(values, color[:, 0], color[:, c]) for c in (1, 2, 3)]
+        expected.append(np.interp(values, opacity[:, 0], opacity[:, 1], left=0, right=0))
+        np.testing.assert_allclose(tf(values), np.stack(expected, -1), rtol=0, atol=1e-15)
+
+    def test_a_step_takes_its_second_point_at_its_value(self):
+        np.testing.assert_allclose(STEPS([math.nextafter(1, 0), 1])[:, 3], [0.4, 0.9])
+        np.testing.assert_array_equal(STEPS([0.5, 1])[:, :3], [[1, 0, 0], [0, 1, 0]])
+
+    def test_any_shape_and_dtype(self):
+        assert TENT(2.0).shape == (4,)
+        assert TENT(np.zeros((2, 0, 3), np.float32)).shape == (2, 0, 3, 4)
+        np.testing.assert_array_equal(TENT(np.uint8([2, 3])), TENT([2.0, 3.0]))
+
+    def test_missing_values_are_transparent(self):
+        np.testing.assert_array_equal(TENT([np.nan, np.inf, -np.inf])[:, 3], 0)
+
+    @given(functions())
+    def test_support_is_where_opacity_is(self, tf):
+        low, high = tf.support
+        values = np.arange(-1000, 1000) / 32 + 1 / 64  # off the grid of points
+        alpha = tf(values)[:, 3]
+        assert not alpha[(values < low) | (values > high)].any()
+        inside = values[alpha > 0]
+        assert low <= inside.min() < low + 1 / 16
+        assert high - 1 / 16 < inside.max() <= high
+
+
+class TestScaled:
+    def test_fractions_become_values(self):
+        tf = TransferFunction(((0, 0), (0.25, 1), (1, 0.5)), ((0, 0, 0, 0), (1, 1, 1, 1))).scaled(-1000, 3000)
+        assert tf.opacity == ((-1000, 0), (0, 1), (3000, 0.5))
+        assert [value for value, *_ in tf.color] == [-1000, 3000]
+
+    @given(st.floats(-1e6, 1e6), st.floats(1e-3, 1e6))
+    def test_ends_are_exact(self, low, width):
+        tf = TransferFunction(((0, 0), (1, 1)), GREY).scaled(low, low + width)
+        assert tf.support == (low, low + width)
+
+    def test_mistakes_are_named(self):
+        with pytest.raises(ArgumentError, match=r"range: expected low < high, both finite, got \(2, 2\)"):
+            TENT.scaled(2, 2)
+        with pytest.raises(ArgumentError, match=r"opacity\[1\]: expected a fraction .*got 2; do not scale"):
+            TENT.scaled(0, 1)
+
+
+class TestWithoutSteps:
+    @given(functions())
+    def test_agrees_with_vtk_which_extends_the_ends(self, tf):
+        core = pytest.importorskip("vtkmodules.vtkRenderingCore")
+        data = pytest.importorskip("vtkmodules.vtkCommonDataModel")
+        opacity, color = data.vtkPiecewiseFunction(), core.vtkColorTransferFunction()
+        for point in tf.without_steps().opacity:
+            opacity.AddPoint(*point)
+        for point in tf.without_steps().color:
+            color.AddRGBPoint(*point)
+        values = np.arange(-72, 73) / 8  # on the points and between them
+        found = [(*color.GetColor(value), opacity.GetValue(value)) for value in values]
+        np.testing.assert_allclose(found, tf(values), rtol=0, atol=1e-4)  # a step moves by 1e-6 of the range
+
+    @given(functions())
+    def test_is_strictly_ascending_and_ends_transparent(self, tf):
+        tf = tf.without_steps()
+        assert (np.diff(np.array(tf.opacity)[:, 0]) > 0).all()
+        assert (np.diff(np.array(tf.color)[:, 0]) > 0).all()
+        assert tf.opacity[0][1] == tf.opacity[-1][1] == 0
+
+    def test_leaves_others_alone(self):
+        assert TENT.without_steps() == TENT
+
+
+class TestSplit:
+    @given(functions(), st.lists(st.integers(-40, 40), min_size=2, max_size=6, unique=True))
+    def test_equals_the_whole_inside_and_nothing_outside(self, tf, cuts):
+        cuts = [cut / 4 for cut in sorted(cuts)]
+        values = np.arange(-640, 640) / 64
+        for low, high in pairwise(cuts):
+            inside = (values > low) & (values < high)
+            if not tf(values[inside])[:, 3].any():
+                with pytest.raises(ArgumentError, match="expected a range with opacity above 0"):
+                    split(tf, [(low, high)])
+                continue
+            (basic,) = split(tf, [(low, high)])
+            whole, part = tf(values), basic(values)
+            visible = inside & (whole[:, 3] > 0)  # the colour of what is transparent is free
+            np.testing.assert_allclose(part[visible], whole[visible], rtol=0, atol=1e-12)
+            np.testing.assert_array_equal(part[inside & ~visible][:, 3], 0)
+            np.testing.assert_array_equal(part[(values < low) | (values > high)][:, 3], 0)
+
+    def test_cuts_at_the_ends_with_the_limits_from_inside(self):
+        left, right = split(STEPS, [(0, 1), (1, 2)])
+        assert left.opacity == ((0, 0.2), (1, 0.4))
+        assert left.color == ((0, 1, 0, 0), (1, 1, 0, 0))
+        assert right.opacity == ((1, 0.9), (2, 0.75))
+        assert right.color == ((1, 0, 1, 0), (2, 0, 0.5, 0.5))
+        check_disjoint({"left": left, "right": right})
+
+    def test_mistakes_are_named(self):
+        with pytest.raises(ArgumentError, match=r"ranges\[1\]: expected low < high.*got \(3, 2\)"):
+            split(TENT, [(1, 2), (3, 2)])
+        with pytest.raises(ArgumentError, match=r"ranges\[0\] and ranges\[1\]: .*\(1, 3\) and \(2, 4\)"):
+            split(TENT, [(1, 3), (2, 4)])
+        with pytest.raises(ArgumentError, match=r"ranges\[0\]: .*got \(5, 6\); .* visible in \(1, 4\)"):
+            split(TENT, [(5, 6)])
+
+
+def test_overlap_names_both_functions_and_ranges():
+    other = TransferFunction(((3.5, 0), (5, 1)), GREY)
+    with pytest.raises(ArgumentError, match=r"TF01 and TF02: .*\(1, 4\) and \(3.5, 5\)"):
+        check_disjoint({"TF01": TENT, "TF02": other})
+    check_disjoint({"TF01": TENT, "TF02": TransferFunction(((4, 1), (5, 1)), GREY)})
+    check_disjoint({})
+
+
+class TestDictionary:
+    @given(functions())
+    def test_round_trip(self, tf):
+        assert TransferFunction.from_dict(tf.to_dict()) == tf
+
+    def test_numpy_and_integers_become_floats(self):
+        tf = TransferFunction.from_dict({"opacity": np.array([[0, 0], [1, 1]]), "color": [[0, 1, 1, 1]]})
+        assert tf.opacity == ((0.0, 0.0), (1.0, 1.0))
+        assert type(tf.opacity[0][0]) is float
+        assert hash(tf) == hash(TransferFunction.from_dict(tf.to_dict()))
+
+    @pytest.mark.parametrize("data", [{}, {"opacity": []}, [1, 2], {"opacity": 1, "color": 1, "more": 1}])
+    def test_wrong_keys(self, data):
+        with pytest.raises(ArgumentError, match="expected the keys opacity, color, got"):
+            TransferFunction.from_dict(data)
+
+
+@pytest.mark.parametrize(
+    ("opacity", "message"),
+    [
+        (5, "opacity: expected a list of points"),
+        ([], "at least 2 points, got 0"),
+        ([(0, 1)], "at least 2 points, got 1"),
+        ([(0, 0), (1, 0)], "expected a range of values with opacity above 0"),
+        ([(1, 0), (1, 1)], "expected a range of values with opacity above 0"),
+        ([(0, 0), (2, 1), (1, 0)], r"opacity\[2\]: expected values in ascending order, got 1 after 2"),
+        ([(0, 0), (1, 0), (1, 1), (1, 0)], r"opacity\[3\]: expected at most two points .* third at 1"),
+        ([(0, 0), (1, 1.5)], r"opacity\[1\]: expected opacity in \[0, 1\], got \(1.5\)"),
+        ([(0, -0.1), (1, 1)], r"opacity\[0\]: expected opacity in \[0, 1\]"),
+        ([(0, 0), (math.nan, 1)], r"opacity\[1\]: expected finite numbers, got \(nan, 1\)"),
+        ([(0, 0), (10**400, 1)], r"opacity\[1\]: expected finite numbers"),
+        ([(0, 0), (1, 1, 1)], r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 1, 1\)"),
+        ([(0, 0), 1], r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1\)"),
+        ([(0, 0), (1, "a")], r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 'a'\)"),
+        ("ab", r"opacity\[0\]: expected the numbers"),
+    ],
+)
+def test_wrong_opacity_is_named(opacity, message):
+    with pytest.raises(ArgumentError, match=message):
+        TransferFunction(opacity, GREY)
+
+
+@pytest.mark.parametrize(
+    ("color", "message"),
+    [
+        ([], "color: expected at least 1 points, got 0"),
+        ([(0, 1, 1)], r"color\[0\]: expected the numbers \(value, r, g, b\), got \(0, 1, 1\)"),
+        ([(0, 1, 255, 1)], r"color\[0\]: expected r, g, b in \[0, 1\], got \(1, 255, 1\)"),
+        ([(1, 0, 0, 0), (0, 0, 0, 0)], r"color\[1\]: expected values in ascending order"),
+    ],
+)
+def test_wrong_color_is_named(color, message):
+    with pytest.raises(ArgumentError, match=message):
+        TransferFunction(((0, 0), (1, 1)), color)

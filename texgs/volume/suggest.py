@@ -1,0 +1,196 @@
+"""Basic transfer functions for a volume whose user has none, from its histogram."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.transfer import TransferFunction
+
+Array = NDArray[np.float64]
+Class = tuple[int, int]  # bins [start, stop)
+
+# Distinct for colour-blind people too (after Okabe and Ito 2008), softened for shaded surfaces.
+COLORS = (
+    (0.93, 0.77, 0.45),  # sand
+    (0.36, 0.68, 0.90),  # sky
+    (0.88, 0.42, 0.20),  # vermilion
+    (0.12, 0.60, 0.46),  # green
+    (0.78, 0.48, 0.70),  # mauve
+    (0.20, 0.36, 0.70),  # blue
+)
+MOST = 5  # classes, where the user does not say
+SHELLS = 3  # classes of a histogram without peaks but the background
+FEW = 32  # a histogram with no more values than this holds labels
+SMOOTHING = 0.02  # standard deviation, as a fraction of the range
+RARE = 2e-4  # of the voxels outside the most frequent bin: a bin with fewer is empty ...
+NOISE = 8.0  # ... and so is one with fewer voxels than this
+DIP = 0.3  # a valley is this much (natural log of counts) below the peaks on both sides: 26 percent
+BROAD = 0.03  # width (of the range) times share (of the foreground) that makes the tail of a peak a class
+BELOW = 0.1  # of the foreground's voxels, that makes values below the background worth showing
+
+
+def suggest(
+    histogram: ArrayLike, minimum: float, maximum: float, count: int | None = None
+) -> dict[str, TransferFunction]:
+    """Propose basic transfer functions with disjoint supports.
+
+    The background, the most frequent value and what is around it, is left out. What remains is cut at the
+    valleys of the smoothed log histogram; where it has too few, as in simulations whose histogram only
+    falls, at thresholds of least variance (Otsu 1979) on the log histogram. A histogram of at most 32
+    distinct values is taken for labels, the lowest for background. Higher values are more opaque.
+
+    Args:
+        histogram: [n] counts of voxels in equal bins over [minimum, maximum].
+        minimum: smallest value, data units.
+        maximum: largest value.
+        count: number of functions, fewer where there are fewer values; by default as many as the histogram
+            shows, at most 5.
+
+    Returns:
+        TF01, TF02, ... in ascending order of value.
+
+    Raises:
+        ArgumentError: if the histogram is no list of counts, holds one value only, or count is below 1.
+    """
+    counts = _checked(histogram, minimum, maximum, count)
+    values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
+    present = counts > 0
+    if present.sum() <= FEW:
+        values, counts = values[present], counts[present]
+        classes = _labels(counts, count)
+    else:
+        classes = _materials(counts, count)
+    edges = np.concatenate([[minimum], (values[1:] + values[:-1]) / 2, [maximum]])
+    opacities = np.geomspace(0.08, 0.6, len(classes)) if len(classes) > 1 else [0.3]
+    return {
+        f"TF{i + 1:02d}": _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum))
+        for i, (start, stop) in enumerate(classes)
+    }
+
+
+def _checked(histogram: ArrayLike, minimum: float, maximum: float, count: int | None) -> Array:
+    counts = np.asarray(histogram, dtype=np.float64)
+    if counts.ndim != 1 or not np.isfinite(counts).all() or (counts < 0).any() or not minimum < maximum:
+        raise ArgumentError(
+            f"histogram: expected [n] counts over minimum < maximum, got {list(counts.shape)} over "
+            f"[{minimum:g}, {maximum:g}]"
+        )
+    if (counts > 0).sum() < 2:
+        raise ArgumentError("histogram: expected at least two different values, got a constant volume")
+    if count is not None and count < 1:
+        raise ArgumentError(f"count: expected at least 1, got {count}")
+    return counts
+
+
+def _labels(counts: Array, count: int | None) -> list[Class]:
+    """Every value but the lowest is a class; too many are grouped with their neighbours."""
+    return _divided([(1, len(counts))], np.sqrt(counts), count or MOST)
+
+
+def _materials(counts: Array, count: int | None) -> list[Class]:
+    """The basins of the log histogram, without the background."""
+    log = _smooth_log(counts)
+    most, dip = count or MOST, DIP
+    classes, tails = _classes(counts, log, dip)
+    while len(classes) > most and _valleys(log, dip):
+        dip *= 1.2
+        classes, tails = _classes(counts, log, dip)
+    classes = sorted(sorted(classes, key=lambda c: -counts[slice(*c)].sum())[:most])
+    weights = log - log.min() + 1e-3  # positive: also an empty class can be divided
+    if count is not None:
+        return _divided(classes, weights, count)
+    peaks, tails = [c for c in classes if c not in tails], [c for c in classes if c in tails]
+    return sorted(peaks + _divided(tails, weights, max(SHELLS - len(peaks), len(tails))))
+
+
+def _smooth_log(counts: Array) -> Array:
+    """Logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat."""
+    sigma = SMOOTHING * len(counts)
+    radius = round(4 * sigma)
+    kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
+    smooth = np.convolve(np.pad(counts, radius, mode="symmetric"), kernel / kernel.sum(), mode="valid")
+    return np.log(smooth + RARE * (counts.sum() - counts.max()) + NOISE)
+
+
+def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[Class]]:
+    """Classes that the histogram shows, and those among them that are only a tail of the background."""
+    mode = int(counts.argmax())
+    basins = list(pairwise([0, *_valleys(log, dip), len(log)]))
+    low, high = next(c for c in basins if c[0] <= mode < c[1])
+    left, right = mode + 1 - _foot(log[low : mode + 1][::-1]), mode + _foot(log[mode:high])
+    foreground = counts[:left].sum() + counts[right:].sum()
+    lowest = 0 if counts[:left].sum() >= BELOW * foreground else right
+
+    def is_broad(start: int, stop: int) -> bool:
+        return counts[start:stop].sum() * (stop - start) >= BROAD * foreground * len(counts)
+
+    classes: list[Class] = []
+    for start, stop in basins:
+        if lowest <= start != low:
+            peak = start + int(log[start:stop].argmax())
+            foot = peak + _foot(log[peak:stop])
+            classes += [(start, foot), (foot, stop)] if is_broad(foot, stop) else [(start, stop)]
+    tails = [c for c in ((low, left), (right, high)) if lowest <= c[0] < c[1]]
+    tails = [c for c in tails if is_broad(*c)] or ([] if classes else tails)
+    return sorted(classes + tails), tails
+
+
+def _valleys(log: Array, dip: float) -> list[int]:
+    """Minima that lie at least `dip` below a maximum on either side."""
+    valleys: list[int] = []
+    best = 0  # the highest bin since the last valley, or the lowest since the last peak
+    falling = False
+    for i, height in enumerate(log):
+        if falling:
+            if height < log[best]:
+                best = i
+            elif height > log[best] + dip:
+                valleys.append(best)
+                best, falling = i, False
+        elif height > log[best]:
+            best = i
+        elif height < log[best] - dip:
+            best, falling = i, True
+    return valleys
+
+
+def _foot(log: Array) -> int:
+    """Where a peak that starts at bin 0 ends: the point farthest below the line to its last bin.
+
+    The triangle method (Zack et al. 1977). A peak that falls ever faster ends half way.
+    """
+    below = np.linspace(log[0], log[-1], len(log)) - log
+    return int(below.argmax()) + 1 if below.max() > 1e-9 else max(len(log) // 2, 1)
+
+
+def _divided(classes: Sequence[Class], weights: Array, count: int) -> list[Class]:
+    """Split the class of the largest variance at Otsu's threshold until there are `count`."""
+    classes = list(classes)
+    while len(classes) < count and any(stop - start > 1 for start, stop in classes):
+        start, stop = classes.pop(int(np.argmax([_variance(weights[slice(*c)]) for c in classes])))
+        mass = np.cumsum(weights[start:stop])
+        moment = np.cumsum(weights[start:stop] * np.arange(stop - start))
+        left, right = mass[:-1], mass[-1] - mass[:-1]
+        between = moment[:-1] ** 2 / left + (moment[-1] - moment[:-1]) ** 2 / right
+        cut = start + 1 + int(between.argmax())
+        classes += [(start, cut), (cut, stop)]
+    return sorted(classes)
+
+
+def _variance(weights: Array) -> float:
+    """Weighted sum of squared distances from the mean bin."""
+    bins = np.arange(len(weights))
+    return float(weights @ (bins - np.average(bins, weights=weights)) ** 2)
+
+
+def _trapezoid(
+    low: float, high: float, opacity: float, i: int, data: tuple[float, float]
+) -> TransferFunction:
+    """Opacity rises over a quarter of the range and falls over another, but not at the ends of the data."""
+    ramp = (high - low) / 4
+    rise = ((low, opacity),) if low <= data[0] else ((low, 0.0), (low + ramp, opacity))
+    fall = ((high, opacity),) if high >= data[1] else ((high - ramp, opacity), (high, 0.0))
+    return TransferFunction(opacity=(*rise, *fall), color=((low, *COLORS[i % len(COLORS)]),))

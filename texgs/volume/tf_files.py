@@ -1,0 +1,215 @@
+"""Transfer functions from and to files: our JSON and ParaView's presets; and from PyVista's names."""
+
+import difflib
+from collections.abc import Sequence
+from itertools import pairwise
+from numbers import Real
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_json
+from texgs.volume.transfer import TransferFunction
+
+Point = tuple[float, float, float, float]
+
+FORMAT, VERSION = "texgs-tf", 1
+SPACES = ("RGB", "HSV", "Lab", "Diverging", "Lab/CIEDE2000", "Step")  # at VTK's number of each
+SAMPLES = 256  # shared by the segments of a function that is not linear, four each at least
+FINE = 64  # points of colour, from which on its space makes no difference between two of them
+JUST = 1e-6  # of a segment: how close to its ends it is sampled
+
+
+def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
+    """Read a transfer function from our JSON or from ParaView's presets (.json).
+
+    What is not piecewise linear in ParaView, colour spaces other than RGB (of fewer than 64 points) and
+    opacity with a midpoint or a sharpness, is sampled by VTK at 256 points or so. A preset
+    without opacity gets the ramp from 0 to 1 over its range, which is ParaView's default. Presets are often
+    given over [0, 1]: see `TransferFunction.scaled`.
+
+    Args:
+        path: the file.
+        preset: name of one of ParaView's presets in the file; the first by default.
+
+    Returns:
+        The transfer function, in the values of the file.
+
+    Raises:
+        ArgumentError: if the file is missing, no JSON, of neither format, or holds a wrong point.
+    """
+    data = read_json(path)
+    try:
+        if isinstance(data, dict) and data.get("format") == FORMAT:
+            return _from_ours(data)
+        presets = data if isinstance(data, list) else [data]
+        if presets and all(
+            isinstance(p, dict) and p.keys() & {"RGBPoints", "IndexedColors"} for p in presets
+        ):
+            return _from_preset(_chosen(presets, preset))
+    except ArgumentError as error:
+        raise ArgumentError(f"{path}: {error}") from error
+    raise ArgumentError(
+        f'{path}: expected a transfer function with "format": "{FORMAT}" or a list of ParaView presets, got '
+        "neither; export it from ParaView or write it with texgs"
+    )
+
+
+def write_tf(path: str | Path, tf: TransferFunction) -> Path:
+    """Write our JSON in one step; `read_tf` gives the same function back."""
+    return write_json(path, {"format": FORMAT, "version": VERSION, **tf.to_dict()})
+
+
+def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
+    """Write a file of one preset that ParaView imports, colour and opacity, in one step.
+
+    Args:
+        path: the .json to write.
+        tf: steps become ramps a millionth of the range wide.
+        name: the preset's name in ParaView.
+    """
+    tf = tf.without_steps()
+    # ParaView stretches colour and opacity to the data, each from its own range: give both the same.
+    low = min(tf.opacity[0][0], tf.color[0][0])
+    high = max(tf.opacity[-1][0], tf.color[-1][0])
+    preset = {
+        "Name": name,
+        "ColorSpace": "RGB",
+        "RGBPoints": [x for point in _extended(tf.color, low, high) for x in point],
+        "Points": [x for point in _extended(tf.opacity, low, high) for x in (*point, 0.5, 0.0)],
+    }
+    return write_json(path, [preset])
+
+
+def from_colormap(
+    name: str, opacity: str | Sequence[float], low: float, high: float, n: int = 256
+) -> TransferFunction:
+    """Transfer function from a colour map and an opacity as PyVista's `add_volume` takes them.
+
+    Args:
+        name: colour map of Matplotlib, such as viridis.
+        opacity: name of one of PyVista's opacities, such as linear, sigmoid_5 or geom_r; or two or more
+            opacities in [0, 1], evenly spaced over the range.
+        low: value of the first colour, data units.
+        high: value of the last.
+        n: points of the table, as PyVista's n_colors.
+
+    Raises:
+        ArgumentError: if a name is unknown (with what is close to it), or a value is wrong.
+    """
+    import matplotlib as mpl
+    import pyvista
+
+    if name not in mpl.colormaps:
+        close = difflib.get_close_matches(name, mpl.colormaps, n=3) or ["viridis", "magma", "coolwarm"]
+        raise ArgumentError(f"colour map: expected one of Matplotlib's, got {name!r}; try {', '.join(close)}")
+    if isinstance(opacity, str):
+        try:
+            heights = pyvista.opacity_transfer_function(opacity, n) / 255
+        except ValueError as error:
+            raise ArgumentError(
+                f"opacity: expected one of PyVista's names, got {opacity!r}; try linear, sigmoid or geom"
+            ) from error
+    else:
+        heights = np.asarray(opacity, dtype=np.float64)
+    colors = mpl.colormaps[name](np.linspace(0, 1, n))[:, :3]
+    return TransferFunction(
+        opacity=tuple(zip(np.linspace(0, 1, len(heights)), heights, strict=True)),
+        color=tuple((t, *rgb) for t, rgb in zip(np.linspace(0, 1, n), colors, strict=True)),
+    ).scaled(low, high)
+
+
+def _from_ours(data: dict[str, Any]) -> TransferFunction:
+    if data.get("version") != VERSION:
+        raise ArgumentError(
+            f"version: expected {VERSION}, got {data.get('version')!r}; update texgs to read this file"
+        )
+    return TransferFunction.from_dict({k: v for k, v in data.items() if k not in ("format", "version")})
+
+
+def _chosen(presets: list[dict[str, Any]], name: str | None) -> dict[str, Any]:
+    """The preset of that name, or the first."""
+    if name is None:
+        return presets[0]
+    for preset in presets:
+        if preset.get("Name") == name:
+            return preset
+    names = ", ".join(str(preset.get("Name")) for preset in presets[:10])
+    raise ArgumentError(f"preset: expected a name in the file, got {name!r}; it holds {names}")
+
+
+def _from_preset(preset: dict[str, Any]) -> TransferFunction:
+    if "RGBPoints" not in preset:
+        raise ArgumentError(
+            f"preset {preset.get('Name')!r}: expected RGBPoints, got a categorical colour map; choose another"
+        )
+    color = _fours(preset, "RGBPoints")
+    ramp = [(color[0][0], 0.0, 0.5, 0.0), (color[-1][0], 1.0, 0.5, 0.0)]
+    nodes = _fours(preset, "Points") if preset.get("Points") else ramp
+    space = preset.get("ColorSpace", "RGB")
+    if space not in SPACES:
+        raise ArgumentError(f"ColorSpace: expected one of {', '.join(SPACES)}, got {space!r}")
+    is_curved = space == "Step" or (space != "RGB" and len(color) < FINE)
+    if is_curved and color[0][0] < color[-1][0]:
+        color = _sampled_color(color, SPACES.index(space), bool(preset.get("HSVWrap")))
+    if all((middle, sharpness) == (0.5, 0) for _, _, middle, sharpness in nodes):
+        return TransferFunction(tuple((value, alpha) for value, alpha, _, _ in nodes), tuple(color))
+    return TransferFunction(_sampled_opacity(nodes), tuple(color))
+
+
+def _fours(preset: dict[str, Any], key: str) -> list[Point]:
+    """A flat list as points of four numbers, sorted by value as ParaView does."""
+    numbers = preset[key]
+    if not isinstance(numbers, list) or not all(isinstance(x, Real) for x in numbers):
+        raise ArgumentError(f"{key}: expected a list of numbers, got {numbers!r:.60}")
+    if len(numbers) % 4 or not numbers:
+        raise ArgumentError(f"{key}: expected four numbers per point, got {len(numbers)} numbers")
+    columns = (numbers[i::4] for i in range(4))
+    return sorted(zip(*columns, strict=True), key=lambda point: point[0])
+
+
+def _sampled_color(points: Sequence[Point], space: int, wrap: bool) -> Any:
+    from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
+
+    function = vtkColorTransferFunction()
+    function.AllowDuplicateScalarsOn()
+    function.SetColorSpace(space)
+    function.SetHSVWrap(wrap)
+    for point in points:
+        function.AddRGBPoint(*point)
+    return _sampled(function, [value for value, *_ in points], channels=3)
+
+
+def _sampled_opacity(nodes: Sequence[Point]) -> Any:
+    from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+
+    function = vtkPiecewiseFunction()
+    function.AllowDuplicateScalarsOn()
+    for node in nodes:
+        function.AddPoint(*node)
+    middles = [a + middle * (b - a) for (a, _, middle, _), (b, *_) in pairwise(nodes)]
+    return _sampled(function, sorted([*(value for value, *_ in nodes), *middles]), channels=1)
+
+
+def _sampled(function: Any, values: Sequence[float], channels: int) -> Any:
+    """Points of a VTK function between neighbouring values; at these the limits from inside."""
+    count = max(SAMPLES // len(values), 4)
+    points: list[list[float]] = []
+    for a, b in pairwise(values):
+        if a < b:
+            table = np.empty(count * channels)
+            function.GetTable(a + JUST * (b - a), b - JUST * (b - a), count, table)
+            heights = table.reshape(count, channels).clip(0, 1)
+            rows = np.column_stack([np.linspace(a, b, count), heights]).tolist()
+            is_continuous = bool(points) and np.allclose(points[-1], rows[0], rtol=0, atol=1e-4)
+            points += rows[1:] if is_continuous else rows
+    return points
+
+
+def _extended(points: Sequence[tuple[float, ...]], low: float, high: float) -> list[tuple[float, ...]]:
+    """The points with the first and the last continued to the ends of a range."""
+    first = [(low, *points[0][1:])] if points[0][0] > low else []
+    last = [(high, *points[-1][1:])] if points[-1][0] < high else []
+    return [*first, *points, *last]

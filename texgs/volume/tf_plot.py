@@ -1,0 +1,92 @@
+"""A picture of transfer functions over the histogram of their volume."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_atomic
+from texgs.volume.transfer import TransferFunction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SIZE = (10.0, 4.5)  # inches at 100 dots per inch: the plot is made for 1000 x 450 pixels
+SAMPLES = 512
+
+
+def plot(
+    path: str | Path,
+    histogram: ArrayLike,
+    minimum: float,
+    maximum: float,
+    basic: Mapping[str, TransferFunction],
+    title: str = "",
+) -> Path:
+    """Draw basic transfer functions over the volume's histogram as PNG, in one step.
+
+    Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis.
+
+    Args:
+        path: the PNG to write, 1000 x 450 pixels.
+        histogram: [n] counts of voxels in equal bins over [minimum, maximum].
+        minimum: smallest value of the volume, data units.
+        maximum: largest value.
+        basic: transfer functions by name, in data units.
+        title: line above the plot.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if the histogram is no list of counts, its range is empty, or the path is not writable.
+    """
+    from matplotlib.figure import Figure  # slow to import
+
+    counts = np.asarray(histogram, dtype=np.float64)
+    if counts.ndim != 1 or len(counts) == 0 or not minimum < maximum:
+        raise ArgumentError(
+            f"histogram: expected [n] counts over minimum < maximum, got {list(counts.shape)} over "
+            f"[{minimum:g}, {maximum:g}]"
+        )
+    figure = Figure(figsize=SIZE, dpi=100, layout="constrained")
+    opacity = figure.add_subplot()
+    voxels = opacity.twinx()
+    opacity.set_zorder(voxels.get_zorder() + 1)
+    opacity.patch.set_visible(False)  # or it would hide the histogram
+    voxels.stairs(counts, np.linspace(minimum, maximum, len(counts) + 1), fill=True, color="0.82")
+    voxels.set(yscale="log", ylim=(0.5, max(2 * counts.max(), 1.0)), ylabel="voxels")
+    for name, tf in basic.items():
+        _draw(opacity, name, tf)
+    low, high = _extent([(minimum, maximum), *(tf.support for tf in basic.values())])
+    opacity.set(xlim=(low, high), xlabel="value", title=title)
+    opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
+    return write_atomic(path, lambda file: figure.savefig(file, format="png"))
+
+
+def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:
+    """One function: the area below its opacity, filled with its colours, and its name at the top."""
+    low, high = tf.support
+    inner = tf.without_steps()
+    points = [value for value, _ in inner.opacity if low < value < high]
+    values = np.sort([*np.linspace(low, high, SAMPLES), *points])
+    alpha = inner(values)[:, 3]
+    (outline,) = axes.fill(
+        [low, *values, high], [0, *alpha, 0], facecolor="none", edgecolor="0.15", linewidth=1.2, zorder=3
+    )
+    colors = tf(np.linspace(low, high, SAMPLES)[None])[..., :3]  # [1, SAMPLES, 3]
+    axes.imshow(colors, extent=(low, high, 0, 1), aspect="auto", alpha=0.85, zorder=2).set_clip_path(outline)
+    center = values[alpha >= alpha.max() - 1e-9].mean()
+    axes.text(center, alpha.max() + 0.015, name, ha="center", va="bottom", zorder=4)
+
+
+def _extent(ranges: list[tuple[float, float]]) -> tuple[float, float]:
+    """The union of ranges with a margin, so that nothing lies on the frame."""
+    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
+    margin = 0.02 * (high - low)
+    return low - margin, high + margin

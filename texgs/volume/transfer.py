@@ -1,0 +1,239 @@
+"""Transfer functions: what colour and opacity a scalar value has, and basic ones that share a volume."""
+
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from numbers import Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from texgs.core.errors import ArgumentError
+
+Array = NDArray[np.float64]
+
+MAXIMUM = sys.float_info.max
+
+
+@dataclass(frozen=True)
+class TransferFunction:
+    """Scalar value -> colour and opacity, piecewise linear.
+
+    Points are sorted by value; two points at one value are a step, and the second holds at that value.
+    Opacity is 0 outside its points (a step there says nothing more: its outer point is dropped), colour is
+    constant outside its points.
+
+    Attributes:
+        opacity: at least two points (value, opacity), values in data units, opacity in [0, 1] per opacity
+            unit distance.
+        color: at least one point (value, r, g, b), linear colour in [0, 1].
+
+    Raises:
+        ArgumentError: naming the point that is malformed, not finite, out of order or out of range; or if
+            opacity is 0 everywhere.
+    """
+
+    opacity: tuple[tuple[float, float], ...]
+    color: tuple[tuple[float, float, float, float], ...]
+
+    def __post_init__(self) -> None:
+        # Lists, as they come from files, become tuples of floats.
+        opacity = _points("opacity", self.opacity, "opacity", 2)
+        first, last = opacity[0][0] == opacity[1][0], opacity[-1][0] == opacity[-2][0]
+        object.__setattr__(self, "opacity", opacity[first : len(opacity) - last])
+        object.__setattr__(self, "color", _points("color", self.color, "r, g, b", 1))
+        low, high = self.support
+        if not low < high:
+            raise ArgumentError(
+                "opacity: expected a range of values with opacity above 0, got none; raise a point"
+            )
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Smallest closed range of values outside which opacity is 0."""
+        visible = [i for i, (_, opacity) in enumerate(self.opacity) if opacity > 0]
+        if not visible:
+            return (0.0, 0.0)
+        first, last = max(visible[0] - 1, 0), min(visible[-1] + 1, len(self.opacity) - 1)
+        return self.opacity[first][0], self.opacity[last][0]
+
+    def __call__(self, values: ArrayLike) -> Array:
+        """Colour and opacity of each value.
+
+        Args:
+            values: [...] in data units; NaN is transparent.
+
+        Returns:
+            [..., 4] r, g, b and opacity in [0, 1], straight alpha.
+        """
+        values = np.asarray(values, dtype=np.float64)
+        opacity = _right_limit(self.opacity, values)  # [..., 1]
+        outside = (values < self.opacity[0][0]) | (values > self.opacity[-1][0])
+        opacity[outside] = 0
+        return np.nan_to_num(np.concatenate([_right_limit(self.color, values), opacity], axis=-1))
+
+    def scaled(self, low: float, high: float) -> "TransferFunction":
+        """Map a function given on fractions of the data range to data values: 0 -> low, 1 -> high.
+
+        Raises:
+            ArgumentError: if the range is empty or a point lies outside [0, 1].
+        """
+        _check_range("range", (low, high))
+        for name, points in (("opacity", self.opacity), ("color", self.color)):
+            for i, (fraction, *_) in enumerate(points):
+                if not 0 <= fraction <= 1:
+                    raise ArgumentError(
+                        f"{name}[{i}]: expected a fraction of the data range in [0, 1], got {fraction:g}; "
+                        "do not scale a transfer function that is in data values"
+                    )
+
+        def scale(points: Iterable[tuple[float, ...]]) -> Any:
+            return tuple(((1 - t) * low + t * high, *rest) for t, *rest in points)
+
+        return TransferFunction(scale(self.opacity), scale(self.color))
+
+    def without_steps(self, ramp: float | None = None) -> "TransferFunction":
+        """The same function with strictly ascending points and opacity 0 at both ends.
+
+        For programs that extend the end points to all values and know no steps, such as VTK. A step becomes
+        a ramp just below its value, so that it still holds at the value.
+
+        Args:
+            ramp: its width, data units; default a millionth of the range of the points. Never more than a
+                quarter of the distance between two points.
+        """
+        values = np.unique([value for value, *_ in (*self.opacity, *self.color)])
+        ramp = 1e-6 * float(values[-1] - values[0]) if ramp is None else ramp
+        gap = min(ramp, float(np.diff(values).min()) / 4)
+
+        def ramps(points: Sequence[tuple[float, ...]]) -> Any:
+            following = [*(point[0] for point in points[1:]), None]
+            return [
+                (value - gap, *rest) if value == after else (value, *rest)
+                for (value, *rest), after in zip(points, following, strict=True)
+            ]
+
+        opacity = list(self.opacity)
+        if opacity[0][1] > 0:
+            opacity.insert(0, (opacity[0][0], 0.0))
+        if opacity[-1][1] > 0:
+            opacity.append((opacity[-1][0] + gap, 0.0))
+        return TransferFunction(ramps(opacity), ramps(self.color))
+
+    def to_dict(self) -> dict[str, list[list[float]]]:
+        """The points as lists, ready for JSON or YAML."""
+        return {"opacity": [list(p) for p in self.opacity], "color": [list(p) for p in self.color]}
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> "TransferFunction":
+        """The inverse of `to_dict`.
+
+        Raises:
+            ArgumentError: if a key is missing or unknown, or a point is wrong.
+        """
+        if not isinstance(data, Mapping) or set(data) != {"opacity", "color"}:
+            found = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
+            raise ArgumentError(f"transfer function: expected the keys opacity, color, got {found or 'none'}")
+        return TransferFunction(data["opacity"], data["color"])
+
+
+def split(tf: TransferFunction, ranges: Sequence[tuple[float, float]]) -> list[TransferFunction]:
+    """Cut a transfer function into basic ones.
+
+    Inside each open range the basic function equals the whole, outside the closed range it is transparent.
+
+    Args:
+        tf: the whole.
+        ranges: (low, high) per basic function, in data units; they may touch but not overlap.
+
+    Raises:
+        ArgumentError: naming a range that is empty, overlaps another, or in which all is transparent.
+    """
+    for i, range_ in enumerate(ranges):
+        _check_range(f"ranges[{i}]", range_)
+    _check_no_overlap({f"ranges[{i}]": range_ for i, range_ in enumerate(ranges)})
+    basic = []
+    for i, (low, high) in enumerate(ranges):
+        first, last = max(low, tf.opacity[0][0]), min(high, tf.opacity[-1][0])
+        opacity = _cut(tf.opacity, first, last) if first < last else ()
+        if not any(alpha > 0 for _, alpha in opacity):
+            raise ArgumentError(
+                f"ranges[{i}]: expected a range with opacity above 0, got {_text(ranges[i])}; "
+                f"the transfer function is visible in {_text(tf.support)}"
+            )
+        basic.append(TransferFunction(opacity, _cut(tf.color, low, high)))
+    return basic
+
+
+def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
+    """Require that no value is visible in two basic transfer functions; ranges may touch.
+
+    Raises:
+        ArgumentError: naming two that overlap, and where each is visible.
+    """
+    _check_no_overlap({name: tf.support for name, tf in basic.items()})
+
+
+def _check_no_overlap(ranges: Mapping[str, tuple[float, float]]) -> None:
+    for (name, one), (other, two) in combinations(ranges.items(), 2):
+        if max(one[0], two[0]) < min(one[1], two[1]):
+            raise ArgumentError(
+                f"{name} and {other}: expected ranges of values that do not overlap, got {_text(one)} and "
+                f"{_text(two)}; cut one of them"
+            )
+
+
+def _check_range(name: str, range_: tuple[float, float]) -> None:
+    low, high = range_
+    if not (-MAXIMUM <= low < high <= MAXIMUM):
+        raise ArgumentError(f"{name}: expected low < high, both finite, got {_text(range_)}")
+
+
+def _cut(points: Sequence[tuple[float, ...]], low: float, high: float) -> Any:
+    """The points between two values, and the limits at them from inside."""
+    inside = [point for point in points if low < point[0] < high]
+    # Mirrored, the limit from the left becomes the one from the right.
+    mirrored = [(-value, *rest) for value, *rest in reversed(points)]
+    start, end = _right_limit(points, np.array(low)), _right_limit(mirrored, np.array(-high))
+    return ((low, *start.tolist()), *inside, (high, *end.tolist()))
+
+
+def _right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
+    """Interpolate [..., C] linearly, constant outside the points; at a step the second point holds."""
+    table = np.array(points)
+    columns = [np.interp(values, table[:, 0], column) for column in table[:, 1:].T]
+    return np.clip(np.stack(columns, axis=-1), 0, 1)  # rounding may leave [0, 1]
+
+
+def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[float, ...], ...]:
+    """Points as tuples of floats, checked one by one."""
+    if not isinstance(points, Iterable):
+        raise ArgumentError(f"{name}: expected a list of points (value, {channels}), got {points!r}")
+    rows = [tuple(point) if isinstance(point, Iterable) else (point,) for point in points]
+    if len(rows) < least:
+        raise ArgumentError(f"{name}: expected at least {least} points, got {len(rows)}")
+    for i, row in enumerate(rows):
+        where = f"{name}[{i}]"
+        if len(row) != channels.count(",") + 2 or not all(isinstance(x, Real) for x in row):
+            raise ArgumentError(f"{where}: expected the numbers (value, {channels}), got {_text(row)}")
+        if not all(-MAXIMUM <= x <= MAXIMUM for x in row):
+            raise ArgumentError(f"{where}: expected finite numbers, got {_text(row)}")
+        if not all(0 <= x <= 1 for x in row[1:]):
+            raise ArgumentError(f"{where}: expected {channels} in [0, 1], got {_text(row[1:])}")
+        if i > 0 and row[0] < rows[i - 1][0]:
+            raise ArgumentError(
+                f"{where}: expected values in ascending order, got {row[0]:.9g} after {rows[i - 1][0]:.9g}; "
+                "sort the points by value"
+            )
+        if i > 1 and row[0] == rows[i - 2][0]:
+            raise ArgumentError(
+                f"{where}: expected at most two points at one value (a step), got a third at {row[0]:.9g}"
+            )
+    return tuple(tuple(map(float, row)) for row in rows)
+
+
+def _text(row: Iterable[Any]) -> str:
+    """A point or range as people write it."""
+    return f"({', '.join(f'{x:.9g}' if isinstance(x, float) else repr(x) for x in row)})"
