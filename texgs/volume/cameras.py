@@ -1,0 +1,126 @@
+"""Camera sets around the origin: an icosphere to learn from, a spiral to test on, an orbit to look at."""
+
+from __future__ import annotations
+
+from itertools import combinations, product
+from math import asin, atan2, degrees, sqrt
+
+import numpy as np
+
+from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError
+
+POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
+FRONT = -90.0  # azimuth of +z, degrees
+
+
+def icosphere(frequency: int, radius: float, fov_y: float, width: int, height: int) -> list[Camera]:
+    """Cameras on the vertices of a geodesic icosphere, looking at the origin: the paper's training views.
+
+    From the bottom to the top (+y), and by azimuth from -180 to 180 degrees where several are at one
+    height: the order of the views published with the paper.
+
+    Args:
+        frequency: parts f that each edge of the icosahedron is split into, at least 1; 10 f^2 + 2 cameras.
+        radius: distance from the origin, world units.
+        fov_y: vertical field of view, degrees.
+        width: pixels.
+        height: pixels.
+
+    Raises:
+        ArgumentError: if an argument is out of range.
+    """
+    if frequency < 1:
+        raise ArgumentError(f"frequency: expected at least 1, got {frequency}")
+    angles = [(degrees(asin(y)), degrees(atan2(-z, x))) for x, y, z in geodesic_vertices(frequency).tolist()]
+    # Rounded, because heights that are equal by symmetry differ in the last bit.
+    angles.sort(key=lambda pair: (round(pair[0], 9), pair[1]))
+    return [_orbit(azimuth, polar, radius, fov_y, width, height) for polar, azimuth in angles]
+
+
+def test_path(count: int, radius: float, fov_y: float, width: int, height: int) -> list[Camera]:
+    """Cameras on a spiral from below to above that turns once, looking at the origin: the paper's test views.
+
+    View i is at azimuth -180 + 360 i / (count - 1) and polar angle -90 + 180 i / (count - 1) degrees, with
+    polar angles kept 0.01 degrees off the poles.
+
+    Args:
+        count: number of cameras, at least 2; the paper has 181.
+        radius: distance from the origin, world units.
+        fov_y: vertical field of view, degrees.
+        width: pixels.
+        height: pixels.
+
+    Raises:
+        ArgumentError: if an argument is out of range.
+    """
+    if count < 2:
+        raise ArgumentError(f"count: expected at least 2 cameras on a path from pole to pole, got {count}")
+    steps = [index / (count - 1) for index in range(count)]
+    return [_orbit(-180 + 360 * t, -90 + 180 * t, radius, fov_y, width, height) for t in steps]
+
+
+def orbit_path(
+    count: int, polar: float, radius: float, fov_y: float, width: int, height: int
+) -> list[Camera]:
+    """Cameras on one turn around +y that starts at the front (+z, for polar 0) and does not repeat it.
+
+    Args:
+        count: number of cameras, at least 1.
+        polar: degrees above the horizon, -90 to 90.
+        radius: distance from the origin, world units.
+        fov_y: vertical field of view, degrees.
+        width: pixels.
+        height: pixels.
+
+    Raises:
+        ArgumentError: if an argument is out of range.
+    """
+    if count < 1:
+        raise ArgumentError(f"count: expected at least 1 camera, got {count}")
+    turn = [FRONT + 360 * index / count for index in range(count)]
+    return [orbit(azimuth, polar, radius, fov_y, width, height) for azimuth in turn]
+
+
+def geodesic_vertices(frequency: int) -> np.ndarray:
+    """Unit vectors [10 f^2 + 2, 3], float64: the faces of an icosahedron split into f^2 triangles each.
+
+    Points are evenly spaced on the flat faces and then moved to the sphere. The edges nearest the poles
+    (+-y) run along z.
+    """
+    corners = _icosahedron()
+    # Neighbours are 2 apart, all others more than 3.
+    edges = [(a, b) for a, b in combinations(corners, 2) if np.linalg.norm(a - b) < 3]
+    faces = [
+        (a, b, c)
+        for a, b, c in combinations(corners, 3)
+        if max(np.linalg.norm(a - b), np.linalg.norm(b - c), np.linalg.norm(c - a)) < 3
+    ]
+    f = frequency
+    inner = [(i, j) for i, j in product(range(1, f), repeat=2) if i + j < f]
+    points = [
+        *corners,
+        *(i * a + (f - i) * b for a, b in edges for i in range(1, f)),
+        *(i * a + j * b + (f - i - j) * c for a, b, c in faces for i, j in inner),
+    ]
+    vertices = np.stack(points)
+    return vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+
+
+def _icosahedron() -> list[np.ndarray]:
+    """The 12 corners, edge length 2: three golden rectangles.
+
+    The lower half is the negative of the upper one down to the sign of zero: on the -x half plane that sign
+    decides between azimuth -180 and 180, and the published order of views follows from it.
+    """
+    golden = (1 + sqrt(5)) / 2
+    half = [
+        (0, golden, 1), (0, golden, -1), (golden, 1, 0), (-golden, 1, 0), (1, 0, golden), (-1, 0, golden)
+    ]  # fmt: skip
+    upper = [np.array(corner, dtype=np.float64) for corner in half]
+    return [*upper, *(-corner for corner in upper)]
+
+
+def _orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:
+    """Camera with +y up everywhere, as the paper has them at the poles."""
+    return orbit(azimuth, max(-POLE, min(POLE, polar)), radius, fov_y, width, height)
