@@ -9,10 +9,10 @@ FORMATTED := $(filter-out %.txt,$(NATIVE))
 .PHONY: help install test bench lint demo lock clean
 
 help:
-	@echo "make demo      render a small built-in scene to a turntable in results/demo"
+	@echo "make demo      simulate a small volume, render views of two transfer functions, into results/"
 	@echo "make test      run all tests; ARGS='-k name' picks some"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
-	@echo "make lint      ruff, mypy, clang-format and the import layers"
+	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
 	@echo "make install   compile what has changed and install it, without running anything"
 	@echo "make lock      resolve requirements.lock anew"
 	@echo "make clean     remove the environment and everything built"
@@ -27,13 +27,15 @@ bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
 
 demo: $(VENV)/installed
-	$(BIN)/texgs demo $(ARGS)
+	$(BIN)/snakemake --workflow-profile workflow/profiles/local --config experiment=demo $(ARGS)
 
 lint: $(VENV)/dependencies
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/clang-format --dry-run -Werror $(FORMATTED)
 	$(BIN)/mypy
+	$(BIN)/snakefmt --check Snakefile workflow
+	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
 $(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt $(NATIVE)

@@ -11,7 +11,7 @@ import torch
 from benchmarks.scenes import KINDS
 from texgs.core.errors import ArgumentError
 
-SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory")
+SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory", "views")
 ROUNDS = 5  # visits to each case, see timing.py
 
 
@@ -56,7 +56,8 @@ def parse(arguments: list[str] | None = None) -> Settings:
         ArgumentError: if a GPU is asked for and torch sees none.
     """
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks", description="Measure the rasterizer and the losses; write JSON."
+        prog="python -m benchmarks",
+        description="Measure the rasterizer, the losses and volume rendering; write JSON.",
     )
     parser.add_argument(
         "--quick", action="store_true", help="few cases, each timed once: seconds, not minutes"

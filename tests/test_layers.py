@@ -9,8 +9,8 @@ ROOT = Path(__file__).parents[1]
 
 # Package: the packages it may import from, besides itself.
 LEFT = {
-    "config": set(),
     "core": set(),
+    "config": {"core"},
     "volume": {"config", "core"},
     "raster": {"config", "core"},
     "scene": {"config", "core", "volume", "raster"},

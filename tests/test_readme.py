@@ -1,6 +1,7 @@
 """Every command of the README exists, and its Python example runs."""
 
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -24,7 +25,7 @@ def test_the_two_commands_come_first():
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_command_exists(command):
+def test_command_exists(command, tmp_path):
     program, *words = command.removeprefix(".venv/bin/").split()
     if program == "make":
         if shutil.which("make") is None:
@@ -32,6 +33,11 @@ def test_command_exists(command):
         check = ["make", "--dry-run", *words]
     elif program == "texgs":
         check = [sys.executable, "-m", "texgs.cli.main", words[0], "--help"]
+    elif program == "snakemake":
+        words = [*shlex.split(command)[1:], "--dry-run", "--directory", str(tmp_path)]
+        check = [sys.executable, "-m", "snakemake", "--snakefile", str(ROOT / "Snakefile"), *words]
+    elif program == "mlflow":
+        check = [sys.executable, "-m", "mlflow", words[0], "--help"]
     else:
         assert words[:2] == ["install", "."], f"{command}: not covered by this test"
         check = [sys.executable, "-m", "pip", "install", "--help"]

@@ -39,7 +39,7 @@ def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
     monkeypatch.setattr(subprocess, "run", lambda *_args, **_kwargs: died)
     finding = probes.opengl()
     assert finding.state == "missing"
-    assert "signal 11" in finding.found
+    assert finding.found == "the probe died of signal 11"
     assert "libegl1" in finding.advice
 
 

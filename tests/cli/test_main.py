@@ -4,7 +4,7 @@ import sys
 import pytest
 
 from texgs import __version__
-from texgs.cli import demo
+from texgs.cli import doctor
 from texgs.cli.main import VERBS, main
 from texgs.core.errors import ArgumentError
 
@@ -27,16 +27,17 @@ def test_an_error_is_one_sentence_and_code_2(monkeypatch, capsys):
     def fail(_arguments):
         raise ArgumentError("size: expected at least 1 pixel, got 0")
 
-    monkeypatch.setattr(demo, "run", fail)
-    assert main(["demo"]) == 2
-    assert capsys.readouterr().err == "texgs demo: size: expected at least 1 pixel, got 0\n"
+    monkeypatch.setattr(doctor, "run", fail)
+    assert main(["doctor"]) == 2
+    assert capsys.readouterr().err == "texgs doctor: size: expected at least 1 pixel, got 0\n"
 
 
 def test_the_command_line_starts_without_heavy_imports():
     """Help must answer at once: torch alone takes seconds to import."""
     code = (
         "import sys; import texgs.cli.main as m; m.parser();"
-        "print(*({'torch', 'numpy', 'PIL', 'tqdm'} & {name.split('.')[0] for name in sys.modules}))"
+        "heavy = {'torch', 'numpy', 'PIL', 'tqdm', 'omegaconf', 'mlflow'};"
+        "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""

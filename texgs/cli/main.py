@@ -2,15 +2,24 @@
 
 import argparse
 import importlib
+import signal
 import sys
 from collections.abc import Sequence
 
 from texgs import __version__
 from texgs.core.errors import TexgsError
 
-# Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
+# Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
+# the verbs of stages share the module texgs.cli.stage.
+STAGE_VERBS = {
+    "volume": "make or read the volume of a data set, and check it",
+    "transfer": "plot the histogram with the basic transfer functions, and export these",
+    "views": "render the training and test views of basic transfer functions",
+    "sheet": "show views on one contact sheet",
+}
 VERBS = {
-    "demo": "render a small built-in scene to a turntable",
+    "new": "start a data set from a volume file of your own, with suggested transfer functions",
+    **STAGE_VERBS,
     "doctor": "show what is installed, what is missing and what to do about it",
 }
 
@@ -24,8 +33,9 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"texgs {__version__}")
     verbs = top.add_subparsers(dest="verb", metavar="VERB", required=True)
     for name, summary in VERBS.items():
-        module = importlib.import_module(f"texgs.cli.{name}")
-        verb = verbs.add_parser(name, help=summary, description=module.__doc__)
+        module = importlib.import_module(f"texgs.cli.{'stage' if name in STAGE_VERBS else name}")
+        about = f"{summary[0].upper()}{summary[1:]}." if name in STAGE_VERBS else module.__doc__
+        verb = verbs.add_parser(name, help=summary, description=about, conflict_handler="resolve")
         module.add_arguments(verb)
         verb.set_defaults(run=module.run)
     return top
@@ -42,6 +52,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sentence on stderr), 130 interrupted.
     """
     arguments = parser().parse_args(argv)
+    if argv is None:  # a process of its own: told to end, it ends as if interrupted, and its run as killed
+        signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         return int(arguments.run(arguments))
     except TexgsError as error:

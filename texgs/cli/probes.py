@@ -3,7 +3,6 @@
 import os
 import platform
 import shutil
-import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
@@ -101,21 +100,14 @@ def cuda() -> Finding:
 
 
 def opengl() -> Finding:
-    """Offscreen OpenGL, tried in a child process: where drivers are incomplete it dies instead of failing."""
-    advice = (
-        "only needed to render volumes: install libegl1, libegl-mesa0 and libgl1-mesa-dri, or libosmesa6 "
-        "with VTK_DEFAULT_OPENGL_WINDOW=vtkOSOpenGLRenderWindow"
-    )
-    command = [sys.executable, "-m", "texgs.cli.opengl"]
+    """Offscreen OpenGL, tried in a child process."""
+    from texgs.volume.opengl import offscreen_opengl
+
     try:
-        child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
-    except subprocess.TimeoutExpired:
-        return Finding("offscreen OpenGL", "missing", "no answer within 60 s", advice)
-    lines = (child.stdout if child.returncode == 0 else child.stderr).strip().splitlines()
-    if child.returncode == 0 and lines:
-        return Finding("offscreen OpenGL", "ok", lines[-1])
-    crash = f"the probe died of signal {-child.returncode}" if child.returncode < 0 else "the probe failed"
-    return Finding("offscreen OpenGL", "missing", lines[-1] if lines else crash, advice)
+        return Finding("offscreen OpenGL", "ok", offscreen_opengl())
+    except TexgsError as error:
+        found, _, advice = str(error).removeprefix("offscreen OpenGL: ").partition("; ")
+        return Finding("offscreen OpenGL", "missing", found, f"only for views.mapper=gpu: {advice}")
 
 
 def cache() -> Finding:

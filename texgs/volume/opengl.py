@@ -1,11 +1,38 @@
-"""Try offscreen OpenGL and print what answers. Run as a program of its own, because it may crash."""
+"""Whether offscreen OpenGL works here: tried in a child process, because incomplete drivers crash VTK."""
 
 import ctypes
 import importlib.util
+import subprocess
 import sys
+
+from texgs.core.errors import DeviceError
+
+ADVICE = (
+    "install libegl1, libegl-mesa0 and libgl1-mesa-dri, or libosmesa6 with "
+    "VTK_DEFAULT_OPENGL_WINDOW=vtkOSOpenGLRenderWindow"
+)
 
 EGL_PLATFORM_SURFACELESS_MESA = 0x31DD
 EGL_VENDOR = 0x3053
+
+
+def offscreen_opengl() -> str:
+    """What renders offscreen, such as the name of a GPU.
+
+    Raises:
+        DeviceError: if nothing does; says which packages to install.
+    """
+    command = [sys.executable, "-m", "texgs.volume.opengl"]
+    try:
+        child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    except subprocess.TimeoutExpired as error:
+        raise DeviceError(f"offscreen OpenGL: no answer within 60 s; {ADVICE}") from error
+    lines = (child.stdout if child.returncode == 0 else child.stderr).strip().splitlines()
+    if child.returncode == 0 and lines:
+        return lines[-1]
+    crash = f"died of signal {-child.returncode}" if child.returncode < 0 else "failed"
+    reason = lines[-1] if lines and child.returncode > 0 else f"the probe {crash}"
+    raise DeviceError(f"offscreen OpenGL: {reason}; {ADVICE}")
 
 
 def through_vtk() -> str:

@@ -1,0 +1,149 @@
+"""Volume rendering: the CPU mapper without OpenGL, the same mapper shown by PyVista, and whole view sets."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from contextlib import redirect_stderr
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks import machine
+from benchmarks.memory import ROOT
+from benchmarks.report import Measurement, Section
+from benchmarks.settings import Settings
+from benchmarks.timing import Case, measure
+from texgs.core.errors import DeviceError
+from texgs.volume.appearance import Appearance, image_data, volume_property
+from texgs.volume.cameras import icosphere
+from texgs.volume.cpu_mapper import CpuMapper
+from texgs.volume.generate import sphere
+from texgs.volume.grid import Grid
+from texgs.volume.opengl import offscreen_opengl
+from texgs.volume.render import render_views
+from texgs.volume.transfer import TransferFunction
+from texgs.volume.view_set import Light, View
+from texgs.volume.vtk_camera import aim
+
+LIGHT = Light("headlight")
+SHELLS = TransferFunction(
+    ((0.2, 0), (0.3, 0.02), (0.4, 0), (0.6, 0), (0.7, 0.5), (1, 0.5)),
+    ((0, 0.3, 0.5, 0.9), (1, 0.9, 0.6, 0.2)),
+)
+LARGE, REDUCE = 2048, 8  # side of a raw volume that is larger than its reader's memory
+
+
+def run(settings: Settings) -> Section:
+    """Time frames and a set of 64 views; measure what opening a large volume takes."""
+    section = Section()
+    size, pixels, n_views = (24, 64, 2) if settings.is_quick else (128, 512, 64)
+    grid, look = sphere(size), Appearance()
+    shots = icosphere(3, 4.0311, 30.0, pixels, pixels)[:n_views]
+    where = {"volume": size, "size": pixels}
+    cases = [
+        frame(grid, replace(look, step=step), shots[0], settings, where | {"step": step})
+        for step in (0.25, 0.5)
+    ]
+    try:
+        offscreen_opengl()
+        cases.append(peer(grid, look, shots[0], where | {"step": look.step, "by": "PyVista, OpenGL"}))
+    except DeviceError as error:
+        section.skip("the same mapper shown by PyVista", str(error))
+    cases.append(view_set(grid, look, shots, settings, where | {"views": n_views}))
+    section.measurements = measure(cases, settings.rounds, settings.device, "views")
+    if cases[2].name == "frame":
+        shown = section.find("frame", by="PyVista, OpenGL")
+        section.measurements.append(
+            shown.over(section.find("frame", by="texgs", step=look.step), "time / texgs")
+        )
+    if settings.is_quick:
+        section.skip(f"a raw volume of {LARGE}^3", "--quick")
+    else:
+        section.measurements += large_volume()
+    return section
+
+
+def frame(grid: Grid, look: Appearance, camera, settings: Settings, where: dict) -> Case:
+    """One frame as premultiplied floats."""
+    mapper = CpuMapper(grid, look, settings.threads[-1])
+    return Case("frame", where | {"by": "texgs"}, {"frame": lambda: mapper.render(SHELLS, camera, LIGHT)})
+
+
+def peer(grid: Grid, look: Appearance, camera, where: dict) -> Case:
+    """The same mapper in a PyVista plotter: drawn by OpenGL, read back as 8 bits."""
+    import pyvista
+    from vtkmodules.vtkRenderingCore import vtkVolume
+    from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
+
+    image, factor = image_data(grid)
+    mapper, volume = vtkFixedPointVolumeRayCastMapper(), vtkVolume()
+    mapper.SetInputData(image)
+    mapper.SetAutoAdjustSampleDistances(0)
+    mapper.SetSampleDistance(look.step * min(image.GetSpacing()))
+    volume.SetMapper(mapper)
+    volume.SetProperty(volume_property(SHELLS, look, factor))
+    plotter = pyvista.Plotter(off_screen=True, lighting="none", window_size=(camera.width, camera.height))
+    plotter.add_light(pyvista.Light(light_type="headlight"))
+    plotter.renderer.AddVolume(volume)
+    aim(plotter.camera, camera)
+
+    def show() -> None:
+        plotter.render()
+        plotter.screenshot(None, transparent_background=True, return_img=True)
+
+    return Case("frame", where, {"frame": show})
+
+
+def view_set(grid: Grid, look: Appearance, shots: list, settings: Settings, where: dict) -> Case:
+    """Render views into PNG files, the mapper's preparation included."""
+
+    def render() -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            views = [View(camera, Path(folder, f"{i}.png"), LIGHT) for i, camera in enumerate(shots)]
+            with redirect_stderr(StringIO()):  # its progress
+                render_views(CpuMapper(grid, look, settings.threads[-1]), SHELLS, views, "views")
+
+    return Case("view set", where, {"view set": render})
+
+
+def large_volume() -> list[Measurement]:
+    """Seconds and resident memory of reading a sparse raw file of 8 GB reduced, in a process of its own."""
+    with tempfile.TemporaryDirectory() as folder:
+        raw = Path(folder, "large.raw")
+        with raw.open("wb") as file:
+            file.truncate(LARGE**3)
+            file.seek(LARGE**3 // 2)
+            file.write(np.arange(256, dtype=np.uint8).tobytes())
+        code = f"from benchmarks.views import child; child({folder!r})"
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=True,
+            preexec_fn=machine.unbind,
+        )
+    seconds, resident = map(float, done.stdout.split())
+    where = {"volume": LARGE, "reduce": REDUCE}
+    return [
+        Measurement.of("open a raw file", where, "ms", [1e3 * seconds]),
+        Measurement.of("resident", where, "MB", [resident]),
+    ]
+
+
+def child(folder: str) -> None:
+    """Print the seconds and the peak of resident memory in MB of preparing the large volume."""
+    import resource
+    from time import perf_counter
+
+    from texgs.volume.prepare import prepare
+    from texgs.volume.sources import open_source
+
+    start = perf_counter()
+    source = open_source(Path(folder, "large.raw"), dims=(LARGE,) * 3, dtype="uint8")
+    prepare(source, Path(folder, "small.nrrd"), reduce=REDUCE)
+    print(perf_counter() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

@@ -1,0 +1,157 @@
+"""The verbs of the stages, by hand: what they write, when they do nothing, and what survives a kill."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from texgs.cli.main import main
+from texgs.volume.view_set import read_views
+
+TINY = [
+    "dataset=sphere",
+    "dataset.volume.size=24",
+    "views=small",
+    "views.width=48",
+    "views.height=32",
+    "views.train.frequency=1",
+    "views.test.count=3",
+    "views.turntable=2",
+    "views.step=0.5",
+    "tracking=none",
+]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "results" / "sphere"
+
+
+def test_views_makes_what_it_needs_first(folder, capsys):
+    assert main(["views", *TINY]) == 0
+    assert "results/sphere/volume: done" in capsys.readouterr().out
+    (tf,) = (path.name for path in folder.iterdir() if path.name != "volume")
+    views = read_views(folder / tf / "views")
+    assert (len(views.train), len(views.test)) == (12, 3)
+    camera = views.train[0].camera
+    assert (camera.width, camera.height) == (48, 32)
+    assert views.metadata["tf"]["name"] == tf
+    assert views.metadata["shading"]["local_viewer"] is False
+    assert views.metadata["aabb"] == [[-0.5] * 3, [0.5] * 3]
+    alpha = np.stack([view.image()[1].numpy() for view in views.train])
+    assert alpha.max() > 0.5
+    assert alpha[:, 0].max() == 0, "the sphere touches the border of the view"
+
+
+def test_a_second_time_does_nothing_and_force_does_it_again(folder, capsys):
+    main(["volume", *TINY])
+    written = (folder / "volume" / "volume.nrrd").stat().st_mtime_ns
+    main(["volume", *TINY])
+    assert "up to date" in capsys.readouterr().out
+    assert (folder / "volume" / "volume.nrrd").stat().st_mtime_ns == written
+    main(["volume", "--force", *TINY])
+    assert (folder / "volume" / "volume.nrrd").stat().st_mtime_ns > written
+
+
+def test_another_setting_does_not_mix_with_what_is_there(folder):
+    main(["views", *TINY])
+    (views,) = folder.glob("*/views")
+    main(["views", *TINY, "views.train.kind=orbit", "views.train.count=2"])
+    assert len(list((views / "train").iterdir())) == 2
+    assert len(read_views(views).train) == 2
+
+
+def test_geometry_of_the_test_views(folder):
+    main(["views", *TINY, "views.geometry=true"])
+    (views,) = folder.glob("*/views")
+    names = sorted(path.name for path in (views / "geometry").iterdir())
+    assert names == ["r_0000.npz", "r_0001.npz", "r_0002.npz"]
+    with np.load(views / "geometry" / "r_0001.npz") as planes:
+        depth, normal = planes["depth"], planes["normal"]
+    assert depth.shape == (32, 48)
+    assert 3 < depth[16, 24] < 4.0311, "the front of a ball in the middle of the view"
+    assert normal[16, 24] @ [1, 0, 0] > 0.9, "test view 1 of 3 is on the +x axis"
+
+
+def test_a_killed_job_goes_on_where_it_was(folder):
+    """Frames that are there are kept, and the result is that of an uninterrupted run."""
+    words = [
+        "views",
+        *TINY,
+        "views.width=400",
+        "views.height=400",
+        "views.step=0.05",
+        "views.train.frequency=3",
+    ]
+    command = [sys.executable, "-m", "texgs.cli.main", *words]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    child = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    deadline = time.monotonic() + 60
+    while time.monotonic() < deadline and len(list(folder.glob("*/views/train/r_*.png"))) < 4:
+        time.sleep(0.02)
+    child.send_signal(signal.SIGKILL)
+    child.communicate()
+    (views,) = folder.glob("*/views")
+    assert not (views / "transforms_train.json").exists()
+    kept = {path.name: path.stat().st_mtime_ns for path in (views / "train").glob("r_*.png")}
+    assert 4 <= len(kept) < 92
+    assert main(words) == 0
+    assert len(read_views(views).train) == 92
+    assert all((views / "train" / name).stat().st_mtime_ns == stamp for name, stamp in kept.items())
+    assert json.loads((views / "metrics.json").read_text())["numbers"]["rendered"] < 92 + 3 + 1
+
+
+def test_a_job_of_the_workflow(folder, capsys):
+    from texgs.config.compose import compose
+    from texgs.config.stage import STAGES, settings_file
+
+    settings = settings_file(STAGES["volume"], compose(tuple(TINY)))
+    output = folder / "elsewhere"
+    assert main(["volume", "--settings", settings, "--output", str(output)]) == 0
+    assert (output / "volume.nrrd").exists()
+    assert main(["views", "--settings", settings, "--output", str(output)]) == 2
+    assert "expected the settings of a views job" in capsys.readouterr().err
+    assert main(["volume", "--settings", settings, "--output", str(output), "dataset=sphere"]) == 2
+
+
+def test_a_folder_of_others_is_left_alone(folder, capsys):
+    (folder / "volume").mkdir(parents=True)
+    (folder / "volume" / "thesis.tex").touch()
+    assert main(["volume", *TINY]) == 2
+    assert "expected an empty folder or one of texgs" in capsys.readouterr().err
+    assert (folder / "volume" / "thesis.tex").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["views.widht=3"], "views.widht: no such key"),
+        (["dataset.volume.generator=null", "dataset.volume.file=no.nrrd"], "no.nrrd is not there"),
+        (["tf=TF09"], "tf: expected a basic TF of data set sphere"),
+        (["views.step=0"], "step: expected more than 0, got 0"),
+        (["views.lights=[]"], "views.lights: expected at least one light"),
+        (
+            ["dataset.basic_tfs.TF01.opacity=[[5,0],[6,1]]", "dataset.tf_values=data"],
+            "expected a range within",
+        ),
+    ],
+)
+def test_mistakes_are_one_sentence(folder, capsys, words, message):
+    assert main(["views", *TINY, *words]) == 2
+    error = capsys.readouterr().err
+    assert message in error.splitlines()[-1]
+    assert "Traceback" not in error
+
+
+def test_help_lists_every_key(capsys):
+    with pytest.raises(SystemExit):
+        main(["views", "--help"])
+    out = capsys.readouterr().out
+    assert "views.fov_y=30.0" in out
+    assert "dataset=" in out

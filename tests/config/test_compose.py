@@ -1,0 +1,87 @@
+import subprocess
+import sys
+from itertools import product
+
+import pytest
+
+from texgs.config.compose import compose, groups, members
+from texgs.config.describe import describe, keys
+from texgs.core.errors import ConfigError
+
+GROUPS = ("dataset", "device", "experiment", "tracking", "views")
+
+
+@pytest.mark.parametrize("choice", [f"{group}={name}" for group in GROUPS for name in members(group)])
+def test_every_file_composes(choice):
+    assert compose((choice,)).dataset.name
+
+
+def test_groups_combine():
+    for views, tracking in product(members("views"), members("tracking")):
+        config = compose((f"views={views}", f"tracking={tracking}", "experiment=demo"))
+        assert (config.tracking.uri is None) == (tracking == "none")
+    assert compose(("experiment=demo", "views=paper")).views.train.frequency == 4, (
+        "a word beats the experiment"
+    )
+
+
+def test_interpolations_are_resolved():
+    config = compose(("dataset.image=300", "results=elsewhere"))
+    assert (config.views.width, config.views.height) == (300, 300)
+    assert config.tracking.uri == "sqlite:///elsewhere/mlflow.db"
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("views.widht=3", "views.widht: no such key, did you mean views.width?"),
+        ("+views.foo=1", "views.foo: no such key"),
+        ("views.width=abc", "views.width: value 'abc' of type 'str' could not be converted to Integer"),
+        ("views.width=1.5", "views.width: value '1.5' of type 'float' could not be converted to Integer"),
+        ("views.width=0", "views.width: expected at least 1, got 0"),
+        ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, got gpuu, did you mean gpu?"),
+        ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
+        ("views=hugge", "views: expected one of default, paper, relight, small, got hugge"),
+        (
+            "views.lights=[{kind: sun}]",
+            "views.lights.0.kind: expected one of headlight, directional, got sun",
+        ),
+        ("views.train.kind=ico", "views.train.kind: expected one of icosphere, spiral, orbit, got ico"),
+        ("a=b=c", "a=b=c: expected key=value"),
+        ("views", "views: expected key=value"),
+        ("nonsense=1", "nonsense: no such key"),
+    ],
+)
+def test_a_mistake_is_one_sentence_that_names_the_key(override, message):
+    with pytest.raises(ConfigError) as error:
+        compose((override,))
+    assert message in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_the_composition_cannot_be_changed():
+    from omegaconf.errors import ReadonlyConfigError
+
+    with pytest.raises(ReadonlyConfigError):
+        compose().views.width = 3
+
+
+def test_every_key_says_what_it_means():
+    for entry in keys():
+        assert entry.help, entry.name
+    assert len({entry.name for entry in keys()}) == len(keys())
+    text = describe()
+    assert "views.fov_y=30.0" in text
+    assert "[degrees]" in text
+    assert "dataset=" in groups()
+
+
+def test_config_is_light():
+    """A Snakefile imports it in every job."""
+    code = (
+        "import sys; import texgs.config.stage, texgs.config.compose;"
+        "heavy = {'torch', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'};"
+        "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == ""

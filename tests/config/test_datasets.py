@@ -1,0 +1,147 @@
+"""Every data set of conf/dataset: its transfer functions, where it comes from, and the paper's numbers."""
+
+import json
+import re
+
+import pytest
+
+from tests.real_data import real_data
+from texgs.cli.stages.tf import check_basic_tfs, in_data_values
+from texgs.config.compose import FOLDER, compose, members
+from texgs.config.locate import source_file, tf_names, views_folder
+from texgs.core.errors import ConfigError
+from texgs.volume.sources import open_source
+
+NAMES = members("dataset")
+# The paper's Tables 1 and 8: samples along x, y, z; width of views; basic scenes.
+PAPER = {
+    "five_jets": ((256, 256, 256), 800, 2),
+    "mantle": ((360, 201, 180), 800, 2),
+    "supernova": ((864, 864, 864), 800, 2),
+    "wood": ((1024, 1024, 1024), 800, 1),
+    "beetle": ((832, 832, 494), 512, 1),
+    "chameleon": ((1024, 1024, 1080), 512, 2),
+    "engine": ((256, 256, 128), 512, 2),
+    "ionization": ((600, 248, 248), 512, 2),
+    "combustion": ((480, 720, 120), 800, 5),
+    "rotstrat": ((2048, 2048, 2048), 800, 1),
+    "sphere": ((512, 512, 512), 800, 1),
+    "vortex": ((1024, 1024, 1024), 800, 1),
+}
+# Downloads come from one commit of a repository: what is there never changes.
+PINNED = re.compile(r"https://raw\.githubusercontent\.com/[\w.-]+/[\w.-]+/[0-9a-f]{40}/[\w./-]+")
+CHECKSUM = re.compile(r"[0-9a-f]{64}")
+
+
+def dataset(name):
+    return compose((f"dataset={name}",)).dataset
+
+
+def with_key(key):
+    return [name for name in NAMES if dataset(name).volume[key] is not None]
+
+
+@pytest.fixture
+def manifest():
+    """What is known of the real volumes, by file name."""
+    return {entry["file"]: entry for entry in json.loads(real_data("volumes/manifest.json").read_text())}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_is_named_like_its_file_and_says_who_made_it(name):
+    assert dataset(name).name == name
+    assert dataset(name).title
+    assert dataset(name).source
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_basic_tfs_are_valid_and_disjoint(name):
+    check_basic_tfs(dataset(name))
+    assert bool(dataset(name).basic_tfs) == (dataset(name).views_folder is None)
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if dataset(name).tf_values == "fraction"])
+def test_fractions_of_a_range_map_to_data_values(name):
+    for tf, points in dataset(name).basic_tfs.items():
+        first, last = in_data_values(tf, points, "fraction", -2.0, 3.0).support
+        assert -2.0 <= first < last <= 3.0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_has_one_source(name):
+    volume, views = dataset(name).volume, dataset(name).views_folder
+    assert [volume.generator, volume.file, views].count(None) == 2
+
+
+@pytest.mark.parametrize("name", with_key("url"))
+def test_downloads_are_pinned(name):
+    volume = dataset(name).volume
+    assert PINNED.fullmatch(volume.url)
+    assert CHECKSUM.fullmatch(volume.sha256)
+
+
+@pytest.mark.parametrize("name", [n for n in with_key("file") if dataset(n).volume.url is None])
+def test_a_file_that_is_neither_there_nor_downloaded_is_explained(name, tmp_path):
+    config = compose((f"dataset={name}", f"data_folder={tmp_path}"))
+    assert dataset(name).volume.sha256 is None
+    with pytest.raises(ConfigError, match=re.escape(dataset(name).volume.obtain)):
+        source_file(config)
+    assert len(dataset(name).volume.obtain) > 40
+
+
+def test_missing_views_are_explained(tmp_path):
+    config = compose(("dataset=vortex", "tf=TF01", f"data_folder={tmp_path}"))
+    with pytest.raises(ConfigError, match="get the sample data"):
+        views_folder(config)
+
+
+@pytest.mark.parametrize("name", PAPER)
+def test_has_the_numbers_of_the_paper(name):
+    found, (dims, width, n_scenes) = dataset(name), PAPER[name]
+    assert found.title == name.replace("_", " ")
+    assert found.image == width
+    assert found.volume.reduce == 1
+    if found.views_folder is None:
+        assert len(found.basic_tfs) == n_scenes
+    if found.volume.generator is not None:
+        assert (found.volume.size,) * 3 == dims
+    if found.volume.dims is not None:
+        assert tuple(found.volume.dims) == dims
+        assert found.volume.file.endswith(f"_{'x'.join(map(str, dims))}_{found.volume.dtype}.raw")
+
+
+def test_stand_ins_are_labelled():
+    titles = {name.replace("_", " ") for name in PAPER}
+    stand_ins = {name: dataset(name).stand_in for name in NAMES if dataset(name).stand_in}
+    assert stand_ins == {"jets": "five jets", "turbulence": "vortex"}
+    assert set(stand_ins.values()) <= titles
+    assert not set(stand_ins) & set(PAPER)
+
+
+@pytest.mark.parametrize("name", [name for name in with_key("file") if dataset(name).tf_values == "data"])
+def test_agrees_with_the_real_volume(name, manifest):
+    found = dataset(name)
+    known = manifest[found.volume.file]
+    source = open_source(real_data(f"volumes/{found.volume.file}"))
+    assert list(source.dims) == known["dims_xyz"]
+    assert found.volume.sha256 in (None, known["sha256"])
+    if name in PAPER:
+        assert source.dims == PAPER[name][0]
+    for tf, points in found.basic_tfs.items():
+        first, last = in_data_values(tf, points, "data", known["min"], known["max"]).support
+        assert known["min"] <= first < last <= known["max"]
+
+
+def test_the_published_views_are_found():
+    folder = real_data("vortex")
+    config = compose(("dataset=vortex", f"data_folder={folder.parent}"))
+    assert tf_names(config)[0] == "TF01"
+    assert (
+        views_folder(compose(("dataset=vortex", "tf=TF01", f"data_folder={folder.parent}")))
+        == folder / "TF01"
+    )
+
+
+def test_no_file_is_left_out():
+    assert set(PAPER) <= set(NAMES)
+    assert {path.suffix for path in (FOLDER / "dataset").iterdir()} == {".yaml"}

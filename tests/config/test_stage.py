@@ -1,0 +1,67 @@
+import pytest
+from omegaconf import OmegaConf
+
+from texgs.config.compose import compose
+from texgs.config.locate import source_file, tf_names, views_folder
+from texgs.config.stage import STAGES, settings_digest, settings_file
+from texgs.core.errors import ConfigError
+
+
+def digest(stage, *overrides):
+    return settings_digest(STAGES[stage].settings(compose(("dataset=turbulence", *overrides))))
+
+
+def test_only_what_a_stage_reads_changes_its_digest():
+    views = digest("views", "tf=TF01")
+    assert digest("views", "tf=TF01", "tracking=none", "results=elsewhere", "data_folder=x") == views
+    assert digest("views", "tf=TF01", "dataset.basic_tfs.TF02.opacity=[[0.5,0],[0.6,1]]") == views
+    assert digest("views", "tf=TF01", "dataset.volume.size=64") == views
+    assert digest("views", "tf=TF01", "views.step=0.3") != views
+    assert digest("views", "tf=TF01", "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.3,1]]") != views
+    assert digest("views", "tf=TF02") != views
+    assert digest("volume", "views=paper") == digest("volume")
+    assert digest("volume", "dataset.volume.size=64") != digest("volume")
+
+
+def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    config = compose(("dataset=turbulence", "tf=TF01"))
+    path = settings_file(STAGES["views"], config)
+    assert settings_file(STAGES["views"], config) == path
+    settings = STAGES["views"].settings(config)
+    assert OmegaConf.to_container(OmegaConf.load(path)) == settings
+    assert settings_digest(settings) in path
+
+
+def test_an_unknown_tf_is_named():
+    with pytest.raises(
+        ConfigError, match=r"tf: expected a basic TF of data set turbulence \(TF01, TF02\), got TF07"
+    ):
+        STAGES["views"].settings(compose(("dataset=turbulence", "tf=TF07")))
+
+
+def test_a_volume_is_generated_or_a_file(tmp_path):
+    assert source_file(compose(("dataset=turbulence",))) is None
+    words = ("dataset=turbulence", f"data_folder={tmp_path}", "dataset.volume.file=a.raw")
+    with pytest.raises(ConfigError, match="expected a generator or a file, got both"):
+        source_file(compose(words))
+    words = (*words, "dataset.volume.generator=null", "dataset.volume.obtain='ask the author'")
+    with pytest.raises(ConfigError, match=r"a\.raw is not there; ask the author, or name its folder"):
+        source_file(compose(words))
+    (tmp_path / "a.raw").touch()
+    assert source_file(compose(words)) == tmp_path / "a.raw"
+
+
+def test_a_data_set_may_start_from_views(tmp_path):
+    words = ("dataset=turbulence", "dataset.views_folder=mine", f"data_folder={tmp_path}")
+    with pytest.raises(ConfigError, match=r"no views in .*TF01"):
+        views_folder(compose((*words, "tf=TF01")))
+    (tmp_path / "mine" / "TF01").mkdir(parents=True)
+    (tmp_path / "mine" / "TF01" / "transforms_train.json").touch()
+    assert views_folder(compose((*words, "tf=TF01"))) == tmp_path / "mine" / "TF01"
+    assert STAGES["sheet"].inputs(compose((*words, "tf=TF01")))["views"].parent == tmp_path / "mine" / "TF01"
+
+
+def test_tf_names():
+    assert tf_names(compose(("dataset=turbulence",))) == ["TF01", "TF02"]
+    assert tf_names(compose(("dataset=turbulence", "tf=TF02"))) == ["TF02"]

@@ -1,0 +1,37 @@
+"""Volumes with closed forms, and pictures over white."""
+
+import numpy as np
+
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction
+
+# Half transparent outside, opaque inside, two colours: of `ball`, whose values fall from 1 at the centre.
+SHELLS = TransferFunction(((0.3, 0.0), (0.5, 0.3), (0.8, 0.6)), ((0.3, 0.8, 0.4, 0.2), (0.6, 0.1, 0.2, 0.9)))
+
+
+def lattice(x: int, y: int, z: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates x, y, z [Z, Y, X] in [-1, 1], float32."""
+    axes = [np.linspace(-1, 1, size, dtype=np.float32) for size in (z, y, x)]
+    Z, Y, X = np.meshgrid(*axes, indexing="ij")
+    return X, Y, Z
+
+
+def ball(size: int = 48) -> Grid:
+    """1 - distance from the centre: its level sets are spheres."""
+    x, y, z = lattice(size, size, size)
+    return Grid(1 - np.sqrt(x * x + y * y + z * z))
+
+
+def constant(tf_opacity: float, color: tuple[float, float, float] = (0.8, 0.4, 0.2)) -> TransferFunction:
+    """One opacity and one colour for every value that the volumes here have."""
+    return TransferFunction(((-10.0, tf_opacity), (10.0, tf_opacity)), ((-10.0, *color),))
+
+
+def over_white(rgba: np.ndarray) -> np.ndarray:
+    """Premultiplied RGBA [H, W, 4] in front of white, [H, W, 3]."""
+    return rgba[..., :3] + 1 - rgba[..., 3:]
+
+
+def psnr(one: np.ndarray, other: np.ndarray) -> float:
+    """Decibels, of values in [0, 1]; 200 for equal arrays."""
+    return -10 * float(np.log10(np.mean((np.float64(one) - other) ** 2) + 1e-20))

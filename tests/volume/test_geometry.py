@@ -1,0 +1,128 @@
+import numpy as np
+import pytest
+import torch
+from torch.nn.functional import normalize
+
+from tests.volume.scenes import SHELLS, ball, constant, lattice, over_white, psnr
+from texgs.core.camera import Camera, intrinsics, look_at, orbit
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.volume.appearance import Appearance
+from texgs.volume.cpu_mapper import CpuMapper
+from texgs.volume.geometry import geometry, march, shade
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction
+from texgs.volume.view_set import Light
+
+SOLID = TransferFunction(((0.3, 1.0), (2, 1.0)), ((0, 0.5, 0.5, 0.5),))  # of `ball`: radius 0.35 in the world
+
+
+def sphere(camera: Camera, radius: float):
+    """Camera z [H, W] and normal [H, W, 3] of a sphere around the origin in closed form; z 0 where missed."""
+    v, u = torch.meshgrid(torch.arange(camera.height), torch.arange(camera.width), indexing="ij")
+    pixels = torch.stack([u + 0.5, v + 0.5, torch.ones_like(u)], dim=-1).double()
+    rays = pixels @ torch.linalg.inv(camera.K.double()).T @ camera.viewmat[:3, :3].double()  # camera z is 1
+    origin = camera.position.double()
+    a, b, c = (rays * rays).sum(-1), rays @ origin, origin @ origin - radius**2
+    root = b * b - a * c
+    z = torch.where(root > 0, (-b - root.clamp_min(0).sqrt()) / a, 0)
+    return z, normalize(origin + z[..., None] * rays, dim=-1) * (root > 0)[..., None], root / b**2
+
+
+@pytest.mark.parametrize(("azimuth", "polar", "width", "height"),
+                         [(-90, 0, 50, 50), (20, 50, 70, 40), (-160, -90, 40, 60)])  # fmt: skip
+def test_depth_and_normal_of_an_opaque_ball(azimuth, polar, width, height):
+    camera = orbit(azimuth, polar, 2.5, 25, width, height)
+    depth, normal = geometry(ball(64), SOLID, camera, 0.2, 0.0005)
+    z, n, root = sphere(camera, 0.35)
+    inner, outside = root > 0.002, root < -0.002
+    assert depth.dtype == normal.dtype == torch.float32
+    assert not depth[outside].any()
+    assert not normal[outside].any()
+    torch.testing.assert_close(depth[inner].double(), z[inner], atol=0.0045, rtol=0)
+    torch.testing.assert_close(normal[inner].double(), n[inner], atol=0.03, rtol=0)
+
+
+def test_expected_depth_of_fog_is_that_of_the_exponential():
+    x, _, _ = lattice(17, 17, 17)
+    camera = orbit(-90, 0, 3, 10, 9, 9)
+    seen = march(Grid(x), constant(0.1), camera, Appearance(step=0.05, opacity_unit=0.05), None)
+    sigma = -np.log(0.9) / 0.05  # per world unit, over a length of 1 from z = 2.5
+    assert seen.alpha[4, 4] == pytest.approx(1 - np.exp(-sigma), abs=1e-4)
+    mean = 1 / sigma - np.exp(-sigma) / (1 - np.exp(-sigma))
+    assert seen.depth[4, 4] == pytest.approx(2.5 + mean, abs=1e-3)
+    assert not seen.color.any()
+
+
+def test_normals_are_turned_towards_the_camera_and_follow_the_spacing():
+    x, y, _ = lattice(17, 17, 17)
+    grid = Grid(x + y, (1.0, 2.0, 1.0))
+    tf = TransferFunction(((-0.5, 0.5), (0.5, 0.5)), ((0, 1, 1, 1),))
+    expected = torch.tensor([2.0, 1.0, 0.0]) / 5**0.5
+    for azimuth, sign in [(0, 1), (180, -1)]:
+        _, normal = geometry(grid, tf, orbit(azimuth, 0, 3, 10, 5, 5), 0.5, 0.01)
+        torch.testing.assert_close(normal[2, 2], sign * expected, atol=1e-3, rtol=0)
+
+
+def test_a_mask_chooses_pixels():
+    camera = orbit(-60, 20, 2.5, 25, 30, 20)
+    mask = torch.zeros(20, 30, dtype=torch.bool)
+    mask[5:12, 8:20] = True
+    everything, chosen = (geometry(ball(32), SOLID, camera, 0.5, 0.01, m) for m in (None, mask))
+    for whole, part in zip(everything, chosen, strict=True):
+        assert not part[~mask].any()
+        torch.testing.assert_close(part[mask], whole[mask], atol=1e-6, rtol=0)
+    nothing, _ = geometry(ball(32), SOLID, camera, 0.5, 0.01, torch.zeros_like(mask))
+    assert not nothing.any()
+
+
+def test_thin_things_between_transparent_blocks_are_not_skipped():
+    rng = np.random.default_rng(0)
+    tf = TransferFunction(((0.5, 0.0), (1, 1.0)), ((0, 1, 1, 1),))
+    for x, y, z in [(0, 0, 0), (21, 16, 0), *rng.integers(0, (22, 17, 18), (12, 3))]:
+        values = np.zeros((18, 17, 22), np.float32)
+        values[z, y, x] = 1
+        grid = Grid(values, (1.0, 0.7, 1.3))
+        lowest, voxel = np.array(grid.aabb[0]), np.array(grid.spacing) * grid.scale
+        place = torch.tensor(lowest + voxel * (x, y, z))
+        viewmat = look_at(torch.tensor([0.1, 0.1, 3.0], dtype=torch.float64), place).float()
+        camera = Camera(viewmat, intrinsics(2, 5, 5), 5, 5)
+        seen = march(grid, tf, camera, Appearance(step=0.1, opacity_unit=0.001), None)
+        assert seen.alpha[2, 2] > 0.9
+        assert seen.depth[2, 2] == pytest.approx(
+            float(viewmat[2, :3] @ place.float() + viewmat[2, 3]), abs=0.03
+        )
+
+
+@pytest.mark.parametrize("light", [Light("headlight"), Light("directional", 30, 40)])
+@pytest.mark.parametrize("step", [0.25, 0.5])
+def test_the_cpu_mapper_agrees(light, step):
+    camera, look = orbit(-60, 20, 2.5, 30, 60, 50), Appearance(step=step)
+    seen = march(ball(64), SHELLS, camera, look, light)
+    expected = np.concatenate([seen.color.numpy(), seen.alpha.numpy()[..., None]], axis=-1)
+    picture = CpuMapper(ball(64), look, 2).render(SHELLS, camera, light)
+    assert psnr(over_white(picture), over_white(expected)) > 48
+    assert psnr(picture[..., 3], expected[..., 3]) > 48
+
+
+def test_shading_of_single_samples():
+    look = Appearance(ambient=0.2, diffuse=0.5, specular=0.4, shininess=8)
+    color, x, z = torch.tensor([[0.6, 0.3, 1.0]]), torch.tensor([1.0, 0, 0]), torch.tensor([0.0, 0, 1])
+    lit = shade(color, z[None], z, z, look)  # everything along z
+    torch.testing.assert_close(lit, (color * 0.7 + 0.4).clamp(max=1))
+    torch.testing.assert_close(shade(color, -z[None], z, z, look), lit)  # two-sided
+    torch.testing.assert_close(shade(color, z[None], z, -z, look), color * 0.2)  # lit from behind
+    torch.testing.assert_close(shade(color, 0 * z[None], z, z, look), color * 0.2)
+    half = normalize(torch.tensor([[1.0, 0, 1]]))
+    torch.testing.assert_close(
+        shade(color, half, z, x, look), (color * (0.2 + 0.5 * 0.5**0.5) + 0.4).clamp(max=1)
+    )
+
+
+def test_mistakes_are_named():
+    camera = orbit(0, 0, 3, 30, 8, 6)
+    with pytest.raises(ArgumentError, match="step: expected more than 0, got 0"):
+        geometry(ball(8), SOLID, camera, 0, 0.01)
+    with pytest.raises(ArgumentError, match="opacity_unit: expected more than 0, got -1"):
+        geometry(ball(8), SOLID, camera, 1, -1)
+    with pytest.raises(ShapeError, match=r"mask: expected \[6, 8\], got \[8, 6\]; did you transpose?"):
+        geometry(ball(8), SOLID, camera, 1, 1, torch.ones(8, 6))

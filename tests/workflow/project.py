@@ -1,0 +1,67 @@
+"""A copy of the project's sources that a test may edit, and Snakemake run on it."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+# The smallest experiment that has all rules.
+TINY = (
+    "dataset.volume.size=24 views=small views.width=40 views.height=32 views.train.frequency=1 "
+    "views.test.count=3 views.turntable=2 views.step=0.5"
+)
+
+# An editable installation finds texgs in the original sources, whatever the path: leave that out.
+LAUNCHER = """
+import sys
+sys.meta_path[:] = [finder for finder in sys.meta_path if "ScikitBuild" not in type(finder).__name__]
+sys.path.insert(0, sys.argv.pop(1))
+from snakemake.cli import main
+main()
+"""
+
+
+class Project:
+    """The copied sources and a working directory for results."""
+
+    def __init__(self, folder: Path):
+        self.sources, self.work = folder / "sources", folder / "work"
+        self.work.mkdir(parents=True)
+        for name in ("conf", "workflow", "texgs"):
+            shutil.copytree(
+                ROOT / name,
+                self.sources / name,
+                ignore=shutil.ignore_patterns("csrc", "_native", "__pycache__"),
+            )
+        shutil.copy(ROOT / "Snakefile", self.sources)
+
+    def snakemake(self, *words: str, overrides: str = "", config: tuple[str, ...] = ("tracking=none",)):
+        command = [sys.executable, "-c", LAUNCHER, str(self.sources), "-s", str(self.sources / "Snakefile")]
+        command += ["-d", str(self.work), "--cores", "2", "--rerun-incomplete", *words]
+        command += ["--config", *config, f"overrides={TINY} {overrides}"]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300)
+
+    def planned(self, **options) -> list[str]:
+        """Jobs of a dry run, such as "views TF01"."""
+        done = self.snakemake("--dry-run", **options)
+        assert done.returncode == 0, done.stderr + done.stdout
+        jobs, rule = [], ""
+        for line in done.stdout.splitlines() + done.stderr.splitlines():
+            word, _, rest = line.strip().partition(" ")
+            if word in ("rule", "localrule"):
+                rule = rest.rstrip(":")
+            elif word == "wildcards:":
+                jobs.append(
+                    f"{rule} {dict(pair.split('=') for pair in rest.split(', ')).get('tf', '')}".strip()
+                )
+        return sorted(jobs)
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        path = self.sources / name
+        text = path.read_text()
+        assert old in text, f"{old} is not in {name}"
+        path.write_text(text.replace(old, new, 1))

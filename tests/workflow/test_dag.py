@@ -1,0 +1,114 @@
+"""The workflow on a tiny volume: what runs, what reruns after which change, and what a mistake looks like."""
+
+import json
+import shutil
+
+import pytest
+
+from tests.workflow.project import Project
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    project = Project(tmp_path_factory.mktemp("project"))
+    done = project.snakemake()
+    assert done.returncode == 0, done.stdout + done.stderr
+    return project
+
+
+@pytest.fixture
+def fresh(project, tmp_path):
+    """The sources again, unedited; results of the first run."""
+    copy = Project(tmp_path)
+    shutil.copytree(project.work, copy.work, dirs_exist_ok=True, symlinks=True)
+    return copy
+
+
+def test_results_are_complete(project):
+    results = project.work / "results" / "turbulence"
+    assert sorted(path.name for path in results.iterdir()) == ["TF01", "TF02", "transfer", "volume"]
+    for tf in ("TF01", "TF02"):
+        assert len(list((results / tf / "views" / "train").glob("*.png"))) == 12
+        assert len(list((results / tf / "views" / "test").glob("*.png"))) == 3
+        assert (results / tf / "sheet" / "sheet.png").stat().st_size > 1000
+    metrics = json.loads((results / "TF01" / "views" / "metrics.json").read_text())
+    assert metrics["numbers"]["frame_ms"] > 0
+    assert {"seconds", "peak_memory_mib", "device", "config_sha", "code_sha", "git_sha", "versions"} <= set(
+        metrics
+    )
+    assert (project.work / "results" / "logs" / "turbulence" / "TF01" / "views.log").stat().st_size > 0
+    assert (project.work / "results" / "benchmarks" / "turbulence" / "TF01" / "views.tsv").stat().st_size > 0
+    assert not list(project.work.rglob("*.tmp*")), "something half written"
+
+
+def test_a_second_run_does_nothing(project):
+    assert project.planned() == []
+
+
+def test_a_changed_tf_reruns_only_its_views(project):
+    changed = "dataset.basic_tfs.TF01.color=[[0.3,1,0,0]]"
+    assert project.planned(overrides=changed) == ["sheet TF01", "transfer", "views TF01"]
+
+
+def test_tracking_and_profiles_rerun_nothing(project):
+    assert project.planned(config=("tracking=mlflow",)) == []
+
+
+def test_a_comment_reruns_nothing_and_a_line_its_stages(fresh):
+    fresh.edit("texgs/volume/render.py", "def render_views(", "# a comment\ndef render_views(")
+    fresh.edit("texgs/cli/main.py", "Run one verb.", "Run a verb.")
+    assert fresh.planned() == []
+    fresh.edit("texgs/volume/render.py", "0.5 / 255", "0.6 / 255")
+    assert fresh.planned() == ["sheet TF01", "sheet TF02", "views TF01", "views TF02"]
+    fresh.edit("texgs/volume/prepare.py", "target = Path(target)", "target = Path(str(target))")
+    assert "volume" in fresh.planned()
+
+
+def test_views_may_be_given(project, tmp_path):
+    other = Project(tmp_path)
+    (tmp_path / "data").mkdir()
+    shutil.copytree(
+        project.work / "results" / "turbulence" / "TF01" / "views", tmp_path / "data" / "mine" / "TFa"
+    )
+    given = f"dataset.views_folder=mine data_folder={tmp_path / 'data'}"
+    given += " ~dataset.basic_tfs.TF01 ~dataset.basic_tfs.TF02"
+    assert other.planned(overrides=given) == ["sheet TFa"]
+    done = other.snakemake(overrides=given)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (other.work / "results" / "turbulence" / "TFa" / "sheet" / "sheet.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ({"overrides": "views.widht=3"}, "texgs: views.widht: no such key, did you mean views.width?"),
+        ({"overrides": "views.fov_y=wide"}, "texgs: views.fov_y: value 'wide' of type 'str'"),
+        ({"config": ("dataset=engien",)}, "texgs: dataset: expected one of"),
+        ({"config": ("datset=engine",)}, "texgs: --config: expected experiment, dataset"),
+        ({"overrides": "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.6,1]]"}, "TF01 and TF02: expected ranges"),
+        ({"overrides": "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.3,7]]"}, "basic TF TF01: opacity[1]"),
+        ({"overrides": "tf=TF07"}, "TF07"),
+        ({"overrides": "dataset.volume.generator=null dataset.volume.file=a.raw"}, "a.raw is not there"),
+    ],
+)
+def test_a_mistake_is_one_sentence_before_any_job(project, words, message):
+    done = project.snakemake(**words)
+    assert done.returncode == 2
+    lines = [line for line in done.stderr.splitlines() if line.strip()]
+    assert len(lines) == 1, done.stderr
+    assert message in lines[0]
+
+
+def test_a_failing_job_says_why_and_leaves_nothing_half_written(project, tmp_path):
+    other = Project(tmp_path)
+    done = other.snakemake(overrides="dataset.basic_tfs.TF01.opacity=[[0.001,0],[0.002,0.001],[0.003,0]]")
+    assert done.returncode != 0
+    assert "expected to see something" in done.stdout + done.stderr
+    views = other.work / "results" / "turbulence" / "TF01" / "views"
+    assert not (views / "transforms_train.json").exists()
+    assert not (views / "metrics.json").exists()
+
+
+def test_lint_is_clean(project):
+    done = project.snakemake("--lint")
+    assert done.returncode == 0, done.stdout + done.stderr

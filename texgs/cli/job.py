@@ -1,0 +1,165 @@
+"""Run one job: a stage with its settings, in a folder of its own, tracked, its numbers in metrics.json."""
+
+from __future__ import annotations
+
+import getpass
+import importlib
+import platform
+import resource
+import shutil
+import subprocess
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from texgs import __version__, track
+from texgs.cli.stages.outcome import Outcome
+from texgs.config.stage import Stage, settings_digest
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_json
+
+STAMP = ".job.json"
+METRICS = "metrics.json"
+PACKAGES = ("torch", "numpy", "vtk", "pyvista")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A stage with everything it needs."""
+
+    stage: Stage
+    settings: dict[str, Any]
+    inputs: Mapping[str, Path]
+    output: Path
+
+    def identity(self) -> dict[str, Any]:
+        """What the job's result depends on: settings, code and input files."""
+        files = {}
+        for name, path in self.inputs.items():
+            state = path.stat()
+            files[name] = [state.st_size, state.st_mtime_ns]
+        return {"settings": settings_digest(self.settings), "code": self.stage.code, "inputs": files}
+
+    def is_done(self) -> bool:
+        """Whether the folder holds the finished result of exactly this job."""
+        metrics, stamp = self.output / METRICS, self.output / STAMP
+        return metrics.exists() and stamp.exists() and read_json(stamp) == self.identity()
+
+
+def execute(job: Job, tracking: str | None, experiment: str) -> dict[str, Any]:
+    """Run a job and write its metrics.json; returns what that says.
+
+    Files that an interrupted run of the same job left in the folder are kept, those of any other job removed.
+
+    Args:
+        job: what to run.
+        tracking: URI of the tracking store, or None.
+        experiment: of the tracking store.
+
+    Raises:
+        TexgsError: for a mistake of the user.
+    """
+    for name, path in job.inputs.items():
+        if not path.exists():
+            raise ArgumentError(
+                f"{name}: expected the file {path}, which is not there; run the stage that makes it"
+            )
+    identity = job.identity()
+    claim(job.output, identity)
+    tags = {
+        "mlflow.user": getpass.getuser(),
+        "snakemake.rule": job.stage.name,
+        **{f"wildcards.{key}": job.settings[key] for key in ("dataset", "tf") if key in job.settings},
+        "config.sha": identity["settings"],
+        "code.sha": identity["code"],
+        "git.sha": git_revision(),
+        "output": job.output.as_posix(),
+    }
+    name = " ".join(str(job.settings[key]) for key in ("dataset", "tf", "stage") if key in job.settings)
+    with track.run(tracking, experiment=experiment, name=name, tags=tags, params=job.settings) as run:
+        start = time.perf_counter()
+        outcome: Outcome = importlib.import_module(job.stage.module).work(
+            job.settings, dict(job.inputs), job.output
+        )
+        seconds = time.perf_counter() - start
+        metrics = {**record(job, identity, seconds), "run": run.id, "numbers": outcome.numbers}
+        write_json(job.output / METRICS, metrics)
+        run.log(
+            {"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(outcome.numbers)}
+        )
+        for step, values in enumerate(series(outcome.numbers)):
+            run.log(values, step)
+        for path in (*outcome.pictures, job.output / METRICS):
+            run.artifact(path)
+    return metrics
+
+
+def claim(output: Path, identity: dict[str, Any]) -> None:
+    """Make the folder this job's: empty, or with what the same job left there.
+
+    Raises:
+        ArgumentError: if the folder holds files that are not of texgs.
+    """
+    stamp = output / STAMP
+    (output / METRICS).unlink(missing_ok=True)  # the job is not done before it is written again
+    if stamp.exists() and read_json(stamp) == identity:
+        return
+    if output.exists() and any(output.iterdir()):
+        if not stamp.exists():
+            raise ArgumentError(
+                f"{output}: expected an empty folder or one of texgs, got other files; move them away"
+            )
+        shutil.rmtree(output)
+    write_json(stamp, identity)
+
+
+def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]:
+    """Where and how a result came about."""
+    return {
+        "stage": job.stage.name,
+        **{key: job.settings[key] for key in ("dataset", "tf") if key in job.settings},
+        "seconds": seconds,
+        "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "device": f"{platform.machine()} CPU",
+        "config_sha": identity["settings"],
+        "code_sha": identity["code"],
+        "git_sha": git_revision(),
+        "versions": versions(),
+    }
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, texgs and what results depend on most."""
+    found = {"python": platform.python_version(), "texgs": __version__}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def git_revision() -> str:
+    """Commit of the source tree, with "+" where files differ from it; "unknown" outside a clone."""
+    folder = Path(__file__).parent
+    command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return done.stdout.strip()
+
+
+def series(numbers: Mapping[str, Any]) -> Iterator[dict[str, float]]:
+    """The entries that are lists of numbers of one kind, step by step."""
+    lists = {key: value for key, value in numbers.items() if isinstance(value, list) and key.endswith("_ms")}
+    for step in range(max(map(len, lists.values()), default=0)):
+        yield {key: float(value[step]) for key, value in lists.items() if step < len(value)}
+
+
+def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
+    """The entries that are single numbers."""
+    return {key: float(value) for key, value in numbers.items() if isinstance(value, int | float)}

@@ -1,0 +1,95 @@
+"""The verbs of the stages: by hand with key=value, or as one job that Snakemake started."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from texgs.core.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+
+class HelpWithKeys(argparse.Action):
+    """`--help` that also lists every key of the configuration; read only now, because it takes a moment."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
+        """Print the help and exit."""
+        from texgs.config.compose import groups
+        from texgs.config.describe import describe
+
+        parser.print_help()
+        print(f"\ngroups, each a folder of conf/:\n{groups()}\n\nkeys, with their defaults:\n{describe()}")
+        parser.exit()
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Overrides of the configuration; or the files of one job."""
+    parser.add_argument("-h", "--help", action=HelpWithKeys, nargs=0, help="show this, and all keys")
+    parser.add_argument(
+        "overrides", nargs="*", metavar="KEY=VALUE", help="such as dataset=engine tf=TF01 views.width=400"
+    )
+    parser.add_argument("--force", action="store_true", help="do it again, even if nothing has changed")
+    job = parser.add_argument_group("one job, as the workflow runs it (no KEY=VALUE then)")
+    job.add_argument(
+        "--settings", type=Path, metavar="FILE", help="what the stage reads, a file in results/.conf"
+    )
+    job.add_argument("--input", nargs="*", default=[], metavar="NAME=FILE", help="files the stage reads")
+    job.add_argument("--output", type=Path, metavar="FOLDER", help="where its files go")
+    job.add_argument("--tracking", default=None, metavar="URI", help="where the run is recorded")
+    job.add_argument("--experiment", default="texgs", metavar="NAME", help="of the tracking store")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the stage that the verb names."""
+    if arguments.settings is not None:
+        return run_settings(arguments)
+    from texgs.config.compose import compose
+    from texgs.config.locate import tf_names
+    from texgs.config.stage import STAGES
+
+    config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
+    for name in tf_names(config) if stage.per_tf else [None]:
+        chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
+        ensure(arguments.verb, chosen, force=arguments.force)
+    return 0
+
+
+def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
+    """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
+    from texgs.cli.job import Job, execute
+    from texgs.config.stage import STAGES
+
+    stage = STAGES[name]
+    inputs = stage.inputs(config)
+    for needed in stage.needs:
+        if any(path.is_relative_to(STAGES[needed].output(config)) for path in inputs.values()):
+            ensure(needed, config)
+    job = Job(stage, stage.settings(config), inputs, stage.output(config))
+    if job.is_done() and not force:
+        print(f"{job.output}: up to date")
+        return
+    execute(job, config.tracking.uri, config.tracking.experiment)
+    print(f"{job.output}: done")
+
+
+def run_settings(arguments: argparse.Namespace) -> int:
+    """Run one job from the file of its settings."""
+    from omegaconf import OmegaConf
+
+    from texgs.cli.job import Job, execute
+    from texgs.config.stage import STAGES
+
+    if arguments.overrides or arguments.output is None:
+        raise ArgumentError("a job: expected --settings and --output and no KEY=VALUE; see --help")
+    settings = OmegaConf.to_container(OmegaConf.load(arguments.settings))
+    if not isinstance(settings, dict) or settings.get("stage") != arguments.verb:
+        raise ArgumentError(
+            f"{arguments.settings}: expected the settings of a {arguments.verb} job, got others"
+        )
+    inputs = {name: Path(path) for name, _, path in (word.partition("=") for word in arguments.input)}
+    job = Job(STAGES[arguments.verb], dict(settings), inputs, arguments.output)  # type: ignore[arg-type]
+    execute(job, arguments.tracking, arguments.experiment)
+    return 0

@@ -1,0 +1,56 @@
+"""The basic TFs of a configuration as functions of data values."""
+
+from typing import Any
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.transfer import TransferFunction, check_disjoint
+
+
+def in_data_values(
+    name: str, points: dict[str, Any], tf_values: str, low: float, high: float
+) -> TransferFunction:
+    """A basic TF in the units of the data.
+
+    Args:
+        name: of the TF, for messages.
+        points: lists `opacity` and `color`.
+        tf_values: "data", or "fraction" where the points are on fractions of the data's range.
+        low: smallest value of the data.
+        high: largest value of the data.
+
+    Raises:
+        ArgumentError: if a point is wrong, or none of the data would be visible.
+    """
+    try:
+        tf = TransferFunction(points["opacity"], points["color"])
+        tf = tf.scaled(low, high) if tf_values == "fraction" else tf
+    except ArgumentError as error:
+        raise ArgumentError(f"basic TF {name}: {error}") from error
+    first, last = tf.support
+    if first >= high or last <= low:
+        raise ArgumentError(
+            f"basic TF {name}: expected a range within the data's [{low:g}, {high:g}], got [{first:g}, "
+            f"{last:g}]; is dataset.tf_values right?"
+        )
+    return tf
+
+
+def check_basic_tfs(dataset: Any) -> None:
+    """Check the points of all basic TFs of a configuration, and that their ranges do not overlap.
+
+    Args:
+        dataset: the part `dataset` of the configuration.
+
+    Raises:
+        ArgumentError: naming the basic TF, or the two that overlap.
+    """
+    basic = {}
+    for name, points in dataset.basic_tfs.items():
+        try:
+            basic[name] = TransferFunction(points.opacity, points.color)
+        except ArgumentError as error:
+            raise ArgumentError(f"{dataset.name}: basic TF {name}: {error}") from error
+    try:
+        check_disjoint(basic)
+    except ArgumentError as error:
+        raise ArgumentError(f"{dataset.name}: basic TFs {error}") from error

@@ -1,0 +1,39 @@
+"""Stage `transfer`: compare a data set's basic TFs with its values, plot them, and export them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.tf import in_data_values
+from texgs.core.io import read_json
+from texgs.volume.tf_files import write_paraview
+from texgs.volume.tf_plot import plot
+from texgs.volume.transfer import check_disjoint
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write transfer.png, the histogram with the basic TFs over it, and each TF for ParaView.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `volume`, the volume.nrrd; volume.json is beside it.
+        output: folder.
+    """
+    summary = read_json(inputs["volume"].with_name("volume.json"))
+    low, high = summary["minimum"], summary["maximum"]
+    basic = {
+        name: in_data_values(name, points, settings["tf_values"], low, high)
+        for name, points in settings["basic_tfs"].items()
+    }
+    check_disjoint(basic)
+    plot(output / "transfer.png", np.array(summary["histogram"]), low, high, basic, settings["title"])
+    for name, tf in basic.items():
+        write_paraview(output / f"{name}.paraview.json", tf, f"{settings['dataset']} {name}")
+    numbers = {
+        f"{name}_{end}": value
+        for name, tf in basic.items()
+        for end, value in zip(("low", "high"), tf.support, strict=True)
+    }
+    return Outcome({"basic_tfs": len(basic), **numbers}, [output / "transfer.png"])

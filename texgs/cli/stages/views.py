@@ -1,0 +1,149 @@
+"""Stage `views`: render the training and test views of one basic TF, and a turntable."""
+
+import os
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any, Literal
+
+import numpy as np
+from PIL import Image
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.tf import in_data_values
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_atomic
+from texgs.core.progress import progress
+from texgs.volume.appearance import Appearance
+from texgs.volume.cameras import icosphere, orbit_path, test_path
+from texgs.volume.cpu_mapper import CpuMapper
+from texgs.volume.geometry import geometry
+from texgs.volume.gpu_mapper import GpuMapper
+from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.render import Frame, Mapper, render_views
+from texgs.volume.sheet import write_animation
+from texgs.volume.transfer import TransferFunction
+from texgs.volume.view_set import Light, View, write_transforms
+
+SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
+TURNTABLE = 320  # pixels of its longer side
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write the folder of views: train/, test/, transforms_*.json and turntable.png.
+
+    Views that are in the folder already, from an interrupted run of the same job, are kept.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `volume`, the volume.nrrd; volume.json is beside it.
+        output: folder.
+    """
+    views, title = settings["views"], f"{settings['dataset']}/{settings['tf']}"
+    grid, summary = open_grid(inputs["volume"]), read_json(inputs["volume"].with_name("volume.json"))
+    tf = in_data_values(
+        settings["tf"], settings["points"], settings["tf_values"], summary["minimum"], summary["maximum"]
+    )
+    appearance = Appearance(**views["shading"], step=views["step"], opacity_unit=views["opacity_unit"])
+    mapper = mapper_for(views["mapper"], grid, appearance)
+    frames = []
+    shots = {split: views_of(views, split, output) for split in SPLITS}
+    for split, shot in shots.items():
+        frames += render_views(mapper, tf, shot, f"{title}: {split} views")
+    if frames and max(frame.coverage for frame in frames) == 0:
+        raise ArgumentError(
+            f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
+        )
+    turntable(mapper, tf, views, output, title)
+    if views["geometry"]:
+        write_geometry(grid, tf, appearance, shots["test"], output / "geometry", title)
+    for split, shot in shots.items():
+        write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
+    return Outcome(numbers(shots, frames), [output / "turntable.png"])
+
+
+def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
+    """The CPU's mapper with as many threads as OMP_NUM_THREADS says (Snakemake sets it), or the GPU's."""
+    if kind == "gpu":
+        return GpuMapper(grid, appearance)
+    return CpuMapper(grid, appearance, int(os.environ.get("OMP_NUM_THREADS") or os.cpu_count() or 1))
+
+
+def cameras(path: dict[str, Any], views: dict[str, Any]) -> list[Camera]:
+    """The cameras of one arrangement."""
+    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
+    if path["kind"] == "icosphere":
+        return icosphere(path["frequency"], *lens)
+    if path["kind"] == "spiral":
+        return test_path(path["count"], *lens)
+    return orbit_path(path["count"], path["polar"], *lens)
+
+
+def views_of(views: dict[str, Any], split: str, output: Path) -> list[View]:
+    """Cameras, lights and files of the training or the test views."""
+    lights = [Light(**light) for light in views["lights"]]
+    if not lights:
+        raise ArgumentError("views.lights: expected at least one light, got none")
+    return [
+        View(camera, output / split / f"r_{index:04}.png", lights[index % len(lights)])
+        for index, camera in enumerate(cameras(views[split], views))
+    ]
+
+
+def turntable(mapper: Mapper, tf: TransferFunction, views: dict[str, Any], output: Path, title: str) -> None:
+    """Write turntable.png, an animation of one turn under a headlight."""
+    scale = min(1.0, TURNTABLE / max(views["width"], views["height"]))
+    small = {key: max(1, round(scale * views[key])) for key in ("width", "height")}
+    path = {"kind": "orbit", "count": views["turntable"], "polar": 15.0}
+    shot = [
+        View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
+        for index, camera in enumerate(cameras(path, {**views, **small}))
+    ]
+    render_views(mapper, tf, shot, f"{title}: turntable")
+    write_animation(output / "turntable.png", [Image.fromarray(view.load().numpy()) for view in shot])
+
+
+def write_geometry(
+    grid: Grid, tf: TransferFunction, look: Appearance, shot: list[View], folder: Path, title: str
+) -> None:
+    """Write depth and normals of views as .npz, the arrays `depth` [H, W] and `normal` [H, W, 3]."""
+    for view in progress(shot, title=f"{title}: depth and normals", unit="view"):
+        path = folder / f"{view.path.stem}.npz"
+        if path.exists():
+            continue
+        _, alpha = view.image()
+        depth, normal = geometry(grid, tf, view.camera, look.step, look.opacity_unit, mask=alpha > 0)
+        write = partial(np.savez_compressed, depth=depth.numpy(), normal=normal.numpy().astype(np.float16))
+        write_atomic(path, write)
+
+
+def describe(settings: dict[str, Any], tf: TransferFunction, grid: Grid, mapper: Mapper) -> dict[str, Any]:
+    """What transforms_*.json says about the images beside cameras and lights."""
+    views = settings["views"]
+    return {
+        "volume": settings["dataset"],
+        "tf": {"name": settings["tf"], **tf.to_dict()},
+        "aabb": [list(corner) for corner in grid.aabb],
+        "shading": {"model": "blinn-phong", "local_viewer": mapper.local_viewer, **views["shading"]},
+        **{key: views[key] for key in ("mapper", "step", "opacity_unit")},
+    }
+
+
+def numbers(shots: Mapping[Any, list[View]], frames: list[Frame]) -> dict[str, Any]:
+    """Counts and sizes, and of the views that were rendered now the time and the coverage."""
+    camera = shots["train"][0].camera
+    counts = {split: len(shot) for split, shot in shots.items()}
+    size = {"width": camera.width, "height": camera.height, "rendered": len(frames)}
+    times = [frame.milliseconds for frame in frames[1:]]  # the first one sets up gradients and tables
+    if not times:
+        return {**counts, **size}
+    timing = {
+        "frame_ms": median(times),
+        "frame_max_ms": max(times),
+        "first_frame_ms": frames[0].milliseconds,
+        "frames_ms": times,
+    }
+    return {**counts, **size, **timing, "coverage": sum(frame.coverage for frame in frames) / len(frames)}

@@ -1,0 +1,54 @@
+"""Stage `volume`: make or read a scalar field, check it, and write the one file that later stages read."""
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.core.io import write_json
+from texgs.core.progress import progress
+from texgs.volume.download import download
+from texgs.volume.generate import GENERATORS
+from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource, Source
+from texgs.volume.sources import open_source
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, range and histogram.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `source`, the volume's file, where it is neither generated nor downloaded.
+        output: folder.
+    """
+    volume = settings["volume"]
+
+    def slabs(steps: Iterable[tuple[int, int]], total: int) -> Iterable[tuple[int, int]]:
+        return progress(steps, total, title=f"{settings['dataset']}: volume", unit="slab")
+
+    summary = prepare(
+        source(volume, inputs.get("source")),
+        output / "volume.nrrd",
+        crop=volume["crop"] and tuple(volume["crop"]),
+        reduce=volume["reduce"],
+        method=volume["method"],
+        up=volume["up"],
+        nan_value=volume["nan_value"],
+        progress=slabs,
+    )
+    write_json(output / "volume.json", asdict(summary))
+    numbers = {key: value for key, value in asdict(summary).items() if key != "histogram"}
+    return Outcome({**numbers, "voxels": summary.voxels})
+
+
+def source(volume: dict[str, Any], path: Path | None) -> Source:
+    """The field itself: generated, or read from a file that is there or in the cache after a download."""
+    if volume["generator"] is not None:
+        options = {"seed": volume["seed"]} if volume["generator"] != "sphere" else {}
+        return ArraySource(GENERATORS[volume["generator"]](volume["size"], **options), volume["generator"])
+    if path is None:
+        path = download(volume["url"], volume["sha256"], Path(volume["file"]).name)
+    triples = {key: volume[key] and tuple(volume[key]) for key in ("dims", "spacing", "origin")}
+    return open_source(path, dtype=volume["dtype"], endian=volume["endian"], skip=volume["skip"], **triples)

@@ -1,0 +1,1 @@
+"""Configuration: typed schema, composition, digests. Light: no torch, no numpy."""

@@ -1,0 +1,90 @@
+"""Where the data of a data set are on this machine, and its basic TFs."""
+
+from pathlib import Path
+
+from omegaconf import DictConfig
+
+from texgs.core.errors import ConfigError
+
+
+def source_file(config: DictConfig) -> Path | None:
+    """The volume's file, or folder of slices; None if it is generated or still to be downloaded.
+
+    Raises:
+        ConfigError: if it is not there and cannot be downloaded; says how to get it.
+    """
+    dataset, volume = config.dataset, config.dataset.volume
+    if (volume.generator is None) == (volume.file is None):
+        raise ConfigError(
+            f"dataset.volume of {dataset.name}: expected a generator or a file, "
+            f"got {'neither' if volume.file is None else 'both'}"
+        )
+    if volume.file is None:
+        return None
+    path = Path(config.data_folder, volume.file)
+    if path.exists():
+        return path
+    if volume.url:
+        return None
+    raise ConfigError(
+        f"data set {dataset.name}: {path} is not there; {volume.obtain or 'put it there'}, "
+        "or name its folder with data_folder=FOLDER or TEXGS_DATA"
+    )
+
+
+def views_folder(config: DictConfig) -> Path | None:
+    """Folder of the views that a data set without volume starts from, for `config.tf`; None with a volume.
+
+    Raises:
+        ConfigError: if the folder has no views; says how to get them.
+    """
+    if config.dataset.views_folder is None:
+        return None
+    folder = Path(config.data_folder, config.dataset.views_folder, config.tf or "")
+    if not (folder / "transforms_train.json").is_file():
+        raise ConfigError(
+            f"data set {config.dataset.name}: no views in {folder}; "
+            f"{config.dataset.volume.obtain or 'put them there, with a file transforms_train.json'}, "
+            "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
+        )
+    return folder
+
+
+def basic_tf(config: DictConfig) -> DictConfig:
+    """The basic TF that `config.tf` names.
+
+    Raises:
+        ConfigError: if the data set has none of that name.
+    """
+    known = config.dataset.basic_tfs
+    if config.tf not in known:
+        found = ", ".join(known) or "none"
+        raise ConfigError(
+            f"tf: expected a basic TF of data set {config.dataset.name} ({found}), got {config.tf}"
+        )
+    return known[config.tf]
+
+
+def tf_names(config: DictConfig) -> list[str]:
+    """The basic TFs to work on: the one chosen, else all of the data set; those of views are its subfolders.
+
+    Raises:
+        ConfigError: if there are none, or not the one chosen.
+    """
+    if config.tf is not None:
+        if config.dataset.views_folder is None:
+            basic_tf(config)
+        return [config.tf]
+    names = list(config.dataset.basic_tfs)
+    if not names and config.dataset.views_folder is not None:
+        folder = Path(config.data_folder, config.dataset.views_folder)
+        names = sorted(path.parent.name for path in folder.glob("*/transforms_train.json"))
+        if not names:
+            raise ConfigError(
+                f"data set {config.dataset.name}: no folder of views in {folder}; "
+                f"{config.dataset.volume.obtain or 'put one there per basic TF'}, "
+                "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
+            )
+    if not names:
+        raise ConfigError(f"data set {config.dataset.name}: expected at least one basic TF, got none")
+    return names

@@ -1,0 +1,124 @@
+"""The stages of the workflow: what each reads of the configuration, which code it runs, where its files are.
+
+A job's settings are written once to a file named after their contents. Snakemake passes that name and the
+digest of the code as parameters of the job, so a changed value or line of code reruns what depends on it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig, OmegaConf
+
+from texgs.config.code import code_digest, digest
+from texgs.config.locate import basic_tf, source_file, views_folder
+from texgs.core.io import write_atomic
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One arrow of the data flow: a rule of the workflow and a verb of the command line."""
+
+    name: str
+    module: str  # what the job runs
+    select: Callable[[DictConfig], dict[str, Any]]  # the part of the configuration that the job reads
+    folder: str  # of its files, below `results`
+    inputs: Callable[[DictConfig], dict[str, Path]]  # the files it reads
+    needs: tuple[str, ...] = ()  # stages that make these files
+    per_tf: bool = False  # a job per basic TF, not per data set
+
+    def settings(self, config: DictConfig) -> dict[str, Any]:
+        """What a job reads, as plain lists and dicts.
+
+        Raises:
+            ConfigError: if the stage works on one basic TF, and `config.tf` is none of the data set's.
+        """
+        selected = {"stage": self.name, "dataset": config.dataset.name, **self.select(config)}
+        if self.per_tf:
+            selected["tf"] = config.tf
+        settings = OmegaConf.to_container(OmegaConf.create(selected), resolve=True)
+        return {str(name): value for name, value in dict(settings).items()}  # type: ignore[arg-type]
+
+    def output(self, config: DictConfig) -> Path:
+        """Folder of the job's files."""
+        return Path(config.results) / self.folder.format(dataset=config.dataset.name, tf=config.tf)
+
+    @property
+    def code(self) -> str:
+        """Digest of the code that the job runs."""
+        return code_digest(self.module)
+
+
+def settings_file(stage: Stage, config: DictConfig) -> str:
+    """Write a job's settings to `results/.conf/STAGE-DIGEST.yaml`, unless that is there; return its path."""
+    text = OmegaConf.to_yaml(OmegaConf.create(stage.settings(config)), sort_keys=True)
+    path = Path(config.results) / ".conf" / f"{stage.name}-{digest(text)}.yaml"
+    if not path.exists():
+        write_atomic(path, lambda file: file.write(text.encode()))
+    return path.as_posix()
+
+
+def settings_digest(settings: dict[str, Any]) -> str:
+    """Digest of a job's settings: the one in the name of its file."""
+    return digest(OmegaConf.to_yaml(OmegaConf.create(settings), sort_keys=True))
+
+
+def volume_inputs(config: DictConfig) -> dict[str, Path]:
+    """The volume's file, where there is one."""
+    path = source_file(config)
+    return {} if path is None else {"source": path}
+
+
+def prepared_volume(config: DictConfig) -> dict[str, Path]:
+    """What stage `volume` writes."""
+    return {"volume": STAGES["volume"].output(config) / "volume.nrrd"}
+
+
+def view_set(config: DictConfig) -> dict[str, Path]:
+    """The views: those that stage `views` renders, or those that the data set consists of."""
+    return {"views": (views_folder(config) or STAGES["views"].output(config)) / "transforms_train.json"}
+
+
+STAGES = {
+    stage.name: stage
+    for stage in (
+        Stage(
+            "volume",
+            "texgs.cli.stages.volume",
+            select=lambda config: {"volume": config.dataset.volume},
+            folder="{dataset}/volume",
+            inputs=volume_inputs,
+        ),
+        Stage(
+            "transfer",
+            "texgs.cli.stages.transfer",
+            select=lambda config: {key: config.dataset[key] for key in ("title", "tf_values", "basic_tfs")},
+            folder="{dataset}/transfer",
+            inputs=prepared_volume,
+            needs=("volume",),
+        ),
+        Stage(
+            "views",
+            "texgs.cli.stages.views",
+            select=lambda config: {
+                "tf_values": config.dataset.tf_values,
+                "points": basic_tf(config),
+                "views": config.views,
+            },
+            folder="{dataset}/{tf}/views",
+            inputs=prepared_volume,
+            needs=("volume",),
+            per_tf=True,
+        ),
+        Stage(
+            "sheet",
+            "texgs.cli.stages.sheet",
+            select=lambda config: {},
+            folder="{dataset}/{tf}/sheet",
+            inputs=view_set,
+            needs=("views",),
+            per_tf=True,
+        ),
+    )
+}

@@ -1,0 +1,140 @@
+"""Volume rendering on the CPU by VTK's fixed-point ray caster, without OpenGL.
+
+VTK casts the rays into a 15-bit RGBA image of its own, and only to show that image does it need OpenGL. Here
+the image is taken as it is: no driver, no display, no loss to 8 bits. Lights and viewer are distant: the
+directions to them are the same for all points of one view (OpenGL's light model without local viewer).
+
+Its numbers have 15 bits: opacities of samples and colours are rounded to 1/32767, which tells where things
+are very transparent and steps short. Rays end at an opacity of 0.992. Between the samples of the grid,
+intensities are interpolated, not gradients.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import re
+from dataclasses import replace
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from texgs.core.camera import Camera
+from texgs.core.errors import NativeError
+from texgs.volume.appearance import Appearance, image_data, volume_property
+from texgs.volume.geometry import march
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction
+from texgs.volume.view_set import Light
+from texgs.volume.vtk_camera import aim, point_light
+
+FULL = 32767  # 1.0 in the mapper's fixed-point numbers
+OPAQUE = 0.99  # nothing behind shows
+MARGIN = 2  # pixels; the mapper may leave out the last row and column of a view that the volume fills
+SHORTENED = 0.03  # part of a ray's length that may be missing
+
+
+class CpuMapper:
+    """Renders one volume from any camera.
+
+    Args:
+        grid: the volume; not copied where its samples have more than 8 bits.
+        appearance: shading and sampling.
+        threads: that cast rays.
+    """
+
+    local_viewer = False
+
+    def __init__(self, grid: Grid, appearance: Appearance, threads: int) -> None:
+        # The first import registers what the mapper creates when it is made.
+        from vtkmodules import vtkRenderingVolumeOpenGL2  # noqa: F401
+        from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkVolume
+        from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
+        from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
+
+        image, self._factor = image_data(grid)
+        self._grid = grid
+        self._appearance = appearance
+        self._mapper = vtkFixedPointVolumeRayCastMapper()
+        self._mapper.SetInputData(image)
+        self._mapper.SetAutoAdjustSampleDistances(0)
+        self._mapper.SetImageSampleDistance(1)
+        self._mapper.SetSampleDistance(appearance.step * min(image.GetSpacing()))
+        self._mapper.SetNumberOfThreads(threads)
+        self._volume = vtkVolume()
+        self._volume.SetMapper(self._mapper)
+        self._light = vtkLight()
+        self._light.SetAmbientColor(1, 1, 1)
+        self._renderer = vtkRenderer()
+        self._renderer.AddLight(self._light)
+        self._renderer.AddVolume(self._volume)
+        # Never shown: the renderer takes its size from a window.
+        self._window = vtkGenericOpenGLRenderWindow()
+        self._window.AddRenderer(self._renderer)
+
+    def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
+        """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""
+        picture = self._cast(tf, _with_margin(camera), light)[MARGIN:-MARGIN, MARGIN:-MARGIN]
+        cut = _shortened(self._grid, camera, self._appearance.step) & (picture[..., 3] < OPAQUE)
+        if cut.any():
+            seen = march(self._grid, tf, camera, self._appearance, light, torch.from_numpy(cut))
+            picture[cut] = torch.cat([seen.color, seen.alpha[..., None]], dim=-1).numpy()[cut]
+        return picture
+
+    def _cast(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
+        """What VTK's rays see."""
+        self._volume.SetProperty(volume_property(tf, self._appearance, self._factor))
+        self._window.SetSize(camera.width, camera.height)
+        aim(self._renderer.GetActiveCamera(), camera)
+        point_light(self._light, camera, light)
+        self._renderer.ResetCameraClippingRange()
+        mapper, renderer, volume = self._mapper, self._renderer, self._volume
+        picture = np.zeros((camera.height, camera.width, 4), np.float32)
+        mapper.Update()
+        if not mapper.PerImageInitialization(renderer, volume, 0, [0.0, 0.0], [0.0, 0.0], [0, 0]):
+            return picture  # the volume is out of sight
+        mapper.PerVolumeInitialization(renderer, volume)
+        mapper.PerSubVolumeInitialization(renderer, volume, 0)
+        mapper.RenderSubVolume()
+        pixels, x, y = self._pixels()
+        height, width = pixels.shape[:2]
+        picture[y : y + height, x : x + width] = pixels
+        return picture[::-1] / np.float32(FULL)
+
+    def _pixels(self) -> tuple[NDArray[np.uint16], int, int]:
+        """The mapper's image [h, w, 4], lowest row first, and where its first pixel is in the view."""
+        image = self._mapper.GetRayCastImage()
+        address = re.match(r"_([0-9a-fA-F]+)_p_", str(image.GetImage()))
+        if address is None:
+            raise NativeError(
+                f"VTK's ray cast image: expected a pointer, got {image.GetImage()!r}; install VTK 9.4 or "
+                "newer"
+            )
+        memory_width, memory_height = image.GetImageMemorySize()
+        width, height = image.GetImageInUseSize()
+        x, y = image.GetImageOrigin()
+        buffer = (ctypes.c_uint16 * (4 * memory_width * memory_height)).from_address(int(address[1], 16))
+        pixels = np.ctypeslib.as_array(buffer).reshape(memory_height, memory_width, 4)
+        return pixels[:height, :width], x, y
+
+
+def _with_margin(camera: Camera) -> Camera:
+    """The same camera with more pixels around its view."""
+    K = camera.K.clone()
+    K[:2, 2] += MARGIN
+    return replace(camera, K=K, width=camera.width + 2 * MARGIN, height=camera.height + 2 * MARGIN)
+
+
+def _shortened(grid: Grid, camera: Camera, step: float) -> NDArray[np.bool_]:
+    """Pixels [H, W] whose rays VTK ends too early: those almost parallel to a side of the volume.
+
+    It counts how many steps lead to the end of the ray along each axis, with a step rounded to 1/32767 voxel.
+    A small component that is rounded up, such as 0.6 to 1, gives too few.
+    """
+    K, R_cw = camera.K.double().cpu().numpy(), camera.viewmat[:3, :3].double().cpu().numpy()
+    v, u = np.mgrid[: camera.height, : camera.width] + 0.5
+    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(K).T @ R_cw  # [H, W, 3]
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    spacing = np.array(grid.spacing)
+    steps = np.abs(rays) * (step * spacing.min() / spacing * FULL)
+    return (np.round(steps) * (1 - SHORTENED) > steps).any(axis=-1)

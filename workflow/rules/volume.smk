@@ -1,0 +1,48 @@
+# A scalar field, checked, in one file; and its histogram with the basic TFs.
+
+
+rule volumes:
+    input:
+        collect("<results>/{dataset}/transfer/metrics.json", dataset=VOLUMES),
+
+
+rule volume:
+    input:
+        unpack(lambda wildcards: inputs("volume", wildcards)),
+    output:
+        volume="<results>/{dataset}/volume/volume.nrrd",
+        summary="<results>/{dataset}/volume/volume.json",
+        metrics="<results>/{dataset}/volume/metrics.json",
+    log:
+        "<logs>/{dataset}/volume.log",
+    benchmark:
+        "<benchmarks>/{dataset}/volume.tsv"
+    threads: 1
+    params:
+        settings=lambda wildcards: settings("volume", wildcards),
+        code=STAGES["volume"].code,
+        folder=subpath(output.metrics, parent=True),
+        source=lambda wildcards, input: (f"--input source={shlex.quote(input.source)}" if input else ""),
+    shell:
+        "texgs volume --settings {params.settings} {params.source} --output {params.folder} "
+        "2>&1 | tee {log}"
+
+
+rule transfer:
+    input:
+        volume="<results>/{dataset}/volume/volume.nrrd",
+        summary="<results>/{dataset}/volume/volume.json",
+    output:
+        plot="<results>/{dataset}/transfer/transfer.png",
+        metrics="<results>/{dataset}/transfer/metrics.json",
+    log:
+        "<logs>/{dataset}/transfer.log",
+    benchmark:
+        "<benchmarks>/{dataset}/transfer.tsv"
+    params:
+        settings=lambda wildcards: settings("transfer", wildcards),
+        code=STAGES["transfer"].code,
+        folder=subpath(output.metrics, parent=True),
+    shell:
+        "texgs transfer --settings {params.settings} --input volume={input.volume} --output {params.folder} "
+        "2>&1 | tee {log}"
