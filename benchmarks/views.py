@@ -137,13 +137,13 @@ def large_volume() -> list[Measurement]:
 
 def child(folder: str) -> None:
     """Print the seconds and the peak of resident memory in MB of preparing the large volume."""
-    import resource
     from time import perf_counter
 
+    from texgs.core.memory import peak_memory
     from texgs.volume.prepare import prepare
     from texgs.volume.sources import open_source
 
     start = perf_counter()
     source = open_source(Path(folder, "large.raw"), dims=(LARGE,) * 3, dtype="uint8")
     prepare(source, Path(folder, "small.nrrd"), reduce=REDUCE)
-    print(perf_counter() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    print(perf_counter() - start, peak_memory() / 1e6)

@@ -213,8 +213,9 @@ def test_eight_bits_show_no_bands():
 
 
 CHILD = """
-import numpy as np, resource, sys
+import numpy as np, sys
 from texgs.core.camera import orbit
+from texgs.core.memory import peak_memory
 from texgs.volume.appearance import Appearance
 from texgs.volume.cpu_mapper import CpuMapper
 from texgs.volume.grid import Grid
@@ -230,7 +231,7 @@ assert mapper.render(tf, orbit(-60, 20, 2, 34, 60, 60), Light("headlight")).any(
 with open("/proc/self/maps") as file:
     libraries = {line.split("/")[-1].strip() for line in file if "/" in line}
 found = [name for name in libraries if name.startswith(("libGL", "libEGL", "libOSMesa", "libOpenGL"))]
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024, values.nbytes, *found)
+print(peak_memory(), values.nbytes, *found)
 """
 
 

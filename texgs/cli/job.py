@@ -5,7 +5,6 @@ from __future__ import annotations
 import getpass
 import importlib
 import platform
-import resource
 import shutil
 import subprocess
 import time
@@ -20,6 +19,7 @@ from texgs.cli.stages.outcome import Outcome
 from texgs.config.stage import Stage, settings_digest
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
+from texgs.core.memory import peak_memory
 
 STAMP = ".job.json"
 METRICS = "metrics.json"
@@ -122,7 +122,7 @@ def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]
         "stage": job.stage.name,
         **{key: job.settings[key] for key in ("dataset", "tf") if key in job.settings},
         "seconds": seconds,
-        "peak_memory_mib": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+        "peak_memory_mib": peak_memory() / 2**20,
         "device": f"{platform.machine()} CPU",
         "config_sha": identity["settings"],
         "code_sha": identity["code"],

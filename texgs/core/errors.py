@@ -27,3 +27,7 @@ class NativeError(TexgsError, RuntimeError):
 
 class ConfigError(TexgsError, ValueError):
     """A key of the configuration is unknown, or its value is not one that is possible."""
+
+
+class FitError(TexgsError, ArithmeticError):
+    """A fit cannot go on."""
