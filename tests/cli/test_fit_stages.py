@@ -1,0 +1,77 @@
+"""The three phases by hand, on views of a small sphere."""
+
+import json
+
+import pytest
+
+from texgs.cli.main import main
+from texgs.scene.model_file import read_model
+
+TINY = [
+    "dataset=sphere",
+    "dataset.volume.size=32",
+    "views=small",
+    "views.width=48",
+    "views.height=48",
+    "views.train.frequency=1",
+    "views.test.count=3",
+    "views.turntable=2",
+    "views.radius=2.5",
+    "tracking=none",
+    "fit=demo",
+    "fit.seeds.count=400",
+    "fit.shading.iterations=150",
+    "fit.shading.densify.stop=0",
+]
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "results" / "sphere" / "TF01" / "demo"
+
+
+def numbers(folder, phase):
+    return json.loads((folder / phase / "metrics.by_hand.json").read_text())["numbers"]
+
+
+def test_texture_makes_what_it_needs_first(folder):
+    assert main(["texture", *TINY]) == 0
+    models = {
+        phase: read_model(folder / phase / "model.safetensors") for phase in ("surfels", "shading", "texture")
+    }
+    assert {phase: model.stage for phase, model in models.items()} == {phase: phase for phase in models}
+    assert models["texture"].metadata["dataset"] == "sphere"
+    assert models["texture"].optics.local_viewer is False, "the CPU's volume mapper has a distant viewer"
+    shading, texture = numbers(folder, "shading"), numbers(folder, "texture")
+    assert shading["psnr"] > 25
+    assert texture["psnr"] >= shading["psnr"] - 0.1
+    assert texture["texels"] == len(models["texture"].parameters["texels"])
+    assert texture["total_mib"] > 0
+    assert shading["losses"][-1] < 0.1
+
+
+def test_harmonics_first_as_in_the_paper(folder):
+    phase = ["fit.surfels.iterations=120", "fit.surfels.sh_every=40", "fit.surfels.densify.stop=0"]
+    assert main(["shading", *TINY, *phase]) == 0
+    model = read_model(folder / "surfels" / "model.safetensors")
+    assert model.parameters["sh"].shape[1:] == (16, 3)
+    assert model.parameters["sh"][:, 9:].abs().max() > 0, "degree 3 has learned"
+    assert numbers(folder, "surfels")["psnr"] > 22
+    assert "sh" not in read_model(folder / "shading" / "model.safetensors").parameters
+
+
+def test_a_material_per_surfel_on_request(folder):
+    main(["shading", *TINY, "fit.material=surfel", "fit.shading.losses.smoothness=0.01"])
+    ambient = read_model(folder / "shading" / "model.safetensors").parameters["ambient"]
+    assert len(ambient) == 400
+    assert ambient.std() > 0.01
+
+
+def test_same_seed_same_model(folder):
+    main(["shading", *TINY])
+    first = (folder / "shading" / "model.safetensors").read_bytes()
+    main(["shading", "--force", *TINY])
+    assert (folder / "shading" / "model.safetensors").read_bytes() == first
+    main(["shading", *TINY, "fit.seed=1"])
+    assert (folder / "shading" / "model.safetensors").read_bytes() != first

@@ -1,0 +1,89 @@
+"""A small ball seen from around, the same as images in memory and as files, and short phases that fit it."""
+
+import math
+
+import torch
+
+from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.core.camera import orbit
+from texgs.fit.images import Images
+from texgs.fit.loop import Fit
+from texgs.fit.seeds import surfels_at
+from texgs.scene.model import Optics, raw_material
+from texgs.volume.view_set import Light
+
+SIZE = 32
+RADIUS = 0.3  # of the ball, world units
+HEADLIGHT = Light("headlight")
+
+
+def cameras(count=6, size=SIZE, distance=1.5):
+    """Around the ball, above and below the equator."""
+    return [orbit(360 * i / count, 25 * (-1) ** i, distance, 50, size, size) for i in range(count)]
+
+
+def ball_planes(camera, radius=RADIUS, color=(0.8, 0.4, 0.2)):
+    """Colour over white and alpha [4, H, W] of a ball without shading but for its rim, by ray casting."""
+    rows, columns = torch.meshgrid(
+        torch.arange(camera.height) + 0.5, torch.arange(camera.width) + 0.5, indexing="ij"
+    )
+    pixels = torch.stack([columns, rows, torch.ones_like(rows)], dim=-1)  # [H, W, 3]
+    rays = pixels @ torch.linalg.inv(camera.K).T @ camera.viewmat[:3, :3]
+    rays = rays / rays.norm(dim=-1, keepdim=True)
+    along = -(rays @ camera.position)
+    nearest = (camera.position + along[..., None] * rays).norm(dim=-1)
+    alpha = (nearest < radius).float()
+    facing = (1 - (nearest / radius) ** 2).clamp_min(0).sqrt()
+    shaded = torch.tensor(color) * (0.4 + 0.6 * facing[..., None])
+    return torch.cat([(shaded * alpha[..., None] + 1 - alpha[..., None]).permute(2, 0, 1), alpha[None]])
+
+
+def images_of(planes, views):
+    """Images of float planes [4, H, W], one for each camera."""
+    stack = torch.stack(planes).mul(255).round().to(torch.uint8)
+    return Images(stack, list(views), [HEADLIGHT] * len(views))
+
+
+def ball_images(count=6, **options):
+    """The ball from `count` cameras."""
+    views = cameras(count, **options)
+    return images_of([ball_planes(camera) for camera in views], views)
+
+
+def ball_seeds(count=80, seed=0, opacity=0.1):
+    """Raw surfels with colours and one material at random points in a cube that holds the ball."""
+    generator = torch.Generator().manual_seed(seed)
+    points = (torch.rand(count, 3, generator=generator) - 0.5) * 2 * RADIUS
+    parameters = surfels_at(points, opacity, generator)
+    return {**parameters, "colors": torch.full((count, 3), 0.5), **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
+
+
+def phase(iterations=60, densify=None, losses=None, rates=None, **options):
+    """A phase that densifies at 20, 30 and 40 and resets opacities at 25 and 50."""
+    densify = densify or Densify(start=10, stop=50, every=10, threshold=1e-5, cap=150, reset_every=25)
+    return Phase(
+        iterations=iterations, densify=densify, losses=losses or Losses(), rates=rates or Rates(), **options
+    )
+
+
+def new_fit(images=None, parameters=None, seed=0, **options):
+    """A fit of the ball."""
+    return Fit(parameters or ball_seeds(), Optics(), images or ball_images(), phase(**options), seed)
+
+
+def run(fit, iterations=None):
+    """Iterate, to the end unless told; return the fit."""
+    for done in fit.run():
+        if done.iteration == iterations:
+            break
+    return fit
+
+
+def is_finite(parameters):
+    """Whether no parameter holds NaN or infinity."""
+    return all(bool(torch.isfinite(x).all()) for x in parameters.values())
+
+
+def logit(value):
+    """Of a number."""
+    return math.log(value / (1 - value))

@@ -1,0 +1,148 @@
+import math
+
+import pytest
+import torch
+
+from texgs.config.fit import Densify
+from texgs.fit.densify import RESET_OPACITY, SHRINK, DensityControl
+from texgs.fit.optimizer import Optimizer, Rate
+
+from .scenes import logit
+
+EXTENT = 2.0
+SMALL, LARGE = 0.01, 0.1  # scales below and above `size` x extent = 0.02
+
+
+def settings(**options):
+    defaults = {"start": 0, "stop": 100, "every": 10, "threshold": 2e-4, "size": 0.01, "cap": 1000}
+    return Densify(**{**defaults, "prune_opacity": 0.005, "prune_size": 0.1, **options})
+
+
+def surfels(scales, opacities=None):
+    """One surfel for each scale, along x, each with a colour that tells which it is."""
+    n = len(scales)
+    turn = torch.tensor([math.cos(0.5), 0.0, math.sin(0.5), 0.0])
+    return Optimizer(
+        {
+            "means": torch.arange(n, dtype=torch.float32)[:, None] * torch.tensor([1.0, 0.0, 0.0]),
+            "quats": turn.repeat(n, 1),
+            "scales": torch.tensor(scales).log()[:, None].repeat(1, 2),
+            "opacities": torch.tensor([logit(o) for o in opacities or [0.5] * n]),
+            "colors": torch.arange(n, dtype=torch.float32)[:, None].repeat(1, 3),
+            "ambient": torch.zeros(1),
+        },
+        {"ambient": Rate(1.0, 1.0)},
+    )
+
+
+def control_of(optimizer, gradients, **options):
+    """Statistics as if each surfel had had this mean gradient, in half image widths."""
+    control = DensityControl(settings(**options), len(gradients), EXTENT, torch.device("cpu"))
+    control.gradients, control.counts = torch.tensor(gradients) * 3, torch.full((len(gradients),), 3.0)
+    return control
+
+
+def step(optimizer, gradients, iteration=10, seed=0, **options):
+    """The colours, which name the surfels, after a step."""
+    control = control_of(optimizer, gradients, **options)
+    control.step(iteration, optimizer, torch.Generator().manual_seed(seed))
+    return optimizer.parameters["colors"][:, 0].tolist()
+
+
+def test_gradients_count_in_half_image_widths_and_only_where_there_are_any():
+    control = DensityControl(settings(), 2, EXTENT, torch.device("cpu"))
+    control.observe(torch.tensor([[3e-6, 0.0], [0.0, 0.0]]), 200, 80)
+    control.observe(torch.tensor([[0.0, 1e-6], [0.0, 2e-6]]), 200, 80)
+    torch.testing.assert_close(control.gradients, torch.tensor([3e-4 + 4e-5, 8e-5]))
+    assert control.counts.tolist() == [2, 1]
+
+
+def test_small_surfels_above_the_threshold_are_cloned():
+    optimizer = surfels([SMALL] * 3)
+    assert step(optimizer, [1e-4, 3e-4, 2e-4]) == [0, 1, 2, 1]
+    for x in optimizer.parameters.values():
+        if len(x) == 4:
+            assert torch.equal(x[3], x[1])
+    assert optimizer.parameters["ambient"].shape == (1,)
+
+
+def test_large_surfels_above_the_threshold_are_split():
+    optimizer = surfels([LARGE, SMALL, LARGE])
+    assert step(optimizer, [1e-3, 0.0, 0.0]) == [1, 2, 0, 0]
+    p = optimizer.parameters
+    torch.testing.assert_close(p["scales"][2:].exp(), torch.full((2, 2), LARGE / SHRINK))
+    normal = torch.tensor([math.sin(1.0), 0.0, math.cos(1.0)])  # z turned by 1 radian about y
+    torch.testing.assert_close(p["means"][2:] @ normal, torch.zeros(2), atol=1e-6, rtol=0)
+    assert not torch.equal(p["means"][2], p["means"][3])
+
+
+def test_children_are_drawn_from_the_gaussian_of_their_parent():
+    n = 4000
+    optimizer = surfels([LARGE] * n)
+    with torch.no_grad():
+        optimizer.parameters["means"].zero_()
+        optimizer.parameters["scales"][:, 1] = math.log(0.5 * LARGE)
+    step(optimizer, [1.0] * n, cap=2 * n)
+    along_u = torch.tensor([math.cos(1.0), 0.0, -math.sin(1.0)])
+    means = optimizer.parameters["means"]
+    assert len(means) == 2 * n
+    # The error of a standard deviation from 8000 draws is 0.8 %.
+    assert (means @ along_u).std().item() == pytest.approx(LARGE, rel=0.04)
+    assert means[:, 1].std().item() == pytest.approx(0.5 * LARGE, rel=0.04)
+
+
+def test_faint_and_huge_surfels_are_removed_and_not_cloned():
+    optimizer = surfels([SMALL, SMALL, 0.3, SMALL], [0.5, 0.004, 0.5, 0.006])  # prune_size x extent = 0.2
+    assert step(optimizer, [0.0, 1.0, 1.0, 0.0]) == [0, 3]
+
+
+def test_the_cap_takes_the_largest_gradients():
+    assert step(surfels([SMALL] * 4), [4e-4, 9e-4, 3e-4, 8e-4], cap=6) == [0, 1, 2, 3, 1, 3]
+    assert sorted(step(surfels([LARGE] * 4), [4e-4, 9e-4, 3e-4, 8e-4], cap=5)) == [0, 1, 1, 2, 3]
+
+
+@pytest.mark.parametrize("cap", [1, 3, 4])
+def test_at_or_above_the_cap_nothing_is_added(cap):
+    assert step(surfels([SMALL, LARGE, SMALL, LARGE]), [1.0] * 4, cap=cap) == [0, 1, 2, 3]
+
+
+def test_what_is_removed_makes_room_under_the_cap():
+    optimizer = surfels([SMALL] * 4, [0.5, 0.001, 0.5, 0.5])
+    assert step(optimizer, [1e-3, 0.0, 2e-3, 3e-3], cap=4) == [0, 2, 3, 3]
+
+
+@pytest.mark.parametrize(("iteration", "expected"), [(9, 2), (10, 2), (20, 3), (30, 3), (40, 2)])
+def test_it_happens_every_so_often_after_start_and_up_to_stop(iteration, expected):
+    optimizer = surfels([SMALL] * 2)
+    assert len(step(optimizer, [1.0, 0.0], iteration, start=10, stop=30)) == expected
+
+
+def test_statistics_start_again_after_a_step():
+    optimizer = surfels([SMALL] * 2)
+    control = control_of(optimizer, [1.0, 0.0])
+    control.step(10, optimizer, torch.Generator())
+    assert control.gradients.tolist() == [0, 0, 0]
+    assert control.counts.tolist() == [0, 0, 0]
+
+
+def test_opacities_are_reset_to_a_hundredth_at_most():
+    optimizer = surfels([SMALL] * 3, [0.9, 0.02, 0.006])
+    step(optimizer, [0.0] * 3, iteration=25, reset_every=25)
+    torch.testing.assert_close(
+        optimizer.parameters["opacities"].sigmoid(), torch.tensor([RESET_OPACITY, RESET_OPACITY, 0.006])
+    )
+
+
+def test_surfels_may_all_be_removed():
+    optimizer = surfels([SMALL] * 2, [0.001, 0.001])
+    assert step(optimizer, [1.0, 0.0]) == []
+    assert step(optimizer, []) == []
+
+
+def test_splits_depend_on_the_generator_only():
+    found = [surfels([LARGE] * 2) for _ in range(3)]
+    for optimizer, seed in zip(found, (0, 0, 1), strict=True):
+        step(optimizer, [1.0, 1.0], seed=seed)
+    first, same, other = (optimizer.parameters["means"] for optimizer in found)
+    assert torch.equal(first, same)
+    assert not torch.equal(first, other)

@@ -1,0 +1,97 @@
+from dataclasses import replace
+
+import pytest
+import torch
+from PIL import Image
+
+from texgs.core.errors import ArgumentError
+from texgs.core.image import write_png
+from texgs.fit.images import load
+from texgs.volume.reduced import over_white, smaller
+from texgs.volume.view_set import View, read_views, write_transforms
+
+from .scenes import HEADLIGHT, cameras
+
+
+def random_view(folder, camera, seed=0, channels=4):
+    """A view of random straight-alpha pixels, and these as floats [H, W, 4]."""
+    generator = torch.Generator().manual_seed(seed)
+    pixels = torch.randint(0, 256, (camera.height, camera.width, 4), generator=generator, dtype=torch.uint8)
+    pixels[0, :2, 3] = torch.tensor([0, 255])
+    path = folder / f"r_{seed}.png"
+    Image.fromarray(pixels[..., :channels].numpy()).save(path)
+    return View(camera, path, HEADLIGHT), pixels.double() / 255
+
+
+def expected_planes(pixels):
+    """Colour over white and alpha [4, H, W], float64."""
+    color, alpha = pixels[..., :3], pixels[..., 3:]
+    return torch.cat([color * alpha + 1 - alpha, alpha], dim=2).permute(2, 0, 1)
+
+
+def test_images_are_kept_to_half_a_value_of_8_bits(tmp_path):
+    found = [random_view(tmp_path, camera, seed) for seed, camera in enumerate(cameras(3, size=8))]
+    images = load([view for view, _ in found])
+    assert images.planes.dtype == torch.uint8
+    assert len(images) == 3
+    for index, (view, pixels) in enumerate(found):
+        target = images.target(index)
+        planes = torch.cat([target.color.permute(2, 0, 1), target.alpha[None]])
+        assert (planes.double() - expected_planes(pixels)).abs().max() <= 0.5 / 255 + 1e-6
+        assert torch.equal(target.camera.viewmat, view.camera.viewmat)
+        torch.testing.assert_close(over_white(view).double(), expected_planes(pixels), atol=1e-6, rtol=0)
+
+
+def test_8_bits_as_floats_and_back_are_the_same(tmp_path):
+    camera = cameras(1, size=16)[0]
+    gray = torch.arange(256, dtype=torch.uint8).reshape(16, 16)
+    Image.fromarray(torch.stack([gray] * 3, dim=2).numpy()).save(tmp_path / "r_0.png")
+    images = load([View(camera, tmp_path / "r_0.png", HEADLIGHT)])
+    assert torch.equal(images.planes[0], torch.stack([gray, gray, gray, torch.full_like(gray, 255)]))
+    target = images.target(0)
+    assert torch.equal((target.color[..., 0] * 255).round().to(torch.uint8), gray)
+
+
+@pytest.mark.parametrize("reduce", [2, 4])
+def test_reducing_averages_premultiplied_colour(tmp_path, reduce):
+    view, pixels = random_view(tmp_path, cameras(1, size=8)[0])
+    n = 8 // reduce
+    blocks = expected_planes(pixels).reshape(4, n, reduce, n, reduce)
+    torch.testing.assert_close(over_white(view, reduce).double(), blocks.mean(dim=(2, 4)), atol=1e-6, rtol=0)
+    assert load([view], reduce).planes.shape == (1, 4, n, n)
+
+
+def test_a_reduced_camera_sees_points_at_the_same_place_of_the_image(tmp_path):
+    camera = cameras(1, size=8)[0]
+    half = smaller(camera, 2)
+    assert (half.width, half.height) == (4, 4)
+    point = torch.tensor([0.1, 0.2, 1.0])
+    torch.testing.assert_close((half.K @ point)[:2] * 2, (camera.K @ point)[:2])
+    assert half.K[2].tolist() == [0, 0, 1]
+
+
+def test_images_without_alpha_are_opaque(tmp_path):
+    view, pixels = random_view(tmp_path, cameras(1, size=8)[0], channels=3)
+    target = load([view]).target(0)
+    assert torch.equal(target.alpha, torch.ones(8, 8))
+    torch.testing.assert_close(target.color.double(), pixels[..., :3], atol=1e-6, rtol=0)
+
+
+def test_mistakes_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="views: expected at least one, got none"):
+        load([])
+    view, _ = random_view(tmp_path, cameras(1, size=8)[0])
+    with pytest.raises(ArgumentError, match="reduce: expected a divisor of 8 x 8 pixels, got 3"):
+        load([view], 3)
+    with pytest.raises(ArgumentError, match=r"gone\.png: expected an image"):
+        load([replace(view, path=tmp_path / "gone.png")])
+
+
+def test_images_of_different_sizes_are_refused_before_any_is_read(tmp_path):
+    views = []
+    for index, camera in enumerate(cameras(2, size=8)):
+        views.append(View(camera, tmp_path / f"r_{index}.png", HEADLIGHT))
+        write_png(views[-1].path, torch.rand(8 + index, 8, 3))
+    write_transforms(tmp_path, "train", views, {})
+    with pytest.raises(ArgumentError, match=r"r_1\.png: expected 8 x 8 pixels as w and h say, got 8 x 9"):
+        read_views(tmp_path)

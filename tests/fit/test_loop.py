@@ -1,0 +1,225 @@
+import pytest
+import torch
+
+from texgs.config.fit import Densify, Losses, Rates
+from texgs.core.camera import Camera, look_at, orbit
+from texgs.core.errors import FitError
+from texgs.core.image import write_png
+from texgs.fit import checkpoint
+from texgs.fit.harmonics import split, zeroth
+from texgs.fit.images import load
+from texgs.fit.loop import CHECKED_EVERY, extent
+from texgs.fit.seeds import seed_surfels
+from texgs.metrics.quality import evaluate, mean
+from texgs.scene.model import MATERIAL, Model, raw_material
+from texgs.volume.view_set import View, ViewSet, read_views, write_transforms
+
+from .scenes import (
+    HEADLIGHT,
+    ball_images,
+    ball_planes,
+    ball_seeds,
+    cameras,
+    images_of,
+    is_finite,
+    new_fit,
+    run,
+)
+
+SIZE = 32
+DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
+
+
+def flat_images(color, alpha, count=4, views=None):
+    """Images of one colour over white and one alpha."""
+    views = views or cameras(count)
+    planes = torch.cat([torch.tensor(color), torch.tensor([alpha])])[:, None, None].expand(4, SIZE, SIZE)
+    return images_of([planes] * len(views), views)
+
+
+def psnr_of(fit, folder):
+    """Mean PSNR on the images that it was fitted to."""
+    views = []
+    for index, camera in enumerate(fit.images.cameras):
+        target = fit.images.target(index)
+        path = write_png(folder / f"{index}.png", target.color)
+        views.append(View(camera, path, fit.images.lights[index]))
+    model = Model({name: x.detach() for name, x in fit.parameters.items()}, fit.optics)
+    return mean(evaluate(model, views))["psnr"]
+
+
+# --- what it does -----------------------------------------------------------
+
+
+def test_it_fits_a_ball(tmp_path):
+    fit = run(new_fit(iterations=200, densify=DENSIFY))
+    assert psnr_of(new_fit(), tmp_path) < 16
+    assert psnr_of(fit, tmp_path) > 21
+    assert 80 < len(fit.parameters["means"]) <= 150
+
+
+def test_harmonics_fit_too(tmp_path):
+    seeds = ball_seeds()
+    sh = torch.cat([zeroth(seeds.pop("colors")), torch.zeros(80, 15, 3)], dim=1)
+    start = {name: x for name, x in seeds.items() if name not in MATERIAL} | split(sh)
+    fit = run(new_fit(parameters=start, iterations=200, densify=Densify(stop=0), sh_every=40))
+    assert psnr_of(fit, tmp_path) > 17
+    assert fit.parameters["sh_rest"].shape == (80, 15, 3)
+    assert fit.parameters["sh_rest"].any()
+
+
+def test_the_same_seed_is_bit_equal_and_another_one_differs():
+    first, same, other = (run(new_fit(seed=seed)).state() for seed in (0, 0, 1))
+    assert first.keys() == same.keys()
+    for name, x in first.items():
+        assert torch.equal(x, same[name]), name
+    assert not all(torch.equal(x, other[name]) for name, x in first.items())
+
+
+def test_threads_do_not_change_the_result():
+    one = run(new_fit(), 26).state()  # past a split and a reset
+    torch.set_num_threads(2)  # the fixture sets it back
+    two = run(new_fit(), 26).state()
+    for name, x in one.items():
+        assert torch.equal(x, two[name]), name
+
+
+def test_every_epoch_shows_every_view_once_in_its_own_order():
+    fit = new_fit(images=ball_images(count=7))
+    epochs = [[fit.view_of(7 * epoch + place + 1) for place in range(7)] for epoch in range(6)]
+    assert all(sorted(epoch) == list(range(7)) for epoch in epochs)
+    assert len(set(map(tuple, epochs))) == 6
+    assert epochs != [
+        [new_fit(seed=1, images=fit.images).view_of(7 * e + p + 1) for p in range(7)] for e in range(6)
+    ]
+
+
+def test_orders_and_splits_have_random_numbers_of_their_own():
+    fit = new_fit()
+    draws = [torch.rand(4, generator=fit.generator(stream)).tolist() for stream in range(50)]
+    assert len(set(map(tuple, draws))) == 50
+
+
+def test_a_rate_of_zero_keeps_a_parameter():
+    rates = Rates(means=0.0, material=0.0)
+    fit = run(new_fit(rates=rates, densify=Densify(stop=0), iterations=5))
+    start = ball_seeds()
+    for name, x in fit.parameters.items():
+        assert torch.equal(x, start[name]) == (name in ("means", *MATERIAL)), name
+
+
+def test_progress_is_told_after_every_iteration():
+    found = list(new_fit(iterations=CHECKED_EVERY + 5, densify=Densify(stop=0)).run())
+    assert [done.iteration for done in found] == list(range(1, CHECKED_EVERY + 6))
+    assert [done.iteration for done in found if done.loss is not None] == [CHECKED_EVERY, CHECKED_EVERY + 5]
+    assert all(done.n_surfels == 80 for done in found)
+
+
+def test_the_extent_is_that_of_the_cameras_or_four_times_that_of_the_surfels():
+    views = [orbit(azimuth, 0, 2.0, 50, SIZE, SIZE) for azimuth in (0, 90, 180, 270)]
+    means = torch.tensor([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
+    assert extent(flat_images([1.0] * 3, 1.0, views=views), means) == pytest.approx(2.2)
+    one = flat_images([1.0] * 3, 1.0, views=views[:1])
+    assert extent(one, means) == pytest.approx(2.2)
+    assert extent(one, means[:0]) > 0
+
+
+# --- hard cases -------------------------------------------------------------
+
+
+def test_one_view_is_enough(tmp_path):
+    fit = run(new_fit(images=ball_images(count=1), iterations=150, densify=DENSIFY))
+    assert is_finite(fit.parameters)
+    assert psnr_of(fit, tmp_path) > 20
+
+
+@pytest.mark.parametrize(
+    ("color", "alpha"),
+    [([1.0, 1.0, 1.0], 0.0), ([1.0, 1.0, 1.0], 1.0), ([0.0, 0.0, 0.0], 1.0)],
+    ids=["empty", "white", "black"],
+)
+def test_images_of_one_colour_give_a_finite_model(tmp_path, color, alpha):
+    fit = run(new_fit(images=flat_images(color, alpha), iterations=120))
+    assert is_finite(fit.state())
+    if alpha == 0 or color[0] == 1:
+        assert psnr_of(fit, tmp_path) > 25
+
+
+def test_a_model_without_surfels_goes_on_and_stays_empty():
+    images = flat_images([1.0, 1.0, 1.0], 0.0)
+    start = ball_seeds(opacity=0.006)
+    densify = Densify(start=0, stop=40, every=10, threshold=10.0, prune_opacity=0.5)
+    fit = run(new_fit(images=images, parameters=start, iterations=60, densify=densify))
+    assert len(fit.parameters["means"]) == 0
+    assert is_finite(fit.state())
+
+
+def test_some_empty_views_do_no_harm():
+    views = cameras(4)
+    nothing = torch.cat([torch.ones(3, SIZE, SIZE), torch.zeros(1, SIZE, SIZE)])
+    planes = [nothing if index % 2 else ball_planes(camera) for index, camera in enumerate(views)]
+    assert is_finite(run(new_fit(images=images_of(planes, views))).state())
+
+
+def test_views_without_alpha_fit_from_files(tmp_path):
+    views = []
+    for index, camera in enumerate(cameras(4)):
+        path = write_png(tmp_path / f"r_{index}.png", ball_planes(camera)[:3].permute(1, 2, 0))
+        views.append(View(camera, path, HEADLIGHT))
+    write_transforms(tmp_path, "train", views, {"aabb": [[-0.4] * 3, [0.4] * 3]})
+    found = read_views(tmp_path)
+    images = load(found.train)
+    parameters, colors = seed_surfels(images, found, "auto", 80, 0.1, 0.55, 0)
+    start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
+    fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
+    assert is_finite(fit.state())
+    assert psnr_of(fit, tmp_path) > 18
+
+
+def test_cameras_inside_of_the_object_fit(tmp_path):
+    K = torch.tensor([[20.0, 0, 16], [0, 20, 16], [0, 0, 1]])
+    targets = torch.tensor([[1.0, 0, 0], [0, 0, 1.0], [-1.0, 0, 0.1], [0.1, 0, -1.0]])
+    views = [Camera(look_at(0.02 * t, t), K, SIZE, SIZE) for t in targets]
+    images = flat_images([0.2, 0.5, 0.9], 1.0, views=views)
+    parameters, colors = seed_surfels(images, ViewSet(tmp_path, [], [], {}), "auto", 150, 0.1, 0.55, 0)
+    start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
+    fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
+    assert is_finite(fit.state())
+    assert psnr_of(fit, tmp_path) > 12
+
+
+@pytest.mark.parametrize("weights", [Losses(normal=0.05), Losses(dssim=1.0), Losses(dssim=0.0, alpha=1.0)])
+@pytest.mark.parametrize("kind", ["ball", "empty"])
+def test_every_loss_stays_finite(weights, kind):
+    images = ball_images() if kind == "ball" else flat_images([1.0, 1.0, 1.0], 0.0)
+    assert is_finite(run(new_fit(images=images, losses=weights, iterations=30)).state())
+
+
+def test_a_material_for_each_surfel_stays_finite_and_smooth():
+    seeds = ball_seeds()
+    seeds |= {name: seeds[name].repeat(80) for name in MATERIAL}
+    fit = run(new_fit(parameters=seeds, losses=Losses(smoothness=0.01)))
+    assert is_finite(fit.state())
+    assert len(fit.parameters["ambient"]) == len(fit.parameters["means"]) > 80
+
+
+def test_a_loss_that_is_not_finite_ends_the_run_and_keeps_the_checkpoint(tmp_path):
+    fit = run(new_fit(iterations=CHECKED_EVERY, densify=Densify(stop=0)), 20)
+    checkpoint.save(tmp_path, fit)
+    with torch.no_grad():
+        fit.parameters["colors"].fill_(torch.nan)
+    with pytest.raises(FitError, match=r"iteration 100: means: .*240 NaN.*the last checkpoint is kept"):
+        run(fit)
+    state = checkpoint.latest(tmp_path)
+    assert int(state["iteration"]) == 20
+    assert is_finite(state)
+
+
+def test_rates_that_are_far_too_high_end_in_an_error_or_a_finite_model():
+    rates = Rates(means=1e6, scales=50.0, quats=1e3, colors=1e4)
+    fit = new_fit(rates=rates, iterations=CHECKED_EVERY, densify=Densify(stop=0))
+    try:
+        run(fit)
+    except FitError:
+        return
+    assert is_finite(fit.state())

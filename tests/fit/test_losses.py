@@ -1,0 +1,78 @@
+import pytest
+import torch
+
+from tests.fit.scenes import ball_images, ball_seeds
+from texgs.config.fit import Losses
+from texgs.fit.losses import view_loss
+from texgs.raster.reference.losses import bilateral_smoothness, ssim
+from texgs.scene.model import Model, Optics, material
+from texgs.scene.render import render
+
+OPTICS = Optics()
+
+
+@pytest.fixture
+def target():
+    return ball_images().target(1)
+
+
+def per_surfel():
+    """Surfels with a material each that is not the same everywhere."""
+    generator = torch.Generator().manual_seed(3)
+    p = ball_seeds(60, opacity=0.6)
+    n = len(p["means"])
+    return {
+        **p,
+        **{
+            name: p[name] + torch.randn(n, generator=generator) for name in ("ambient", "diffuse", "specular")
+        },
+        "shininess": p["shininess"] + torch.randn(n, generator=generator),
+    }
+
+
+def photometric(image, target, weight):
+    """L1 + D-SSIM from its definition, in float64."""
+    image, target = image.double(), target.double()
+    return (1 - weight) * (image - target).abs().mean() + weight * (1 - ssim(image, target))
+
+
+def loss(parameters, target, **weights):
+    return float(view_loss(parameters, OPTICS, target, Losses(**weights), None, iteration=10))
+
+
+def test_color_and_alpha(target):
+    parameters = per_surfel()
+    seen = render(Model(parameters, OPTICS), target.camera, target.light)
+    color = photometric(seen.color, target.color, 0.2)
+    alpha = photometric(seen.alpha[..., None], target.alpha[..., None], 0.2)
+    assert loss(parameters, target, alpha=0.0) == pytest.approx(float(color), rel=1e-4)
+    assert loss(parameters, target, alpha=0.5) == pytest.approx(float(color + 0.5 * alpha), rel=1e-4)
+
+
+def test_smoothness_of_each_map_of_the_material(target):
+    parameters = per_surfel()
+    n = len(parameters["means"])
+    expected = 0.0
+    for values in material(parameters, "bounded").values():
+        flat = {**parameters, "colors": values[:, None].expand(n, 3)}
+        unlit = {**flat, "ambient": torch.full((1,), 40.0), "diffuse": torch.full((1,), -40.0)}
+        unlit |= {"specular": torch.full((1,), -40.0), "shininess": torch.zeros(1)}
+        scale = float(values.max())
+        unlit["colors"] = unlit["colors"] / scale  # colours are clamped to 1
+        plane = scale * render(Model(unlit, OPTICS), target.camera, background=torch.zeros(3)).color[..., 0]
+        expected += float(bilateral_smoothness(plane.double(), target.color.double(), target.alpha.double()))
+    without, with_it = loss(parameters, target), loss(parameters, target, smoothness=0.01)
+    assert with_it - without == pytest.approx(0.01 * expected, rel=1e-3)
+
+
+def test_one_material_for_all_is_smooth_already(target):
+    parameters = ball_seeds(60)
+    assert loss(parameters, target, smoothness=5.0) == loss(parameters, target)
+
+
+def test_normals_count_from_their_iteration_on(target):
+    parameters = per_surfel()
+    late = loss(parameters, target, normal=0.1, normal_from=10)
+    early = loss(parameters, target, normal=0.1, normal_from=9)
+    assert late == loss(parameters, target)
+    assert early > late

@@ -1,0 +1,255 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from scipy.spatial.distance import cdist
+
+from tests.real_data import real_data
+from texgs.core.errors import ArgumentError
+from texgs.fit.hull import hull_points, mean_colors, project
+from texgs.fit.images import load
+from texgs.fit.seeds import box_of, read_points, seed_surfels, surfels_at
+from texgs.fit.visible import shrunk
+from texgs.volume.view_set import ViewSet, read_views
+
+from .scenes import RADIUS, ball_images, cameras, images_of
+
+BOX = (torch.full((3,), -0.55), torch.full((3,), 0.55))
+
+
+def random_numbers(seed=0):
+    return torch.Generator().manual_seed(seed)
+
+
+def view_set(folder=Path("views"), **metadata):
+    return ViewSet(folder, [], [], metadata)
+
+
+def seeds(folder=Path("views"), images=None, metadata=None, **options):
+    defaults = {"kind": "auto", "count": 300, "opacity": 0.1, "half_size": 0.55, "seed": 0}
+    views = view_set(folder, **metadata or {})
+    return seed_surfels(images or ball_images(), views, **{**defaults, **options})
+
+
+def write_ply(path, columns):
+    """An ASCII PLY file of vertices; columns are name to (type, values)."""
+    n = len(next(iter(columns.values()))[1])
+    header = ["ply", "format ascii 1.0", f"element vertex {n}"]
+    header += [f"property {kind} {name}" for name, (kind, _) in columns.items()] + ["end_header"]
+    rows = zip(*(values for _, values in columns.values()), strict=True)
+    path.write_text("\n".join(header + [" ".join(map(str, row)) for row in rows]) + "\n")
+
+
+def xyz(n=5):
+    return {name: ("float", [axis + 0.25 * row for row in range(n)]) for axis, name in enumerate("xyz")}
+
+
+# --- the hull ---------------------------------------------------------------
+
+
+def test_hull_points_are_seen_by_every_view():
+    images = ball_images()
+    points = hull_points(images, BOX, 500, random_numbers())
+    assert points.shape == (500, 3)
+    for index, camera in enumerate(images.cameras):
+        in_camera = points.double() @ camera.viewmat[:3, :3].double().T + camera.viewmat[:3, 3].double()
+        places = in_camera @ camera.K.double().T
+        columns, rows = (places[:, :2] / places[:, 2:]).floor().long().T
+        assert (images.planes[index, 3][rows, columns] > 0).all()
+
+
+def test_the_hull_of_a_ball_is_little_more_than_the_ball():
+    images = ball_images(count=24, size=64)
+    distances = hull_points(images, BOX, 2000, random_numbers()).norm(dim=1)
+    pixel = 1.5 / float(images.cameras[0].K[0, 0])
+    assert (distances < RADIUS + 6 * pixel).all()
+    # All of the ball is filled evenly: half of its volume lies within 2^(-1/3) of its radius.
+    inside = distances[distances < RADIUS]
+    assert (inside < RADIUS * 0.5 ** (1 / 3)).float().mean() == pytest.approx(0.5, abs=0.05)
+
+
+def test_points_outside_of_a_view_are_not_carved_by_it():
+    camera = cameras(1)[0]
+    empty = images_of([torch.zeros(4, camera.height, camera.width)], [camera])
+    behind = (camera.position * 1.5 - 0.01, camera.position * 1.5 + 0.01)
+    assert len(hull_points(empty, behind, 10, random_numbers())) == 10
+
+
+def test_views_that_show_nothing_are_an_error():
+    views = cameras(3)
+    empty = images_of([torch.cat([torch.ones(3, 32, 32), torch.zeros(1, 32, 32)])] * 3, views)
+    with pytest.raises(ArgumentError, match=r"visual hull: .*found none.*do the views show anything"):
+        hull_points(empty, BOX, 100, random_numbers())
+    with pytest.raises(ArgumentError, match="visual hull"):
+        seeds(images=empty)
+    parameters, colors = seeds(images=empty, kind="random")
+    assert torch.equal(colors, torch.zeros(300, 3))
+    assert all(torch.isfinite(x).all() for x in parameters.values())
+
+
+def test_projection_is_that_of_the_pinhole():
+    camera = cameras(1)[0]
+    target = torch.zeros(1, 3)
+    columns, rows, is_inside = project(camera, torch.cat([target, 2 * camera.position[None]]))
+    assert (columns[0], rows[0]) == (16, 16)
+    assert is_inside.tolist() == [True, False]
+
+
+def test_colours_are_means_without_the_background():
+    views = cameras(4)
+    tint = torch.tensor([0.2, 0.6, 1.0])
+    planes = []
+    for alpha in (1.0, 0.5, 0.5, 0.0):
+        over_white = tint * alpha + 1 - alpha
+        planes.append(torch.cat([over_white, torch.tensor([alpha])])[:, None, None].expand(4, 32, 32))
+    points = torch.cat([torch.zeros(1, 3), torch.full((1, 3), 50.0)])
+    colors = mean_colors(images_of(planes, views), points)
+    torch.testing.assert_close(colors[0], tint, atol=0.01, rtol=0)  # 8 bits
+    assert torch.equal(colors[1], torch.zeros(3))
+
+
+# --- surfels ----------------------------------------------------------------
+
+
+def test_scales_are_distances_of_the_three_nearest():
+    points = torch.rand(60, 3, generator=random_numbers())
+    distances = np.sort(cdist(points.double(), points.double()), axis=1)[:, 1:4]
+    surfels = surfels_at(points, 0.3, random_numbers())
+    expected = torch.from_numpy(np.sqrt((distances**2).mean(axis=1))).float()
+    torch.testing.assert_close(surfels["scales"].exp(), expected[:, None].repeat(1, 2))
+    torch.testing.assert_close(surfels["opacities"].sigmoid(), torch.full((60,), 0.3))
+    torch.testing.assert_close(surfels["quats"].norm(dim=1), torch.ones(60))
+    assert torch.equal(surfels["means"], points)
+
+
+def test_equal_points_have_a_finite_scale():
+    surfels = surfels_at(torch.zeros(10, 3), 0.1, random_numbers())
+    assert torch.isfinite(surfels["scales"]).all()
+
+
+def test_three_points_are_too_few():
+    with pytest.raises(ArgumentError, match="seeds: expected at least 4 points, got 3"):
+        surfels_at(torch.zeros(3, 3), 0.1, random_numbers())
+
+
+@pytest.mark.parametrize("kind", ["visible", "hull", "random"])
+def test_the_same_seed_gives_the_same_surfels_and_another_one_others(kind):
+    (first, colors), (same, same_colors), (other, _) = (seeds(kind=kind, seed=s) for s in (3, 3, 4))
+    assert {name: len(x) for name, x in first.items()} == dict.fromkeys(first, 300)
+    assert colors.shape == (300, 3)
+    assert 0 <= colors.min() <= colors.max() <= 1
+    assert torch.equal(colors, same_colors)
+    assert all(torch.equal(x, same[name]) for name, x in first.items())
+    assert not torch.equal(first["means"], other["means"])
+
+
+def test_visible_surfels_are_on_the_opaque_ball_not_in_it():
+    options = {"images": ball_images(count=12, size=64), "count": 500}
+    filled, _ = seeds(kind="hull", **options)
+    seen, _ = seeds(kind="visible", **options)
+    depth = [torch.quantile(x["means"].norm(dim=1), 0.25) / RADIUS for x in (filled, seen)]
+    assert depth[0] == pytest.approx(0.25 ** (1 / 3), abs=0.06)
+    assert depth[1] > 0.78
+
+
+def test_images_are_shrunk_by_averages_and_the_rest_is_cut():
+    camera = cameras(1, size=11)[0]
+    planes = torch.rand(4, 11, 11, generator=random_numbers())
+    images = images_of([planes], [camera])
+    small = shrunk(images, 2)
+    blocks = images.planes[0, :, :10, :10].float().reshape(4, 5, 2, 5, 2).mean(dim=(2, 4))
+    assert (small.planes[0].float() - blocks).abs().max() <= 0.5
+    assert (small.cameras[0].width, small.cameras[0].height) == (5, 5)
+    assert shrunk(images, 0) is images
+
+
+# --- given points -----------------------------------------------------------
+
+
+def test_given_points_come_first(tmp_path):
+    colors = {name: ("uchar", [0, 51, 102, 153, 255]) for name in ("red", "green", "blue")}
+    write_ply(tmp_path / "points3d.ply", {**xyz(), **colors})
+    parameters, found = seeds(tmp_path, count=2)
+    expected = torch.tensor([[0.0, 1.0, 2.0]]) + 0.25 * torch.arange(5)[:, None]
+    assert torch.equal(parameters["means"], expected)
+    torch.testing.assert_close(found, torch.tensor([0.0, 0.2, 0.4, 0.6, 1.0])[:, None].repeat(1, 3))
+
+
+def test_points_without_colours_take_those_of_the_views(tmp_path):
+    write_ply(tmp_path / "points3d.ply", {name: ("double", [0.0, 0.1, 0.0, 0.1, 0.05]) for name in "xyz"})
+    images = ball_images()
+    parameters, colors = seeds(tmp_path, images)
+    assert torch.equal(colors, mean_colors(images, parameters["means"]))
+
+
+def test_colours_may_be_floats(tmp_path):
+    write_ply(tmp_path / "a.ply", {**xyz(), **{c: ("float", [0.5] * 5) for c in ("red", "green", "blue")}})
+    assert torch.equal(read_points(tmp_path / "a.ply")[1], torch.full((5, 3), 0.5))
+
+
+def test_mistakes_in_points_are_named(tmp_path):
+    path = tmp_path / "points3d.ply"
+    with pytest.raises(ArgumentError, match=r"points3d\.ply: no such file; .*visible needs no points"):
+        seeds(tmp_path, kind="points")
+    path.write_bytes(b"no points at all")
+    with pytest.raises(ArgumentError, match=r"points3d\.ply: expected a PLY file with vertices"):
+        seeds(tmp_path)
+    write_ply(path, {name: column for name, column in xyz().items() if name != "z"})
+    with pytest.raises(ArgumentError, match="expected vertices with x, y and z, found no z"):
+        seeds(tmp_path)
+    write_ply(path, {**xyz(), "x": ("float", ["nan"] * 5)})
+    with pytest.raises(ArgumentError, match="expected finite x, y and z"):
+        seeds(tmp_path)
+    write_ply(path, xyz(3))
+    with pytest.raises(ArgumentError, match="at least 4 points, got 3"):
+        seeds(tmp_path)
+    write_ply(path, xyz())
+    path.write_bytes(path.read_bytes()[:-12])
+    with pytest.raises(ArgumentError, match="expected a PLY file with vertices"):
+        seeds(tmp_path)
+
+
+# --- the box ----------------------------------------------------------------
+
+
+def test_the_box_is_that_of_the_data_with_a_margin():
+    low, high = box_of(view_set(aabb=[[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]), 9.0)
+    torch.testing.assert_close(low, torch.tensor([-0.52, -0.27, -0.02]))
+    torch.testing.assert_close(high, torch.tensor([0.52, 0.27, 0.12]))
+    low, high = box_of(view_set(), 0.7)
+    assert torch.equal(low, torch.full((3,), -0.7))
+    assert torch.equal(high, torch.full((3,), 0.7))
+
+
+@pytest.mark.parametrize("aabb", [[1, 2], "box", [[0, 0, 0], [1, 1, "x"]], [[0, 0], [1, 1]], {}])
+def test_an_aabb_of_another_form_is_an_error(aabb):
+    with pytest.raises(ArgumentError, match="aabb: expected two corners of three numbers"):
+        box_of(view_set(aabb=aabb), 1.0)
+
+
+@pytest.mark.parametrize("aabb", [[[1, 0, 0], [0, 1, 1]], [[0, 0, float("nan")], [1, 1, 1]]])
+def test_an_aabb_the_wrong_way_round_is_an_error(aabb):
+    with pytest.raises(ArgumentError, match="aabb: expected the lowest corner, then the highest"):
+        box_of(view_set(aabb=aabb), 1.0)
+
+
+def test_arguments_out_of_range_are_named():
+    with pytest.raises(ArgumentError, match=r"seeds\.kind: expected one of auto, .*got 'grid'"):
+        seeds(kind="grid")
+    for opacity in (0.0, 1.0, -1.0):
+        with pytest.raises(ArgumentError, match=r"seeds\.opacity: expected a value between 0 and 1"):
+            seeds(opacity=opacity)
+    with pytest.raises(ArgumentError, match=r"seeds\.half_size: expected more than 0, got 0"):
+        seeds(half_size=0)
+
+
+# --- real views -------------------------------------------------------------
+
+
+def test_points_published_with_the_paper_are_near_what_its_views_show():
+    views = read_views(real_data("vortex/TF01"))
+    images = load(views.train[:3], 8)
+    parameters, colors = seed_surfels(images, views, "auto", 1, 0.1, 0.55, 0)
+    assert len(parameters["means"]) == len(colors) > 9000
+    assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15

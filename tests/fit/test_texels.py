@@ -1,0 +1,156 @@
+"""Layout of textures, and what the phase changes and what it leaves alone."""
+
+import math
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.fit.scenes import HEADLIGHT, ball_images, ball_seeds, cameras, images_of, new_fit, run
+from texgs.core.errors import ArgumentError
+from texgs.fit.texels import mean_color, textured, texturize
+from texgs.fit.texture_layout import Sight, look, offsets_of, sizes_for_budget, sizes_where_seen
+from texgs.raster.atlas import check_texture
+from texgs.raster.types import Texture
+from texgs.scene.model import Model, Optics
+from texgs.scene.render import render
+
+
+@pytest.fixture(scope="module")
+def images():
+    return ball_images()
+
+
+@pytest.fixture(scope="module")
+def ball(images):
+    fit = run(new_fit(images, iterations=60))
+    return Model({name: x.detach() for name, x in fit.parameters.items()}, fit.optics)
+
+
+def total(sizes):
+    return int(sizes.long().prod(dim=1).sum())
+
+
+def color(model, view):
+    return render(model, view, HEADLIGHT).color
+
+
+def sight(largest, pixel):
+    return Sight(torch.tensor(largest), torch.tensor(pixel), torch.ones(len(largest)))
+
+
+def test_sizes_follow_the_formula():
+    scales = torch.tensor([[0.1, 0.2], [0.05, 0.01], [1e-6, 1e-6]])
+    edge = math.sqrt(36 * (0.1 * 0.2 + 0.05 * 0.01 + 1e-12) / 1000)
+    expected = [[math.ceil(6 * u / edge), math.ceil(6 * v / edge)] for u, v in scales.tolist()]
+    assert sizes_for_budget(scales, 1000).tolist() == expected
+    assert expected[2] == [1, 1]
+
+
+@pytest.mark.parametrize("budget", [1000, 20_000, 300_000])
+def test_budget_is_met_but_for_rounding_up(budget):
+    scales = torch.rand(50, 2) * 0.1 + 0.02
+    found = total(sizes_for_budget(scales, budget))
+    perimeter = math.sqrt(budget * 50) * 4  # one more row and column each, of at most six times longer sides
+    assert budget <= found <= budget + perimeter + 50
+
+
+def test_a_texel_is_a_pixel_where_a_surfel_is_fully_seen():
+    scales = torch.full((4, 2), 0.1)
+    found = sizes_where_seen(scales, sight([1.0, 0.25, 0.0, 1.0], [0.061, 0.061, math.inf, 0.0301]))
+    assert found.tolist() == [[10, 10], [5, 5], [1, 1], [20, 20]]
+
+
+def test_textures_lie_one_after_the_other():
+    sizes = torch.tensor([[2, 3], [1, 1], [4, 2]], dtype=torch.int32)
+    offsets = offsets_of(sizes)
+    assert offsets.tolist() == [0, 6, 7]
+    check_texture(Texture(torch.zeros(3, 3), torch.ones(3), torch.zeros(15, 3), sizes, offsets), 3)
+
+
+def test_look_sees_the_size_of_pixels_and_what_is_hidden():
+    p = ball_seeds(count=20)
+    p["means"] = torch.zeros(20, 3)
+    p["opacities"] = torch.full((20,), 8.0)
+    p["means"][0] = torch.tensor([0.0, 50.0, 0.0])  # in no view
+    views = cameras()
+    found = look(
+        textured(Model(p, Optics()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)), ball_images(), ""
+    )
+    assert found.largest[0] == 0
+    assert found.pixel[0] == math.inf
+    expected = torch.tensor(min(float(v.position.norm() / v.K[0, 0]) for v in views))
+    assert_close(found.pixel[found.largest > 0], expected.expand(int((found.largest > 0).sum())))
+    assert (found.curvature[found.largest > 0] > 0).all()
+
+
+def test_mean_color_counts_what_is_there_only():
+    planes = [torch.ones(4, 8, 8) for _ in range(2)]
+    planes[0][3] = 0  # white behind nothing
+    planes[1][:3, :, :4] = torch.tensor([0.2, 0.4, 0.6])[:, None, None]
+    planes[1][3, :, 4:] = 0
+    assert_close(mean_color(images_of(planes, cameras(2, 8))), torch.tensor([0.2, 0.4, 0.6]))
+
+
+def test_mean_color_of_nothing_is_finite():
+    planes = torch.ones(4, 8, 8)
+    planes[3] = 0
+    assert mean_color(images_of([planes], cameras(1, 8))).tolist() == [0, 0, 0]
+
+
+def test_an_empty_texture_renders_as_before(ball, images):
+    p = {**ball.parameters, "colors": ball.parameters["colors"] * 1.5 - 0.2}
+    plain = Model(p, ball.optics)
+    with_texels = texturize(plain, images, sweeps=0)
+    assert with_texels.stage == "texture"
+    for view in cameras():
+        assert_close(color(with_texels, view), color(plain, view), atol=1e-6, rtol=0)
+
+
+def test_texels_can_take_the_colors_over(ball, images):
+    with_offset = texturize(ball, images, texels=2000, sweeps=0)
+    without = texturize(ball, images, texels=2000, sweeps=0, has_offset=False)
+    assert not without.parameters["colors"].any()
+    p = with_offset.parameters
+    for surfel, offset in enumerate(p["offsets"].tolist()):
+        own = slice(offset, offset + int(p["sizes"][surfel].prod()))
+        assert_close(without.parameters["texels"][own], p["texels"][own] + p["colors"][surfel])
+
+
+def test_all_else_stays(ball, images):
+    found = texturize(ball, images, sweeps=1, iterations=2)
+    for name in ("means", "quats", "scales", "opacities", "ambient", "diffuse", "specular", "shininess"):
+        assert found.parameters[name] is ball.parameters[name]
+    assert_close(found.parameters["colors"] + found.parameters["palette"], ball.parameters["colors"])
+
+
+def test_same_seed_same_texels(ball, images):
+    first, second, other = (texturize(ball, images, sweeps=1, iterations=3, seed=s) for s in (1, 1, 2))
+    assert torch.equal(first.parameters["texels"], second.parameters["texels"])
+    assert not torch.equal(first.parameters["texels"], other.parameters["texels"])
+
+
+def test_a_model_of_another_stage_is_refused(ball, images):
+    p = {name: ball.parameters[name] for name in ("means", "quats", "scales", "opacities")}
+    with pytest.raises(ArgumentError, match="expected stage shading, got surfels"):
+        texturize(Model({**p, "sh": torch.zeros(len(ball), 1, 3)}), images)
+    with pytest.raises(ArgumentError, match="expected stage shading, got texture"):
+        texturize(texturize(ball, images, sweeps=0), images)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("sweeps", -1), ("iterations", -1), ("ridge", -0.1), ("sparsity", math.nan)]
+)
+def test_numbers_out_of_range_are_named(ball, images, name, value):
+    with pytest.raises(ArgumentError, match=f"{name}: expected 0 or more, got {value}"):
+        texturize(ball, images, **{name: value})
+
+
+def test_a_budget_of_nothing_is_refused(ball, images):
+    with pytest.raises(ArgumentError, match="texels: expected at least 1, got 0"):
+        texturize(ball, images, texels=0)
+
+
+def test_a_texture_too_large_for_the_rasterizer_is_refused():
+    with pytest.raises(ArgumentError, match=r"expected at most 2\^24 for one surfel, got"):
+        sizes_for_budget(torch.tensor([[1.0, 1.0]]), 2**25)

@@ -1,0 +1,176 @@
+"""Texels found from images: against least squares by brute force, and on views with detail of their own."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.fit.scenes import HEADLIGHT, ball_images, ball_planes, ball_seeds, cameras, images_of, new_fit, run
+from texgs.config.fit import Densify
+from texgs.core.errors import FitError
+from texgs.fit.images import Images
+from texgs.fit.texels import textured
+from texgs.fit.texture_adam import refine, texel_map
+from texgs.fit.texture_layout import look, sizes_for_budget
+from texgs.fit.texture_solve import curvature, sampled_error, solve
+from texgs.scene.model import Model, Optics, raw_material
+from texgs.scene.render import render, shaded
+
+
+def striped():
+    """The ball with stripes that its surfels are too few to show."""
+    views = cameras()
+    planes = [ball_planes(camera) for camera in views]
+    for camera, plane in zip(views, planes, strict=True):
+        rows = torch.arange(camera.height)[None, :, None]
+        plane[:3] -= 0.15 * plane[3] * (rows // 3 % 2)
+    return images_of(planes, views)
+
+
+@pytest.fixture(scope="module")
+def images():
+    return striped()
+
+
+@pytest.fixture(scope="module")
+def start(images):
+    rest = Densify(start=10, stop=80, every=10, threshold=1e-5, cap=150)
+    fit = run(new_fit(images, ball_seeds(opacity=0.5), iterations=150, densify=rest))
+    p = {name: x.detach() for name, x in fit.parameters.items()}
+    return textured(Model(p, fit.optics), torch.full((3,), 0.5), sizes_for_budget(p["scales"].exp(), 3000))
+
+
+def squared(model, images):
+    targets = [images.target(i) for i in range(len(images))]
+    return sum(float((render(model, t.camera, t.light).color - t.color).square().sum()) for t in targets)
+
+
+def one_surfel():
+    """A surfel of 4 x 4 texels seen from the front, and images of a known texture on it."""
+    p = {**ball_seeds(count=10), **raw_material(0.6, 0.3, 0.01, 20, "bounded")}
+    p = {name: x[:1] for name, x in p.items()}
+    p |= {"means": torch.zeros(1, 3), "quats": torch.tensor([[0.7, 0.0, 0.7, 0.0]])}
+    p |= {"scales": torch.full((1, 2), 0.15).log(), "opacities": torch.tensor([4.0])}
+    model = textured(Model(p, Optics()), torch.full((3,), 0.5), torch.tensor([[4, 4]], dtype=torch.int32))
+    texels = torch.rand(16, 3, generator=torch.Generator().manual_seed(3)) * 0.4 - 0.2
+    views = [camera for camera in cameras(8, 32) if abs(float(camera.position[0])) > 0.7]
+    known = Model({**model.parameters, "texels": texels}, model.optics)
+    planes = [
+        torch.cat([render(known, c, HEADLIGHT).color.permute(2, 0, 1), torch.ones(1, 32, 32)]) for c in views
+    ]
+    return model, texels, images_of(planes, views)
+
+
+def dense(model, images):
+    """Columns of one channel's matrix A [V H W, T], one texel at a time."""
+    base = [render(model, c, HEADLIGHT).color for c in images.cameras]
+    columns = []
+    for texel in range(len(model.parameters["texels"])):
+        unit = torch.zeros_like(model.parameters["texels"])
+        unit[texel] = 1
+        lit = Model({**model.parameters, "texels": unit}, model.optics)
+        shown = [render(lit, c, HEADLIGHT).color - b for c, b in zip(images.cameras, base, strict=True)]
+        columns.append(torch.stack(shown)[..., 0].flatten())
+    return torch.stack(columns, dim=1).double()
+
+
+def test_solve_agrees_with_dense_least_squares():
+    model, _, images = one_surfel()
+    A = dense(model, images)
+    base = torch.stack([render(model, c, HEADLIGHT).color for c in images.cameras])
+    wanted = torch.stack([images.target(i).color for i in range(len(images))])
+    residual = (wanted - base).flatten(end_dim=2).double()
+    exact = torch.linalg.lstsq(A, residual).solution
+    solved = solve(model, images, look(model, images, ""), sweeps=60, ridge=0.05, seed=0, title="")
+    found = solved.parameters["texels"].double()
+    is_seen = A.sum(dim=0) > 0.05 * A.sum(dim=0).max()  # the corners hardly are
+    assert int(is_seen.sum()) >= 12
+    assert_close(found[is_seen], exact[is_seen], atol=0.02, rtol=0)
+    left = ((A @ found - residual).square().sum() / residual.square().sum()).item()
+    assert left < 5e-3
+
+
+def test_curvature_is_that_of_the_dense_matrix_among_other_surfels():
+    model, _, images = one_surfel()
+    A = dense(model, images).reshape(len(images), -1, 16)
+    gains = [shaded(model.parameters, model.optics, c, HEADLIGHT).gain.item() for c in images.cameras]
+    exact = torch.stack([a.sum(dim=0) * gain for a, gain in zip(A, gains, strict=True)])  # [V, T]
+    typical = exact.square().sum(dim=0) / exact.sum(dim=0)
+    found = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
+    middle = [5, 6, 9, 10]
+    assert_close(found[middle], typical[middle], atol=0, rtol=0.25)  # texels as wide as 1.5 sigma are coarse
+    assert_close(found.sum(), typical.sum(), atol=0, rtol=0.05)
+
+
+def test_curvature_bounds_that_of_a_surfel_alone():
+    model, _, images = one_surfel()
+    A = dense(model, images).reshape(len(images), -1, 16)
+    exact = torch.stack([a.T @ a.sum(dim=1) for a in A])  # [V, T], rows of A'A summed
+    found = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
+    assert (found >= exact.mean(dim=0)).all()
+
+
+def test_curvatures_of_texels_sum_to_those_of_surfels():
+    sizes = torch.tensor([[3, 2], [1, 1], [7, 5]], dtype=torch.int32)
+    of_surfels = torch.tensor([2.0, 0.5, 3.0])
+    found = curvature(sizes, of_surfels)[:, 0]
+    assert_close(torch.stack([x.sum() for x in found.split([6, 1, 35])]), of_surfels)
+    assert int(found[7:].argmax()) == 2 * 7 + 3  # rows of v, the middle one
+
+
+def test_solve_finds_detail(start, images):
+    solved = solve(start, images, look(start, images, ""), sweeps=3, ridge=0.2, seed=0, title="")
+    assert squared(solved, images) < 0.7 * squared(start, images)
+
+
+def test_sampled_error_is_that_of_few_views(start, images):
+    assert sampled_error(start, images) == pytest.approx(squared(start, images))
+
+
+def test_texels_that_would_be_worse_are_not_kept(start, images):
+    """A curvature far too small makes steps far too large."""
+    sight = look(start, images, "")
+    wild = replace(sight, curvature=sight.curvature * 1e-3)
+    assert solve(start, images, wild, sweeps=1, ridge=0.0, seed=0, title="") is start
+
+
+def test_views_of_nothing_leave_the_texels_alone(start):
+    planes = torch.ones(4, 16, 16)
+    planes[3] = 0
+    behind = cameras(1, 16)
+    away = behind[0].viewmat.clone()
+    away[2, 3] = -5.0
+    blank = images_of([planes], [type(behind[0])(away, behind[0].K, 16, 16)])
+    solved = solve(start, blank, look(start, blank, ""), sweeps=2, ridge=0.2, seed=0, title="")
+    assert torch.equal(solved.parameters["texels"], start.parameters["texels"])
+
+
+def test_adam_finds_detail(start, images):
+    refined = refine(start, images, iterations=120, sparsity=0.0, seed=0, title="")
+    assert squared(refined, images) < 0.95 * squared(start, images)
+
+
+def test_sparsity_makes_rendered_texels_small(start, images):
+    sizes = []
+    for sparsity in (0.0, 3.0):
+        refined = refine(start, images, iterations=60, sparsity=sparsity, seed=0, title="")
+        sizes.append(float(texel_map(refined, images.target(0)).detach().abs().mean()))
+    assert sizes[1] < 0.3 * sizes[0]
+
+
+def test_texel_map_shows_texels_without_light(start, images):
+    constant = Model(
+        {**start.parameters, "texels": torch.full_like(start.parameters["texels"], 0.25)}, start.optics
+    )
+    target = images.target(0)
+    alpha = render(constant, target.camera, target.light).alpha
+    assert_close(texel_map(constant, target), 0.25 * alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
+
+
+def test_numbers_that_are_not_finite_are_reported(start):
+    one = ball_images(1)
+    broken = Images(one.planes, one.cameras, one.lights)
+    model = Model({**start.parameters, "colors": start.parameters["colors"] * torch.nan}, start.optics)
+    with pytest.raises(FitError, match="texels are not finite after Adam"):
+        refine(model, broken, iterations=2, sparsity=0.0, seed=0, title="")

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+import torch
+
+from tests.scene.ply_files import columns_of, numbered, write_vertices
+from tests.scene.samples import sample
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.scene.ply import read_ply, write_ply
+
+
+def release_run(folder):
+    """Files of the release's third stage: surfels, and textures that are stored along v first."""
+    model = sample("shading", n=3, material="paper", low_pass=2.0)
+    path = write_ply(folder / "point_cloud.ply", model, "release")
+    no_color = dict.fromkeys((*numbered("f_dc", 3), *numbered("f_rest", 45)))
+    extra = {"scale_2": np.ones(3), "mappings_0": np.ones(3), "mappings_1": np.ones(3)}
+    write_vertices(path, columns_of(path, **no_color, **extra))
+    pictures = [np.random.default_rng(k).uniform(-0.3, 0.3, (2 + k, 4 - k, 3)) for k in range(3)]  # [U, V, 3]
+    starts = np.cumsum([0, *(picture.size // 3 for picture in pictures)])
+    dims = [(*picture.shape[:2], start) for picture, start in zip(pictures, starts, strict=False)]
+    texels = np.concatenate([picture.reshape(-1, 3) for picture in pictures]).astype(np.float32)
+    np.savez(
+        folder / "texture.npz",
+        texture_dc=texels,
+        texture_dims=np.array(dims, np.int32),
+        mappings=np.ones((3, 2)),
+    )
+    palette = torch.nn.Parameter(torch.tensor([0.9, 0.5, -0.2]))
+    torch.save(([palette], 3000), folder / "palette_colors_chkpnt.pth")
+    return path, model, pictures
+
+
+def test_textures_of_the_release(tmp_path):
+    path, relightable, pictures = release_run(tmp_path)
+    found = read_ply(path)
+    assert (found.stage, found.optics) == ("texture", relightable.optics)
+    p = found.parameters
+    for name in ("means", "quats", "scales", "opacities", "ambient", "shininess"):
+        assert torch.equal(p[name], relightable.parameters[name])
+    palette = np.array([0.9, 0.5, 0.0])
+    np.testing.assert_allclose(p["palette"].numpy(), palette, rtol=1e-6)
+    for n, picture in enumerate(pictures):
+        n_u, n_v = p["sizes"][n].tolist()
+        assert (n_u, n_v) == picture.shape[:2]
+        for i in range(n_u):
+            for j in range(n_v):
+                ours = p["texels"][p["offsets"][n] + j * n_u + i] + p["palette"] + p["colors"][n]
+                np.testing.assert_allclose(ours, np.clip(picture[i, j] + palette, 0, 1), atol=1e-6)
+
+
+def test_files_missing_or_foreign_beside_the_release_are_named(tmp_path):
+    path, *_ = release_run(tmp_path)
+    palette, texture = tmp_path / "palette_colors_chkpnt.pth", tmp_path / "texture.npz"
+    for content in (b"", b"x", b"not a palette", palette.read_bytes()[:50]):
+        palette.write_bytes(content)
+        with pytest.raises(ArgumentError, match="expected a palette as the release saves it"):
+            read_ply(path)
+    for saved in (torch.zeros(3), {"a": 1}, ([], 3), ([3], 3)):
+        torch.save(saved, palette)
+        with pytest.raises(ArgumentError, match="expected a palette as the release saves it"):
+            read_ply(path)
+    palette.unlink()
+    with pytest.raises(ArgumentError, match=r"palette_colors_chkpnt\.pth: no such file"):
+        read_ply(path)
+    dims = np.array([[2, 2, 0]] * 2)
+    np.savez(texture, texture_dc=np.zeros((4, 3)), texture_dims=dims)
+    with pytest.raises(ShapeError, match=r"texture_dims: expected \[3, 3\], got \[2, 3\]"):
+        read_ply(path)
+    for content in (b"", b"x" * 100):
+        texture.write_bytes(content)
+        with pytest.raises(ArgumentError, match="expected texture_dc and texture_dims as npz"):
+            read_ply(path)
+    np.savez(texture, other=dims)
+    with pytest.raises(ArgumentError, match="expected texture_dc and texture_dims as npz"):
+        read_ply(path)
+    texture.unlink()
+    with pytest.raises(ArgumentError, match=r"texture\.npz: no such file"):
+        read_ply(path)
+
+
+def test_textures_outside_the_texels_are_refused(tmp_path):
+    path, *_ = release_run(tmp_path)
+    dims = np.array([[2, 2, 0], [2, 2, 4], [2, 2, 8]], np.int32)
+    np.savez(tmp_path / "texture.npz", texture_dc=np.zeros((11, 3), np.float32), texture_dims=dims)
+    with pytest.raises(ArgumentError, match="within the 11 texels"):
+        read_ply(path)

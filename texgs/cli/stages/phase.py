@@ -1,0 +1,66 @@
+"""What the stages of the fit share: views, the loop with checkpoints, evaluation, numbers."""
+
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.core.progress import progress
+from texgs.fit import checkpoint
+from texgs.fit.images import Images
+from texgs.fit.loop import Fit
+from texgs.metrics.quality import evaluate, mean
+from texgs.scene.model import Model, Optics
+from texgs.volume.view_set import ViewSet
+
+SAVED_EVERY = 30.0  # seconds between checkpoints
+
+
+def phase_from(values: Mapping[str, Any]) -> Phase:
+    """A phase from the plain values of its settings."""
+    parts = {"rates": Rates, "losses": Losses, "densify": Densify}
+    return Phase(**{**values, **{name: kind(**values[name]) for name, kind in parts.items()}})
+
+
+def run_phase(
+    parameters: Mapping[str, Tensor],
+    optics: Optics,
+    images: Images,
+    phase: Phase,
+    seed: int,
+    output: Path,
+    title: str,
+) -> tuple[Model, float, list[float]]:
+    """Run the loop from the last checkpoint in the folder, if there is one.
+
+    Returns:
+        The model, the seconds of this run, and the losses that were looked at.
+    """
+    fit = Fit(parameters, optics, images, phase, seed)
+    folder = output / "checkpoint"
+    if (state := checkpoint.latest(folder)) is not None:
+        fit.restore(state)
+    start = saved = time.monotonic()
+    losses = []
+    steps = phase.iterations - fit.iteration
+    for done in progress(fit.run(), steps, title=title, unit="view") if steps else ():
+        losses += [done.loss] if done.loss is not None else []
+        if time.monotonic() - saved > SAVED_EVERY:
+            checkpoint.save(folder, fit)
+            saved = time.monotonic()
+    seconds = time.monotonic() - start
+    return Model({name: x.detach() for name, x in fit.parameters.items()}, optics), seconds, losses
+
+
+def quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
+    """PSNR and SSIM on the test views; none where there are none."""
+    return mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {}
+
+
+def device() -> torch.device:
+    """Where fits run."""
+    return torch.device("cpu")

@@ -1,0 +1,48 @@
+"""Stage `surfels`: seed surfels in the views, and fit them with spherical harmonics."""
+
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.phase import phase_from, quality, run_phase
+from texgs.fit.harmonics import join, split, zeroth
+from texgs.fit.images import load
+from texgs.fit.seeds import seed_surfels
+from texgs.scene.model import Model, Optics
+from texgs.scene.model_file import write_model
+from texgs.volume.view_set import read_views
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write model.safetensors; a recipe without iterations here only seeds.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `views`, the transforms_train.json.
+        output: folder.
+    """
+    fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: surfels"
+    views = read_views(inputs["views"].parent)
+    images = load(views.train, fit["reduce"])
+    shading = views.metadata.get("shading") or {}
+    optics = Optics(fit["low_pass"], fit["activation"], bool(shading.get("local_viewer", True)))
+    phase = phase_from(settings["phase"])
+    parameters, colors = seed_surfels(images, views, **fit["seeds"], seed=fit["seed"])
+    sh = zeroth(colors)
+    if phase.iterations:
+        sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
+    start = {**parameters, **split(sh)}
+    model, seconds, losses = run_phase(start, optics, images, phase, fit["seed"], output, title)
+    model = Model(join(model.parameters), optics, {"dataset": settings["dataset"], "tf": settings["tf"]})
+    write_model(output / "model.safetensors", model)
+    numbers = {
+        "fit_seconds": seconds,
+        "surfels": len(model),
+        "iterations": phase.iterations,
+        "losses": losses,
+    }
+    if phase.iterations:
+        numbers |= quality(model, views, fit["reduce"], title)
+    return Outcome(numbers)

@@ -1,0 +1,32 @@
+"""Stage `texture`: give the surfels of a relightable model textures; geometry and material stay."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.phase import quality
+from texgs.fit.images import load
+from texgs.fit.texels import texturize
+from texgs.scene.model_file import read_model, write_model
+from texgs.scene.size import sizes
+from texgs.volume.view_set import read_views
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write model.safetensors.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `model`, of the stage before, and `views`, the transforms_train.json.
+        output: folder.
+    """
+    fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: texture"
+    views, before = read_views(inputs["views"].parent), read_model(inputs["model"])
+    images = load(views.train, fit["reduce"])
+    start = time.monotonic()
+    model = texturize(before, images, **settings["texture"], seed=fit["seed"], title=title)
+    seconds = time.monotonic() - start
+    write_model(output / "model.safetensors", model)
+    numbers = {"fit_seconds": seconds, "surfels": len(model), "texels": len(model.parameters["texels"])}
+    return Outcome({**numbers, **sizes(model), **quality(model, views, fit["reduce"], title)})

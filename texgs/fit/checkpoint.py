@@ -1,0 +1,59 @@
+"""Checkpoints of a fit: one safetensors file, from which a run goes on as if it had never stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_bytes
+from texgs.fit.loop import Fit, require_finite
+
+NAME = "checkpoint.safetensors"
+
+
+def save(folder: str | Path, fit: Fit) -> Path:
+    """Write the state of a fit; the checkpoint before it stays until this one is complete.
+
+    Args:
+        folder: of the run, created where missing; it holds one checkpoint.
+        fit: between two steps.
+
+    Returns:
+        Path of the file.
+
+    Raises:
+        FitError: if a value is NaN or infinite; the last good checkpoint stays.
+        ArgumentError: if the folder cannot be written to, or the disk is full.
+    """
+    from safetensors.torch import save as serialize
+
+    state = {name: x.contiguous() for name, x in fit.state().items()}
+    require_finite(fit.iteration, state)
+    return write_bytes(Path(folder) / NAME, serialize(state))
+
+
+def latest(folder: str | Path) -> dict[str, Tensor] | None:
+    """The state that `save` wrote last, on the CPU, for `Fit.restore`; None where there is none.
+
+    Raises:
+        ArgumentError: if the file cannot be read or is no checkpoint.
+    """
+    from safetensors import SafetensorError
+    from safetensors.torch import load
+
+    path = Path(folder) / NAME
+    try:
+        state: dict[str, Tensor] = load(path.read_bytes())
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+    except SafetensorError as error:
+        raise ArgumentError(
+            f"{path}: expected a checkpoint, got {error}; remove it to start from the beginning"
+        ) from error
+    if "iteration" not in state:
+        raise ArgumentError(f"{path}: expected a checkpoint, found no iteration in it; remove it")
+    return state

@@ -1,0 +1,86 @@
+"""Adaptive density control: surfels that should move much are cloned or split, invisible ones removed."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from texgs.config.fit import Densify
+from texgs.core.rotation import quats_to_matrices
+from texgs.fit.optimizer import Optimizer
+
+CHILDREN = 2  # of a split
+SHRINK = 1.6  # by which children are smaller
+RESET_OPACITY = 0.01
+
+
+class DensityControl:
+    """Statistics since the last step, and the steps (Kerbl et al. 2023, section 5, as in 2DGS).
+
+    Args:
+        settings: when and how.
+        n: number of surfels.
+        extent: radius of the cameras, world units.
+        device: of the surfels.
+    """
+
+    def __init__(self, settings: Densify, n: int, extent: float, device: torch.device) -> None:
+        self.settings, self.extent = settings, extent
+        self._clear(n, device)
+
+    def _clear(self, n: int, device: torch.device) -> None:
+        self.gradients = torch.zeros(n, device=device)  # sums of norms, half image widths
+        self.counts = torch.zeros(n, device=device)  # views in which a surfel had a gradient
+
+    def observe(self, shift_gradient: Tensor, width: int, height: int) -> None:
+        """Note the gradient [N, 2] of the loss for shifts in pixels."""
+        half = shift_gradient.new_tensor([0.5 * width, 0.5 * height])
+        norms = (shift_gradient * half).norm(dim=1)
+        self.gradients += norms
+        self.counts += norms > 0
+
+    def step(self, iteration: int, optimizer: Optimizer, generator: torch.Generator) -> None:
+        """Whatever is due after an iteration (from 1)."""
+        s = self.settings
+        if iteration > s.stop:
+            return
+        if iteration > s.start and iteration % s.every == 0:
+            self._densify(optimizer, generator)
+        if s.reset_every and iteration % s.reset_every == 0:
+            raw = optimizer.parameters["opacities"].detach()
+            optimizer.reset("opacities", raw.clamp_max(torch.logit(torch.tensor(RESET_OPACITY)).item()))
+
+    def _densify(self, optimizer: Optimizer, generator: torch.Generator) -> None:
+        p = {name: x.detach() for name, x in optimizer.parameters.items()}
+        n = len(p["means"])
+        largest = p["scales"].exp().amax(dim=1)
+        alive = (p["opacities"].sigmoid() >= self.settings.prune_opacity) & (
+            largest <= self.settings.prune_size * self.extent
+        )
+        chosen = self._chosen(alive)
+        is_split = chosen & (largest > self.settings.size * self.extent)
+        rows = {name: x for name, x in p.items() if len(x) == n}
+        clones = {name: x[chosen & ~is_split] for name, x in rows.items()}
+        children = self._children({name: x[is_split] for name, x in rows.items()}, generator)
+        added = {name: torch.cat([clones[name], children[name]]) for name in rows}
+        optimizer.edit_rows(n, alive & ~is_split, added)
+        self._clear(len(optimizer.parameters["means"]), largest.device)
+
+    def _chosen(self, alive: Tensor) -> Tensor:
+        """Surfels [N] bool with the largest mean gradients above the threshold, as the cap leaves room."""
+        mean = self.gradients / self.counts.clamp_min(1)
+        mean = torch.where(alive & (mean > self.settings.threshold), mean, 0.0)
+        room = max(0, self.settings.cap - int(alive.sum()))
+        chosen = torch.zeros_like(alive)
+        best = mean.topk(min(room, len(mean))).indices
+        chosen[best[mean[best] > 0]] = True
+        return chosen
+
+    def _children(self, parents: dict[str, Tensor], generator: torch.Generator) -> dict[str, Tensor]:
+        """Two smaller surfels for each, drawn from its Gaussian."""
+        rows = {name: x.repeat(CHILDREN, *[1] * (x.ndim - 1)) for name, x in parents.items()}
+        noise = torch.randn(rows["scales"].shape, generator=generator).to(rows["scales"])
+        along = quats_to_matrices(rows["quats"])[..., :2]  # [n, 3, 2]
+        rows["means"] = rows["means"] + (along @ (noise * rows["scales"].exp())[..., None]).squeeze(-1)
+        rows["scales"] = rows["scales"] - torch.log(torch.tensor(SHRINK)).item()
+        return rows

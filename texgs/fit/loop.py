@@ -1,0 +1,152 @@
+"""The training loop: one view per iteration, the same for every phase and recipe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from texgs.config.fit import Phase, Rates
+from texgs.core import check
+from texgs.core.errors import ArgumentError, FitError
+from texgs.fit.densify import DensityControl
+from texgs.fit.harmonics import join
+from texgs.fit.images import Images
+from texgs.fit.losses import view_loss
+from texgs.fit.optimizer import Optimizer, Rate
+from texgs.scene.model import MATERIAL, Optics
+
+USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
+SMALLEST = 1e-3  # distance, world units
+CHECKED_EVERY = 100  # iterations between looks at the loss: a GPU need not wait in between
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where the loop is."""
+
+    iteration: int  # done, from 1
+    n_surfels: int
+    loss: float | None  # where it was looked at
+
+
+def extent(images: Images, means: Tensor) -> float:
+    """The length that rates of means, and sizes of density control, refer to.
+
+    1.1 times the largest distance of a camera from the cameras' mean. One camera, or some inside of the
+    object, have none to speak of: they count as far away as an object is usually seen from.
+    """
+    around = spread(torch.stack([camera.position for camera in images.cameras]))
+    radius = spread(means)
+    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST)
+
+
+def spread(points: Tensor) -> float:
+    """Largest distance of points [N, 3] from their mean; 0 for none."""
+    return float((points - points.mean(dim=0)).norm(dim=1).max()) if len(points) else 0.0
+
+
+def rates(names: Iterable[str], r: Rates, size: float) -> dict[str, Rate]:
+    """Learning rate of each parameter that learns; `size` is the extent of the cameras."""
+    starts = {"quats": r.quats, "scales": r.scales, "opacities": r.opacities, "colors": r.colors}
+    starts |= {"sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
+    found = {name: Rate(starts[name], r.final) for name in names if name in starts}
+    found["means"] = Rate(size * r.means, r.means_final)
+    return {name: rate for name, rate in found.items() if rate.start > 0}
+
+
+class Fit:
+    """One phase on one set of views.
+
+    Args:
+        parameters: raw, where the phase starts.
+        optics: of the model.
+        images: training views.
+        phase: what to do.
+        seed: of the order of views and of splits; with the same one, machine and versions results are equal.
+    """
+
+    def __init__(
+        self, parameters: Mapping[str, Tensor], optics: Optics, images: Images, phase: Phase, seed: int
+    ) -> None:
+        self.optics, self.images, self.phase, self.seed = optics, images, phase, seed
+        self.iteration = 0
+        size = extent(images, parameters["means"])
+        self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
+        means = self.parameters["means"]
+        self.control = DensityControl(phase.densify, len(means), size, means.device)
+
+    @property
+    def parameters(self) -> dict[str, Tensor]:
+        """Raw parameters of now."""
+        return self.optimizer.parameters
+
+    def run(self) -> Iterator[Progress]:
+        """Iterate to the end of the phase.
+
+        Raises:
+            FitError: if the loss or a parameter is no longer finite.
+        """
+        while self.iteration < self.phase.iterations:
+            loss = self.step()
+            is_looked_at = self.iteration % CHECKED_EVERY == 0 or self.iteration == self.phase.iterations
+            if is_looked_at:
+                require_finite(self.iteration, {"loss": loss, **self.parameters})
+            value = float(loss) if is_looked_at else None
+            yield Progress(self.iteration, len(self.parameters["means"]), value)
+
+    def step(self) -> Tensor:
+        """One view: loss, gradients, a step of Adam, density control."""
+        self.iteration += 1
+        p = self.parameters
+        target = self.images.target(self.view_of(self.iteration), p["means"].device)
+        is_observed = self.iteration <= self.phase.densify.stop
+        shift = torch.zeros_like(p["scales"]).requires_grad_() if is_observed else None
+        degrees = min(self.phase.sh_degree, self.iteration // self.phase.sh_every)
+        visible = join(p, degrees)
+        loss = view_loss(visible, self.optics, target, self.phase.losses, shift, self.iteration)
+        loss.backward()
+        if shift is not None and shift.grad is not None:
+            self.control.observe(shift.grad, target.camera.width, target.camera.height)
+        self.optimizer.step(self.iteration / self.phase.iterations)
+        self.control.step(self.iteration, self.optimizer, self.generator(2 * self.iteration + 1))
+        return loss.detach()
+
+    def view_of(self, iteration: int) -> int:
+        """The view of an iteration: every epoch a new order, without memory of the ones before."""
+        epoch, place = divmod(iteration - 1, len(self.images))
+        order = torch.randperm(len(self.images), generator=self.generator(2 * epoch))
+        return int(order[place])
+
+    def generator(self, stream: int) -> torch.Generator:
+        """Random numbers that depend on the seed and a number only, so that a resumed run draws the same."""
+        return torch.Generator().manual_seed(hash((self.seed, stream)) & 0x7FFFFFFF)
+
+    def state(self) -> dict[str, Tensor]:
+        """Everything a resumed run needs, as tensors."""
+        control = {"control.gradients": self.control.gradients, "control.counts": self.control.counts}
+        return {**self.optimizer.state(), **control, "iteration": torch.tensor(self.iteration)}
+
+    def restore(self, state: Mapping[str, Tensor]) -> None:
+        """Go on from what `state` returned."""
+        self.optimizer.restore(state)
+        device = self.parameters["means"].device
+        self.control.gradients = state["control.gradients"].to(device, copy=True)
+        self.control.counts = state["control.counts"].to(device, copy=True)
+        self.iteration = int(state["iteration"])
+
+
+def require_finite(iteration: int, tensors: Mapping[str, Tensor]) -> None:
+    """Stop a fit that has gone wrong; the loss alone does not tell, as the rasterizer skips surfels with NaN.
+
+    Raises:
+        FitError: naming the first tensor with NaN or infinity.
+    """
+    try:
+        check.finite(**tensors)
+    except ArgumentError as error:
+        raise FitError(
+            f"iteration {iteration}: {error}; start again with lower rates, the last checkpoint is kept"
+        ) from error

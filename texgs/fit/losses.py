@@ -1,0 +1,88 @@
+"""The loss of one view."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import cast
+
+import torch
+from torch import Tensor
+
+from texgs.config.fit import Losses
+from texgs.fit.images import Target
+from texgs.raster import Render, rasterize
+from texgs.raster.normals import normal_consistency
+from texgs.raster.smoothness import bilateral_smoothness
+from texgs.raster.ssim import l1_dssim
+from texgs.scene.model import MATERIAL, Optics, geometry, material
+from texgs.scene.render import shaded
+
+SMOOTHED = len(MATERIAL)
+
+
+def view_loss(
+    parameters: Mapping[str, Tensor],
+    optics: Optics,
+    target: Target,
+    weights: Losses,
+    shift: Tensor | None,
+    iteration: int,
+) -> Tensor:
+    """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
+
+    Args:
+        parameters: raw, of the surfels.
+        optics: of the model.
+        target: the view.
+        weights: of the losses.
+        shift: [N, 2] zeros that receive the screen-space gradient, or None.
+        iteration: from 1; losses may start later.
+    """
+    camera = target.camera
+    colors = cast(Tensor, shaded(parameters, optics, camera, target.light))  # surfels have no texture yet
+    maps = material_maps(parameters, optics) if weights.smoothness > 0 else None
+    has_normals = weights.normal > 0 and iteration > weights.normal_from
+    features = colors if maps is None else torch.cat([colors, maps], dim=1)
+    render = rasterize(
+        *geometry(parameters),
+        camera.viewmat,
+        camera.K,
+        camera.width,
+        camera.height,
+        features=features,
+        background=white(features),
+        shift=shift,
+        outputs=("normal", "depth") if has_normals else (),
+        options=optics.options,
+    )
+    loss = l1_dssim(render.color[..., :3], target.color, weights.dssim)
+    if weights.alpha > 0:
+        loss = loss + weights.alpha * l1_dssim(render.alpha, target.alpha, weights.dssim)
+    if has_normals:
+        loss = loss + weights.normal * consistency(render, target)
+    if maps is not None:
+        attributes = render.color[..., 3:]
+        loss = loss + weights.smoothness * SMOOTHED * bilateral_smoothness(
+            attributes, target.color, target.alpha
+        )
+    return loss
+
+
+def material_maps(parameters: Mapping[str, Tensor], optics: Optics) -> Tensor | None:
+    """The material of each surfel as features [N, 4]; None where all share one, or there is none."""
+    if "ambient" not in parameters or len(parameters["ambient"]) == 1:
+        return None
+    return torch.stack(list(material(parameters, optics.material).values()), dim=1)
+
+
+def white(features: Tensor) -> Tensor:
+    """Background [C]: white behind colours, 0 behind material."""
+    background = features.new_zeros(features.shape[1])
+    background[:3] = 1
+    return background
+
+
+def consistency(render: Render, target: Target) -> Tensor:
+    """Normal consistency of 2DGS on the rendered normals and depth."""
+    camera = target.camera
+    return normal_consistency(render.normal, render.depth, render.alpha, camera.viewmat, camera.K)  # type: ignore[arg-type]

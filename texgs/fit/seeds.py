@@ -1,0 +1,149 @@
+"""Where surfels start: at given points, where views show something, in their hull, or anywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.fit.hull import Box, hull_points, mean_colors, random_points
+from texgs.fit.images import Images
+from texgs.fit.visible import CANDIDATES, most_seen
+from texgs.volume.view_set import ViewSet
+
+POINTS = "points3d.ply"  # in a folder of views
+KINDS = ("auto", "points", "visible", "hull", "random")
+MARGIN = 0.02  # of the box around the data, relative to its longest side
+NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
+SMALLEST = 1e-4  # scale, world units
+
+
+def seed_surfels(
+    images: Images, views: ViewSet, kind: str, count: int, opacity: float, half_size: float, seed: int
+) -> tuple[dict[str, Tensor], Tensor]:
+    """Raw geometry of the first surfels, and their colours.
+
+    Surfels that opaque matter hides never show, and still count under the cap of density control: "visible"
+    starts without them.
+
+    Args:
+        images: training views.
+        views: the same with their folder and metadata.
+        kind: "points" in the folder's points3d.ply, all of them; "hull", points that no view sees through;
+            "visible", those of them that a quick fit finds to be seen; "random" in the box; "auto", points if
+            there are any, else visible.
+        count: of surfels; points are taken as they are.
+        opacity: of each, between 0 and 1; for "visible", before the quick fit.
+        half_size: half the side of the box, where the views' metadata has no `aabb`, world units.
+        seed: of random numbers; the same one gives the same surfels.
+
+    Returns:
+        `means`, `quats`, `scales` and `opacities` by name, and colours [N, 3] in [0, 1].
+
+    Raises:
+        ArgumentError: if an argument is out of range, there are no points, or the views show nothing.
+    """
+    if kind not in KINDS:
+        raise ArgumentError(f"seeds.kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    if not 0 < opacity < 1:
+        raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {opacity}")
+    given = views.folder / POINTS
+    if kind == "auto":
+        kind = "points" if given.is_file() else "visible"
+    generator = torch.Generator().manual_seed(seed)
+    colors: Tensor | None = None
+    if kind == "points":
+        points, colors = read_points(given)
+    elif kind == "random":
+        points = random_points(box_of(views, half_size), count, generator)
+    else:
+        candidates = CANDIDATES * count if kind == "visible" else count
+        points = hull_points(images, box_of(views, half_size), candidates, generator)
+    if colors is None:
+        colors = mean_colors(images, points)
+    surfels = surfels_at(points, opacity, generator)
+    return most_seen(surfels, colors, images, count, seed) if kind == "visible" else (surfels, colors)
+
+
+def box_of(views: ViewSet, half_size: float) -> Box:
+    """The box of the data with a margin, or a cube around the origin where the views do not say.
+
+    Raises:
+        ArgumentError: if the metadata's `aabb` is no box, or half_size is not above 0.
+    """
+    aabb = views.metadata.get("aabb")
+    if aabb is None:
+        if not half_size > 0:
+            raise ArgumentError(f"seeds.half_size: expected more than 0, got {half_size}")
+        corner = torch.full((3,), float(half_size))
+        return -corner, corner
+    try:
+        low, high = torch.tensor(aabb, dtype=torch.float32).reshape(2, 3)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ArgumentError(
+            f"{views.folder}: aabb: expected two corners of three numbers, got {aabb}"
+        ) from error
+    if not bool((low <= high).all()):  # so is NaN
+        raise ArgumentError(f"{views.folder}: aabb: expected the lowest corner, then the highest, got {aabb}")
+    margin = MARGIN * (high - low).max()
+    return low - margin, high + margin
+
+
+def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
+    """Points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file.
+
+    Raises:
+        ArgumentError: if the file is missing, no PLY file, or has no finite x, y and z.
+    """
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        vertices = PlyData.read(path)["vertex"].data
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points") from error
+    except (OSError, KeyError, ValueError, PlyParseError) as error:
+        raise ArgumentError(f"{path}: expected a PLY file with vertices, got {error}") from error
+    names = vertices.dtype.names or ()
+    if missing := [name for name in "xyz" if name not in names]:
+        raise ArgumentError(f"{path}: expected vertices with x, y and z, found no {', '.join(missing)}")
+    points = columns(vertices, ("x", "y", "z"))
+    if not bool(points.isfinite().all()):
+        raise ArgumentError(f"{path}: expected finite x, y and z, got NaN or infinity; remove those points")
+    if not {"red", "green", "blue"} <= set(names):
+        return points, None
+    colors = columns(vertices, ("red", "green", "blue"))
+    return points, colors / 255 if vertices.dtype["red"].kind == "u" else colors.clamp(0, 1)
+
+
+def columns(vertices: np.ndarray, names: tuple[str, ...]) -> Tensor:
+    """Columns of a table as [N, names], float32."""
+    return torch.from_numpy(np.stack([vertices[name].astype(np.float32) for name in names], axis=1))
+
+
+def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
+    """Raw geometry of surfels at points: round, as large as their neighbours are far, in random directions.
+
+    Args:
+        points: [N, 3] world units, at least four.
+        opacity: of each.
+        generator: of random numbers.
+
+    Raises:
+        ArgumentError: if there are fewer than four points.
+    """
+    from scipy.spatial import cKDTree
+
+    if len(points) <= NEIGHBOURS:
+        raise ArgumentError(f"seeds: expected at least {NEIGHBOURS + 1} points, got {len(points)}")
+    places = points.double().numpy()
+    distances, _ = cKDTree(places).query(places, k=NEIGHBOURS + 1)
+    scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(SMALLEST)
+    return {
+        "means": points.float(),
+        "quats": torch.nn.functional.normalize(torch.randn(len(points), 4, generator=generator), dim=1),
+        "scales": scale.log()[:, None].repeat(1, 2),
+        "opacities": torch.full((len(points),), opacity).logit(),
+    }

@@ -1,0 +1,26 @@
+"""How alike images are: PSNR and SSIM as the tables define them."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from texgs.raster.ssim import ssim as structural_similarity
+
+BEST = 100.0  # dB, of equal images
+
+
+def psnr(image: Tensor, target: Tensor) -> float:
+    """Peak signal-to-noise ratio in dB of images in [0, 1]: the full frame, all channels; 100 if equal.
+
+    Args:
+        image: [H, W, C], clamped to [0, 1].
+        target: the same shape.
+    """
+    error = torch.mean((image.clamp(0, 1) - target) ** 2).item()
+    return BEST if error == 0 else min(BEST, -10 * torch.log10(torch.tensor(error)).item())
+
+
+def ssim(image: Tensor, target: Tensor) -> float:
+    """Structural similarity; see `texgs.raster.ssim.ssim`."""
+    return structural_similarity(image.clamp(0, 1), target).item()

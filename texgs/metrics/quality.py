@@ -1,0 +1,42 @@
+"""PSNR and SSIM of a model on views."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import fmean
+
+import torch
+
+from texgs.core.progress import progress
+from texgs.metrics.image import psnr, ssim
+from texgs.scene.model import Model
+from texgs.scene.render import render
+from texgs.volume.reduced import over_white, smaller
+from texgs.volume.view_set import View
+
+
+@torch.no_grad()
+def evaluate(
+    model: Model, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
+) -> dict[str, list[float]]:
+    """PSNR in dB and SSIM of each view over white, full frame, against the exact image.
+
+    Args:
+        model: any stage.
+        views: to compare with.
+        reduce: of the images, as in `images.load`.
+        title: of the progress bar.
+    """
+    found: dict[str, list[float]] = {"psnr": [], "ssim": []}
+    device = model.parameters["means"].device
+    for view in progress(views, title=title, unit="view"):
+        target = over_white(view, reduce)[:3].permute(1, 2, 0).to(device)
+        image = render(model, smaller(view.camera, reduce).to(device), view.light).color
+        found["psnr"].append(psnr(image, target))
+        found["ssim"].append(ssim(image, target))
+    return found
+
+
+def mean(found: dict[str, list[float]]) -> dict[str, float]:
+    """Mean of each metric over the views."""
+    return {name: fmean(values) for name, values in found.items() if values}

@@ -1,0 +1,64 @@
+"""Table `fitting`: quality, time, memory and primitives after each phase, beside the paper's numbers."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
+from texgs.report.table import Cell, Column, Table
+
+PHASES = ("surfels", "shading", "texture")
+COLUMNS = (
+    Column("data set"),
+    Column("TF"),
+    Column("recipe"),
+    Column("phase"),
+    Column("PSNR", 2),
+    Column("SSIM", 4),
+    Column("minutes", 2),
+    Column("memory GiB", 2),
+    Column("primitives", 0),
+    Column("PSNR (paper)", 2),
+    Column("SSIM (paper)", 4),
+    Column("minutes (paper)", 2),
+)
+CAPTION = "Test views; minutes of the phase itself. The paper: means over basic scenes, on an RTX 4090."
+
+
+def fitting(paths: Iterable[str | Path]) -> Table:
+    """The table of all jobs of the fit among some metrics files.
+
+    Raises:
+        ArgumentError: if a file is no metrics file.
+    """
+    published = paper()
+    rows = []
+    for path in sorted(map(Path, paths)):
+        metrics = read_json(path)
+        if not isinstance(metrics, dict) or "numbers" not in metrics:
+            raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
+        if metrics["stage"] in PHASES:
+            rows.append(row(metrics, path.parts[-3], published))
+    return Table(CAPTION, COLUMNS, sorted(rows, key=lambda cells: (cells[:3], PHASES.index(str(cells[3])))))
+
+
+def row(metrics: dict[str, Any], recipe: str, published: dict[tuple[str, str], dict[str, str]]) -> list[Cell]:
+    """The cells of one job."""
+    numbers, phase = metrics["numbers"], metrics["stage"]
+    beside = published.get((metrics["dataset"], phase), {})
+    own = [numbers.get("psnr"), numbers.get("ssim"), numbers["fit_seconds"] / 60]
+    own += [metrics["peak_memory_mib"] / 1024, numbers["surfels"]]
+    theirs = [float(beside[key]) if key in beside else None for key in ("psnr", "ssim", "minutes")]
+    return [metrics["dataset"], metrics["tf"], recipe, phase, *own, *theirs]
+
+
+def paper() -> dict[tuple[str, str], dict[str, str]]:
+    """The paper's table by data set and phase."""
+    text = files("texgs.report").joinpath("paper", "fitting.csv").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return {(line["dataset"], line["phase"]): line for line in csv.DictReader(lines)}

@@ -1,0 +1,166 @@
+"""Files of basic models: raw tensors as safetensors, and what belongs to them as JSON in the header."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.io import write_bytes
+from texgs.raster import Texture
+from texgs.raster.atlas import check_texture
+from texgs.scene.model import GEOMETRY, MATERIAL, SHAPES, TEXTURE, Model, Optics
+
+FORMAT = "texgs-model"
+VERSION = 1
+SHADED = (*GEOMETRY, "colors", *MATERIAL)
+NEEDED = {"surfels": (*GEOMETRY, "sh"), "shading": SHADED, "texture": (*SHADED, *TEXTURE)}  # by stage
+DTYPES = {"sizes": torch.int32, "offsets": torch.int64}  # all others are float32
+
+
+def write_model(path: str | Path, model: Model) -> Path:
+    """Create or replace a model file in one step; the same model gives the same bytes.
+
+    A safetensors file with the raw tensors under their names. Its header has one entry, "texgs-model": JSON
+    with `version`, `stage`, `optics` and `metadata`. One, because safetensors keeps no order of entries.
+
+    Args:
+        path: target, by custom `model.safetensors`.
+        model: any stage, on any device. Its metadata must be JSON: tuples come back as lists, keys as text.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError, ShapeError: if the model could not be read back (a tensor is missing, unknown, not
+            finite or of another type, textures overlap, metadata is no JSON), or the file cannot be written.
+    """
+    from safetensors.numpy import save
+
+    _check(path, model, model.stage)
+    description = {
+        "version": VERSION,
+        "stage": model.stage,
+        "optics": asdict(model.optics),
+        "metadata": dict(model.metadata),
+    }
+    try:
+        text = json.dumps(description, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{path}: metadata cannot be written as JSON: {error}") from error
+    arrays = {name: x.detach().cpu().contiguous().numpy() for name, x in model.parameters.items()}
+    return write_bytes(path, save(arrays, {FORMAT: text}))
+
+
+def read_model(path: str | Path) -> Model:
+    """Read a model file as `write_model` writes it, bit for bit, to the CPU. Nothing in it is executed.
+
+    Raises:
+        ArgumentError, ShapeError: if the file is missing, no safetensors, cut short, of another program or a
+            newer version, or a tensor is missing, unknown, not finite or of another type or shape.
+    """
+    path = Path(path)
+    description, tensors = _open(path)
+    try:
+        stage, optics = str(description["stage"]), _optics(description["optics"])
+        model = Model(tensors, optics, dict(description["metadata"]))
+    except TexgsError as error:
+        raise type(error)(f"{path}: {error}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"{path}: expected stage, optics and metadata in the header, got {_short(description)}; "
+            "write the file again"
+        ) from error
+    _check(path, model, stage)
+    return model
+
+
+def _open(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Description and tensors; the description is judged before any tensor is looked at."""
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="pt") as file:
+            description = _description(path, file.metadata() or {})
+            # A copy is aligned in memory and does not depend on the file any more.
+            return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file") from error
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error})") from error
+    except SafetensorError as error:
+        raise ArgumentError(f"{path}: {_damage(path)}") from error
+
+
+def _damage(path: Path) -> str:
+    """What is wrong with a file that safetensors cannot open: it would begin with a length and then JSON."""
+    with path.open("rb") as file:
+        start = file.read(9)
+    if start[8:] == b"{":
+        return "expected a whole safetensors file, got one cut short or damaged; copy or write it again"
+    return "expected a safetensors file, got one of another format; read_ply reads PLY files"
+
+
+def _description(path: Path, header: dict[str, str]) -> dict[str, Any]:
+    if FORMAT not in header:
+        raise ArgumentError(f"{path}: expected a {FORMAT} file, got safetensors of another program")
+    try:
+        description: dict[str, Any] = json.loads(header[FORMAT])
+        version = int(str(description["version"]))
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"{path}: expected JSON with a version in the header, got {_short(header[FORMAT])}; "
+            "write the file again"
+        ) from error
+    if version > VERSION:
+        raise ArgumentError(
+            f"{path}: expected version {VERSION} of the format at most, got {version}; update texgs"
+        )
+    return description
+
+
+def _short(value: object) -> str:
+    """Enough of a value to recognise it in a message."""
+    return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
+
+
+def _optics(stored: dict[str, Any]) -> Optics:
+    optics = Optics(**stored)
+    known = optics.material in ("bounded", "paper") and isinstance(optics.local_viewer, bool)
+    if not known or not 0 < float(optics.low_pass) < math.inf:
+        raise ArgumentError(f"optics: expected values of texgs {FORMAT} version {VERSION}, got {stored}")
+    return optics
+
+
+def _check(path: str | Path, model: Model, stage: str) -> None:
+    """Require the tensors of a stage with finite values, of the right type, in a layout that can be drawn.
+
+    Raises:
+        ArgumentError, ShapeError: naming the file and the tensor.
+    """
+    given = model.parameters
+    if stage not in NEEDED:
+        raise ArgumentError(f"{path}: expected stage {', '.join(NEEDED)}, got {stage!r}")
+    for name in NEEDED[stage]:
+        if name not in given:
+            raise ArgumentError(f"{path}: expected tensor {name} at stage {stage}, got {', '.join(given)}")
+    for name, tensor in given.items():
+        if name not in SHAPES and name not in MATERIAL:
+            raise ArgumentError(f"{path}: expected tensors of a texgs model, got {name}; remove it")
+        if tensor.dtype != (dtype := DTYPES.get(name, torch.float32)):
+            raise ArgumentError(f"{path}: {name}: expected {dtype}, got {tensor.dtype}; convert it")
+    try:
+        check.finite(**given)
+        if "texels" in given:
+            texels, sizes, offsets = (given[name] for name in TEXTURE[1:])
+            layout = Texture(given["colors"], given["opacities"], texels, sizes, offsets)
+            check_texture(layout, len(model))
+    except TexgsError as error:
+        raise type(error)(f"{path}: {error}") from error

@@ -1,0 +1,226 @@
+"""Exchange of surfels with other programs: PLY files of 2DGS, of 3DGS and of the paper's release."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.io import write_atomic
+from texgs.core.rotation import quats_to_matrices
+from texgs.raster.spherical_harmonics import DEGREES
+from texgs.scene.model import Model, Optics, material
+from texgs.scene.release_texture import read_texture
+
+FLAVOURS = ("2dgs", "3dgs", "release")
+Y00 = 0.5 / math.sqrt(math.pi)  # the constant harmonic
+FLAT = float(np.float32(math.log(1e-6)))  # third scale of a surfel for viewers of 3D Gaussians
+RELEASE = {  # our name of a factor by the release's, in the order of its files
+    "diffuse_factor": "diffuse",
+    "shininess": "shininess",
+    "ambient_factor": "ambient",
+    "specular_factor": "specular",
+}
+MOST_SPECULAR, MOST_SHININESS = 5.0, 50.0  # of the release
+
+
+def write_ply(path: str | Path, model: Model, flavour: str = "2dgs") -> Path:
+    """Create or replace a binary PLY file in one step.
+
+    All flavours hold means, unit normals (which 2DGS leaves at zero), opacities, scales and quaternions raw,
+    as the model does, and colours as harmonics, `f_rest` one channel after the other. With shading the only
+    harmonic is that of the colour without light, (c_ind - 0.5) / Y00. Textures are lost: what is left of
+    palette, offset and texture is their mean over each surfel. Low-pass filter and metadata are lost too.
+
+    - "2dgs": `scale_0` and `scale_1`; without material.
+    - "3dgs": also `scale_2` = log(1e-6), for viewers of 3D Gaussians.
+    - "release": as the paper's release stores relightable surfels, so only with shading: 45 `f_rest`, and
+      `diffuse_factor`, `shininess`, `ambient_factor`, `specular_factor` under its activations. It clamps the
+      coloured and the white part of its shading one by one, so that it may render less light.
+
+    Args:
+        path: target.
+        model: any stage, on any device.
+        flavour: one of the above.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if the flavour is unknown or cannot express the model, a value is not finite, or the
+            file cannot be written.
+    """
+    from plyfile import PlyData, PlyElement
+
+    if flavour not in FLAVOURS:
+        raise ArgumentError(f"flavour: expected {', '.join(FLAVOURS)}, got {flavour!r}")
+    if flavour == "release" and model.stage == "surfels":
+        raise ArgumentError(
+            f"{path}: release needs a model with shading, got stage surfels; use flavour 2dgs"
+        )
+    parameters = {name: x.detach().cpu() for name, x in model.parameters.items()}
+    try:
+        check.finite(**parameters)
+        columns = _columns(Model(parameters, model.optics), flavour)
+    except TexgsError as error:
+        raise type(error)(f"{path}: {error}") from error
+    vertices = np.empty(len(model), [(name, "<f4") for name in columns])
+    for name, column in columns.items():
+        vertices[name] = column.numpy()
+    return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
+
+
+def read_ply(path: str | Path) -> Model:
+    """Read surfels from a PLY file of 2DGS, of the paper's release, or of 3DGS where Gaussians are flat.
+
+    Files are told apart by their properties. Those of the release become models of stage shading with
+    material "paper" and colours of at least 0, as it clamps them; its textured ones, of stage texture, see
+    `texgs.scene.release_texture.read_texture`; all others, of stage surfels. The low-pass filter is that of
+    2DGS, as no file says; `dataclasses.replace` gives a model another.
+
+    Raises:
+        ArgumentError: if the file is missing, no PLY, cut short or without surfels, or values are not finite.
+    """
+    path = Path(path)
+    vertices = _vertices(path)
+    try:
+        parameters = _geometry(vertices)
+        if "ambient_factor" not in (vertices.dtype.names or ()):
+            parameters["sh"] = _harmonics(vertices)
+            optics = Optics(low_pass=2.0)
+        else:
+            parameters |= _appearance(vertices, path.parent)
+            optics = Optics(low_pass=2.0, material="paper")
+        check.finite(**parameters)
+        return Model(parameters, optics)
+    except TexgsError as error:
+        raise type(error)(f"{path}: {error}") from error
+
+
+# -- writing ---
+
+
+def _columns(model: Model, flavour: str) -> dict[str, Tensor]:
+    """[N] values by property, in the order of the flavour."""
+    p = model.parameters
+    normals = quats_to_matrices(p["quats"])[..., 2]  # [N, 3]
+    sh = p["sh"] if model.stage == "surfels" else ((_color(p) - 0.5) / Y00)[:, None]  # [N, K, 3]
+    rest = sh[:, 1:].transpose(1, 2).flatten(1)  # [N, 3 (K - 1)], one channel after the other
+    place = dict(zip("xyz", p["means"].T, strict=True))
+    common = {"opacity": p["opacities"]}
+    dc, rotation = _numbered("f_dc", sh[:, 0]), _numbered("rot", p["quats"])
+    scales = _numbered("scale", p["scales"])
+    if flavour == "release":
+        dark = _numbered("f_rest", rest.new_zeros(len(model), 45))  # its loader expects as many
+        normal = _numbered("normal", normals)
+        return place | dc | dark | common | normal | scales | rotation | _release_material(model)
+    if flavour == "3dgs":
+        scales["scale_2"] = torch.full_like(p["opacities"], FLAT)
+    normal = dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
+    return place | normal | dc | _numbered("f_rest", rest) | common | scales | rotation
+
+
+def _numbered(name: str, values: Tensor) -> dict[str, Tensor]:
+    """Columns of [N, k] as name_0, name_1, ..."""
+    return {f"{name}_{k}": column for k, column in enumerate(values.T)}
+
+
+def _color(p: Mapping[str, Tensor]) -> Tensor:
+    """Colour of each surfel without light [N, 3]; in float64, so that harmonics of it are rounded once."""
+    if "texels" not in p:
+        return p["colors"].double()
+    running = torch.cat([p["texels"].new_zeros(1, 3).double(), p["texels"].double().cumsum(0)])  # [T + 1, 3]
+    counts = p["sizes"].long().prod(1)  # [N]
+    means = (running[p["offsets"] + counts] - running[p["offsets"]]) / counts[:, None]
+    return p["colors"].double() + p["palette"].double() + means
+
+
+def _release_material(model: Model) -> dict[str, Tensor]:
+    """Raw material under the release's names and activations, [N] each."""
+    raw = {name: model.parameters[name] for name in RELEASE.values()}
+    if model.optics.material != "paper":
+        raw = material({name: x.double() for name, x in raw.items()}, model.optics.material)
+        if bool((raw["shininess"] >= MOST_SHININESS).any()):
+            raise ArgumentError(
+                f"shininess: expected less than {MOST_SHININESS:g}, as the release can express, got up to "
+                f"{float(raw['shininess'].max()):.4g}; use flavour 2dgs, or lower it"
+            )
+        raw["specular"] = torch.logit(raw["specular"] / MOST_SPECULAR)
+        raw["shininess"] = torch.logit(raw["shininess"] / MOST_SHININESS)
+    return {theirs: raw[ours].expand(len(model)) for theirs, ours in RELEASE.items()}
+
+
+# -- reading ---
+
+
+def _vertices(path: Path) -> np.ndarray:
+    """Vertices of a PLY file as a structured array [N]."""
+    from plyfile import PlyData, PlyParseError
+
+    try:
+        data = PlyData.read(path)
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file") from error
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+    except (PlyParseError, ValueError) as error:
+        raise ArgumentError(f"{path}: expected a whole PLY file, got {error}") from error
+    if "vertex" not in data:
+        raise ArgumentError(f"{path}: expected vertices, got {', '.join(e.name for e in data) or 'nothing'}")
+    return data["vertex"].data
+
+
+def _take(vertices: np.ndarray, *names: str) -> Tensor:
+    """Properties as columns [N, k] float32."""
+    given = vertices.dtype.names or ()
+    for name in names:
+        if name not in given or vertices.dtype[name].kind not in "iuf":
+            raise ArgumentError(f"expected surfels with a number {name} each, got {', '.join(given)}")
+    return torch.from_numpy(np.stack([vertices[name].astype(np.float32) for name in names], axis=1))
+
+
+def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
+    scales = _take(vertices, "scale_0", "scale_1")
+    names = vertices.dtype.names or ()
+    if "scale_2" in names and "ambient_factor" not in names:  # the release has one without meaning
+        third = _take(vertices, "scale_2")[:, 0]
+        thick = (third > FLAT) & (third > scales.amax(1) - math.log(10))
+        if bool(thick.any()):
+            raise ArgumentError(
+                f"expected flat Gaussians, got {int(thick.sum())} of {len(thick)} with a third axis above a "
+                "tenth of the longest; fit surfels instead"
+            )
+    return {
+        "means": _take(vertices, "x", "y", "z"),
+        "quats": _take(vertices, *(f"rot_{k}" for k in range(4))),
+        "scales": scales,
+        "opacities": _take(vertices, "opacity")[:, 0],
+    }
+
+
+def _harmonics(vertices: np.ndarray) -> Tensor:
+    """[N, K, 3] with as many coefficients as the file has."""
+    dc = _take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")[:, None]  # [N, 1, 3]
+    n_rest = sum(name.startswith("f_rest_") for name in vertices.dtype.names or ())
+    if n_rest % 3 or 1 + n_rest // 3 not in DEGREES:
+        raise ArgumentError(f"expected 0, 9, 24 or 45 properties f_rest, got {n_rest}")
+    if not n_rest:
+        return dc
+    rest = _take(vertices, *(f"f_rest_{k}" for k in range(n_rest))).unflatten(1, (3, -1))  # [N, 3, K - 1]
+    return torch.cat([dc, rest.transpose(1, 2)], dim=1)
+
+
+def _appearance(vertices: np.ndarray, folder: Path) -> dict[str, Tensor]:
+    """Colour and material of the release's surfels, with their textures where the file has no colour."""
+    factors = _take(vertices, *RELEASE)
+    found = {ours: factors[:, k].contiguous() for k, ours in enumerate(RELEASE.values())}
+    if "mappings_0" in (vertices.dtype.names or ()):
+        return found | {"colors": torch.zeros(len(vertices), 3)} | read_texture(folder, len(vertices))
+    dc = _take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")
+    return found | {"colors": (0.5 + Y00 * dc.double()).clamp(min=0).float()}
