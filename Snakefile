@@ -5,7 +5,7 @@
 #   snakemake --cores all --config dataset=engine overrides="views=paper views.width=400"
 from snakemake.utils import min_version
 
-min_version("9.0")
+min_version("9.19")
 
 
 # Used only with --software-deployment-method apptainer: the image in which `make install` has made .venv.
@@ -15,6 +15,8 @@ container: "docker://python:3.11-bookworm"
 include: "workflow/rules/common.smk"
 include: "workflow/rules/volume.smk"
 include: "workflow/rules/views.smk"
+include: "workflow/rules/fit.smk"
+include: "workflow/rules/tables.smk"
 
 
 rule all:
@@ -22,9 +24,10 @@ rule all:
     input:
         rules.volumes.input,
         rules.sheets.input,
+        rules.tables.output,
 
 
 onsuccess:
     print(f"Done: {RESULTS}/*/transfer, {RESULTS}/*/*/views and {RESULTS}/*/*/sheet")
-    if STORE is not None:
+    if STORE is not None and STORE.startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")

@@ -6,11 +6,14 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from texgs.cli.job import BY_HAND
 from texgs.cli.main import main
+from texgs.cli.stages import views as views_stage
 from texgs.volume.view_set import read_views
 
 TINY = [
@@ -27,16 +30,35 @@ TINY = [
 ]
 
 
+class Blank:
+    """A mapper that sees nothing."""
+
+    local_viewer = False
+
+    def render(self, _tf, camera, _light):
+        return np.zeros((camera.height, camera.width, 4), np.float32)
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     return tmp_path / "results" / "sphere"
 
 
+def numbers(views):
+    """What the stage says about its folder."""
+    return json.loads((views / BY_HAND).read_text())["numbers"]
+
+
+def images(views):
+    """Names and bytes of all images in a folder of views."""
+    return {path.relative_to(views): path.read_bytes() for path in views.rglob("*.png")}
+
+
 def test_views_makes_what_it_needs_first(folder, capsys):
     assert main(["views", *TINY]) == 0
     assert "results/sphere/volume: done" in capsys.readouterr().out
-    (tf,) = (path.name for path in folder.iterdir() if path.name != "volume")
+    (tf,) = (path.name for path in folder.glob("TF*"))
     views = read_views(folder / tf / "views")
     assert (len(views.train), len(views.test)) == (12, 3)
     camera = views.train[0].camera
@@ -79,15 +101,44 @@ def test_geometry_of_the_test_views(folder):
     assert normal[16, 24] @ [1, 0, 0] > 0.9, "test view 1 of 3 is on the +x axis"
 
 
-def test_a_killed_job_goes_on_where_it_was(folder):
-    """Frames that are there are kept, and the result is that of an uninterrupted run."""
+def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):
+    monkeypatch.setattr(views_stage, "mapper_for", lambda *_: Blank())
+    for _ in range(2):
+        assert main(["views", *TINY]) == 2
+        error = capsys.readouterr().err.splitlines()[-1]
+        assert error.endswith("expected to see something, but all views are empty; raise its opacity")
+        (views,) = folder.glob("*/views")
+        assert len(list(views.glob("train/*.png"))) == 12
+        assert not list(views.glob("transforms_*.json"))
+
+
+def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
+    main(["views", *TINY])
+    (views,) = folder.glob("*/views")
+    whole = numbers(views)
+    lost = [views / "train" / "r_0011.png", *(views / "test").iterdir(), views / BY_HAND]
+    for path in lost:
+        path.unlink()
+    monkeypatch.setattr(views_stage, "mapper_for", lambda *_: Blank())
+    assert main(["views", *TINY]) == 0
+    assert len(whole["frames_ms"]) == 15 - 1
+    resumed = numbers(views)
+    assert len(resumed["frames_ms"]) == 15 - 2
+    assert resumed["frames_ms"][:10] == whole["frames_ms"][:10]
+    assert resumed["first_frame_ms"] == whole["first_frame_ms"]
+    alpha = np.stack([view.load()[..., 3].numpy() for view in read_views(views).train])
+    assert resumed["coverage"] == pytest.approx((alpha > 0).mean() * 12 / 15)
+
+
+def test_a_killed_job_goes_on_where_it_was(folder, tmp_path, monkeypatch):
+    """Images and times are kept, and the result is that of an uninterrupted run."""
     words = [
         "views",
         *TINY,
-        "views.width=400",
-        "views.height=400",
-        "views.step=0.05",
-        "views.train.frequency=3",
+        "views.width=96",
+        "views.height=96",
+        "views.step=0.2",
+        "views.train.frequency=2",
     ]
     command = [sys.executable, "-m", "texgs.cli.main", *words]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -100,11 +151,17 @@ def test_a_killed_job_goes_on_where_it_was(folder):
     (views,) = folder.glob("*/views")
     assert not (views / "transforms_train.json").exists()
     kept = {path.name: path.stat().st_mtime_ns for path in (views / "train").glob("r_*.png")}
-    assert 4 <= len(kept) < 92
+    assert 4 <= len(kept) < 42
     assert main(words) == 0
-    assert len(read_views(views).train) == 92
+    assert len(read_views(views).train) == 42
     assert all((views / "train" / name).stat().st_mtime_ns == stamp for name, stamp in kept.items())
-    assert json.loads((views / "metrics.json").read_text())["numbers"]["rendered"] < 92 + 3 + 1
+    assert len(numbers(views)["frames_ms"]) == 42 + 3 - 2, "one time per view, without the first of each run"
+    (tmp_path / "other").mkdir()
+    monkeypatch.chdir(tmp_path / "other")
+    assert main(words) == 0
+    (other,) = Path.cwd().glob("results/*/*/views")
+    assert len(images(other)) == 42 + 3 + 2 + 1
+    assert images(views) == images(other)
 
 
 def test_a_job_of_the_workflow(folder, capsys):
@@ -134,7 +191,7 @@ def test_a_folder_of_others_is_left_alone(folder, capsys):
         (["views.widht=3"], "views.widht: no such key"),
         (["dataset.volume.generator=null", "dataset.volume.file=no.nrrd"], "no.nrrd is not there"),
         (["tf=TF09"], "tf: expected a basic TF of data set sphere"),
-        (["views.step=0"], "step: expected more than 0, got 0"),
+        (["views.step=0"], "views.step: expected more than 0, got 0"),
         (["views.lights=[]"], "views.lights: expected at least one light"),
         (
             ["dataset.basic_tfs.TF01.opacity=[[5,0],[6,1]]", "dataset.tf_values=data"],

@@ -39,6 +39,13 @@ def test_interpolations_are_resolved():
         ("views.width=abc", "views.width: value 'abc' of type 'str' could not be converted to Integer"),
         ("views.width=1.5", "views.width: value '1.5' of type 'float' could not be converted to Integer"),
         ("views.width=0", "views.width: expected at least 1, got 0"),
+        ("views.step=0", "views.step: expected more than 0, got 0"),
+        ("views.fov_y=180", "views.fov_y: expected less than 180, got 180"),
+        ("views.shading.ambient=inf", "views.shading.ambient: expected a finite number, got inf"),
+        ("dataset.name=../../x", "dataset.name: expected a letter and then letters"),
+        ("dataset.name=logs", "dataset.name: logs is a folder of texgs"),
+        ("dataset=123", "expected the name of a file of conf/"),
+        ("tracking=http://x", "an address goes to tracking.uri"),
         ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, got gpuu, did you mean gpu?"),
         ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
         ("views=hugge", "views: expected one of default, paper, relight, small, got hugge"),
@@ -70,8 +77,10 @@ def test_every_key_says_what_it_means():
     for entry in keys():
         assert entry.help, entry.name
     assert len({entry.name for entry in keys()}) == len(keys())
-    text = describe()
+    text = describe(compose())
     assert "views.fov_y=30.0" in text
+    assert "views.test.kind=spiral" in text
+    assert "tracking.uri=sqlite:///results/mlflow.db" in text
     assert "[degrees]" in text
     assert "dataset=" in groups()
 

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.sheet import write_animation, write_sheet
+from texgs.volume.sheet import GUTTER, write_animation, write_sheet
 
 
 def greys(count, size=(30, 20)):
@@ -11,10 +11,24 @@ def greys(count, size=(30, 20)):
 
 
 def test_sheet_shows_evenly_spaced_pictures_in_reading_order(tmp_path):
-    with Image.open(write_sheet(tmp_path / "sheet.png", greys(24), columns=3, thumbnail=60)) as sheet:
-        assert (sheet.size, sheet.mode) == ((180, 80), "RGB")  # 2 rows of 3, each 60 x 40
-        centres = [sheet.getpixel((30 + 60 * (i % 3), 20 + 40 * (i // 3)))[0] for i in range(6)]
-    assert centres == [0, 40, 80, 120, 160, 200]
+    pictures = greys(24, (90, 60))
+    with Image.open(write_sheet(tmp_path / "sheet.png", pictures, columns=3, thumbnail=60)) as sheet:
+        assert (sheet.size, sheet.mode) == ((180 + 2 * GUTTER, 80 + GUTTER), "RGB")  # 2 rows of 3 of 60 x 40
+        corners = [((60 + GUTTER) * (i % 3), (40 + GUTTER) * (i // 3)) for i in range(6)]
+        shown = [np.unique(sheet.crop((x, y, x + 60, y + 40))) for x, y in corners]
+        gutters = [np.unique(sheet.crop((x - GUTTER, 0, x, 40))) for x, y in corners[1:3]]
+        gutters.append(np.unique(sheet.crop((0, 40, 180, 40 + GUTTER))))
+    assert shown == [0, 40, 80, 120, 160, 200]
+    assert gutters == [255] * 3
+
+
+def test_pictures_smaller_than_a_thumbnail_stay_as_they_are(tmp_path):
+    noise = Image.fromarray(np.random.default_rng(0).integers(0, 256, (20, 30, 3), np.uint8))
+    with Image.open(write_sheet(tmp_path / "sheet.png", [noise])) as sheet:
+        np.testing.assert_array_equal(np.asarray(sheet), np.asarray(noise))
+    large = Image.new("RGB", (60, 60), "red")
+    with Image.open(write_sheet(tmp_path / "sheet.png", [noise, large], thumbnail=40)) as sheet:
+        np.testing.assert_array_equal(np.asarray(sheet.crop((5, 10, 35, 30))), np.asarray(noise))
 
 
 def test_sheet_of_few_pictures_is_as_wide_as_they_are(tmp_path):
@@ -25,10 +39,10 @@ def test_sheet_of_few_pictures_is_as_wide_as_they_are(tmp_path):
 def test_sheet_centres_pictures_of_other_aspects(tmp_path):
     red, blue = Image.new("RGB", (20, 10), "red"), Image.new("RGB", (10, 20), "blue")
     with Image.open(write_sheet(tmp_path / "sheet.png", [red, blue], thumbnail=20)) as sheet:
-        assert sheet.size == (40, 20)
+        assert sheet.size == (40 + GUTTER, 20)
         assert sheet.getpixel((10, 10)) == (255, 0, 0)
-        assert sheet.getpixel((30, 10)) == (0, 0, 255)
-        assert sheet.getpixel((10, 2)) == sheet.getpixel((22, 10)) == (255, 255, 255)
+        assert sheet.getpixel((30 + GUTTER, 10)) == (0, 0, 255)
+        assert sheet.getpixel((10, 2)) == sheet.getpixel((22 + GUTTER, 10)) == (255, 255, 255)
 
 
 @pytest.mark.parametrize("write", [write_sheet, write_animation])

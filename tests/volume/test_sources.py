@@ -1,7 +1,9 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from tests.volume.volume_files import sample_values
+from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Grid
 from texgs.volume.slabs import slab_bounds
@@ -91,3 +93,29 @@ def test_mistakes_in_the_path(tmp_path, monkeypatch):
     np.save(tmp_path / "v.npy", sample_values())
     with pytest.raises(ArgumentError, match="this format has a header; leave them out"):
         open_source("v.npy", dims=DIMS)
+
+
+@pytest.mark.parametrize("name", [*WRITERS, "v.raw", "v.slc"])
+def test_a_file_without_permission_is_one_sentence(tmp_path, monkeypatch, name):
+    """The tests may run as root, who may read everything: opening the file is made to fail."""
+    path = tmp_path / name
+    WRITERS.get(name, lambda path, values: path.write_bytes(values.tobytes()))(path, sample_values())
+
+    def refuse(self, *_arguments, **_options):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "open", refuse)
+    arguments = {"dims": DIMS, "dtype": "uint16"} if name == "v.raw" else {}
+    with pytest.raises(ArgumentError) as caught:
+        open_source(path, **arguments)
+    assert str(caught.value) == f"{path}: cannot be read (Permission denied)"
+
+
+@pytest.mark.parametrize("function", ["is_dir", "iterdir"])
+def test_a_folder_without_permission_is_one_sentence(tmp_path, monkeypatch, function):
+    def refuse(self):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, function, refuse)
+    with pytest.raises(ArgumentError, match=r"cannot be read \(Permission denied\)"):
+        open_source(tmp_path)

@@ -2,6 +2,7 @@
 
 import os
 import shutil
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -38,16 +39,34 @@ class Project:
             )
         shutil.copy(ROOT / "Snakefile", self.sources)
 
-    def snakemake(self, *words: str, overrides: str = "", config: tuple[str, ...] = ("tracking=none",)):
+    def start(
+        self,
+        *words: str,
+        targets: tuple[str, ...] = ("volumes", "sheets"),
+        overrides: str = "",
+        config: tuple[str, ...] = ("tracking=none",),
+    ) -> subprocess.Popen[str]:
+        """Snakemake in a process group of its own; `targets` are rules, by default those before the fits."""
         command = [sys.executable, "-c", LAUNCHER, str(self.sources), "-s", str(self.sources / "Snakefile")]
-        command += ["-d", str(self.work), "--cores", "2", "--rerun-incomplete", *words]
+        command += ["-d", str(self.work), "--cores", "2", "--rerun-incomplete", *targets, *words]
         command += ["--config", *config, f"overrides={TINY} {overrides}"]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        return subprocess.run(command, capture_output=True, text=True, env=environment, timeout=300)
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        return subprocess.Popen(command, text=True, env=environment, start_new_session=True, **pipes)
 
-    def planned(self, **options) -> list[str]:
+    def snakemake(self, *words: str, **options) -> subprocess.CompletedProcess[str]:
+        """Snakemake to its end; arguments as for `start`."""
+        process = self.start(*words, **options)
+        try:
+            out, err = process.communicate(timeout=300)
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+        return subprocess.CompletedProcess(process.args, process.returncode, out, err)
+
+    def planned(self, *words: str, **options) -> list[str]:
         """Jobs of a dry run, such as "views TF01"."""
-        done = self.snakemake("--dry-run", **options)
+        done = self.snakemake("--dry-run", *words, **options)
         assert done.returncode == 0, done.stderr + done.stdout
         jobs, rule = [], ""
         for line in done.stdout.splitlines() + done.stderr.splitlines():

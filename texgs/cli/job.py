@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import getpass
 import importlib
+import os
 import platform
 import shutil
 import subprocess
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
+
+from filelock import FileLock, Timeout
 
 from texgs import __version__, track
 from texgs.cli.stages.outcome import Outcome
@@ -22,7 +26,8 @@ from texgs.core.io import read_json, write_json
 from texgs.core.memory import peak_memory
 
 STAMP = ".job.json"
-METRICS = "metrics.json"
+METRICS = "metrics.json"  # its presence tells the workflow that a job is done
+BY_HAND = "metrics.by_hand.json"  # the same of a job that the workflow does not know of
 PACKAGES = ("torch", "numpy", "vtk", "pyvista")
 
 
@@ -45,12 +50,25 @@ class Job:
 
     def is_done(self) -> bool:
         """Whether the folder holds the finished result of exactly this job."""
-        metrics, stamp = self.output / METRICS, self.output / STAMP
-        return metrics.exists() and stamp.exists() and read_json(stamp) == self.identity()
+        stamp = self.output / STAMP
+        is_finished = any((self.output / name).exists() for name in (METRICS, BY_HAND))
+        return is_finished and stamp.exists() and read_json(stamp) == self.identity()
 
 
-def execute(job: Job, tracking: str | None, experiment: str) -> dict[str, Any]:
-    """Run a job and write its metrics.json; returns what that says.
+def discard(job: Job) -> None:
+    """Remove the result of a job, finished or not, so that it starts from nothing."""
+    if (job.output / STAMP).exists():
+        shutil.rmtree(job.output)
+
+
+def adopt(job: Job) -> None:
+    """Let the workflow have a finished result that was made by hand."""
+    if not (job.output / METRICS).exists():
+        (job.output / BY_HAND).replace(job.output / METRICS)
+
+
+def execute(job: Job, tracking: str | None, experiment: str, metrics_name: str = METRICS) -> dict[str, Any]:
+    """Run a job and write its metrics; returns what they say.
 
     Files that an interrupted run of the same job left in the folder are kept, those of any other job removed.
 
@@ -58,10 +76,39 @@ def execute(job: Job, tracking: str | None, experiment: str) -> dict[str, Any]:
         job: what to run.
         tracking: URI of the tracking store, or None.
         experiment: of the tracking store.
+        metrics_name: file of the metrics.
 
     Raises:
         TexgsError: for a mistake of the user.
     """
+    with alone(job.output):
+        return _execute(job, tracking, experiment, metrics_name)
+
+
+@contextmanager
+def alone(output: Path) -> Iterator[None]:
+    """Keep other processes out of a job's folder.
+
+    Raises:
+        ArgumentError: if another job works there, or the folder above it cannot be written to.
+    """
+    lock = FileLock(output.parent / f".{output.name}.lock")
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire(blocking=False)
+    except Timeout as error:
+        raise ArgumentError(f"{output}: another job works there; wait for it to end") from error
+    except OSError as error:
+        raise ArgumentError(
+            f"{output}: cannot write there ({error.strerror}); choose other results"
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def _execute(job: Job, tracking: str | None, experiment: str, metrics_name: str) -> dict[str, Any]:
     for name, path in job.inputs.items():
         if not path.exists():
             raise ArgumentError(
@@ -70,7 +117,7 @@ def execute(job: Job, tracking: str | None, experiment: str) -> dict[str, Any]:
     identity = job.identity()
     claim(job.output, identity)
     tags = {
-        "mlflow.user": getpass.getuser(),
+        "mlflow.user": user(),
         "snakemake.rule": job.stage.name,
         **{f"wildcards.{key}": job.settings[key] for key in ("dataset", "tf") if key in job.settings},
         "config.sha": identity["settings"],
@@ -86,13 +133,13 @@ def execute(job: Job, tracking: str | None, experiment: str) -> dict[str, Any]:
         )
         seconds = time.perf_counter() - start
         metrics = {**record(job, identity, seconds), "run": run.id, "numbers": outcome.numbers}
-        write_json(job.output / METRICS, metrics)
+        write_json(job.output / metrics_name, metrics)
         run.log(
             {"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(outcome.numbers)}
         )
         for step, values in enumerate(series(outcome.numbers)):
             run.log(values, step)
-        for path in (*outcome.pictures, job.output / METRICS):
+        for path in (*outcome.pictures, job.output / metrics_name):
             run.artifact(path)
     return metrics
 
@@ -104,7 +151,8 @@ def claim(output: Path, identity: dict[str, Any]) -> None:
         ArgumentError: if the folder holds files that are not of texgs.
     """
     stamp = output / STAMP
-    (output / METRICS).unlink(missing_ok=True)  # the job is not done before it is written again
+    for name in (METRICS, BY_HAND):  # the job is not done before it is written again
+        (output / name).unlink(missing_ok=True)
     if stamp.exists() and read_json(stamp) == identity:
         return
     if output.exists() and any(output.iterdir()):
@@ -123,12 +171,25 @@ def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]
         **{key: job.settings[key] for key in ("dataset", "tf") if key in job.settings},
         "seconds": seconds,
         "peak_memory_mib": peak_memory() / 2**20,
-        "device": f"{platform.machine()} CPU",
+        "device": device(job.settings),
+        "seed": seed(job.settings),
         "config_sha": identity["settings"],
         "code_sha": identity["code"],
         "git_sha": git_revision(),
         "versions": versions(),
     }
+
+
+def device(settings: Mapping[str, Any]) -> str:
+    """What did the work."""
+    by_gpu = settings.get("views", {}).get("mapper") == "gpu"
+    return "OpenGL" if by_gpu else f"{platform.machine()} CPU"
+
+
+def seed(settings: Mapping[str, Any]) -> int | None:
+    """The seed of the stage's random numbers, where it has one."""
+    parts = [settings.get(name, {}) for name in ("fit", "volume")]
+    return next((part["seed"] for part in parts if "seed" in part), None)
 
 
 def versions() -> dict[str, str]:
@@ -140,6 +201,14 @@ def versions() -> dict[str, str]:
         except PackageNotFoundError:
             continue
     return found
+
+
+def user() -> str:
+    """Who runs this; a number where the system has no name for it."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return str(os.getuid())
 
 
 def git_revision() -> str:

@@ -16,10 +16,14 @@ STAGE_VERBS = {
     "transfer": "plot the histogram with the basic transfer functions, and export these",
     "views": "render the training and test views of basic transfer functions",
     "sheet": "show views on one contact sheet",
+    "surfels": "seed surfels and fit them with spherical harmonics",
+    "shading": "fit relightable surfels with Blinn-Phong shading",
+    "texture": "give relightable surfels textures",
 }
 VERBS = {
     "new": "start a data set from a volume file of your own, with suggested transfer functions",
     **STAGE_VERBS,
+    "tables": "write the tables that metrics files hold",
     "doctor": "show what is installed, what is missing and what to do about it",
 }
 
@@ -41,6 +45,18 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
+def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The arguments; KEY=VALUE may stand anywhere, also behind options, where argparse alone gives up."""
+    top = parser()
+    arguments, rest = top.parse_known_args(argv)
+    overrides: list[str] | None = getattr(arguments, "overrides", None)
+    if rest and (overrides is None or any(word.startswith("-") for word in rest)):
+        top.error(f"unrecognized arguments: {' '.join(rest)}")
+    if rest:
+        arguments.overrides = [*(overrides or ()), *rest]
+    return arguments
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb.
 
@@ -51,7 +67,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit code: 0 done, 1 the verb says no, 2 a mistake of the user or a limit of the machine (told in one
         sentence on stderr), 130 interrupted.
     """
-    arguments = parser().parse_args(argv)
+    arguments = parse(argv)
     if argv is None:  # a process of its own: told to end, it ends as if interrupted, and its run as killed
         signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:

@@ -40,12 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
     from texgs.cli.stage import ensure
-    from texgs.config.compose import FOLDER
+    from texgs.config.compose import FOLDER, check_name
     from texgs.config.schema import BasicTF
 
-    name = arguments.name or re.sub(r"\W+", "_", arguments.file.name.split(".")[0])
-    if not re.fullmatch(r"\w+", name):
-        raise ArgumentError(f"--name: expected letters, digits and _, got {name}")
+    name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
+    check_name("--name", name)
     target = FOLDER / "dataset" / f"{name}.yaml"
     if target.exists() and not arguments.force:
         raise ArgumentError(f"{target}: is there already; choose another --name, or replace it with --force")
@@ -80,8 +79,9 @@ def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
 
     words = [f"dataset.volume.{word}" for word in overrides]
     blank = "dataset.volume.generator=null"
-    config = compose(("tracking=none", blank, f"dataset.volume.file='{file.absolute()}'", *words)).copy()
+    config = compose(("tracking=none", blank, *words)).copy()
     OmegaConf.set_readonly(config, False)
+    config.dataset.volume.file = str(file.absolute())
     fresh = OmegaConf.merge(
         OmegaConf.structured(Dataset(name=name)), {"title": name, "volume": config.dataset.volume}
     )
@@ -102,11 +102,18 @@ def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -
     from texgs.volume.tf_files import read_tf
     from texgs.volume.transfer import check_disjoint
 
+    summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     if files:
         basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
         check_disjoint(basic)
+        for path, tf in zip(files, basic.values(), strict=True):
+            low, high = tf.support
+            if high <= 1 < summary["maximum"]:
+                raise ArgumentError(
+                    f"{path}: expected values of the data, which go up to {summary['maximum']:g}, got a TF "
+                    f"on [{low:g}, {high:g}]; rescale it to the data in ParaView first"
+                )
         return basic
-    summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     return suggest(np.array(summary["histogram"]), summary["minimum"], summary["maximum"], count)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,11 +18,12 @@ class HelpWithKeys(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
         """Print the help and exit."""
-        from texgs.config.compose import groups
+        from texgs.config.compose import compose, groups
         from texgs.config.describe import describe
 
         parser.print_help()
-        print(f"\ngroups, each a folder of conf/:\n{groups()}\n\nkeys, with their defaults:\n{describe()}")
+        print(f"\ngroups, each a folder of conf/:\n{groups()}")
+        print(f"\nkeys, with their defaults:\n{describe(compose())}")
         parser.exit()
 
 
@@ -32,25 +34,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "overrides", nargs="*", metavar="KEY=VALUE", help="such as dataset=engine tf=TF01 views.width=400"
     )
     parser.add_argument("--force", action="store_true", help="do it again, even if nothing has changed")
-    job = parser.add_argument_group("one job, as the workflow runs it (no KEY=VALUE then)")
+    job = parser.add_argument_group(
+        "one job, as the workflow runs it (no KEY=VALUE then)",
+        "TEXGS_TRACKING and TEXGS_EXPERIMENT say where the run is recorded; by default it is not.",
+    )
     job.add_argument(
         "--settings", type=Path, metavar="FILE", help="what the stage reads, a file in results/.conf"
     )
     job.add_argument("--input", nargs="*", default=[], metavar="NAME=FILE", help="files the stage reads")
     job.add_argument("--output", type=Path, metavar="FOLDER", help="where its files go")
-    job.add_argument("--tracking", default=None, metavar="URI", help="where the run is recorded")
-    job.add_argument("--experiment", default="texgs", metavar="NAME", help="of the tracking store")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the stage that the verb names."""
     if arguments.settings is not None:
         return run_settings(arguments)
+    from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
     from texgs.config.stage import STAGES
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
+    check_basic_tfs(config.dataset)
     for name in tf_names(config) if stage.per_tf else [None]:
         chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
         ensure(arguments.verb, chosen, force=arguments.force)
@@ -59,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
-    from texgs.cli.job import Job, execute
+    from texgs.cli.job import BY_HAND, Job, discard, execute
     from texgs.config.stage import STAGES
 
     stage = STAGES[name]
@@ -68,28 +73,37 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
         if any(path.is_relative_to(STAGES[needed].output(config)) for path in inputs.values()):
             ensure(needed, config)
     job = Job(stage, stage.settings(config), inputs, stage.output(config))
-    if job.is_done() and not force:
+    if force:
+        discard(job)
+    if job.is_done():
         print(f"{job.output}: up to date")
         return
-    execute(job, config.tracking.uri, config.tracking.experiment)
+    execute(job, config.tracking.uri, config.tracking.experiment, BY_HAND)
     print(f"{job.output}: done")
 
 
 def run_settings(arguments: argparse.Namespace) -> int:
     """Run one job from the file of its settings."""
     from omegaconf import OmegaConf
+    from yaml import YAMLError
 
-    from texgs.cli.job import Job, execute
+    from texgs.cli.job import Job, adopt, execute
     from texgs.config.stage import STAGES
 
     if arguments.overrides or arguments.output is None:
         raise ArgumentError("a job: expected --settings and --output and no KEY=VALUE; see --help")
-    settings = OmegaConf.to_container(OmegaConf.load(arguments.settings))
+    try:
+        settings = OmegaConf.to_container(OmegaConf.load(arguments.settings))
+    except (OSError, YAMLError) as error:
+        raise ArgumentError(f"{arguments.settings}: expected the settings of a job ({error})") from error
     if not isinstance(settings, dict) or settings.get("stage") != arguments.verb:
         raise ArgumentError(
             f"{arguments.settings}: expected the settings of a {arguments.verb} job, got others"
         )
     inputs = {name: Path(path) for name, _, path in (word.partition("=") for word in arguments.input)}
     job = Job(STAGES[arguments.verb], dict(settings), inputs, arguments.output)  # type: ignore[arg-type]
-    execute(job, arguments.tracking, arguments.experiment)
+    if job.is_done():
+        adopt(job)
+        return 0
+    execute(job, os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs"))
     return 0

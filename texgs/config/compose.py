@@ -19,6 +19,7 @@ from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 
 FOLDER = Path(__file__).parents[2] / "conf"
+RESERVED = ("volume", "transfer", "logs", "benchmarks", "mlartifacts", "tables")  # folders below `results`
 
 
 @lru_cache(maxsize=256)
@@ -31,13 +32,17 @@ def compose(overrides: tuple[str, ...] = ()) -> DictConfig:
     Raises:
         ConfigError: for an unknown key, group member or value, or one of the wrong type or out of range.
     """
+    if not FOLDER.is_dir():
+        raise ConfigError(
+            f"{FOLDER}: no configuration there; use texgs from a clone, installed with `make install`"
+        )
     ConfigStore.instance().store(name="schema", node=Config)
     try:
         with initialize_config_dir(str(FOLDER), version_base="1.3"):
             composed = hydra_compose("config", overrides=list(overrides))
         resolved = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
         checked = OmegaConf.merge(OmegaConf.structured(Config), resolved)  # refuses keys added by +key=value
-    except (HydraException, OmegaConfBaseException) as error:
+    except (HydraException, OmegaConfBaseException, ValueError) as error:
         raise ConfigError(sentence(error)) from error
     config = cast(DictConfig, checked)
     check(config)
@@ -62,17 +67,33 @@ def check(config: DictConfig) -> None:
     Raises:
         ConfigError: naming the first key that is out of bounds.
     """
+    check_name("dataset.name", config.dataset.name)
+    for tf in config.dataset.basic_tfs:
+        check_name("dataset.basic_tfs", tf)
     for entry in keys():
         for name, value in values(config, entry.name):
-            choices, least = entry.choices, entry.least
+            choices = entry.choices
             if value is None:
                 continue
             if choices and value not in choices:
                 raise ConfigError(
                     f"{name}: expected one of {', '.join(choices)}, got {value}{close(value, choices)}"
                 )
-            if least is not None and not value >= least:
-                raise ConfigError(f"{name}: expected at least {least:g}, got {value:g}")
+            is_number = isinstance(value, int | float) and not isinstance(value, bool)
+            if is_number and (expected := entry.bounds.complaint(value)):
+                raise ConfigError(f"{name}: expected {expected}, got {value:g}")
+
+
+def check_name(key: str, name: str) -> None:
+    """Require a name that can be a folder beside the others below `results`.
+
+    Raises:
+        ConfigError: naming the key.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", str(name)):
+        raise ConfigError(f"{key}: expected a letter and then letters, digits, _ or -, got {name!r}")
+    if name in RESERVED:
+        raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
 
 
 def values(config: Any, name: str) -> Iterator[tuple[str, Any]]:
@@ -92,13 +113,16 @@ def values(config: Any, name: str) -> Iterator[tuple[str, Any]]:
 def sentence(error: Exception) -> str:
     """What is wrong in one sentence, from an exception of Hydra or OmegaConf."""
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:
-        group, _, name = error.missing_cfg_file.rpartition("/")
+        group, _, name = error.missing_cfg_file.partition("/")
         found = members(group)
-        return f"{group}: expected one of {', '.join(found)}, got {name}{close(name, found)}"
+        hint = close(name, found) or ("; an address goes to tracking.uri" if group == "tracking" else "")
+        return f"{group}: expected one of {', '.join(found)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):
         return (
             f"{error.override}: expected key=value, with quotes around a value that has commas, spaces or ="
         )
+    if isinstance(error, ValueError) and "group override" in str(error):
+        return "a group: expected the name of a file of conf/, such as dataset=engine, got something else"
     cause = error.__cause__ or error
     lines = [line.strip() for line in str(cause).splitlines() if line.strip()]
     text = lines[0]

@@ -8,6 +8,9 @@ from functools import cache
 from types import UnionType
 from typing import Any
 
+from omegaconf import DictConfig, OmegaConf
+
+from texgs.config.keys import Bounds
 from texgs.config.schema import Config
 
 
@@ -21,7 +24,7 @@ class Key:
     help: str
     unit: str
     choices: tuple[str, ...]
-    least: float | None
+    bounds: Bounds
 
 
 @cache
@@ -30,14 +33,13 @@ def keys() -> tuple[Key, ...]:
     return tuple(_walk(Config, ""))
 
 
-def describe(names: tuple[str, ...] = ()) -> str:
-    """A table of keys: name, type and default, unit, meaning.
+def describe(config: DictConfig) -> str:
+    """A table of all keys: name, value, type, unit, meaning.
 
     Args:
-        names: prefixes of the keys to show, such as ``("views.",)``; default all.
+        config: whose values are shown as defaults.
     """
-    shown = [entry for entry in keys() if not names or entry.name.startswith(names)]
-    return "\n".join(f"  {entry.name}={_text(entry.default)}\n      {_meaning(entry)}" for entry in shown)
+    return "\n".join(f"  {entry.name}={_value(entry, config)}\n      {_meaning(entry)}" for entry in keys())
 
 
 def _walk(table: type, prefix: str) -> Iterator[Key]:
@@ -50,7 +52,7 @@ def _walk(table: type, prefix: str) -> Iterator[Key]:
         else:
             default = None if field.default is dataclasses.MISSING else field.default
             told: dict[str, Any] = {
-                key: field.metadata.get(key) for key in ("help", "unit", "choices", "least")
+                key: field.metadata.get(key) for key in ("help", "unit", "choices", "bounds")
             }
             yield Key(name, _type(hint), default, **told)
 
@@ -71,12 +73,16 @@ def _type(hint: Any) -> str:
     return (
         "null"
         if hint is type(None)
-        else str(getattr(hint, "__name__", hint) if not typing.get_args(hint) else hint)
+        else str(getattr(hint, "__name__", hint) if not typing.get_args(hint) else hint).replace(
+            "typing.", ""
+        )
     )
 
 
-def _text(default: Any) -> str:
-    return "null" if default is None else str(default)
+def _value(entry: Key, config: DictConfig) -> str:
+    """The value in a configuration; of keys that come any number of times the schema's default."""
+    value = entry.default if "*" in entry.name else OmegaConf.select(config, entry.name)
+    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _meaning(entry: Key) -> str:

@@ -1,11 +1,44 @@
 """How the schema declares a key: default, meaning, unit, and the values that are allowed."""
 
-from dataclasses import field
+from dataclasses import dataclass, field
+from math import isfinite
 from typing import Any
 
 
+@dataclass(frozen=True)
+class Bounds:
+    """The numbers that are allowed."""
+
+    least: float | None = None
+    most: float | None = None
+    above: float | None = None
+    below: float | None = None
+
+    def complaint(self, value: float) -> str | None:
+        """What was expected of a number that is not allowed; None for one that is."""
+        if not isfinite(value):
+            return "a finite number"
+        if self.least is not None and value < self.least:
+            return f"at least {self.least:g}"
+        if self.most is not None and value > self.most:
+            return f"at most {self.most:g}"
+        if self.above is not None and value <= self.above:
+            return f"more than {self.above:g}"
+        if self.below is not None and value >= self.below:
+            return f"less than {self.below:g}"
+        return None
+
+
 def key(
-    default: Any, help: str, unit: str = "", *, choices: tuple[str, ...] = (), least: float | None = None
+    default: Any,
+    help: str,
+    unit: str = "",
+    *,
+    choices: tuple[str, ...] = (),
+    least: float | None = None,
+    most: float | None = None,
+    above: float | None = None,
+    below: float | None = None,
 ) -> Any:
     """A dataclass field that `--help` and the checks can read.
 
@@ -15,8 +48,12 @@ def key(
         unit: of its numbers.
         choices: the only values allowed, where these are few.
         least: the smallest number allowed.
+        most: the largest number allowed.
+        above: numbers must be larger.
+        below: numbers must be smaller.
     """
-    metadata = {"help": help, "unit": unit, "choices": choices, "least": least}
+    bounds = Bounds(least, most, above, below)
+    metadata = {"help": help, "unit": unit, "choices": choices, "bounds": bounds}
     if isinstance(default, type):
         return field(default_factory=default, metadata=metadata)
     if isinstance(default, list):

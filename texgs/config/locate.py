@@ -14,6 +14,10 @@ def source_file(config: DictConfig) -> Path | None:
         ConfigError: if it is not there and cannot be downloaded; says how to get it.
     """
     dataset, volume = config.dataset, config.dataset.volume
+    if dataset.views_folder is not None:
+        raise ConfigError(
+            f"data set {dataset.name}: starts from views, it has no volume; texgs sheet shows them"
+        )
     if (volume.generator is None) == (volume.file is None):
         raise ConfigError(
             f"dataset.volume of {dataset.name}: expected a generator or a file, "

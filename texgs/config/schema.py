@@ -9,6 +9,7 @@ from typing import Any
 
 from omegaconf import II, MISSING
 
+from texgs.config.fit import Fit
 from texgs.config.keys import key
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -45,7 +46,6 @@ class BasicTF:
     # OmegaConf takes no integers for list[list[float]]; the points are checked where the TF is made.
     opacity: list[Any] = key([], "points [value, opacity]; opacity is 0 outside")
     color: list[Any] = key([], "points [value, r, g, b], linear, 0 to 1")
-    file: str | None = key(None, "JSON or ParaView preset instead; relative to data_folder")
 
 
 @dataclass
@@ -77,7 +77,7 @@ class CameraPath:
     kind: str = key("icosphere", "arrangement", choices=("icosphere", "spiral", "orbit"))
     frequency: int = key(3, "of the icosphere: 10 f^2 + 2 views", least=1)
     count: int = key(181, "views of a spiral or orbit", least=1)
-    polar: float = key(15.0, "angle of an orbit above the horizon", "degrees")
+    polar: float = key(15.0, "angle of an orbit above the horizon", "degrees", least=-90, most=90)
 
 
 @dataclass
@@ -107,15 +107,15 @@ class Views:
     test: CameraPath = key(CameraPath, "test views")
     width: int = key(II("dataset.image"), "width of views", "pixels", least=1)
     height: int = key(II("dataset.image"), "height of views", "pixels", least=1)
-    fov_y: float = key(30.0, "vertical field of view", "degrees", least=0)
-    radius: float = key(4.0311, "distance of cameras; the volume's longest side is 1", "world units", least=0)
+    fov_y: float = key(30.0, "vertical field of view", "degrees", above=0, below=180)
+    radius: float = key(4.0311, "distance of cameras; the volume's longest side is 1", "world units", above=0)
     lights: list[Light] = field(
         default_factory=lambda: [Light()],
         metadata={"help": "view i is lit by light i modulo their number"},
     )
     shading: Shading = key(Shading, "material of the volume")
-    step: float = key(0.25, "sample distance along rays", "voxels", least=0)
-    opacity_unit: float = key(0.005, "length over which a TF's opacity applies", "world units", least=0)
+    step: float = key(0.25, "sample distance along rays", "voxels", above=0)
+    opacity_unit: float = key(0.005, "length over which a TF's opacity applies", "world units", above=0)
     mapper: str = key(II("device.mapper"), "volume mapper", choices=("cpu", "gpu"))
     geometry: bool = key(False, "also write depth and normals of the test views, geometry/*.npz; slow")
     turntable: int = key(36, "frames of the turntable", least=1)
@@ -145,6 +145,7 @@ class Config:
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: Views = key(Views, "training and test views")
+    fit: Fit = key(Fit, "recipe of the fit")
     tracking: Tracking = key(Tracking, "where runs are recorded")
     device: Device = key(Device, "what the work runs on")
     data_folder: str = key(II("oc.env:TEXGS_DATA,data"), "folder of data files; or set TEXGS_DATA")

@@ -40,9 +40,15 @@ class Stage:
         settings = OmegaConf.to_container(OmegaConf.create(selected), resolve=True)
         return {str(name): value for name, value in dict(settings).items()}  # type: ignore[arg-type]
 
+    def applies(self, config: DictConfig) -> bool:
+        """Whether the data set goes through this stage: one of views has no volume."""
+        return config.dataset.views_folder is None or self.name not in ("volume", "transfer", "views")
+
     def output(self, config: DictConfig) -> Path:
         """Folder of the job's files."""
-        return Path(config.results) / self.folder.format(dataset=config.dataset.name, tf=config.tf)
+        return Path(config.results) / self.folder.format(
+            dataset=config.dataset.name, tf=config.tf, fit=config.fit.name
+        )
 
     @property
     def code(self) -> str:
@@ -80,13 +86,26 @@ def view_set(config: DictConfig) -> dict[str, Path]:
     return {"views": (views_folder(config) or STAGES["views"].output(config)) / "transforms_train.json"}
 
 
+def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
+    """The model that a stage of the fit writes, and the views."""
+    return lambda config: {"model": STAGES[stage].output(config) / "model.safetensors", **view_set(config)}
+
+
+def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
+    """What a stage of the fit reads: what holds for all of them, and its own parts."""
+    common = ("name", "seed", "reduce")
+    return lambda config: {"fit": {part: config.fit[part] for part in (*common, *parts)}}
+
+
 STAGES = {
     stage.name: stage
     for stage in (
         Stage(
             "volume",
             "texgs.cli.stages.volume",
-            select=lambda config: {"volume": config.dataset.volume},
+            select=lambda config: {
+                "volume": {k: v for k, v in config.dataset.volume.items() if k != "obtain"}
+            },
             folder="{dataset}/volume",
             inputs=volume_inputs,
         ),
@@ -118,6 +137,39 @@ STAGES = {
             folder="{dataset}/{tf}/sheet",
             inputs=view_set,
             needs=("views",),
+            per_tf=True,
+        ),
+        Stage(
+            "surfels",
+            "texgs.cli.stages.surfels",
+            select=lambda config: {
+                **recipe("low_pass", "activation", "seeds")(config),
+                "phase": config.fit.surfels,
+            },
+            folder="{dataset}/{tf}/{fit}/surfels",
+            inputs=view_set,
+            needs=("views",),
+            per_tf=True,
+        ),
+        Stage(
+            "shading",
+            "texgs.cli.stages.shading",
+            select=lambda config: {
+                **recipe("activation", "material", "first_material")(config),
+                "phase": config.fit.shading,
+            },
+            folder="{dataset}/{tf}/{fit}/shading",
+            inputs=model_of("surfels"),
+            needs=("surfels", "views"),
+            per_tf=True,
+        ),
+        Stage(
+            "texture",
+            "texgs.cli.stages.texture",
+            select=lambda config: {**recipe()(config), "texture": config.fit.texture},
+            folder="{dataset}/{tf}/{fit}/texture",
+            inputs=model_of("shading"),
+            needs=("shading", "views"),
             per_tf=True,
         ),
     )

@@ -1,7 +1,6 @@
 """How much memory this process has needed."""
 
 import re
-import resource
 import sys
 from pathlib import Path
 
@@ -17,5 +16,7 @@ def peak_memory() -> int:
         found = re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())
         if found:
             return 1024 * int(found[1])
+    import resource  # not on Windows
+
     unit = 1 if sys.platform == "darwin" else 1024
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Protocol
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 import torch
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
 from texgs.core.image import write_png
+from texgs.core.io import read_json, write_json
 from texgs.core.progress import progress
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import Light, View
@@ -27,15 +28,39 @@ class Mapper(Protocol):
         """Premultiplied RGBA [H, W, 4] in [0, 1]."""
 
 
-@dataclass(frozen=True)
-class Frame:
-    """One view that was rendered now."""
+class Times:
+    """How long each view took, in a file that is written anew with each: a killed run loses none.
 
-    milliseconds: float  # of rendering, without writing the file
-    coverage: float  # share of pixels that show something
+    Args:
+        path: of the JSON file, in a folder above the views; what it says of earlier runs is kept.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._views: dict[str, dict[str, Any]] = read_json(path) if path.exists() else {}
+        self._is_first = True
+
+    def add(self, view: View, milliseconds: float) -> None:
+        """Keep the time of a view, in place of an earlier one of the same view."""
+        name = view.path.relative_to(self._path.parent).as_posix()
+        self._views[name] = {"ms": milliseconds, "is_first": self._is_first}
+        self._is_first = False
+        write_json(self._path, self._views)
+
+    @property
+    def first(self) -> list[float]:
+        """Milliseconds of the first view of each run, which sets up gradients and tables."""
+        return [entry["ms"] for entry in self._views.values() if entry["is_first"]]
+
+    @property
+    def others(self) -> list[float]:
+        """Milliseconds of all other views, in the order in which they were rendered."""
+        return [entry["ms"] for entry in self._views.values() if not entry["is_first"]]
 
 
-def render_views(mapper: Mapper, tf: TransferFunction, views: Sequence[View], title: str) -> list[Frame]:
+def render_views(
+    mapper: Mapper, tf: TransferFunction, views: Sequence[View], title: str, times: Times | None = None
+) -> None:
     """Render the views whose files are missing, as PNG with straight alpha.
 
     Args:
@@ -43,17 +68,14 @@ def render_views(mapper: Mapper, tf: TransferFunction, views: Sequence[View], ti
         tf: in data values.
         views: cameras, lights and files.
         title: of the progress bar.
-
-    Returns:
-        One entry per view that was rendered, in their order.
+        times: gets the time of each view that is rendered, without that of writing its file.
     """
     missing = [view for view in views if not view.path.exists()]
-    frames = []
     for view in progress(missing, title=title, unit="view"):
         start = time.perf_counter()
         picture = mapper.render(tf, view.camera, view.light)
         seconds = time.perf_counter() - start
+        if times is not None:
+            times.add(view, 1e3 * seconds)  # before the image: an image without a time would stay so
         image = torch.from_numpy(np.ascontiguousarray(picture))
         write_png(view.path, image[..., :3], image[..., 3])
-        frames.append(Frame(1e3 * seconds, float((image[..., 3] > 0.5 / 255).float().mean())))
-    return frames

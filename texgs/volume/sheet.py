@@ -11,6 +11,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 
 ROWS = 2  # of a contact sheet, at most
+GUTTER = 6  # pixels between its pictures
 
 
 def write_sheet(
@@ -26,7 +27,7 @@ def write_sheet(
         path: target file.
         pictures: at least one, of any mode and size.
         columns: pictures per row.
-        thumbnail: longer side of each, pixels; the aspect is kept.
+        thumbnail: longer side of each, pixels; larger pictures are reduced to it, smaller ones stay.
         background: colour name or #rrggbb behind transparent pictures and around smaller ones.
 
     Returns:
@@ -45,10 +46,12 @@ def write_sheet(
     shown = [_thumbnail(_opaque(picture, background), thumbnail) for picture in chosen]
     width, height = max(picture.width for picture in shown), max(picture.height for picture in shown)
     columns = min(columns, n_shown)
-    sheet = Image.new("RGB", (columns * width, -(-n_shown // columns) * height), background)
+    across, down = width + GUTTER, height + GUTTER  # from one picture to the next
+    size = (columns * across - GUTTER, -(-n_shown // columns) * down - GUTTER)
+    sheet = Image.new("RGB", size, background)
     for index, picture in enumerate(shown):
-        left = index % columns * width + (width - picture.width) // 2
-        top = index // columns * height + (height - picture.height) // 2
+        left = index % columns * across + (width - picture.width) // 2
+        top = index // columns * down + (height - picture.height) // 2
         sheet.paste(picture, (left, top))
     return write_atomic(path, lambda file: sheet.save(file, format="PNG", optimize=True))
 
@@ -102,7 +105,9 @@ def _opaque(picture: Image.Image, background: str) -> Image.Image:
 
 
 def _thumbnail(picture: Image.Image, longest: int) -> Image.Image:
-    """The picture with its longer side at `longest` pixels."""
+    """The picture with its longer side at `longest` pixels, or as it is where it is smaller."""
+    if max(picture.size) <= longest:
+        return picture
     scale = longest / max(picture.size)
     width, height = (max(1, round(scale * side)) for side in picture.size)
     return picture.resize((width, height), Image.Resampling.LANCZOS)

@@ -63,12 +63,12 @@ def open_source(
         origin: replaces the file's, x, y, z.
 
     Raises:
-        ArgumentError, ShapeError: if the file is missing, unknown, damaged or no scalar volume.
+        ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
+            volume.
     """
     path = Path(path)
-    if not path.exists():
-        raise ArgumentError(f"{path}: no such file or folder; looked for {path.absolute()}")
     try:
+        _try_to_read(path)
         if path.is_file() and _suffix(path) in RAW_SUFFIXES:
             return open_raw(path, dims, dtype, endian, skip, spacing, origin)
         if (dims, dtype, endian, skip) != (None, None, "little", 0):
@@ -79,6 +79,20 @@ def open_source(
         return _opener(path)(path, spacing, origin)
     except (ArgumentError, ShapeError) as error:
         raise type(error)(f"{path}: {error}") from error
+    except FileNotFoundError as error:
+        path = Path(error.filename or path)
+        raise ArgumentError(f"{path}: no such file or folder; looked for {path.absolute()}") from error
+    except OSError as error:
+        path = Path(error.filename or path)
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def _try_to_read(path: Path) -> None:
+    """Raise OSError where that is not possible; the readers of the formats say it each in other words."""
+    if path.is_dir():
+        next(path.iterdir(), None)
+    else:
+        path.open("rb").close()
 
 
 def _suffix(path: Path) -> str:

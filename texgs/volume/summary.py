@@ -48,11 +48,13 @@ def summarize(source: Source, minimum: float, maximum: float) -> Summary:
 
 
 def histogram(values: np.ndarray, minimum: float, maximum: float) -> np.ndarray:
-    """Counts [256] in equal bins over [minimum, maximum], as by `numpy.histogram`."""
+    """Counts [256] in equal bins over [minimum, maximum]; the last bin includes its end."""
     if values.dtype.kind in "iu" and values.dtype.itemsize <= 2:
         # Counting every level first is ten times as fast.
         info = np.iinfo(values.dtype)
         counts = np.bincount(values.ravel().astype(np.intp) - info.min, minlength=info.max - info.min + 1)
         levels = np.arange(info.min, info.max + 1)
         return np.histogram(levels, BINS, (minimum, maximum), weights=counts)[0]
-    return np.histogram(values, BINS, (minimum, maximum))[0]
+    # There may be fewer than 256 numbers of the samples' type in their range, but not in [0, 1].
+    fractions = (values.astype(np.float64) - minimum) / (float(maximum) - float(minimum))
+    return np.histogram(fractions, BINS, (0, 1))[0]

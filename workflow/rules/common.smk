@@ -4,12 +4,13 @@ import shlex
 import sys
 
 from texgs.cli.stages.tf import check_basic_tfs
+from texgs.config.code import code_digest
 from texgs.config.compose import compose
 from texgs.config.locate import tf_names
 from texgs.config.stage import STAGES, settings_file
 from texgs.core.errors import ConfigError, TexgsError
 
-GROUPS = ("experiment", "dataset", "views", "device", "tracking")
+GROUPS = ("experiment", "dataset", "views", "fit", "device", "tracking")
 
 
 def overrides():
@@ -19,8 +20,16 @@ def overrides():
         raise ConfigError(
             f'--config: expected {expected} or overrides="KEY=VALUE ...", got {", ".join(unknown)}'
         )
+    lists = [group for group in GROUPS if not isinstance(config.get(group, ""), str)]
+    if lists:
+        raise ConfigError(
+            f"{lists[0]}: expected one name, got {config[lists[0]]}; several data sets go to datasets=[...]"
+        )
     groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
-    return (*groups, *shlex.split(str(config.get("overrides", ""))))
+    try:
+        return (*groups, *shlex.split(str(config.get("overrides", ""))))
+    except ValueError as error:
+        raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
 
 
 def data_sets(words):
@@ -35,13 +44,15 @@ def data_sets(words):
         starts_from_views = base.dataset.views_folder is not None
         for each_config in tfs.values() if starts_from_views else [base]:
             STAGES["sheet" if starts_from_views else "volume"].inputs(each_config)  # the data are there
+        if base.dataset.name in found:
+            raise ConfigError(f"datasets: expected different names, got {base.dataset.name} twice")
         found[base.dataset.name] = {None: base, **tfs}
     return found
 
 
 def settings(stage, wildcards):
     """The file with the settings of a job: its name is the digest of its contents."""
-    return settings_file(STAGES[stage], DATA_SETS[wildcards.dataset][getattr(wildcards, "tf", None)])
+    return SETTINGS[stage, wildcards.dataset, getattr(wildcards, "tf", None)]
 
 
 def inputs(stage, wildcards):
@@ -55,22 +66,35 @@ try:
     WORDS = overrides()
     CONFIG = compose(WORDS)
     DATA_SETS = data_sets(WORDS)
+    SETTINGS = {
+        (name, dataset, tf): settings_file(stage, config)
+        for name, stage in STAGES.items()
+        for dataset, configs in DATA_SETS.items()
+        for tf, config in configs.items()
+        if stage.per_tf == (tf is not None) and stage.applies(config)
+    }
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
 
 RESULTS = CONFIG.results
 STORE = CONFIG.tracking.uri
+GPU = int(CONFIG.device.mapper == "gpu")  # a volume mapper's
 VOLUMES = [name for name, configs in DATA_SETS.items() if configs[None].dataset.views_folder is None]
 
 # In front of the commands, not a parameter of the rules: where runs are recorded changes no result.
-TRACKING = (
-    "" if STORE is None else shlex.join(["--tracking", STORE, "--experiment", CONFIG.tracking.experiment])
+ENVIRONMENT = (
+    {} if STORE is None else {"TEXGS_TRACKING": STORE, "TEXGS_EXPERIMENT": CONFIG.tracking.experiment}
 )
+SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 shell.prefix(
     "set -euo pipefail; "
-    f'texgs() {{{{ {shlex.quote(sys.executable)} -m texgs.cli.main "$@" {TRACKING}; }}}}; '
+    f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -P -m texgs.cli.main "$@"; }}}}; '
 )
+
+
+# Data sets and their basic TFs, as wildcards of the rules that make a job for each.
+PAIRS = [(dataset, tf) for dataset, tfs in DATA_SETS.items() for tf in tfs if tf]
 
 
 pathvars:
@@ -80,5 +104,6 @@ pathvars:
 
 
 wildcard_constraints:
+    fit=re.escape(CONFIG.fit.name),
     dataset="|".join(map(re.escape, DATA_SETS)),
     tf="|".join(sorted({re.escape(tf) for tfs in DATA_SETS.values() for tf in tfs if tf})),

@@ -1,7 +1,5 @@
 # Training and test views of each basic TF; a data set may also start from views that are there.
 
-PAIRS = [(dataset, tf) for dataset, tfs in DATA_SETS.items() for tf in tfs if tf]
-
 
 rule sheets:
     input:
@@ -27,8 +25,8 @@ rule views:
         code=STAGES["views"].code,
         folder=subpath(output.metrics, parent=True),
     shell:
-        "texgs views --settings {params.settings} --input volume={input.volume} --output {params.folder} "
-        "2>&1 | tee {log}"
+        "texgs views --settings {params.settings:q} --input volume={input.volume:q} --output {params.folder:q} "
+        "2>&1 | tee {log:q}"
 
 
 rule sheet:
@@ -46,5 +44,5 @@ rule sheet:
         code=STAGES["sheet"].code,
         folder=subpath(output.metrics, parent=True),
     shell:
-        "texgs sheet --settings {params.settings} --input views={input.views} --output {params.folder} "
-        "2>&1 | tee {log}"
+        "texgs sheet --settings {params.settings:q} --input views={input.views:q} --output {params.folder:q} "
+        "2>&1 | tee {log:q}"

@@ -24,8 +24,8 @@ rule volume:
         folder=subpath(output.metrics, parent=True),
         source=lambda wildcards, input: (f"--input source={shlex.quote(input.source)}" if input else ""),
     shell:
-        "texgs volume --settings {params.settings} {params.source} --output {params.folder} "
-        "2>&1 | tee {log}"
+        "texgs volume --settings {params.settings:q} {params.source} --output {params.folder:q} "
+        "2>&1 | tee {log:q}"
 
 
 rule transfer:
@@ -44,5 +44,5 @@ rule transfer:
         code=STAGES["transfer"].code,
         folder=subpath(output.metrics, parent=True),
     shell:
-        "texgs transfer --settings {params.settings} --input volume={input.volume} --output {params.folder} "
-        "2>&1 | tee {log}"
+        "texgs transfer --settings {params.settings:q} --input volume={input.volume:q} --output {params.folder:q} "
+        "2>&1 | tee {log:q}"

@@ -4,7 +4,7 @@ import os
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from statistics import median
+from statistics import mean, median
 from typing import Any, Literal
 
 import numpy as np
@@ -23,7 +23,7 @@ from texgs.volume.geometry import geometry
 from texgs.volume.gpu_mapper import GpuMapper
 from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.render import Frame, Mapper, render_views
+from texgs.volume.render import Mapper, Times, render_views
 from texgs.volume.sheet import write_animation
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import Light, View, write_transforms
@@ -33,9 +33,10 @@ TURNTABLE = 320  # pixels of its longer side
 
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
-    """Write the folder of views: train/, test/, transforms_*.json and turntable.png.
+    """Write the folder of views: train/, test/, transforms_*.json, turntable.png, and times.json.
 
-    Views that are in the folder already, from an interrupted run of the same job, are kept.
+    Views that are in the folder already, from an interrupted run of the same job, are kept, and so are
+    their times.
 
     Args:
         settings: what the stage reads of the configuration.
@@ -49,20 +50,21 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
     appearance = Appearance(**views["shading"], step=views["step"], opacity_unit=views["opacity_unit"])
     mapper = mapper_for(views["mapper"], grid, appearance)
-    frames = []
+    times, coverages = Times(output / "times.json"), []
     shots = {split: views_of(views, split, output) for split in SPLITS}
     for split, shot in shots.items():
-        frames += render_views(mapper, tf, shot, f"{title}: {split} views")
-    if frames and max(frame.coverage for frame in frames) == 0:
-        raise ArgumentError(
-            f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
-        )
+        render_views(mapper, tf, shot, f"{title}: {split} views", times)
+        coverages += [coverage(view) for view in shot]
+        if not any(coverages):  # the training views come first
+            raise ArgumentError(
+                f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
+            )
     turntable(mapper, tf, views, output, title)
     if views["geometry"]:
         write_geometry(grid, tf, appearance, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
-    return Outcome(numbers(shots, frames), [output / "turntable.png"])
+    return Outcome(numbers(shots, times, coverages), [output / "turntable.png"])
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
@@ -132,18 +134,22 @@ def describe(settings: dict[str, Any], tf: TransferFunction, grid: Grid, mapper:
     }
 
 
-def numbers(shots: Mapping[Any, list[View]], frames: list[Frame]) -> dict[str, Any]:
-    """Counts and sizes, and of the views that were rendered now the time and the coverage."""
+def coverage(view: View) -> float:
+    """Share of pixels that show something."""
+    return float((view.load()[..., 3] > 0).float().mean())
+
+
+def numbers(shots: Mapping[Any, list[View]], times: Times, coverages: list[float]) -> dict[str, Any]:
+    """Counts, sizes, mean coverage, and the time per view over all runs that this job took."""
     camera = shots["train"][0].camera
     counts = {split: len(shot) for split, shot in shots.items()}
-    size = {"width": camera.width, "height": camera.height, "rendered": len(frames)}
-    times = [frame.milliseconds for frame in frames[1:]]  # the first one sets up gradients and tables
-    if not times:
+    size = {"width": camera.width, "height": camera.height, "coverage": mean(coverages)}
+    if not times.others:
         return {**counts, **size}
     timing = {
-        "frame_ms": median(times),
-        "frame_max_ms": max(times),
-        "first_frame_ms": frames[0].milliseconds,
-        "frames_ms": times,
+        "frame_ms": median(times.others),
+        "frame_max_ms": max(times.others),
+        "first_frame_ms": times.first[0],
+        "frames_ms": times.others,
     }
-    return {**counts, **size, **timing, "coverage": sum(frame.coverage for frame in frames) / len(frames)}
+    return {**counts, **size, **timing}

@@ -1,0 +1,42 @@
+"""A workflow that is killed in the middle of a job goes on where it was."""
+
+import json
+import os
+import signal
+import time
+
+from tests.workflow.project import Project
+
+LONG = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=160 views.height=160 views.step=0.1"
+
+
+def test_killed_in_the_middle_of_the_views(tmp_path):
+    project = Project(tmp_path)
+    views = project.work / "results" / "turbulence" / "TF01" / "views"
+    process = project.start(overrides=LONG)
+    deadline = time.monotonic() + 120
+    while len(images(views)) < 5 and process.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert process.poll() is None, process.communicate()
+    os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+    kept = images(views)
+    assert 5 <= len(kept) < 42
+    time.sleep(1)
+    assert images(views) == kept, "the job outlived the workflow"
+    assert not (views / "metrics.json").exists()
+    assert "locked" in project.snakemake(overrides=LONG).stderr
+    done = project.snakemake("--unlock", overrides=LONG)
+    assert done.returncode == 0, done.stderr
+    done = project.snakemake(overrides=LONG)
+    assert done.returncode == 0, done.stdout + done.stderr
+    finished = images(views)
+    assert len(finished) == 42
+    assert kept.items() <= finished.items()
+    numbers = json.loads((views / "metrics.json").read_text())["numbers"]
+    assert len(numbers["frames_ms"]) == 42 + 3 - 2, "one time per view, without the first of each run"
+
+
+def images(views):
+    """When each training view was written."""
+    return {path.name: path.stat().st_mtime_ns for path in views.glob("train/r_*.png")}
