@@ -28,6 +28,6 @@ rule all:
 
 
 onsuccess:
-    print(f"Done: {RESULTS}/*/transfer, {RESULTS}/*/*/views and {RESULTS}/*/*/sheet")
+    print(f"Done: {RESULTS}/tables/fitting.md; pictures in {RESULTS}/*/transfer and {RESULTS}/*/*/sheet")
     if STORE is not None and STORE.startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")

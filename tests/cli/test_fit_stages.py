@@ -75,3 +75,29 @@ def test_same_seed_same_model(folder):
     assert (folder / "shading" / "model.safetensors").read_bytes() == first
     main(["shading", *TINY, "fit.seed=1"])
     assert (folder / "shading" / "model.safetensors").read_bytes() != first
+
+
+def test_the_time_before_an_interruption_counts(folder, monkeypatch):
+    from texgs.cli.stages import phase
+    from texgs.fit.loop import Fit
+
+    main(["surfels", *TINY])  # its seeds run a fit of their own
+    run = Fit.run
+
+    def interrupted(fit):
+        for done in run(fit):
+            yield done
+            if done.iteration == 50:
+                raise KeyboardInterrupt
+
+    monkeypatch.setattr(phase, "SAVED_EVERY", 0.0)
+    monkeypatch.setattr(Fit, "run", interrupted)
+    assert main(["shading", *TINY]) == 130
+    monkeypatch.setattr(Fit, "run", run)
+    state = phase.checkpoint.latest(folder / "shading" / "checkpoint")
+    assert int(state["iteration"]) == 50
+    monkeypatch.setattr(
+        phase.checkpoint, "latest", lambda _folder: {**state, "seconds": state["seconds"] + 1000}
+    )
+    assert main(["shading", *TINY]) == 0
+    assert numbers(folder, "shading")["fit_seconds"] > 1000

@@ -73,6 +73,7 @@ class Fit:
     ) -> None:
         self.optics, self.images, self.phase, self.seed = optics, images, phase, seed
         self.iteration = 0
+        self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
         size = extent(images, parameters["means"])
         self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
         means = self.parameters["means"]
@@ -127,7 +128,8 @@ class Fit:
     def state(self) -> dict[str, Tensor]:
         """Everything a resumed run needs, as tensors."""
         control = {"control.gradients": self.control.gradients, "control.counts": self.control.counts}
-        return {**self.optimizer.state(), **control, "iteration": torch.tensor(self.iteration)}
+        clock = {"iteration": torch.tensor(self.iteration), "seconds": torch.tensor(self.seconds).double()}
+        return {**self.optimizer.state(), **control, **clock}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
         """Go on from what `state` returned."""
@@ -136,6 +138,7 @@ class Fit:
         self.control.gradients = state["control.gradients"].to(device, copy=True)
         self.control.counts = state["control.counts"].to(device, copy=True)
         self.iteration = int(state["iteration"])
+        self.seconds = float(state["seconds"])
 
 
 def require_finite(iteration: int, tensors: Mapping[str, Tensor]) -> None:

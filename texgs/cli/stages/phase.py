@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import torch
 from torch import Tensor
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
@@ -38,18 +37,20 @@ def run_phase(
     """Run the loop from the last checkpoint in the folder, if there is one.
 
     Returns:
-        The model, the seconds of this run, and the losses that were looked at.
+        The model, the seconds of all runs together, and the losses that this one looked at.
     """
     fit = Fit(parameters, optics, images, phase, seed)
     folder = output / "checkpoint"
     if (state := checkpoint.latest(folder)) is not None:
         fit.restore(state)
-    start = saved = time.monotonic()
+    saved = time.monotonic()
+    start = saved - fit.seconds
     losses = []
     steps = phase.iterations - fit.iteration
     for done in progress(fit.run(), steps, title=title, unit="view") if steps else ():
         losses += [done.loss] if done.loss is not None else []
         if time.monotonic() - saved > SAVED_EVERY:
+            fit.seconds = time.monotonic() - start
             checkpoint.save(folder, fit)
             saved = time.monotonic()
     seconds = time.monotonic() - start
@@ -59,8 +60,3 @@ def run_phase(
 def quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """PSNR and SSIM on the test views; none where there are none."""
     return mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {}
-
-
-def device() -> torch.device:
-    """Where fits run."""
-    return torch.device("cpu")
