@@ -11,7 +11,7 @@ import torch
 from benchmarks.scenes import KINDS
 from texgs.core.errors import ArgumentError
 
-SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory", "views")
+SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory", "views", "fit")
 ROUNDS = 5  # visits to each case, see timing.py
 
 

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from texgs import __version__
 from texgs.core.errors import TexgsError
+from texgs.core.memory import keep_freed_memory
 
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
 # the verbs of stages share the module texgs.cli.stage.
@@ -70,6 +71,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse(argv)
     if argv is None:  # a process of its own: told to end, it ends as if interrupted, and its run as killed
         signal.signal(signal.SIGTERM, signal.default_int_handler)
+        keep_freed_memory()
     try:
         return int(arguments.run(arguments))
     except TexgsError as error:

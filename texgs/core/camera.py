@@ -42,6 +42,13 @@ class Camera:
         """The same camera with its matrices on another device."""
         return replace(self, viewmat=self.viewmat.to(device), K=self.K.to(device))
 
+    def crop(self, left: int, top: int, right: int, bottom: int) -> Camera:
+        """The camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
+        K = self.K.clone()
+        K[0, 2] -= left
+        K[1, 2] -= top
+        return replace(self, K=K, width=right - left, height=bottom - top)
+
 
 def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
     """World-to-camera matrix of a camera at `position` that looks at `target`.

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.fit.crop import Box, content_box, surfel_box
+from texgs.scene.model import Optics
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import Light, View
 
@@ -23,6 +26,7 @@ class Target:
     alpha: Tensor  # [H, W]
     camera: Camera
     light: Light
+    share: float = 1.0  # of all pixels of the view, where this is a part of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,12 +40,39 @@ class Images:
     def __len__(self) -> int:
         return len(self.planes)
 
-    def target(self, index: int, device: torch.device | str = "cpu") -> Target:
-        """One view as floats on a device."""
-        planes = self.planes[index].to(device).float().div_(255)
-        return Target(
-            planes[:3].permute(1, 2, 0), planes[3], self.cameras[index].to(device), self.lights[index]
-        )
+    @cached_property
+    def boxes(self) -> list[Box]:
+        """For each view the pixels that are not white."""
+        with ThreadPoolExecutor() as pool:
+            return list(pool.map(content_box, self.planes.numpy()))
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.planes.shape[3], self.planes.shape[2]
+
+    def target(self, index: int, device: torch.device | str = "cpu", around: Box | None = None) -> Target:
+        """One view as floats on a device.
+
+        Args:
+            index: of the view.
+            device: of the tensors.
+            around: only the part that holds these pixels and all that is not white; by default the whole.
+        """
+        planes, camera, share = self.planes[index], self.cameras[index], 1.0
+        if around is not None:
+            box = self.boxes[index].union(around).within(*self.size)
+            planes = planes[:, box.top : box.bottom, box.left : box.right]
+            camera, share = camera.crop(*box), planes[0].numel() / self.planes[0, 0].numel()
+        planes = planes.to(device).float().div_(255)
+        color = planes[:3].permute(1, 2, 0)
+        return Target(color, planes[3], camera.to(device), self.lights[index], share)
+
+    def visible(self, index: int, parameters: Mapping[str, Tensor], optics: Optics) -> Target:
+        """The part of a view in which it or the surfels show anything, on the surfels' device."""
+        device = parameters["means"].device
+        around = surfel_box(parameters, optics, self.cameras[index].to(device))
+        return self.target(index, device, around)
 
 
 def load(views: Sequence[View], reduce: int = 1) -> Images:

@@ -102,7 +102,7 @@ class Fit:
         """One view: loss, gradients, a step of Adam, density control."""
         self.iteration += 1
         p = self.parameters
-        target = self.images.target(self.view_of(self.iteration), p["means"].device)
+        target = self.images.visible(self.view_of(self.iteration), p, self.optics)
         is_observed = self.iteration <= self.phase.densify.stop
         shift = torch.zeros_like(p["scales"]).requires_grad_() if is_observed else None
         degrees = min(self.phase.sh_degree, self.iteration // self.phase.sh_every)
@@ -110,7 +110,7 @@ class Fit:
         loss = view_loss(visible, self.optics, target, self.phase.losses, shift, self.iteration)
         loss.backward()
         if shift is not None and shift.grad is not None:
-            self.control.observe(shift.grad, target.camera.width, target.camera.height)
+            self.control.observe(shift.grad, *self.images.size)
         self.optimizer.step(self.iteration / self.phase.iterations)
         self.control.step(self.iteration, self.optimizer, self.generator(2 * self.iteration + 1))
         return loss.detach()

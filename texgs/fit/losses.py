@@ -55,17 +55,18 @@ def view_loss(
         outputs=("normal", "depth") if has_normals else (),
         options=optics.options,
     )
-    loss = l1_dssim(render.color[..., :3], target.color, weights.dssim)
+    # Split as planes, as they lie in memory: the gradient of a slice would be a whole image of zeros.
+    channels = [3] if maps is None else [3, SMOOTHED]
+    color, *attributes = (x.permute(1, 2, 0) for x in render.color.permute(2, 0, 1).split(channels))
+    loss = l1_dssim(color, target.color, weights.dssim)
     if weights.alpha > 0:
         loss = loss + weights.alpha * l1_dssim(render.alpha, target.alpha, weights.dssim)
     if has_normals:
         loss = loss + weights.normal * consistency(render, target)
-    if maps is not None:
-        attributes = render.color[..., 3:]
-        loss = loss + weights.smoothness * SMOOTHED * bilateral_smoothness(
-            attributes, target.color, target.alpha
-        )
-    return loss
+    if attributes:
+        smoothness = bilateral_smoothness(attributes[0], target.color, target.alpha)
+        loss = loss + weights.smoothness * SMOOTHED * smoothness
+    return target.share * loss
 
 
 def material_maps(parameters: Mapping[str, Tensor], optics: Optics) -> Tensor | None:

@@ -20,6 +20,7 @@ def texturize(
     texels: int | None = None,
     sweeps: int = 3,
     iterations: int = 0,
+    rate: float = 0.0025,
     ridge: float = 0.2,
     sparsity: float = 0.0,
     has_offset: bool = True,
@@ -35,8 +36,9 @@ def texturize(
             seen.
         sweeps: of `solve` over all views.
         iterations: of `refine` afterwards.
+        rate: of `refine` at the start.
         ridge: of `solve`, relative: how strongly texels that are hardly seen stay where they are.
-        sparsity: of `refine`, weight of the mean absolute rendered texel.
+        sparsity: of `refine`, weight of the mean absolute value of what texels add to an image.
         has_offset: whether surfels keep their colours, as offsets from the palette, and texels start at 0;
             else texels take them over, as the paper has it.
         seed: of the order of views; with the same one, machine and versions, results are the same.
@@ -49,7 +51,7 @@ def texturize(
         ArgumentError: if the model is of another stage, or a number is out of range.
         FitError: if texels are no longer finite.
     """
-    numbers = {"sweeps": sweeps, "iterations": iterations, "ridge": ridge, "sparsity": sparsity}
+    numbers = {"sweeps": sweeps, "iterations": iterations, "rate": rate, "ridge": ridge, "sparsity": sparsity}
     for name, value in numbers.items():
         if not value >= 0:
             raise ArgumentError(f"{name}: expected 0 or more, got {value}")
@@ -66,7 +68,9 @@ def texturize(
     if sweeps:
         result = solve(result, images, sight, sweeps=sweeps, ridge=ridge, seed=seed, title=title)
     if iterations:
-        result = refine(result, images, iterations=iterations, sparsity=sparsity, seed=seed, title=title)
+        result = refine(
+            result, images, iterations=iterations, rate=rate, sparsity=sparsity, seed=seed, title=title
+        )
     return result
 
 

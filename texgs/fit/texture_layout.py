@@ -43,7 +43,7 @@ def look(model: Model, images: Images, title: str) -> Sight:
     largest, total, squares = means.new_zeros(3, n)
     pixel = means.new_full((n,), torch.inf)
     for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
-        target = images.target(index, means.device)
+        target = images.visible(index, model.parameters, model.optics)
         camera = target.camera
         texture = shaded(model.parameters, model.optics, camera, target.light)
         if not isinstance(texture, Texture):

@@ -44,7 +44,7 @@ def solve(
     generator = torch.Generator().manual_seed(seed)
     order = [i for _ in range(sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
-        target = images.target(index, texels.device)
+        target = images.visible(index, model.parameters, model.optics)
         image = render(moving, target.camera, target.light).color
         structure = STRUCTURE * image.numel() * l1_dssim(image, target.color, 1.0)
         loss = 0.5 * squared_error(image, target) + structure

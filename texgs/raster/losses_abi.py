@@ -17,8 +17,8 @@ SIGNATURES = {
     "texgs_depth_to_normal_backward": "ppp ii pp",
     "texgs_normal_consistency": "ppppp ii ppp",
     "texgs_bilateral_smoothness": "ppp iii pp",
-    "texgs_blinn_phong": "n ppppp i pppp pp",
-    "texgs_blinn_phong_backward": "n ppppp i pppp pp ppppppp",
+    "texgs_blinn_phong": "n ppppp i pppp i pp",
+    "texgs_blinn_phong_backward": "n ppppp i pppp i pp ppppppp",
     "texgs_spherical_harmonics": "n i ppp p",
     "texgs_spherical_harmonics_backward": "n i ppp pp pp",
 }

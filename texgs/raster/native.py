@@ -20,7 +20,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 FOLDER = Path(__file__).parent / "_native"
 INSTALL = "install texgs again (pip install .)"
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")

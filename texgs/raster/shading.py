@@ -25,13 +25,19 @@ def blinn_phong(
     quats: Tensor,  # [N, 4]
     camera_position: Tensor,  # [3]
     light: Tensor | None = None,  # [3]
+    *,
+    facing: bool = False,
 ) -> Tensor:
     """Shade surfels: color * (ambient + diffuse |n.l|) + specular |n.h|^shininess.
 
     n is the surfel's normal, l the direction to the light, h halfway between l and the direction v to the
     camera (Blinn 1977; the paper's eq. Blinn-Phong with white highlights). Both faces are lit alike and
-    nothing is clamped. Differentiable in every surfel tensor, through n and v in quats and means too; not in
-    the camera or the light.
+    nothing is clamped. With `facing` only the face that the camera sees is, as renderers of volumes do: for n
+    turned towards the camera, color * (ambient + diffuse max(n.l, 0)) + specular max(n.h, 0)^shininess, and
+    the last term is there only where n.l > 0. For a light at the camera this is the same.
+
+    Differentiable in every surfel tensor, through n and v in quats and means too, but not in the side that
+    faces the camera; not in the camera or the light.
 
     Args:
         color: [N, 3] colours of the surfels without light.
@@ -43,6 +49,7 @@ def blinn_phong(
         quats: [N, 4] wxyz, of any length but zero; the third axis is the normal.
         camera_position: [3] world units.
         light: [3] direction to a light far away, of any length, or None for a light at the camera.
+        facing: whether the light must be in front of the face that the camera sees.
 
     Returns:
         [N, 3] shaded colours.
@@ -51,7 +58,7 @@ def blinn_phong(
         ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     material = (ambient, diffuse, specular, shininess)
-    return blinn_phong_texture(color, *material, means, quats, camera_position, light)[0]
+    return blinn_phong_texture(color, *material, means, quats, camera_position, light, facing=facing)[0]
 
 
 def blinn_phong_texture(
@@ -64,12 +71,14 @@ def blinn_phong_texture(
     quats: Tensor,
     camera_position: Tensor,
     light: Tensor | None = None,
+    *,
+    facing: bool = False,
 ) -> tuple[Tensor, Tensor]:
     """Shade textured surfels, whose colour is color + texel(u, v): the base and gain of `Texture`.
 
     Light is constant over a surfel and Blinn-Phong affine in colour, so that the shaded fragment is
-    base + gain * texel with gain = ambient + diffuse |n.l| and base = blinn_phong(color). Arguments,
-    gradients and errors are those of `blinn_phong`.
+    base + gain * texel with gain = ambient + diffuse |n.l|, or ambient + diffuse max(n.l, 0) with `facing`,
+    and base = blinn_phong(color). Arguments, gradients and errors are those of `blinn_phong`.
 
     Returns:
         base [N, 3] and gain [N].
@@ -89,18 +98,19 @@ def blinn_phong_texture(
     check.same_device(**surfels, **lights)
     check.constant(**lights)
     dense = [x.contiguous() for x in (*surfels.values(), *lights.values())]
-    return _BlinnPhong.apply(*dense)
+    return _BlinnPhong.apply(facing, *dense)
 
 
 class _BlinnPhong(torch.autograd.Function):
-    """Colour, material, means, quats, camera position and, unless it is a headlight, the light."""
+    """`facing`, then colour, material, means, quats, camera position and, unless at the camera, the light."""
 
     @staticmethod
-    def forward(ctx: Any, *tensors: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(ctx: Any, facing: bool, *tensors: Tensor) -> tuple[Tensor, Tensor]:
         color = tensors[0]
         base, gain = torch.empty_like(color), color.new_empty(len(color))
-        call("texgs_blinn_phong", *_arguments(tensors), base, gain, device=color.device)
+        call("texgs_blinn_phong", *_arguments(tensors, facing), base, gain, device=color.device)
         ctx.save_for_backward(*tensors)
+        ctx.facing = facing
         ctx.set_materialize_grads(False)
         return base, gain
 
@@ -110,14 +120,15 @@ class _BlinnPhong(torch.autograd.Function):
         tensors = ctx.saved_tensors
         grad_base = torch.zeros_like(tensors[0]) if grad_base is None else grad_base.contiguous()
         grad_gain = None if grad_gain is None else grad_gain.contiguous()
-        wanted = zip(tensors, ctx.needs_input_grad, strict=True)
+        wanted = zip(tensors, ctx.needs_input_grad[1:], strict=True)
         gradients = [torch.empty_like(x) if want else None for x, want in wanted]
-        arguments = (*_arguments(tensors), grad_base, grad_gain, *gradients[:7])
+        arguments = (*_arguments(tensors, ctx.facing), grad_base, grad_gain, *gradients[:7])
         call("texgs_blinn_phong_backward", *arguments, device=grad_base.device)
-        return tuple(gradients)
+        return None, *gradients
 
 
-def _arguments(tensors: Sequence[Tensor]) -> tuple:
-    """Number of surfels, colour, material, bits of what is shared of it, means, quats, camera, light."""
+def _arguments(tensors: Sequence[Tensor], facing: bool) -> tuple:
+    """Surfels, colour, material, bits of what is shared of it, means, quats, camera, light and `facing`."""
     shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
-    return len(tensors[0]), *tensors[:5], shared, *tensors[5:8], tensors[8] if len(tensors) > 8 else None
+    light = tensors[8] if len(tensors) > 8 else None
+    return len(tensors[0]), *tensors[:5], shared, *tensors[5:8], light, facing

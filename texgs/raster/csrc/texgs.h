@@ -25,7 +25,7 @@
 extern "C" {
 #endif
 
-#define TEXGS_ABI_VERSION 1
+#define TEXGS_ABI_VERSION 2
 #define TEXGS_MAX_CHANNELS 32
 #define TEXGS_MAX_SIDE 1048560 /* 2^20 - 16 pixels: 65535 tiles, which 16 bits can count */
 

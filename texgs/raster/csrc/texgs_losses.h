@@ -39,20 +39,22 @@ TEXGS_API int32_t texgs_bilateral_smoothness(const float* attribute, const float
 enum { TEXGS_SHARED_AMBIENT = 1, TEXGS_SHARED_DIFFUSE = 2, TEXGS_SHARED_SPECULAR = 4, TEXGS_SHARED_SHININESS = 8 };
 
 /* gain = ambient + diffuse |n.l|, shaded = gain * color + specular |n.h|^shininess, n the surfel's normal, l the
- * direction to the light (`light` [3], any length, or NULL for a headlight), h halfway between it and the camera.
+ * direction to the light (`light` [3], any length, or NULL for a headlight), h halfway between it and the direction v
+ * to the camera. With `facing` not 0, n is turned towards the camera, and its side alone is lit:
+ * gain = ambient + diffuse max(n.l, 0), and the highlight max(n.h, 0)^shininess is there only where n.l > 0.
  * `gain` may be NULL. */
 TEXGS_API int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
                                     const float* specular, const float* shininess, int32_t shared, const float* means,
-                                    const float* quats, const float* camera_position, const float* light, float* shaded,
-                                    float* gain, void* stream);
+                                    const float* quats, const float* camera_position, const float* light,
+                                    int32_t facing, float* shaded, float* gain, void* stream);
 /* A gradient of a shared parameter is one number. Outputs and `grad_gain` may be NULL. */
 TEXGS_API int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
                                              const float* specular, const float* shininess, int32_t shared,
                                              const float* means, const float* quats, const float* camera_position,
-                                             const float* light, const float* grad_shaded, const float* grad_gain,
-                                             float* grad_color, float* grad_ambient, float* grad_diffuse,
-                                             float* grad_specular, float* grad_shininess, float* grad_means,
-                                             float* grad_quats, void* stream);
+                                             const float* light, int32_t facing, const float* grad_shaded,
+                                             const float* grad_gain, float* grad_color, float* grad_ambient,
+                                             float* grad_diffuse, float* grad_specular, float* grad_shininess,
+                                             float* grad_means, float* grad_quats, void* stream);
 
 /* color [N, 3] = max(0, 0.5 + sum_k Y_k(direction from the camera) sh[k]) for sh [N, (degree + 1)^2, 3]. */
 TEXGS_API int32_t texgs_spherical_harmonics(int64_t n, int32_t degree, const float* sh, const float* means,

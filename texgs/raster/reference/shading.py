@@ -22,20 +22,28 @@ def blinn_phong_texture(
     quats: Tensor,
     camera_position: Tensor,
     light: Tensor | None = None,
+    *,
+    facing: bool = False,
 ) -> tuple[Tensor, Tensor]:
     """Base [N, 3] and gain [N] of shaded surfels; see `texgs.raster.shading`."""
     n = quats_to_matrices(quats)[:, :, 2]  # [N, 3]
     v = normalize(camera_position - means, dim=-1)
     l = v if light is None else normalize(light, dim=-1).expand_as(v)  # noqa: E741 (the paper's letter)
     h = normalize(l + v, dim=-1)
-    gain = ambient + diffuse * (n * l).sum(-1).abs()
-    highlight = specular * (n * h).sum(-1).abs() ** shininess
-    return gain[:, None] * color + highlight[:, None], gain
+    n_v, n_l, n_h = ((n * x).sum(-1) for x in (v, l, h))  # [N]
+    if facing:
+        side = torch.where(n_v < 0, -1, 1)
+        n_l, n_h = (side * n_l).clamp_min(0), (side * n_h).clamp_min(0)
+        lobe = torch.where(n_l > 0, n_h**shininess, 0)
+    else:
+        n_l, lobe = n_l.abs(), n_h.abs() ** shininess
+    gain = ambient + diffuse * n_l
+    return gain[:, None] * color + (specular * lobe)[:, None], gain
 
 
-def blinn_phong(*arguments: Any) -> Tensor:
+def blinn_phong(*arguments: Any, facing: bool = False) -> Tensor:
     """Shaded colours [N, 3]; the arguments are those of `blinn_phong_texture`."""
-    return blinn_phong_texture(*arguments)[0]
+    return blinn_phong_texture(*arguments, facing=facing)[0]
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:

@@ -46,6 +46,7 @@ struct BlinnPhongJob {
     const float *color, *ambient, *diffuse, *specular, *shininess;
     int shared;  // TEXGS_SHARED_...
     const float *means, *quats, *camera_position, *light;
+    bool facing;
     float *shaded, *gain;
     const float *grad_shaded, *grad_gain;
     float *grad_color, *grad_ambient, *grad_diffuse, *grad_specular, *grad_shininess, *grad_means, *grad_quats;

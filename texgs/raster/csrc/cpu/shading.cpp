@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Blinn-Phong shading of surfels (Blinn 1977), both faces lit alike:
 //     gain = ambient + diffuse |n.l|,  shaded = gain * color + specular |n.h|^shininess.
+// With `facing` only ambient light is left where the light is behind the face that the camera sees. Elsewhere nothing
+// changes: v, l and so h are on one side of the surfel, and for n on that side |n.l| = n.l and |n.h| = n.h.
 #include "interleaved.h"
 #include "loss_kernels.h"
 
@@ -20,7 +22,7 @@ struct Lit {
     vf w, x, y, z, inverse_norm;  // unit quaternion, 1 / length as given
     Vec3<vf> normal, view, light, half;
     vf over_distance, over_sum;  // 1 / distance of the camera, 1 / |view + light|
-    vf n_l, n_h;                 // signed
+    vf n_l, n_h;                 // signed; 0 in the shadow, as the lobe
     vf lobe;                     // |n_h|^shininess
 };
 
@@ -53,6 +55,12 @@ TEXGS_INLINE vf inverse_length(Vec3<vf> a) {
     return zero_unless(length > vf(kSmallest), vf(1.0f) / length);
 }
 
+// No light where it is behind the face that the camera sees. A NaN is not hidden.
+TEXGS_INLINE void cast_shadow(Lit& s) {
+    const vm lit = ~(select(dot(s.normal, s.view) < vf(0.0f), -s.n_l, s.n_l) <= vf(0.0f));
+    s.n_l = zero_unless(lit, s.n_l), s.n_h = zero_unless(lit, s.n_h), s.lobe = zero_unless(lit, s.lobe);
+}
+
 Lit light_surfels(const BlinnPhongJob& job, const Material& m, int64_t i, int n) {
     Lit s;
     vf q[4];
@@ -76,6 +84,7 @@ Lit light_surfels(const BlinnPhongJob& job, const Material& m, int64_t i, int n)
     s.n_l = dot(s.normal, s.light);
     s.n_h = dot(s.normal, s.half);
     s.lobe = exp2(m.shininess * log2(max(abs(s.n_h), kSmallest)));
+    if (job.facing) cast_shadow(s);
     return s;
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Blinn-Phong shading of surfels (Blinn 1977), both faces lit alike, one surfel per thread:
 //     gain = ambient + diffuse |n.l|,  shaded = gain * color + specular |n.h|^shininess.
+// With `facing` only ambient light is left where the light is behind the face that the camera sees. Elsewhere nothing
+// changes: v, l and so h are on one side of the surfel, and for n on that side |n.l| = n.l and |n.h| = n.h.
 #include "../texgs_losses.h"
 #include "maths.cuh"
 #include "workspace.cuh"
@@ -16,6 +18,7 @@ struct Job {
     const float *color, *ambient, *diffuse, *specular, *shininess;
     int shared;
     const float *means, *quats, *camera_position, *light;
+    bool facing;
 };
 struct Gradients {
     const float *shaded, *gain;
@@ -50,7 +53,7 @@ struct Lit {
     float w, x, y, z, inverse_norm;  // unit quaternion, 1 / length as given
     Vec3<float> normal, view, light, half;
     float over_distance, over_sum = 0;  // 1 / distance of the camera, 1 / |view + light|
-    float n_l, n_h;                     // signed
+    float n_l, n_h;                     // signed; 0 in the shadow, as the lobe
     float lobe;                         // |n_h|^shininess
 
     __device__ Lit(const Job& job, const Material& m, int64_t i) {
@@ -70,6 +73,8 @@ struct Lit {
         }
         n_l = dot(normal, light), n_h = dot(normal, half);
         lobe = exp2f(m.shininess * log2f(fmaxf(abs(n_h), kSmallest)));
+        // No light where it is behind the face that the camera sees.
+        if (job.facing && (dot(normal, view) < 0.0f ? -n_l : n_l) <= 0.0f) n_l = n_h = lobe = 0.0f;
     }
 };
 
@@ -143,22 +148,24 @@ using namespace texgs::cuda;
 
 int32_t texgs_blinn_phong(int64_t n, const float* color, const float* ambient, const float* diffuse,
                           const float* specular, const float* shininess, int32_t shared, const float* means,
-                          const float* quats, const float* camera_position, const float* light, float* shaded,
-                          float* gain, void* on) {
+                          const float* quats, const float* camera_position, const float* light, int32_t facing,
+                          float* shaded, float* gain, void* on) {
     return on_device_of(camera_position, on, [&](cudaStream_t stream) {
-        const Job job{n, color, ambient, diffuse, specular, shininess, shared, means, quats, camera_position, light};
+        const Job job{n,      color, ambient, diffuse,         specular, shininess,
+                      shared, means, quats,   camera_position, light,    facing != 0};
         launch(shade_kernel, blocks_for(n, kBlock), kBlock, stream, job, shaded, gain);
     });
 }
 
 int32_t texgs_blinn_phong_backward(int64_t n, const float* color, const float* ambient, const float* diffuse,
                                    const float* specular, const float* shininess, int32_t shared, const float* means,
-                                   const float* quats, const float* camera_position, const float* light,
+                                   const float* quats, const float* camera_position, const float* light, int32_t facing,
                                    const float* grad_shaded, const float* grad_gain, float* grad_color,
                                    float* grad_ambient, float* grad_diffuse, float* grad_specular,
                                    float* grad_shininess, float* grad_means, float* grad_quats, void* on) {
     return with_workspace(camera_position, on, [&](Workspace& workspace, cudaStream_t stream) {
-        const Job job{n, color, ambient, diffuse, specular, shininess, shared, means, quats, camera_position, light};
+        const Job job{n,      color, ambient, diffuse,         specular, shininess,
+                      shared, means, quats,   camera_position, light,    facing != 0};
         const int64_t blocks = blocks_for(n, kBlock);
         Gradients out{grad_shaded,
                       grad_gain,

@@ -1,0 +1,103 @@
+"""A step of the shading phase with every map and loss, and where its time goes."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import torch
+from torch.profiler import ProfilerActivity, profile
+
+from benchmarks import scenes
+from benchmarks.report import Measurement, Section
+from benchmarks.settings import Settings
+from benchmarks.timing import Case, measure
+from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.core.camera import orbit
+from texgs.core.memory import keep_freed_memory
+from texgs.fit.images import Images
+from texgs.fit.loop import Fit
+from texgs.scene.model import Model, Optics, raw_material
+from texgs.scene.render import render
+from texgs.volume.view_set import Light
+
+SIZES = {400: 15_000, 800: 40_000}  # surfels by image size
+VIEWS = 8
+DISTANCE = 2 * 4.0311  # as the paper's cameras see an object of side 2
+PROFILED = 40  # steps
+LOSSES = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
+RATES = Rates(*[1e-12] * 8)  # the scene stays as heavy as it is
+PARTS = {  # by what the profiler's names contain; the first that fits
+    "rasterizer, forward": ("RasterizeFunction",),
+    "rasterizer, backward": ("RasterizeFunctionBackward",),
+    "losses": ("_FusedLoss", "_FusedLossBackward"),
+    "shading": ("_BlinnPhong", "_BlinnPhongBackward"),
+    "Adam": ("Adam", "adam"),
+}
+
+
+def run(settings: Settings) -> Section:
+    """Time whole steps, then profile some for their parts."""
+    keep_freed_memory()  # as the command line does
+    section = Section()
+    fits = {size: training(size, n, settings.device) for size, n in SIZES.items() if size in settings.sizes}
+    if not fits:
+        section.skip("training steps", f"--sizes has none of {', '.join(map(str, SIZES))}")
+    cases = [
+        Case("step", {"size": size, "surfels": SIZES[size]}, {"step": fit.step}) for size, fit in fits.items()
+    ]
+    section.measurements = measure(cases, settings.rounds, settings.device, "fit")
+    for size, fit in fits.items():
+        where = {"size": size, "surfels": SIZES[size]}
+        for name, ms in parts(fit).items():
+            section.measurements.append(Measurement(f"part {name}", where, "ms", ms, ms, PROFILED))
+    return section
+
+
+def training(size: int, n: int, device: torch.device) -> Fit:
+    """The shading phase of the paper on views of a generated scene that was slightly moved."""
+    made = {name: x.to(device) for name, x in scenes.surfels("opaque", n).items()}
+    shared = raw_material(0.3, 0.7, 0.3, 20.0, "bounded")
+    raw = {
+        "means": made["means"],
+        "quats": made["quats"],
+        "scales": made["scales"].log(),
+        "opacities": made["opacities"].logit(),
+        "colors": made["features"],
+        **{name: x.to(device).repeat(n) for name, x in shared.items()},
+    }
+    phase = Phase(10**9, losses=LOSSES, rates=RATES, densify=Densify(start=10**9, stop=10**9))
+    moved = raw | {"means": raw["means"] + 0.003}
+    return Fit(moved, Optics(), views(Model(raw), size), phase, seed=0)
+
+
+@torch.no_grad()
+def views(model: Model, size: int) -> Images:
+    """Views around a model, as 8-bit images."""
+    cameras = [orbit(-60.0 + 360 / VIEWS * i, 25.0, DISTANCE, 30.0, size, size) for i in range(VIEWS)]
+    shown = [render(model, camera.to(model.parameters["means"].device)) for camera in cameras]
+    planes = [torch.cat([x.color.permute(2, 0, 1), x.alpha[None]]) for x in shown]
+    eight_bits = torch.stack(planes).clamp(0, 1).mul(255).round().to(torch.uint8).cpu()
+    return Images(eight_bits, cameras, [Light("headlight")] * VIEWS)
+
+
+def parts(fit: Fit) -> dict[str, float]:
+    """Milliseconds of a step by part, from the profiler; what is none of PARTS is `everything else`."""
+    gpu = fit.parameters["means"].is_cuda
+    activities = [ProfilerActivity.CPU, *([ProfilerActivity.CUDA] if gpu else [])]
+    fit.step()
+    with profile(activities=activities) as recorded:
+        for _ in range(PROFILED):
+            fit.step()
+    found: dict[str, float] = defaultdict(float)
+    for event in recorded.key_averages():
+        taken = event.self_device_time_total if gpu else event.self_cpu_time_total
+        found[part(event.key)] += taken / PROFILED / 1e3
+    return dict(found)
+
+
+def part(name: str) -> str:
+    """The part that an event belongs to."""
+    for known, names in PARTS.items():
+        if name in names or any(name.startswith(f"{x}#") for x in names):
+            return known
+    return "everything else"

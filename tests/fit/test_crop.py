@@ -1,0 +1,143 @@
+from dataclasses import replace
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from torch.testing import assert_close
+
+from tests.fit.scenes import ball_seeds, cameras, images_of
+from texgs.config.fit import Losses
+from texgs.core.camera import orbit
+from texgs.fit.crop import MARGIN, Box, content_box, surfel_box
+from texgs.fit.losses import view_loss
+from texgs.scene.model import Model, Optics
+from texgs.scene.render import render
+
+ALL = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
+
+
+def box_of(seen):
+    """The smallest box of a mask [H, W]."""
+    rows, columns = seen.any(dim=1).nonzero(), seen.any(dim=0).nonzero()
+    return Box(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
+
+
+def is_inside(box, other):
+    return box.union(other) == other
+
+
+def random_surfels(seed, count, spread, size):
+    """Surfels of any size and tilt around a point off the middle."""
+    generator = torch.Generator().manual_seed(seed)
+    p = ball_seeds(count, seed, opacity=0.9)
+    middle = torch.randn(3, generator=generator) * 0.3
+    p["means"] = torch.randn(count, 3, generator=generator) * spread + middle
+    p["quats"] = torch.randn(count, 4, generator=generator)
+    p["scales"] = torch.log(size * torch.rand(count, 2, generator=generator).clamp_min(1e-3))
+    return p
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    seed=st.integers(0, 10**6),
+    count=st.integers(4, 12),
+    spread=st.floats(0, 0.6),
+    size=st.floats(1e-3, 0.5),
+    distance=st.floats(0.5, 4),
+    low_pass=st.floats(0.5, 20),
+)
+def test_nothing_is_drawn_outside_the_box_of_the_surfels(seed, count, spread, size, distance, low_pass):
+    p = random_surfels(seed, count, spread, size)
+    camera = orbit(seed % 360, 20, distance, 50, 48, 40)
+    optics = Optics(low_pass)
+    alpha = render(Model(p, optics), camera).alpha
+    if (alpha > 0).any():
+        assert is_inside(box_of(alpha > 0), surfel_box(p, optics, camera))
+
+
+def test_the_box_is_not_much_larger_than_what_is_drawn():
+    p = random_surfels(3, 200, 0.05, 0.02)
+    camera = orbit(30, 20, 2, 50, 200, 200)
+    drawn, box = box_of(render(Model(p), camera).alpha > 0), surfel_box(p, Optics(), camera)
+    assert max(abs(a - b) for a, b in zip(drawn, box, strict=True)) <= 10
+
+
+@pytest.mark.parametrize("mean", [(0.0, 0.0, 1.0), (0.0, 0.0, torch.nan)])
+def test_a_surfel_around_the_camera_or_nowhere_needs_the_whole_image(mean):
+    p = random_surfels(0, 4, 0.0, 0.1)
+    camera = cameras(1)[0]
+    p["means"][0] = camera.position if mean[2] == 1 else torch.tensor(mean)
+    assert surfel_box(p, Optics(), camera) == Box(0, 0, camera.width, camera.height)
+
+
+def test_no_surfels_need_one_place():
+    p = {"means": torch.zeros(0, 3), "scales": torch.zeros(0, 2)}
+    assert surfel_box(p, Optics(), cameras(1)[0]) == Box(16, 16, 16, 16)
+
+
+def test_content_is_what_is_not_white():
+    planes = torch.full((4, 20, 30), 255, dtype=torch.uint8)
+    planes[3] = 0
+    empty = content_box(planes.numpy())
+    assert (empty.left, empty.top) == (empty.right, empty.bottom)
+    planes[1, 5, 7] = 254
+    planes[3, 11, 22] = 1
+    assert content_box(planes.numpy()) == Box(7, 5, 23, 12)
+
+
+def test_a_box_gets_a_margin_but_stays_in_the_image_with_a_pixel_at_least():
+    assert Box(10, 20, 15, 30).within(100, 100) == Box(10 - MARGIN, 20 - MARGIN, 15 + MARGIN, 30 + MARGIN)
+    assert Box(2, -50, 99, 300).within(100, 80) == Box(0, 0, 100, 80)
+    for box in (Box(-90, -90, -80, -80), Box(500, 500, 600, 600)):
+        left, top, right, bottom = box.within(100, 80)
+        assert 0 <= left < right <= 100
+        assert 0 <= top < bottom <= 80
+
+
+def test_the_camera_of_a_part_sees_that_part():
+    p, camera = random_surfels(5, 40, 0.2, 0.1), orbit(30, 20, 1.5, 50, 48, 40)
+    whole = render(Model(p), camera).color
+    part = render(Model(p), camera.crop(7, 3, 40, 31)).color
+    assert_close(part, whole[3:31, 7:40], atol=2e-5, rtol=0)
+
+
+def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
+    """An independent surfel far to the left, and content far to the right: both count."""
+    camera = cameras(1, size=96, distance=4)[0]
+    p = random_surfels(7, 30, 0.05, 0.05)
+    generator = torch.Generator().manual_seed(1)
+    p |= {
+        name: p[name] + torch.randn(30, generator=generator)
+        for name in ("ambient", "diffuse", "specular", "shininess")
+    }
+    planes = torch.ones(4, 96, 96)
+    planes[3] = 0
+    planes[:, 40:52, 70:80] = 0.5
+    images = images_of([planes], [camera])
+    part, whole = images.visible(0, p, Optics()), images.target(0)
+    assert part.share < 0.6
+    found = []
+    for target in (part, whole):
+        leaves = {name: x.clone().requires_grad_() for name, x in p.items()}
+        view_loss(leaves, Optics(), target, ALL, None, iteration=1).backward()
+        without_normals = view_loss(p, Optics(), target, replace(ALL, normal=0.0), None, iteration=1)
+        found.append((without_normals, {name: x.grad for name, x in leaves.items()}))
+    assert_close(found[0][0], found[1][0], rtol=1e-5, atol=0)
+    for name, gradient in found[0][1].items():
+        scale = float(found[1][1][name].abs().max())
+        assert_close(
+            gradient, found[1][1][name], rtol=1e-3, atol=1e-4 * scale, msg=lambda m, n=name: f"{n}: {m}"
+        )
+
+
+def test_the_part_keeps_the_light_and_moves_the_principal_point():
+    camera = cameras(1, size=64)[0]
+    images = images_of([torch.zeros(4, 64, 64)], [camera])
+    target = images.target(0, around=Box(0, 0, 1, 1))
+    assert target.share == 1
+    assert torch.equal(target.camera.K, camera.K)
+    moved = camera.crop(5, 9, 20, 30)
+    assert (moved.width, moved.height) == (15, 21)
+    assert_close(moved.K[:2, 2], camera.K[:2, 2] - torch.tensor([5.0, 9.0]))
+    assert_close(replace(moved, K=camera.K).position, camera.position)
