@@ -87,7 +87,7 @@ def test_content_is_what_is_not_white():
 
 
 def test_a_box_gets_a_margin_but_stays_in_the_image_with_a_pixel_at_least():
-    assert Box(10, 20, 15, 30).within(100, 100) == Box(10 - MARGIN, 20 - MARGIN, 15 + MARGIN, 30 + MARGIN)
+    assert Box(30, 40, 45, 50).within(100, 100) == Box(30 - MARGIN, 40 - MARGIN, 45 + MARGIN, 50 + MARGIN)
     assert Box(2, -50, 99, 300).within(100, 80) == Box(0, 0, 100, 80)
     for box in (Box(-90, -90, -80, -80), Box(500, 500, 600, 600)):
         left, top, right, bottom = box.within(100, 80)

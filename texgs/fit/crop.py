@@ -1,8 +1,8 @@
 """The part of a view in which anything can be seen: all that a loss needs to look at.
 
 Outside of it image and target are white, and gradients have nothing to add; nor have losses, but for the
-normal consistency, which is a constant there. An object in the middle of the view fills a third of it, so that
-a step takes a third of the memory traffic.
+normal consistency, which is a constant there. An object in the middle of the view fills a third of it, and a
+step takes a third of the memory traffic.
 """
 
 from __future__ import annotations
