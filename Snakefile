@@ -1,4 +1,4 @@
-# The whole experiment: volume -> views -> contact sheets, for every data set and basic transfer function.
+# The whole experiment: volume -> views -> models, their table and pictures, for every data set and basic TF.
 #
 #   snakemake --cores all                                          the default data set
 #   snakemake --cores all --config experiment=demo                 a file of conf/experiment
@@ -24,10 +24,12 @@ rule all:
     input:
         rules.volumes.input,
         rules.sheets.input,
+        rules.figures.input,
         rules.tables.output,
 
 
 onsuccess:
-    print(f"Done: {RESULTS}/tables/fitting.md; pictures in {RESULTS}/*/transfer and {RESULTS}/*/*/sheet")
+    pictures = (f"{RESULTS}/*/transfer", f"{RESULTS}/*/*/sheet", f"{RESULTS}/*/*/*/figure")
+    print(f"Done: {RESULTS}/tables/{TABLE}.md; pictures in {', '.join(pictures)}")
     if STORE is not None and STORE.startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")

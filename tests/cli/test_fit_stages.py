@@ -1,6 +1,7 @@
 """The three phases by hand, on views of a small sphere."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -101,3 +102,30 @@ def test_the_time_before_an_interruption_counts(folder, monkeypatch):
     )
     assert main(["shading", *TINY]) == 0
     assert numbers(folder, "shading")["fit_seconds"] > 1000
+
+
+def test_figure_shows_test_views_and_says_what_was_not_fitted(folder, monkeypatch):
+    from texgs.cli.stages import figure
+
+    drawn = []
+    write = figure.write_fit_figure
+    monkeypatch.setattr(figure, "write_fit_figure", lambda *args: drawn.append(args) or write(*args))
+    assert main(["figure", *TINY]) == 0
+    ((path, models, views, reduce, title),) = drawn
+    assert list(models) == ["shading", "texture"], "this recipe only seeds surfels"
+    assert list(views) == ["test view 0", "test view 1"]
+    assert (reduce, title.partition(":")[0]) == (1, "sphere/TF01, recipe demo")
+    assert path == Path("results/sphere/TF01/demo/figure/figure.png")
+    assert path.stat().st_size > 10_000
+    assert numbers(folder, "figure")["shown"] == [0, 1]
+
+
+def test_figure_without_test_views_shows_training_views(folder, monkeypatch):
+    from texgs.cli.stages import figure
+
+    main(["texture", *TINY])
+    (folder.parent / "views" / "transforms_test.json").unlink()
+    shown = []
+    monkeypatch.setattr(figure, "write_fit_figure", lambda *args: shown.extend(args[2]) or args[0])
+    assert main(["figure", *TINY]) == 0
+    assert shown == ["training view 0", "training view 4"]

@@ -48,7 +48,7 @@ def test_interpolations_are_resolved():
         ("tracking=http://x", "an address goes to tracking.uri"),
         ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, got gpuu, did you mean gpu?"),
         ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
-        ("views=hugge", "views: expected one of default, paper, relight, small, got hugge"),
+        ("views=hugge", "views: expected one of default, paper, relight, small, unseen, got hugge"),
         (
             "views.lights=[{kind: sun}]",
             "views.lights.0.kind: expected one of headlight, directional, got sun",

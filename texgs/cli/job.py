@@ -169,6 +169,7 @@ def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]
     return {
         "stage": job.stage.name,
         **{key: job.settings[key] for key in ("dataset", "tf") if key in job.settings},
+        **recipe(job.settings),
         "seconds": seconds,
         "peak_memory_mib": peak_memory() / 2**20,
         "device": device(job.settings),
@@ -180,8 +181,23 @@ def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]
     }
 
 
+def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Names of the recipe and of the variant of a sweep, where the stage is of a fit."""
+    fit = settings.get("fit", {})
+    return {"recipe": fit["name"], "variant": fit["variant"]} if "variant" in fit else {}
+
+
+def gpu_name() -> str:
+    """Of the GPU that fits run on."""
+    import torch  # the jobs that need it have it already
+
+    return str(torch.cuda.get_device_name())
+
+
 def device(settings: Mapping[str, Any]) -> str:
     """What did the work."""
+    if settings.get("fit", {}).get("device") == "cuda":
+        return gpu_name()
     by_gpu = settings.get("views", {}).get("mapper") == "gpu"
     return "OpenGL" if by_gpu else f"{platform.machine()} CPU"
 

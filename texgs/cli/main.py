@@ -20,6 +20,7 @@ STAGE_VERBS = {
     "surfels": "seed surfels and fit them with spherical harmonics",
     "shading": "fit relightable surfels with Blinn-Phong shading",
     "texture": "give relightable surfels textures",
+    "figure": "show a fit beside test views, with its maps",
 }
 VERBS = {
     "new": "start a data set from a volume file of your own, with suggested transfer functions",

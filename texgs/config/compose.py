@@ -68,6 +68,10 @@ def check(config: DictConfig) -> None:
         ConfigError: naming the first key that is out of bounds.
     """
     check_name("dataset.name", config.dataset.name)
+    check_name("fit.name", config.fit.name)
+    if not re.fullmatch(r"[A-Za-z0-9_-]*", config.variant):
+        raise ConfigError(f"variant: expected letters, digits, _ or -, got {config.variant!r}")
+    check_name("views.name", config.views.name)
     for tf in config.dataset.basic_tfs:
         check_name("dataset.basic_tfs", tf)
     for entry in keys():

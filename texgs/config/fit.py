@@ -27,6 +27,7 @@ class Losses:
 
     dssim: float = key(0.2, "lambda of D-SSIM against L1, of colour and of alpha", least=0)
     alpha: float = key(0.1, "of L1 + D-SSIM of alpha", least=0)
+    alpha_l1: bool = key(True, "alpha's L1 has a gradient; in the release only its D-SSIM has")
     normal: float = key(0.0, "of normal consistency", least=0)
     normal_from: int = key(0, "iteration from which normals count", least=0)
     smoothness: float = key(0.0, "of bilateral smoothness, of each map of a per-surfel material", least=0)
@@ -56,6 +57,7 @@ class Phase:
     iterations: int = key(0, "views, one each", least=0)
     sh_degree: int = key(3, "of spherical harmonics, in the phase without shading", least=0)
     sh_every: int = key(1000, "iterations between degrees", least=1)
+    turns_normals: bool = key(True, "shading has gradients into normals; in the release it has none")
     rates: Rates = key(Rates, "learning rates")
     losses: Losses = key(Losses, "weights")
     densify: Densify = key(Densify, "density control")
@@ -106,6 +108,9 @@ class Fit:
     seed: int = key(0, "random numbers")
     reduce: int = key(1, "factor by which images are made smaller, by averaging", least=1)
     low_pass: float = key(6.0, "k of the low-pass filter, variance 1/k px^2; stays with the model", least=0)
+    facing: bool = key(
+        True, "lights shine on the side that faces the viewer; false: on both, as in the paper"
+    )
     material: str = key("shared", "one material for all, or one per surfel", choices=("shared", "surfel"))
     activation: str = key("bounded", "range of material factors", choices=("bounded", "paper"))
     first_material: Material = key(Material, "before the shading phase")

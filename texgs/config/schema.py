@@ -103,6 +103,7 @@ class Shading:
 class Views:
     """Training and test views of a volume."""
 
+    name: str = key("views", "of their folder; a sweep over views has several")
     train: CameraPath = key(CameraPath, "training views")
     test: CameraPath = key(CameraPath, "test views")
     width: int = key(II("dataset.image"), "width of views", "pixels", least=1)
@@ -112,6 +113,10 @@ class Views:
     lights: list[Light] = field(
         default_factory=lambda: [Light()],
         metadata={"help": "view i is lit by light i modulo their number"},
+    )
+    test_lights: list[Light] = field(
+        default_factory=list,
+        metadata={"help": "the same for test views; default those of `lights`"},
     )
     shading: Shading = key(Shading, "material of the volume")
     step: float = key(0.25, "sample distance along rays", "voxels", above=0)
@@ -138,6 +143,17 @@ class Device:
 
 
 @dataclass
+class Sweep:
+    """Variants of an experiment, each with its own overrides, side by side in one table."""
+
+    name: str = key("none", "of the table")
+    seeds: list[int] = key([0], "random numbers; each variant runs once with each")
+    variants: dict[str, list[str]] = field(
+        default_factory=dict, metadata={"help": "overrides by the name of the variant"}
+    )
+
+
+@dataclass
 class Config:
     """Everything."""
 
@@ -146,6 +162,8 @@ class Config:
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: Views = key(Views, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")
+    sweep: Sweep = key(Sweep, "variants of the experiment")
+    variant: str = key("", "which of the sweep this is, in the folder of its fits")
     tracking: Tracking = key(Tracking, "where runs are recorded")
     device: Device = key(Device, "what the work runs on")
     data_folder: str = key(II("oc.env:TEXGS_DATA,data"), "folder of data files; or set TEXGS_DATA")

@@ -42,18 +42,26 @@ class Stage:
 
     def applies(self, config: DictConfig) -> bool:
         """Whether the data set goes through this stage: one of views has no volume."""
+        if self.name == "sheet":  # of the views of a sweep there is none
+            return bool(config.views.name == "views")
         return config.dataset.views_folder is None or self.name not in ("volume", "transfer", "views")
 
     def output(self, config: DictConfig) -> Path:
         """Folder of the job's files."""
         return Path(config.results) / self.folder.format(
-            dataset=config.dataset.name, tf=config.tf, fit=config.fit.name
+            dataset=config.dataset.name, tf=config.tf, views=config.views.name, fit=fit_folder(config)
         )
 
     @property
     def code(self) -> str:
         """Digest of the code that the job runs."""
         return code_digest(self.module)
+
+
+def fit_folder(config: DictConfig) -> str:
+    """Name of the folder of a fit: the recipe, the variant of a sweep, and a seed other than 0."""
+    seed = f"s{config.fit.seed}" if config.fit.seed else ""
+    return "-".join(part for part in (config.fit.name, config.variant, seed) if part)
 
 
 def settings_file(stage: Stage, config: DictConfig) -> str:
@@ -91,10 +99,25 @@ def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
     return lambda config: {"model": STAGES[stage].output(config) / "model.safetensors", **view_set(config)}
 
 
+def models(config: DictConfig) -> dict[str, Path]:
+    """The models that the three phases of the fit write, and the views."""
+    phases = ("surfels", "shading", "texture")
+    return {
+        **{name: STAGES[name].output(config) / "model.safetensors" for name in phases},
+        **view_set(config),
+    }
+
+
 def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
     """What a stage of the fit reads: what holds for all of them, and its own parts."""
     common = ("name", "seed", "reduce")
-    return lambda config: {"fit": {part: config.fit[part] for part in (*common, *parts)}}
+    return lambda config: {
+        "fit": {
+            **{part: config.fit[part] for part in (*common, *parts)},
+            "variant": config.variant,
+            "device": config.device.name,
+        }
+    }
 
 
 STAGES = {
@@ -123,9 +146,9 @@ STAGES = {
             select=lambda config: {
                 "tf_values": config.dataset.tf_values,
                 "points": basic_tf(config),
-                "views": config.views,
+                "views": {name: value for name, value in config.views.items() if name != "name"},
             },
-            folder="{dataset}/{tf}/views",
+            folder="{dataset}/{tf}/{views}",
             inputs=prepared_volume,
             needs=("volume",),
             per_tf=True,
@@ -143,7 +166,7 @@ STAGES = {
             "surfels",
             "texgs.cli.stages.surfels",
             select=lambda config: {
-                **recipe("low_pass", "activation", "seeds")(config),
+                **recipe("low_pass", "facing", "activation", "seeds")(config),
                 "phase": config.fit.surfels,
             },
             folder="{dataset}/{tf}/{fit}/surfels",
@@ -170,6 +193,21 @@ STAGES = {
             folder="{dataset}/{tf}/{fit}/texture",
             inputs=model_of("shading"),
             needs=("shading", "views"),
+            per_tf=True,
+        ),
+        Stage(
+            "figure",
+            "texgs.cli.stages.figure",
+            select=lambda config: {
+                "fit": {
+                    "name": config.fit.name,
+                    "reduce": config.fit.reduce,
+                    "surfels_iterations": config.fit.surfels.iterations,
+                }
+            },
+            folder="{dataset}/{tf}/{fit}/figure",
+            inputs=models,
+            needs=("texture",),  # which needs the others
             per_tf=True,
         ),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 from torch import Tensor
@@ -57,3 +58,8 @@ def latest(folder: str | Path) -> dict[str, Tensor] | None:
     if "iteration" not in state:
         raise ArgumentError(f"{path}: expected a checkpoint, found no iteration in it; remove it")
     return state
+
+
+def discard(folder: str | Path) -> None:
+    """Remove the checkpoint of a run that has ended well; no error where there is none."""
+    shutil.rmtree(folder, ignore_errors=True)

@@ -8,10 +8,16 @@ from torch import Tensor
 from texgs.config.fit import Densify
 from texgs.core.rotation import quats_to_matrices
 from texgs.fit.optimizer import Optimizer
+from texgs.scene.model import MATERIAL
 
 CHILDREN = 2  # of a split
 SHRINK = 1.6  # by which children are smaller
 RESET_OPACITY = 0.01
+
+
+def is_shared(name: str, values: Tensor) -> bool:
+    """Whether a parameter is one material for all surfels, also where there is but one surfel."""
+    return name in MATERIAL and len(values) == 1
 
 
 class DensityControl:
@@ -59,7 +65,7 @@ class DensityControl:
         )
         chosen = self._chosen(alive)
         is_split = chosen & (largest > self.settings.size * self.extent)
-        rows = {name: x for name, x in p.items() if len(x) == n}
+        rows = {name: x for name, x in p.items() if len(x) == n and not is_shared(name, x)}
         clones = {name: x[chosen & ~is_split] for name, x in rows.items()}
         children = self._children({name: x[is_split] for name, x in rows.items()}, generator)
         added = {name: torch.cat([clones[name], children[name]]) for name in rows}

@@ -107,7 +107,15 @@ class Fit:
         shift = torch.zeros_like(p["scales"]).requires_grad_() if is_observed else None
         degrees = min(self.phase.sh_degree, self.iteration // self.phase.sh_every)
         visible = join(p, degrees)
-        loss = view_loss(visible, self.optics, target, self.phase.losses, shift, self.iteration)
+        loss = view_loss(
+            visible,
+            self.optics,
+            target,
+            self.phase.losses,
+            shift,
+            self.iteration,
+            self.phase.turns_normals,
+        )
         loss.backward()
         if shift is not None and shift.grad is not None:
             self.control.observe(shift.grad, *self.images.size)

@@ -13,7 +13,7 @@ from texgs.fit.images import Target
 from texgs.raster import Render, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.smoothness import bilateral_smoothness
-from texgs.raster.ssim import l1_dssim
+from texgs.raster.ssim import l1_dssim, ssim
 from texgs.scene.model import MATERIAL, Optics, geometry, material
 from texgs.scene.render import shaded
 
@@ -27,6 +27,7 @@ def view_loss(
     weights: Losses,
     shift: Tensor | None,
     iteration: int,
+    turns_normals: bool = True,
 ) -> Tensor:
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
@@ -37,9 +38,13 @@ def view_loss(
         weights: of the losses.
         shift: [N, 2] zeros that receive the screen-space gradient, or None.
         iteration: from 1; losses may start later.
+        turns_normals: whether shading has gradients into the surfels' orientation and place.
     """
     camera = target.camera
-    colors = cast(Tensor, shaded(parameters, optics, camera, target.light))  # surfels have no texture yet
+    fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
+    colors = cast(
+        Tensor, shaded({**parameters, **fixed}, optics, camera, target.light)
+    )  # surfels have no texture yet
     maps = material_maps(parameters, optics) if weights.smoothness > 0 else None
     has_normals = weights.normal > 0 and iteration > weights.normal_from
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
@@ -60,13 +65,20 @@ def view_loss(
     color, *attributes = (x.permute(1, 2, 0) for x in render.color.permute(2, 0, 1).split(channels))
     loss = l1_dssim(color, target.color, weights.dssim)
     if weights.alpha > 0:
-        loss = loss + weights.alpha * l1_dssim(render.alpha, target.alpha, weights.dssim)
+        loss = loss + weights.alpha * alpha_loss(render.alpha, target.alpha, weights)
     if has_normals:
         loss = loss + weights.normal * consistency(render, target)
     if attributes:
         smoothness = bilateral_smoothness(attributes[0], target.color, target.alpha)
         loss = loss + weights.smoothness * SMOOTHED * smoothness
     return target.share * loss
+
+
+def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:
+    """L1 + D-SSIM of alpha [H, W], or D-SSIM alone at the same weight."""
+    if weights.alpha_l1:
+        return l1_dssim(alpha, target, weights.dssim)
+    return weights.dssim * (1 - ssim(alpha, target))
 
 
 def material_maps(parameters: Mapping[str, Tensor], optics: Optics) -> Tensor | None:

@@ -8,11 +8,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json
+from texgs.report.metrics_files import PHASES, fits
 from texgs.report.table import Cell, Column, Table
 
-PHASES = ("surfels", "shading", "texture")
 COLUMNS = (
     Column("data set"),
     Column("TF"),
@@ -37,13 +35,7 @@ def fitting(paths: Iterable[str | Path]) -> Table:
         ArgumentError: if a file is no metrics file.
     """
     published = paper()
-    rows = []
-    for path in sorted(map(Path, paths)):
-        metrics = read_json(path)
-        if not isinstance(metrics, dict) or "numbers" not in metrics:
-            raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
-        if metrics["stage"] in PHASES:
-            rows.append(row(metrics, path.parts[-3], published))
+    rows = [row(metrics, path.parts[-3], published) for path, metrics in fits(paths)]
     return Table(CAPTION, COLUMNS, sorted(rows, key=lambda cells: (cells[:3], PHASES.index(str(cells[3])))))
 
 

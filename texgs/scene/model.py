@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import torch
@@ -26,6 +26,7 @@ class Optics:
     low_pass: float = 6.0  # of the rasterizer, see texgs.raster.Options
     material: Literal["bounded", "paper"] = "bounded"  # how raw material becomes factors
     local_viewer: bool = True  # whether directions to viewer and headlight differ from surfel to surfel
+    facing: bool = True  # whether lights shine on the side that faces the viewer, or on both
 
     @property
     def options(self) -> Options:
@@ -69,6 +70,10 @@ class Model:
 
     def __len__(self) -> int:
         return len(self.parameters["means"])
+
+    def to(self, device: torch.device | str) -> Model:
+        """The same model on another device."""
+        return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
 
     @property
     def stage(self) -> Literal["surfels", "shading", "texture"]:

@@ -133,7 +133,8 @@ def _short(value: object) -> str:
 
 def _optics(stored: dict[str, Any]) -> Optics:
     optics = Optics(**stored)
-    known = optics.material in ("bounded", "paper") and isinstance(optics.local_viewer, bool)
+    are_flags = isinstance(optics.local_viewer, bool) and isinstance(optics.facing, bool)
+    known = optics.material in ("bounded", "paper") and are_flags
     if not known or not 0 < float(optics.low_pass) < math.inf:
         raise ArgumentError(f"optics: expected values of texgs {FORMAT} version {VERSION}, got {stored}")
     return optics

@@ -93,10 +93,10 @@ def read_ply(path: str | Path) -> Model:
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
             parameters["sh"] = _harmonics(vertices)
-            optics = Optics(low_pass=2.0)
+            optics = Optics(low_pass=2.0, facing=False)
         else:
             parameters |= _appearance(vertices, path.parent)
-            optics = Optics(low_pass=2.0, material="paper")
+            optics = Optics(low_pass=2.0, material="paper", facing=False)
         check.finite(**parameters)
         return Model(parameters, optics)
     except TexgsError as error:

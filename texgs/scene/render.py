@@ -41,8 +41,8 @@ def shaded(
     a, d, s, b = material(p, optics.material).values()
     rest = (a, d, s, b, p["means"], p["quats"], viewer(camera, optics), light_direction(light, camera))
     if "texels" not in p:
-        return blinn_phong(p["colors"], *rest).clamp(0, 1)  # as renderers of volumes do
-    base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest)
+        return blinn_phong(p["colors"], *rest, facing=optics.facing).clamp(0, 1)  # as renderers of volumes do
+    base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest, facing=optics.facing)
     return Texture(base.clamp(0, 1), gain, p["texels"], p["sizes"], p["offsets"])
 
 

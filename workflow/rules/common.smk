@@ -2,15 +2,17 @@
 import re
 import shlex
 import sys
+from pathlib import Path
 
 from texgs.cli.stages.tf import check_basic_tfs
 from texgs.config.code import code_digest
 from texgs.config.compose import compose
 from texgs.config.locate import tf_names
-from texgs.config.stage import STAGES, settings_file
+from texgs.config.stage import STAGES, fit_folder, settings_file
+from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError, TexgsError
 
-GROUPS = ("experiment", "dataset", "views", "fit", "device", "tracking")
+GROUPS = ("experiment", "dataset", "views", "fit", "sweep", "device", "tracking")
 
 
 def overrides():
@@ -32,55 +34,71 @@ def overrides():
         raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
 
 
-def data_sets(words):
-    """Configurations by data set and basic TF; the one of the data set itself has the name None."""
+def configurations(words):
+    """One for each data set, variant of the sweep and basic TF, each TF's views and files checked."""
     names = compose(words).datasets
-    chosen = [(*words, f"dataset={name}") for name in names] or [words]
-    found = {}
-    for each in chosen:
+    found, known = [], set()
+    for each in [(*words, f"dataset={name}") for name in names] or [words]:
         base = compose(each)
         check_basic_tfs(base.dataset)
-        tfs = {name: compose((*each, f"tf={name}")) for name in tf_names(base)}
-        starts_from_views = base.dataset.views_folder is not None
-        for each_config in tfs.values() if starts_from_views else [base]:
-            STAGES["sheet" if starts_from_views else "volume"].inputs(each_config)  # the data are there
-        if base.dataset.name in found:
+        if base.dataset.name in known:
             raise ConfigError(f"datasets: expected different names, got {base.dataset.name} twice")
-        found[base.dataset.name] = {None: base, **tfs}
+        known.add(base.dataset.name)
+        for variant in variants(each):
+            found += [compose((*variant, f"tf={name}")) for name in tf_names(base)]
+    for each in found:
+        starts_from_views = each.dataset.views_folder is not None
+        STAGES["surfels" if starts_from_views else "volume"].inputs(each)  # the data are there
     return found
+
+
+def jobs(configs):
+    """Settings file and input files of each job, by stage and folder."""
+    found = {}
+    for each in configs:
+        for name, stage in STAGES.items():
+            if not stage.applies(each):
+                continue
+            job = settings_file(stage, each), stage.inputs(each)
+            if found.setdefault((name, stage.output(each).as_posix()), job) != job:
+                raise ConfigError(f"{stage.output(each)}: two variants go there; give one another name")
+    return found
+
+
+def job(stage, wildcards):
+    """Settings file and input files of the job that wildcards describe."""
+    folder = Path(RESULTS, STAGES[stage].folder.format(**dict(wildcards.items())))
+    return JOBS[stage, folder.as_posix()]
 
 
 def settings(stage, wildcards):
     """The file with the settings of a job: its name is the digest of its contents."""
-    return SETTINGS[stage, wildcards.dataset, getattr(wildcards, "tf", None)]
+    return job(stage, wildcards)[0]
 
 
 def inputs(stage, wildcards):
     """The files a job reads."""
-    config = DATA_SETS[wildcards.dataset][getattr(wildcards, "tf", None)]
-    return {name: path.as_posix() for name, path in STAGES[stage].inputs(config).items()}
+    return {name: path.as_posix() for name, path in job(stage, wildcards)[1].items()}
+
+
+def done(*stages):
+    """The metrics files of all jobs of some stages."""
+    return sorted(f"{folder}/metrics.json" for stage, folder in JOBS if stage in stages)
 
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
     WORDS = overrides()
     CONFIG = compose(WORDS)
-    DATA_SETS = data_sets(WORDS)
-    SETTINGS = {
-        (name, dataset, tf): settings_file(stage, config)
-        for name, stage in STAGES.items()
-        for dataset, configs in DATA_SETS.items()
-        for tf, config in configs.items()
-        if stage.per_tf == (tf is not None) and stage.applies(config)
-    }
+    CONFIGS = configurations(WORDS)
+    RESULTS = CONFIG.results
+    JOBS = jobs(CONFIGS)
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
 
-RESULTS = CONFIG.results
 STORE = CONFIG.tracking.uri
 GPU = int(CONFIG.device.mapper == "gpu")  # a volume mapper's
-VOLUMES = [name for name, configs in DATA_SETS.items() if configs[None].dataset.views_folder is None]
 
 # In front of the commands, not a parameter of the rules: where runs are recorded changes no result.
 ENVIRONMENT = (
@@ -93,10 +111,6 @@ shell.prefix(
 )
 
 
-# Data sets and their basic TFs, as wildcards of the rules that make a job for each.
-PAIRS = [(dataset, tf) for dataset, tfs in DATA_SETS.items() for tf in tfs if tf]
-
-
 pathvars:
     results=RESULTS,
     logs=f"{RESULTS}/logs",
@@ -104,6 +118,7 @@ pathvars:
 
 
 wildcard_constraints:
-    fit=re.escape(CONFIG.fit.name),
-    dataset="|".join(map(re.escape, DATA_SETS)),
-    tf="|".join(sorted({re.escape(tf) for tfs in DATA_SETS.values() for tf in tfs if tf})),
+    dataset="|".join(sorted({re.escape(each.dataset.name) for each in CONFIGS})),
+    tf="|".join(sorted({re.escape(each.tf) for each in CONFIGS})),
+    views="|".join(sorted({re.escape(each.views.name) for each in CONFIGS})),
+    fit="|".join(sorted({re.escape(fit_folder(each)) for each in CONFIGS})),

@@ -1,14 +1,19 @@
-# The three phases of a basic model, by the recipe of conf/fit.
+# The three phases of a basic model, by the recipe of conf/fit, and a figure of what they are worth.
 
 
 rule fits:
     input:
-        [f"{RESULTS}/{dataset}/{tf}/{CONFIG.fit.name}/texture/metrics.json" for dataset, tf in PAIRS],
+        done("texture"),
+
+
+rule figures:
+    input:
+        done("figure"),
 
 
 rule surfels:
     input:
-        unpack(lambda wildcards: {"views": inputs("sheet", wildcards)["views"]}),
+        unpack(lambda wildcards: {"views": inputs("surfels", wildcards)["views"]}),
     output:
         model="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
         metrics="<results>/{dataset}/{tf}/{fit}/surfels/metrics.json",
@@ -28,7 +33,7 @@ rule surfels:
 
 rule shading:
     input:
-        unpack(lambda wildcards: {"views": inputs("sheet", wildcards)["views"]}),
+        unpack(lambda wildcards: {"views": inputs("shading", wildcards)["views"]}),
         model="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
     output:
         model="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
@@ -49,7 +54,7 @@ rule shading:
 
 rule texture:
     input:
-        unpack(lambda wildcards: {"views": inputs("sheet", wildcards)["views"]}),
+        unpack(lambda wildcards: {"views": inputs("texture", wildcards)["views"]}),
         model="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
     output:
         model="<results>/{dataset}/{tf}/{fit}/texture/model.safetensors",
@@ -65,4 +70,28 @@ rule texture:
         folder=subpath(output.metrics, parent=True),
     shell:
         "texgs texture --settings {params.settings:q} --input model={input.model:q} views={input.views:q} "
+        "--output {params.folder:q} 2>&1 | tee {log:q}"
+
+
+rule figure:
+    input:
+        unpack(lambda wildcards: {"views": inputs("figure", wildcards)["views"]}),
+        surfels="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
+        shading="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
+        texture="<results>/{dataset}/{tf}/{fit}/texture/model.safetensors",
+    output:
+        figure="<results>/{dataset}/{tf}/{fit}/figure/figure.png",
+        metrics="<results>/{dataset}/{tf}/{fit}/figure/metrics.json",
+    log:
+        "<logs>/{dataset}/{tf}/{fit}/figure.log",
+    benchmark:
+        "<benchmarks>/{dataset}/{tf}/{fit}/figure.tsv"
+    threads: 4
+    params:
+        settings=lambda wildcards: settings("figure", wildcards),
+        code=STAGES["figure"].code,
+        folder=subpath(output.metrics, parent=True),
+    shell:
+        "texgs figure --settings {params.settings:q} --input surfels={input.surfels:q} "
+        "shading={input.shading:q} texture={input.texture:q} views={input.views:q} "
         "--output {params.folder:q} 2>&1 | tee {log:q}"

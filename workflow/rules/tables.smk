@@ -1,19 +1,20 @@
 # Tables, from the metrics files of jobs.
 
 
+SWEEP = CONFIG.sweep.name if CONFIG.sweep.variants else None
+TABLE = SWEEP or "fitting"
+
+
 rule tables:
     input:
-        [
-            f"{RESULTS}/{dataset}/{tf}/{CONFIG.fit.name}/{phase}/metrics.json"
-            for dataset, tf in PAIRS
-            for phase in ("surfels", "shading", "texture")
-        ],
+        done("surfels", "shading", "texture"),
     output:
-        collect("<results>/tables/fitting.{format}", format=("csv", "md", "tex")),
+        collect("<results>/tables/{name}.{format}", name=TABLE, format=("csv", "md", "tex")),
     log:
-        "<logs>/tables.log",
+        f"<logs>/tables-{TABLE}.log",
     params:
-        code=code_digest("texgs.report.fitting"),
+        code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
+        sweep=f"--sweep {shlex.quote(SWEEP)}" if SWEEP else "",
     shell:
-        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "texgs tables {input:q} {params.sweep} --output {params.folder:q} 2>&1 | tee {log:q}"

@@ -3,7 +3,7 @@
 
 rule sheets:
     input:
-        [f"{RESULTS}/{dataset}/{tf}/sheet/metrics.json" for dataset, tf in PAIRS],
+        done("sheet"),
 
 
 rule views:
@@ -11,14 +11,14 @@ rule views:
         volume="<results>/{dataset}/volume/volume.nrrd",
         summary="<results>/{dataset}/volume/volume.json",
     output:
-        train="<results>/{dataset}/{tf}/views/transforms_train.json",
-        test="<results>/{dataset}/{tf}/views/transforms_test.json",
-        turntable="<results>/{dataset}/{tf}/views/turntable.png",
-        metrics="<results>/{dataset}/{tf}/views/metrics.json",
+        train="<results>/{dataset}/{tf}/{views}/transforms_train.json",
+        test="<results>/{dataset}/{tf}/{views}/transforms_test.json",
+        turntable="<results>/{dataset}/{tf}/{views}/turntable.png",
+        metrics="<results>/{dataset}/{tf}/{views}/metrics.json",
     log:
-        "<logs>/{dataset}/{tf}/views.log",
+        "<logs>/{dataset}/{tf}/{views}.log",
     benchmark:
-        "<benchmarks>/{dataset}/{tf}/views.tsv"
+        "<benchmarks>/{dataset}/{tf}/{views}.tsv"
     threads: 4
     params:
         settings=lambda wildcards: settings("views", wildcards),

@@ -3,7 +3,7 @@
 
 rule volumes:
     input:
-        collect("<results>/{dataset}/transfer/metrics.json", dataset=VOLUMES),
+        done("transfer"),
 
 
 rule volume:

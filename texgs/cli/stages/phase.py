@@ -5,9 +5,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.core.errors import DeviceError
 from texgs.core.progress import progress
 from texgs.fit import checkpoint
 from texgs.fit.images import Images
@@ -17,12 +19,31 @@ from texgs.scene.model import Model, Optics
 from texgs.volume.view_set import ViewSet
 
 SAVED_EVERY = 30.0  # seconds between checkpoints
+CHECKPOINT = "checkpoint"  # folder, there until the stage has ended
 
 
 def phase_from(values: Mapping[str, Any]) -> Phase:
     """A phase from the plain values of its settings."""
     parts = {"rates": Rates, "losses": Losses, "densify": Densify}
     return Phase(**{**values, **{name: kind(**values[name]) for name, kind in parts.items()}})
+
+
+def device_of(fit: Mapping[str, Any]) -> torch.device:
+    """The device that a recipe asks for.
+
+    Raises:
+        DeviceError: if torch sees no GPU.
+    """
+    if fit["device"] == "cuda" and not torch.cuda.is_available():
+        raise DeviceError("device=cuda: torch sees no GPU; leave it out to fit on the CPU, see texgs doctor")
+    return torch.device(fit["device"])
+
+
+def gpu_memory(device: torch.device) -> dict[str, float]:
+    """Peak memory of the GPU in this process; nothing on a CPU."""
+    if device.type != "cuda":
+        return {}
+    return {"peak_gpu_memory_mib": torch.cuda.max_memory_allocated(device) / 2**20}
 
 
 def run_phase(
@@ -40,7 +61,7 @@ def run_phase(
         The model, the seconds of all runs together, and the losses that this one looked at.
     """
     fit = Fit(parameters, optics, images, phase, seed)
-    folder = output / "checkpoint"
+    folder = output / CHECKPOINT
     if (state := checkpoint.latest(folder)) is not None:
         fit.restore(state)
     saved = time.monotonic()
@@ -60,3 +81,9 @@ def run_phase(
 def quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """PSNR and SSIM on the test views; none where there are none."""
     return mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {}
+
+
+def training_quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
+    """The same on the views that the model was fitted to."""
+    found = mean(evaluate(model, views.train, reduce, f"{title}: training views"))
+    return {f"train_{name}": value for name, value in found.items()}

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import phase_from, quality, run_phase
+from texgs.cli.stages.phase import CHECKPOINT, device_of, gpu_memory, phase_from, quality, run_phase
+from texgs.fit import checkpoint
 from texgs.fit.harmonics import base_color
 from texgs.fit.images import load
 from texgs.scene.model import Model, material, raw_material
@@ -23,25 +24,27 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         output: folder.
     """
     fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: shading"
-    views, before = read_views(inputs["views"].parent), read_model(inputs["model"])
+    device = device_of(fit)
+    views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
     images = load(views.train, fit["reduce"])
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}
     start["colors"] = base_color(before.parameters["sh"])
     first = raw_material(**fit["first_material"], kind=fit["activation"])
     rows = 1 if fit["material"] == "shared" else len(before)
-    start |= {name: value.repeat(rows) for name, value in first.items()}
+    start |= {name: value.to(device).repeat(rows) for name, value in first.items()}
     phase = phase_from(settings["phase"])
     model, seconds, losses = run_phase(start, before.optics, images, phase, fit["seed"], output, title)
     model = Model(model.parameters, before.optics, before.metadata)
     write_model(output / "model.safetensors", model)
     factors = material(model.parameters, before.optics.material)
-    return Outcome(
-        {
-            "fit_seconds": seconds,
-            "surfels": len(model),
-            "iterations": phase.iterations,
-            "losses": losses,
-            **{f"{name}_median": float(value.median()) for name, value in factors.items()},
-            **quality(model, views, fit["reduce"], title),
-        }
-    )
+    numbers = {
+        "fit_seconds": seconds,
+        "surfels": len(model),
+        "iterations": phase.iterations,
+        "losses": losses,
+        **{f"{name}_median": float(value.median()) for name, value in factors.items()},
+        **quality(model, views, fit["reduce"], title),
+        **gpu_memory(device),
+    }
+    checkpoint.discard(output / CHECKPOINT)
+    return Outcome(numbers)

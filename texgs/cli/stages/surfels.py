@@ -6,7 +6,8 @@ from typing import Any
 import torch
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import phase_from, quality, run_phase
+from texgs.cli.stages.phase import CHECKPOINT, device_of, gpu_memory, phase_from, quality, run_phase
+from texgs.fit import checkpoint
 from texgs.fit.harmonics import join, split, zeroth
 from texgs.fit.images import load
 from texgs.fit.seeds import seed_surfels
@@ -27,13 +28,15 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     views = read_views(inputs["views"].parent)
     images = load(views.train, fit["reduce"])
     shading = views.metadata.get("shading") or {}
-    optics = Optics(fit["low_pass"], fit["activation"], bool(shading.get("local_viewer", True)))
+    local_viewer = bool(shading.get("local_viewer", True))
+    optics = Optics(fit["low_pass"], fit["activation"], local_viewer, fit["facing"])
     phase = phase_from(settings["phase"])
     parameters, colors = seed_surfels(images, views, **fit["seeds"], seed=fit["seed"])
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
-    start = {**parameters, **split(sh)}
+    device = device_of(fit)
+    start = {name: x.to(device) for name, x in {**parameters, **split(sh)}.items()}
     model, seconds, losses = run_phase(start, optics, images, phase, fit["seed"], output, title)
     model = Model(join(model.parameters), optics, {"dataset": settings["dataset"], "tf": settings["tf"]})
     write_model(output / "model.safetensors", model)
@@ -44,5 +47,6 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         "losses": losses,
     }
     if phase.iterations:
-        numbers |= quality(model, views, fit["reduce"], title)
+        numbers |= quality(model, views, fit["reduce"], title) | gpu_memory(device)
+    checkpoint.discard(output / CHECKPOINT)
     return Outcome(numbers)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import quality
+from texgs.cli.stages.phase import device_of, gpu_memory, quality, training_quality
 from texgs.fit.images import load
 from texgs.fit.texels import texturize
 from texgs.scene.model_file import read_model, write_model
@@ -22,11 +22,14 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         output: folder.
     """
     fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: texture"
-    views, before = read_views(inputs["views"].parent), read_model(inputs["model"])
+    device = device_of(fit)
+    views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
     images = load(views.train, fit["reduce"])
     start = time.monotonic()
     model = texturize(before, images, **settings["texture"], seed=fit["seed"], title=title)
     seconds = time.monotonic() - start
     write_model(output / "model.safetensors", model)
     numbers = {"fit_seconds": seconds, "surfels": len(model), "texels": len(model.parameters["texels"])}
-    return Outcome({**numbers, **sizes(model), **quality(model, views, fit["reduce"], title)})
+    found = quality(model, views, fit["reduce"], title)
+    found |= training_quality(model, views, fit["reduce"], title) | gpu_memory(device)
+    return Outcome({**numbers, **sizes(model), **found})

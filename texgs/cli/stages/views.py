@@ -86,7 +86,8 @@ def cameras(path: dict[str, Any], views: dict[str, Any]) -> list[Camera]:
 
 def views_of(views: dict[str, Any], split: str, output: Path) -> list[View]:
     """Cameras, lights and files of the training or the test views."""
-    lights = [Light(**light) for light in views["lights"]]
+    chosen = (views["test_lights"] if split == "test" else None) or views["lights"]
+    lights = [Light(**light) for light in chosen]
     if not lights:
         raise ArgumentError("views.lights: expected at least one light, got none")
     return [

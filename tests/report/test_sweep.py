@@ -1,0 +1,63 @@
+import json
+
+import pytest
+
+from texgs.core.errors import ArgumentError
+from texgs.report.sweep import sweep
+from texgs.report.table import Table
+
+
+def run(folder, variant, seed=0, psnr=30.0, phases=("surfels", "shading", "texture")):
+    """Metrics files of one fit."""
+    paths = []
+    for phase in phases:
+        path = folder / f"{variant}-{seed}-{phase}.json"
+        numbers = {"fit_seconds": 60.0, "surfels": 1000}
+        if phase == "texture":
+            numbers |= {"psnr": psnr, "train_psnr": psnr + 1, "ssim": 0.9}
+        if phase == "shading":
+            numbers |= {f"{name}_median": 0.5 for name in ("ambient", "diffuse", "specular", "shininess")}
+        record = {"stage": phase, "dataset": "engine", "tf": "TF01", "recipe": "quick", "variant": variant}
+        path.write_text(json.dumps({**record, "seed": seed, "peak_memory_mib": 1024.0, "numbers": numbers}))
+        paths.append(path)
+    return paths
+
+
+def column(table: Table, title):
+    return [row[[c.title for c in table.columns].index(title)] for row in table.rows]
+
+
+def test_means_and_spread_over_seeds(tmp_path):
+    paths = run(tmp_path, "a", 0, 30.0) + run(tmp_path, "a", 1, 32.0) + run(tmp_path, "b", 0, 20.0)
+    table = sweep(paths, "mine")
+    assert column(table, "variant") == ["a", "b"]
+    assert column(table, "seeds") == [2, 1]
+    assert column(table, "PSNR") == [31.0, 20.0]
+    assert column(table, "PSNR, training") == [32.0, 21.0]
+    assert column(table, "± PSNR") == [pytest.approx(2**0.5), None]
+    assert column(table, "minutes") == [3.0, 3.0]
+    assert column(table, "memory GiB") == [1.0, 1.0]
+    assert "PSNR (paper)" not in [c.title for c in table.columns]
+
+
+def test_numbers_of_the_paper_stand_beside_the_variants_in_their_order(tmp_path):
+    paths = [path for name in ("162", "42", "92") for path in run(tmp_path, name)]
+    table = sweep(paths, "views")
+    assert column(table, "variant") == ["42", "92", "162"]
+    assert column(table, "PSNR (paper)") == [29.33, 30.95, 31.64]
+    assert column(table, "primitives (paper)")[0] == 60172
+    table = sweep(run(tmp_path, "400") + run(tmp_path, "77"), "resolution")
+    assert column(table, "PSNR, training (paper)") == [None, 27.91], "77 is not the paper's"
+
+
+def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
+    table = sweep(run(tmp_path, "a", phases=("shading",)), "mine")
+    assert column(table, "seeds") == [0]
+    assert set(table.rows[0][5:]) == {None}
+
+
+def test_fits_of_no_sweep_do_not_count_and_other_files_are_named(tmp_path):
+    assert sweep(run(tmp_path, ""), "mine").rows == []
+    (tmp_path / "x.json").write_text("[]")
+    with pytest.raises(ArgumentError, match=r"x\.json: expected the metrics of a job"):
+        sweep([tmp_path / "x.json"], "mine")

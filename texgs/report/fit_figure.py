@@ -1,0 +1,246 @@
+"""Figure of a fit: a basic model after each phase beside views it has not seen, and its maps in one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_atomic
+from texgs.fit.losses import material_maps
+from texgs.metrics.image import psnr
+from texgs.raster import rasterize
+from texgs.report.fitting import PHASES
+from texgs.scene.model import MATERIAL, Model, geometry, material
+from texgs.scene.render import render
+from texgs.volume.reduced import over_white, smaller
+from texgs.volume.view_set import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+DPI = 200
+WIDTH = 10.0  # inches, as all lengths on the page: 2000 pixels
+COLUMNS = 5  # at least, of a row
+LEFT, GAP = 0.3, 0.08  # the names of the rows, and what is free between panels
+TOP, HEAD, FOOT = 0.4, 0.25, 0.28  # the title of the page, and the lines above and below a panel
+LARGE, MEDIUM, SMALL = 11, 9, 8  # points
+CENTERED: dict[str, Any] = {"fontsize": MEDIUM, "ha": "center", "va": "center"}
+
+MAGNIFIED = 4  # errors: a quarter of the range of colours has the full colour
+DIVERGING = "bwr"  # 0 is white
+VISIBLE = 2 / 255  # alpha
+MARGIN = 1.06  # of what is shown around what is visible
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Which colours stand for which values."""
+
+    low: float
+    high: float
+    colormap: str = "viridis"
+
+    def __call__(self, values: Tensor) -> Tensor:
+        """Colours [..., 3] of values [...]."""
+        from matplotlib import colormaps  # slow to import
+
+        shares = ((values - self.low) / (self.high - self.low)).clamp(0, 1)
+        return torch.from_numpy(colormaps[self.colormap](shares.numpy())[..., :3]).float()
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One picture of the figure, or words in its place."""
+
+    title: str
+    pixels: Tensor | None = None  # [H, W, 3] in [0, 1]
+    words: str = ""  # below the picture
+    scale: Scale | None = None  # below the picture, instead of words
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """Panels side by side."""
+
+    name: str
+    panels: list[Panel]
+
+    @property
+    def panel_width(self) -> float:
+        """Of each panel, inches."""
+        columns = max(COLUMNS, len(self.panels))
+        return (WIDTH - LEFT - columns * GAP) / columns
+
+
+@torch.no_grad()
+def write_fit_figure(
+    path: str | Path, models: Mapping[str, Model], views: Mapping[str, View], reduce: int = 1, title: str = ""
+) -> Path:
+    """Draw what a fit is worth as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
+
+    A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
+    that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first
+    view: normals, depth, alpha and material. All panels show the same part of the frame, on white; PSNR is of
+    the whole frame.
+
+    Args:
+        path: the file to write.
+        models: by phase, "shading" and "texture" at least; without "surfels" its panels say "seeds only".
+        views: by the name that stands beside them, at least one; all of one size.
+        reduce: of the images, as in `images.load`.
+        title: line at the top.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if there is no view, a model is missing, or the path is not writable.
+    """
+    if not views or not {"shading", "texture"} <= set(models):
+        raise ArgumentError(
+            f"{path}: expected models shading and texture and a view, got {', '.join(models) or 'no model'} "
+            f"and {len(views)} views"
+        )
+    compared = [compare(models, view, reduce) for view in views.values()]
+    rows = [Row(name, panels) for name, (panels, _) in zip(views, compared, strict=True)]
+    name, view = next(iter(views.items()))
+    rows.append(Row(name, maps(models["texture"], view, reduce)))
+    box = frame(torch.stack([visible for _, visible in compared]).any(dim=0))
+    return draw(path, [Row(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
+
+
+def compare(models: Mapping[str, Model], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
+    """Panels of one view, and where it or one of its renderings shows something, [H, W]."""
+    planes = over_white(view, reduce)
+    truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
+    height, width = visible.shape
+    panels = [Panel("ground truth", truth, f"PSNR over {width} × {height} pixels")]
+    for phase in PHASES:
+        if phase not in models:
+            panels.append(Panel(phase, words="seeds only"))
+            continue
+        model = models[phase]
+        image = render(model, smaller(view.camera, reduce).to(model.parameters["means"].device), view.light)
+        color = image.color.cpu().clamp(0, 1)
+        visible = visible | (image.alpha.cpu() > VISIBLE)
+        panels.append(Panel(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
+    scale = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)
+    panels.append(Panel(f"error × {MAGNIFIED} ({DIVERGING})", scale(signed_error(color, truth)), scale=scale))
+    return panels, visible
+
+
+def signed_error(image: Tensor, target: Tensor) -> Tensor:
+    """Of the channel that is farthest off, [H, W]; above 0 where the image is too bright."""
+    error = image - target
+    return error.gather(2, error.abs().argmax(dim=2, keepdim=True))[..., 0]
+
+
+def maps(model: Model, view: View, reduce: int) -> list[Panel]:
+    """Panels of normals, depth, alpha and material of a model with shading in one view."""
+    camera = smaller(view.camera, reduce).to(model.parameters["means"].device)
+    image = render(model, camera, view.light, outputs=("normal", "depth"))
+    alpha, normal, depth = image.alpha.cpu(), image.normal.cpu(), image.depth.cpu()  # type: ignore[union-attr]
+    cover = alpha[..., None]
+    grey = Scale(0, 1, "gray_r")
+    panels = [
+        Panel("normals", (0.5 * (normal + cover) + 1 - cover).clamp(0, 1), "xyz as RGB"),
+        map_panel("depth, world units", depth, alpha),
+        Panel("alpha", grey(alpha), scale=grey),
+    ]
+    features = material_maps(model.parameters, model.optics)
+    if features is None:
+        factors = material(model.parameters, model.optics.material)
+        lines = [f"{name:9} {value.item():6.3f}" for name, value in factors.items()]
+        return [*panels, Panel("material of all surfels", words="\n".join(lines))]
+    size = (camera.width, camera.height)
+    blended = rasterize(
+        *geometry(model.parameters),
+        camera.viewmat,
+        camera.K,
+        *size,
+        features=features,
+        options=model.optics.options,
+    ).color.cpu()
+    means = (blended / cover.clamp_min(1e-6)).unbind(dim=2)  # of the surfels that a pixel shows
+    return [*panels, *(map_panel(name, mean, alpha) for name, mean in zip(MATERIAL, means, strict=True))]
+
+
+def map_panel(title: str, values: Tensor, alpha: Tensor) -> Panel:
+    """Values [H, W] as colours over white, from the lowest percent of them to the highest."""
+    seen = values[alpha > 0.1].numpy()
+    low, high = np.percentile(seen, (1, 99)) if seen.size else (0.0, 1.0)
+    scale = Scale(float(low), float(high) if high > low else float(low) + 1)
+    return Panel(title, torch.lerp(torch.ones(3), scale(values), alpha[..., None]).clamp(0, 1), scale=scale)
+
+
+def frame(visible: Tensor) -> tuple[slice, slice]:
+    """Rows and columns of the smallest part of an image, of its aspect, around what is visible [H, W]."""
+    places = visible.nonzero()
+    if not len(places):
+        return slice(None), slice(None)
+    first, last = places.amin(dim=0), places.amax(dim=0) + 1
+    whole = torch.tensor(visible.shape)
+    size = (MARGIN * ((last - first) / whole).max() * whole).ceil().long().minimum(whole)
+    start = torch.div(first + last - size, 2, rounding_mode="floor").clamp_min(0).minimum(whole - size)
+    rows, columns = (slice(int(a), int(a + n)) for a, n in zip(start, size, strict=True))
+    return rows, columns
+
+
+def crop(panel: Panel, box: tuple[slice, slice]) -> Panel:
+    """The part of a panel's picture in a box."""
+    return panel if panel.pixels is None else replace(panel, pixels=panel.pixels[box])
+
+
+def draw(path: str | Path, rows: list[Row], title: str) -> Path:
+    """Lay out rows of panels, whose pictures are of one size, and write them as PNG."""
+    from matplotlib.figure import Figure  # slow to import
+
+    height, width = next(panel.pixels.shape[:2] for panel in rows[0].panels if panel.pixels is not None)
+    heights = [row.panel_width * height / width for row in rows]
+    page = TOP + sum(heights) + len(rows) * (HEAD + FOOT)
+    figure = Figure(figsize=(WIDTH, page), dpi=DPI, facecolor="white")
+
+    def axes_at(left: float, top: float, width: float, height: float) -> Axes:
+        """Axes without ticks in a grey frame, by inches from the upper left corner."""
+        box = (left / WIDTH, 1 - (top + height) / page, width / WIDTH, height / page)
+        axes = figure.add_axes(box, xticks=[], yticks=[])
+        axes.spines[:].set(color="0.8", linewidth=0.5)
+        return axes
+
+    figure.text(LEFT / WIDTH, 1 - 0.5 * TOP / page, title, fontsize=LARGE, va="center")
+    top = TOP
+    for row, tall in zip(rows, heights, strict=True):
+        top, wide = top + HEAD, row.panel_width
+        for index, panel in enumerate(row.panels):
+            left = LEFT + index * (wide + GAP)
+            fill(axes_at(left, top, wide, tall), panel)
+            if panel.scale is not None:
+                bar = axes_at(left + 0.33 * wide, top + tall + 0.07, 0.34 * wide, 0.1)
+                fill_bar(bar, panel.scale)
+        figure.text(0.5 * LEFT / WIDTH, 1 - (top + 0.5 * tall) / page, row.name, rotation=90, **CENTERED)
+        top += tall + FOOT
+    return write_atomic(path, lambda file: figure.savefig(file, format="png"))
+
+
+def fill(axes: Axes, panel: Panel) -> None:
+    """The picture with its title above and its words below, or the words in its place."""
+    axes.set_title(panel.title, fontsize=MEDIUM, pad=4)
+    if panel.pixels is None:
+        axes.text(0.5, 0.5, panel.words, transform=axes.transAxes, family="monospace", **CENTERED)
+        return
+    axes.imshow(panel.pixels.numpy(), aspect="auto")
+    axes.set_xlabel(panel.words, fontsize=SMALL, labelpad=4)
+
+
+def fill_bar(axes: Axes, scale: Scale) -> None:
+    """All colours of a scale, between the values of its ends."""
+    axes.imshow(scale(torch.linspace(scale.low, scale.high, 256))[None].numpy(), aspect="auto")
+    for x, value, side in ((-0.1, scale.low, "right"), (1.1, scale.high, "left")):
+        axes.text(x, 0.4, f"{value:.3g}", transform=axes.transAxes, fontsize=SMALL, ha=side, va="center")

@@ -1,0 +1,103 @@
+"""The table of a sweep: what became of each variant, over all seeds, beside the paper's numbers."""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
+from pathlib import Path
+from statistics import fmean, stdev
+from typing import Any
+
+from texgs.report.metrics_files import fits
+from texgs.report.table import Cell, Column, Table
+
+MATERIAL = ("ambient_median", "diffuse_median", "specular_median", "shininess_median")
+PUBLISHED = {  # columns of the paper's numbers, by their headings in its files
+    "train_psnr": Column("PSNR, training (paper)", 2),
+    "test_psnr": Column("PSNR (paper)", 2),
+    "test_ssim": Column("SSIM (paper)", 4),
+    "fitting_min": Column("minutes (paper)", 2),
+    "primitives": Column("primitives (paper)", 0),
+}
+COLUMNS = (
+    Column("data set"),
+    Column("TF"),
+    Column("recipe"),
+    Column("variant"),
+    Column("seeds", 0),
+    Column("PSNR, training", 2),
+    Column("PSNR", 2),
+    Column("± PSNR", 2),
+    Column("SSIM", 4),
+    Column("minutes", 2),
+    Column("memory GiB", 2),
+    Column("primitives", 0),
+    *(Column(title, 2) for title in ("k_a", "k_d", "k_s", "beta")),
+)
+CAPTION = (
+    "Test views after the texture phase; means over seeds, ± their standard deviation; "
+    "minutes of all phases; medians of the material."
+)
+
+
+def sweep(paths: Iterable[str | Path], name: str) -> Table:
+    """The table of the variants among some metrics files.
+
+    Args:
+        paths: metrics files; those of fits without a variant do not count.
+        name: of the sweep; the paper's numbers stand beside those of the same name, where it has them.
+
+    Raises:
+        ArgumentError: if a file is no metrics file.
+    """
+    groups: dict[tuple[str, ...], dict[int, dict[str, dict[str, Any]]]] = defaultdict(
+        lambda: defaultdict(dict)
+    )
+    for _, metrics in fits(paths):
+        if metrics.get("variant"):
+            key = tuple(metrics[part] for part in ("dataset", "tf", "recipe", "variant"))
+            groups[key][metrics["seed"]][metrics["stage"]] = metrics
+    published = paper(name)
+    beside = [PUBLISHED[key] for key in PUBLISHED if any(key in line for line in published.values())]
+    rows = []
+    for key, by_seed in sorted(groups.items(), key=lambda item: (*item[0][:3], natural(item[0][3]))):
+        line = published.get(key[3], {})
+        theirs = [float(line[k]) if line.get(k) else None for k, c in PUBLISHED.items() if c in beside]
+        rows.append([*key, *cells(list(by_seed.values())), *theirs])
+    return Table(CAPTION, (*COLUMNS, *beside), rows)
+
+
+def cells(runs: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[Cell]:
+    """The cells of one variant from the metrics of its runs, by phase; None where a phase is missing."""
+    complete = [run for run in runs if {"surfels", "shading", "texture"} <= set(run)]
+    if not complete:
+        return [0, *[None] * (len(COLUMNS) - 5)]
+
+    def mean(stage: str, key: str) -> float | None:
+        values = [run[stage]["numbers"].get(key) for run in complete]
+        return None if None in values else fmean(values)
+
+    psnr = [run["texture"]["numbers"].get("psnr") for run in complete]
+    spread = stdev(psnr) if len(psnr) > 1 and None not in psnr else None
+    minutes = [sum(phase["numbers"]["fit_seconds"] for phase in run.values()) / 60 for run in complete]
+    memory = [max(phase["peak_memory_mib"] for phase in run.values()) / 1024 for run in complete]
+    quality = [mean("texture", "train_psnr"), mean("texture", "psnr"), spread, mean("texture", "ssim")]
+    costs = [fmean(minutes), max(memory), mean("texture", "surfels")]
+    return [len(complete), *quality, *costs, *(mean("shading", key) for key in MATERIAL)]
+
+
+def natural(name: str) -> tuple[float, str]:
+    """Numbers in their order before words."""
+    return (float(name), "") if name.isdigit() else (float("inf"), name)
+
+
+def paper(name: str) -> dict[str, dict[str, str]]:
+    """The paper's numbers by variant; none for a sweep that it does not have."""
+    file = files("texgs.report").joinpath("paper", f"{name}.csv")
+    if not file.is_file():
+        return {}
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    return {next(iter(row.values())): row for row in rows}
