@@ -9,7 +9,7 @@ FORMATTED := $(filter-out %.txt,$(NATIVE))
 .PHONY: help install test bench lint demo lock clean
 
 help:
-	@echo "make demo      simulate a small volume, render views of two transfer functions, into results/"
+	@echo "make demo      from a small simulated volume to an edited scene and results/report.html"
 	@echo "make test      run all tests; ARGS='-k name' picks some"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"

@@ -1,4 +1,4 @@
-# The whole experiment: volume -> views -> models, their table and pictures, for every data set and basic TF.
+# The whole experiment: volume -> views -> models -> scene -> edits, timing, tables and a report.
 #
 #   snakemake --cores all                                          the default data set
 #   snakemake --cores all --config experiment=demo                 a file of conf/experiment
@@ -16,6 +16,7 @@ include: "workflow/rules/common.smk"
 include: "workflow/rules/volume.smk"
 include: "workflow/rules/views.smk"
 include: "workflow/rules/fit.smk"
+include: "workflow/rules/scene.smk"
 include: "workflow/rules/tables.smk"
 
 
@@ -24,12 +25,13 @@ rule all:
     input:
         rules.volumes.input,
         rules.sheets.input,
-        rules.figures.input,
+        rules.figures.input if SWEEP is None else [],
+        rules.scenes.input if SWEEP is None else [],
         rules.tables.output,
+        rules.report.output if SWEEP is None else [],
 
 
 onsuccess:
-    pictures = (f"{RESULTS}/*/transfer", f"{RESULTS}/*/*/sheet", f"{RESULTS}/*/*/*/figure")
-    print(f"Done: {RESULTS}/tables/{TABLE}.md; pictures in {', '.join(pictures)}")
+    print(f"Done: {RESULTS}/{'report.html' if SWEEP is None else f'tables/{SWEEP}.md'}")
     if STORE is not None and STORE.startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")

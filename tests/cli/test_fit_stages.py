@@ -7,6 +7,7 @@ import pytest
 
 from texgs.cli.main import main
 from texgs.scene.model_file import read_model
+from texgs.volume.view_set import read_views
 
 TINY = [
     "dataset=sphere",
@@ -75,7 +76,8 @@ def test_same_seed_same_model(folder):
     main(["shading", "--force", *TINY])
     assert (folder / "shading" / "model.safetensors").read_bytes() == first
     main(["shading", *TINY, "fit.seed=1"])
-    assert (folder / "shading" / "model.safetensors").read_bytes() != first
+    other = folder.with_name("demo-s1") / "shading" / "model.safetensors"
+    assert other.read_bytes() != first
 
 
 def test_the_time_before_an_interruption_counts(folder, monkeypatch):
@@ -129,3 +131,28 @@ def test_figure_without_test_views_shows_training_views(folder, monkeypatch):
     monkeypatch.setattr(figure, "write_fit_figure", lambda *args: shown.extend(args[2]) or args[0])
     assert main(["figure", *TINY]) == 0
     assert shown == ["training view 0", "training view 4"]
+
+
+def test_a_gpu_that_is_not_there_is_one_sentence(folder, capsys, monkeypatch):
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    assert main(["shading", *TINY, "device.name=cuda"]) == 2
+    assert "device=cuda: torch sees no GPU; leave it out to fit on the CPU" in capsys.readouterr().err
+
+
+def test_a_finished_phase_leaves_no_checkpoint(folder, monkeypatch):
+    from texgs.cli.stages import phase
+
+    monkeypatch.setattr(phase, "SAVED_EVERY", 0.0)
+    assert main(["shading", *TINY]) == 0
+    assert sorted(path.name for path in (folder / "shading").iterdir() if path.name[0] != ".") == [
+        "metrics.by_hand.json",
+        "model.safetensors",
+    ]
+
+
+def test_test_views_may_have_lights_of_their_own(folder):
+    words = [*TINY, "views.test_lights=[{kind: directional, azimuth: 60, polar: 20}]"]
+    assert main(["views", *words]) == 0
+    views = read_views(folder.parent / "views")
+    assert {view.light.kind for view in views.train} == {"headlight"}
+    assert {(view.light.kind, view.light.azimuth) for view in views.test} == {("directional", 60.0)}

@@ -146,3 +146,10 @@ def test_splits_depend_on_the_generator_only():
     first, same, other = (optimizer.parameters["means"] for optimizer in found)
     assert torch.equal(first, same)
     assert not torch.equal(first, other)
+
+
+def test_one_material_stays_one_where_there_is_one_surfel():
+    optimizer = surfels([LARGE])
+    step(optimizer, [1e-3])
+    assert len(optimizer.parameters["means"]) == 2
+    assert len(optimizer.parameters["ambient"]) == 1

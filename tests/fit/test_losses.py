@@ -76,3 +76,32 @@ def test_normals_count_from_their_iteration_on(target):
     early = loss(parameters, target, normal=0.1, normal_from=9)
     assert late == loss(parameters, target)
     assert early > late
+
+
+def gradients(parameters, target, turns_normals=True, **weights):
+    leaves = {name: x.clone().requires_grad_() for name, x in parameters.items()}
+    weights = Losses(**{"alpha": 0.0, **weights})
+    view_loss(leaves, OPTICS, target, weights, None, 10, turns_normals).backward()
+    return {name: x.grad for name, x in leaves.items()}
+
+
+def test_alpha_without_l1_is_its_dissimilarity_at_the_same_weight(target):
+    parameters = per_surfel()
+    alpha = render(Model(parameters, OPTICS), target.camera, target.light).alpha[..., None].double()
+    expected = 0.5 * 0.2 * (1 - ssim(alpha, target.alpha[..., None].double()))
+    found = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
+    assert found == pytest.approx(float(expected), rel=1e-3)
+
+
+def test_shading_turns_normals_unless_told_not_to(target):
+    """Spheres seen from afar do not change with their orientation but for their shading."""
+    parameters = per_surfel()
+    both = [gradients(parameters, target, turns) for turns in (True, False)]
+    turned = {**parameters, "diffuse": torch.full((60,), -40.0), "specular": torch.full((60,), -40.0)}
+    unlit = gradients(turned, target)
+    assert not torch.allclose(both[0]["quats"], both[1]["quats"], rtol=1e-2)
+    assert torch.equal(both[0]["colors"], both[1]["colors"]), "the image is the same"
+    assert unlit["quats"].abs().max() > 0
+    assert torch.allclose(
+        unlit["quats"], gradients(turned, target, turns_normals=False)["quats"], rtol=1e-3, atol=1e-9
+    ), "without light that depends on normals there is nothing to leave out"

@@ -6,7 +6,8 @@ import pytest
 
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
-from texgs.report.fitting import COLUMNS, fitting, paper
+from texgs.report.fitting import COLUMNS, fitting
+from texgs.report.metrics_files import paper
 from texgs.report.table import Column, Table
 
 TABLE = Table(
@@ -57,20 +58,20 @@ def test_fitting_stands_beside_the_paper(tmp_path):
 
 
 def test_the_papers_numbers_are_all_there():
-    published = paper()
+    published = paper("fitting", keys=2)
     assert len(published) == 8 * 3
     assert float(published["supernova", "shading"]["psnr"]) == 29.34
 
 
-def test_the_verb_writes_three_files(tmp_path, capsys):
-    path = metrics(tmp_path, "engine", "default", "texture", psnr=40.0, ssim=0.99)
+def test_the_verb_writes_three_files_a_table(tmp_path, capsys):
+    path = metrics(tmp_path, "engine", "default", "shading", psnr=40.0, ssim=0.99)
     assert main(["tables", str(path), "--output", str(tmp_path / "tables")]) == 0
     assert sorted(file.name for file in (tmp_path / "tables").iterdir()) == [
-        "fitting.csv",
-        "fitting.md",
-        "fitting.tex",
+        f"{name}.{kind}"
+        for name in ("datasets", "edits", "fitting", "model_size", "rendering")
+        for kind in ("csv", "md", "tex")
     ]
-    assert "| engine | TF01 | default | texture | 40.00 |" in capsys.readouterr().out
+    assert "| engine | TF01 | default | shading | 40.00 |" in capsys.readouterr().out
 
 
 def test_a_file_that_is_no_metrics_is_named(tmp_path):

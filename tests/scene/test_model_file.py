@@ -80,7 +80,7 @@ def test_other_programs_can_read_the_tensors(tmp_path):
     assert description == {
         "version": 1,
         "stage": "texture",
-        "optics": {"low_pass": 3.0, "material": "bounded", "local_viewer": True},
+        "optics": {"low_pass": 3.0, "material": "bounded", "local_viewer": True, "facing": True},
         "metadata": sample().metadata,
     }
 

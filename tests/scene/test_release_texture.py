@@ -10,7 +10,7 @@ from texgs.scene.ply import read_ply, write_ply
 
 def release_run(folder):
     """Files of the release's third stage: surfels, and textures that are stored along v first."""
-    model = sample("shading", n=3, material="paper", low_pass=2.0)
+    model = sample("shading", n=3, material="paper", low_pass=2.0, facing=False)
     path = write_ply(folder / "point_cloud.ply", model, "release")
     no_color = dict.fromkeys((*numbered("f_dc", 3), *numbered("f_rest", 45)))
     extra = {"scale_2": np.ones(3), "mappings_0": np.ones(3), "mappings_1": np.ones(3)}

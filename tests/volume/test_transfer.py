@@ -7,7 +7,7 @@ from hypothesis import given, reject
 from hypothesis import strategies as st
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.transfer import TransferFunction, check_disjoint, split
+from texgs.volume.transfer import TransferFunction, check_disjoint, combine, split
 
 GREY = ((0, 0.5, 0.5, 0.5),)
 TENT = TransferFunction(opacity=((1, 0), (2, 0.8), (4, 0)), color=((1, 1, 0, 0), (4, 0, 0, 1)))
@@ -208,3 +208,29 @@ def test_wrong_opacity_is_named(opacity, message):
 def test_wrong_color_is_named(color, message):
     with pytest.raises(ArgumentError, match=message):
         TransferFunction(((0, 0), (1, 1)), color)
+
+
+@given(functions(), functions(), st.integers(0, 40))
+def test_combined_functions_show_what_each_shows(first, second, apart):
+    """Away from the ends of ranges, where steps may be, the sum of opacities is that of the one visible."""
+    low, high = first.support
+    moved = high - second.support[0] + apart / 4
+    second = TransferFunction(
+        tuple((value + moved, alpha) for value, alpha in second.opacity),
+        tuple((value + moved, *rgb) for value, *rgb in second.color),
+    )
+    both = combine({"b": second, "a": first})
+    ends = {value for tf in (first, second) for value, *_ in (*tf.opacity, *tf.color)}
+    values = np.array([v for v in np.arange(low - 1, second.support[1] + 1, 0.0625) if v not in ends])
+    for tf in (first, second):
+        inside = (values > tf.support[0]) & (values < tf.support[1])
+        np.testing.assert_allclose(both(values[inside]), tf(values[inside]), atol=1e-12)
+    outside = ~np.any([(values > tf.support[0]) & (values < tf.support[1]) for tf in (first, second)], axis=0)
+    assert (both(values[outside])[:, 3] == 0).all()
+
+
+def test_functions_that_overlap_are_not_combined():
+    with pytest.raises(ArgumentError, match="a and b: expected ranges of values that do not overlap"):
+        combine({"a": TENT, "b": TENT})
+    with pytest.raises(ArgumentError, match="transfer functions: expected at least one, got none"):
+        combine({})

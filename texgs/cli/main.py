@@ -21,11 +21,17 @@ STAGE_VERBS = {
     "shading": "fit relightable surfels with Blinn-Phong shading",
     "texture": "give relightable surfels textures",
     "figure": "show a fit beside test views, with its maps",
+    "compose": "make one scene of the basic models of a data set",
+    "pse": "edit colours, opacities and lights of a scene beside those of its volume",
+    "timing": "measure how long frames of a scene and of its volume take",
 }
 VERBS = {
     "new": "start a data set from a volume file of your own, with suggested transfer functions",
     **STAGE_VERBS,
+    "edit": "change colours, opacities and lights of a scene",
+    "render": "render a scene to PNG, GIF or MP4",
     "tables": "write the tables that metrics files hold",
+    "report": "write one HTML file with the pictures, tables and provenance of all jobs",
     "doctor": "show what is installed, what is missing and what to do about it",
 }
 

@@ -14,10 +14,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the tables and print them."""
     from texgs.report.fitting import fitting
+    from texgs.report.scene_tables import SCENE_TABLES
     from texgs.report.sweep import sweep
 
     paths = arguments.metrics or sorted(Path("results").rglob("metrics*.json"))
-    table = sweep(paths, arguments.sweep) if arguments.sweep else fitting(paths)
-    table.write(arguments.output, arguments.sweep or "fitting")
-    print(table.markdown())
+    if arguments.sweep:
+        tables = {arguments.sweep: sweep(paths, arguments.sweep)}
+    else:
+        tables = {"fitting": fitting(paths), **{name: make(paths) for name, make in SCENE_TABLES.items()}}
+    for name, table in tables.items():
+        table.write(arguments.output, name)
+        print(table.markdown())
     return 0

@@ -19,7 +19,15 @@ from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 
 FOLDER = Path(__file__).parents[2] / "conf"
-RESERVED = ("volume", "transfer", "logs", "benchmarks", "mlartifacts", "tables")  # folders below `results`
+RESERVED = (
+    "volume",
+    "transfer",
+    "logs",
+    "benchmarks",
+    "mlartifacts",
+    "tables",
+    "scene",
+)  # folders below `results`
 
 
 @lru_cache(maxsize=256)

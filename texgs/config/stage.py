@@ -12,7 +12,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.code import code_digest, digest
-from texgs.config.locate import basic_tf, source_file, views_folder
+from texgs.config.locate import basic_tf, source_file, tf_names, views_folder
 from texgs.core.io import write_atomic
 
 
@@ -99,6 +99,50 @@ def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
     return lambda config: {"model": STAGES[stage].output(config) / "model.safetensors", **view_set(config)}
 
 
+def for_tf(config: DictConfig, name: str) -> DictConfig:
+    """The same configuration for one basic TF."""
+    chosen: DictConfig = config.copy()
+    OmegaConf.set_readonly(chosen, False)
+    chosen.tf = name
+    OmegaConf.set_readonly(chosen, True)
+    return chosen
+
+
+def all_models(config: DictConfig) -> dict[str, Path]:
+    """The textured models of all basic TFs, by name."""
+    return {
+        name: STAGES["texture"].output(for_tf(config, name)) / "model.safetensors"
+        for name in tf_names(config)
+    }
+
+
+def scene_and_volume(config: DictConfig) -> dict[str, Path]:
+    """The scene, and the prepared volume where there is one."""
+    scene = {"scene": STAGES["compose"].output(config) / "scene.yaml"}
+    return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
+
+
+def scene_settings(config: DictConfig) -> dict[str, Any]:
+    """What stages read that compare a scene with its volume."""
+    basic = {} if config.dataset.views_folder is not None else config.dataset.basic_tfs
+    return {
+        "tf_values": config.dataset.tf_values,
+        "basic_tfs": {name: basic[name] for name in tf_names(config) if name in basic},
+        "views": view_settings(config),
+        **fit_label(config),
+    }
+
+
+def fit_label(config: DictConfig) -> dict[str, Any]:
+    """Which fit a scene is made of, for its metrics."""
+    return {"fit": {"name": config.fit.name, "variant": config.variant, "seed": config.fit.seed}}
+
+
+def view_settings(config: DictConfig) -> dict[str, Any]:
+    """How views are rendered, without the name of their folder."""
+    return {name: value for name, value in config.views.items() if name != "name"}
+
+
 def models(config: DictConfig) -> dict[str, Path]:
     """The models that the three phases of the fit write, and the views."""
     phases = ("surfels", "shading", "texture")
@@ -146,7 +190,7 @@ STAGES = {
             select=lambda config: {
                 "tf_values": config.dataset.tf_values,
                 "points": basic_tf(config),
-                "views": {name: value for name, value in config.views.items() if name != "name"},
+                "views": view_settings(config),
             },
             folder="{dataset}/{tf}/{views}",
             inputs=prepared_volume,
@@ -209,6 +253,30 @@ STAGES = {
             inputs=models,
             needs=("texture",),  # which needs the others
             per_tf=True,
+        ),
+        Stage(
+            "compose",
+            "texgs.cli.stages.compose",
+            select=lambda config: {"image": config.dataset.image, **fit_label(config)},
+            folder="{dataset}/scene/{fit}/compose",
+            inputs=all_models,
+            needs=("texture",),
+        ),
+        Stage(
+            "pse",
+            "texgs.cli.stages.pse",
+            select=scene_settings,
+            folder="{dataset}/scene/{fit}/pse",
+            inputs=scene_and_volume,
+            needs=("volume", "compose"),
+        ),
+        Stage(
+            "timing",
+            "texgs.cli.stages.timing",
+            select=scene_settings,
+            folder="{dataset}/scene/{fit}/timing",
+            inputs=scene_and_volume,
+            needs=("volume", "compose"),
         ),
     )
 }

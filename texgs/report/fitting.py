@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from texgs.report.metrics_files import PHASES, fits
+from texgs.report.metrics_files import PHASES, fits, paper
 from texgs.report.table import Cell, Column, Table
 
 COLUMNS = (
@@ -34,12 +32,12 @@ def fitting(paths: Iterable[str | Path]) -> Table:
     Raises:
         ArgumentError: if a file is no metrics file.
     """
-    published = paper()
+    published = paper("fitting", keys=2)
     rows = [row(metrics, path.parts[-3], published) for path, metrics in fits(paths)]
     return Table(CAPTION, COLUMNS, sorted(rows, key=lambda cells: (cells[:3], PHASES.index(str(cells[3])))))
 
 
-def row(metrics: dict[str, Any], recipe: str, published: dict[tuple[str, str], dict[str, str]]) -> list[Cell]:
+def row(metrics: dict[str, Any], recipe: str, published: dict[tuple[str, ...], dict[str, str]]) -> list[Cell]:
     """The cells of one job."""
     numbers, phase = metrics["numbers"], metrics["stage"]
     beside = published.get((metrics["dataset"], phase), {})
@@ -47,10 +45,3 @@ def row(metrics: dict[str, Any], recipe: str, published: dict[tuple[str, str], d
     own += [metrics["peak_memory_mib"] / 1024, numbers["surfels"]]
     theirs = [float(beside[key]) if key in beside else None for key in ("psnr", "ssim", "minutes")]
     return [metrics["dataset"], metrics["tf"], recipe, phase, *own, *theirs]
-
-
-def paper() -> dict[tuple[str, str], dict[str, str]]:
-    """The paper's table by data set and phase."""
-    text = files("texgs.report").joinpath("paper", "fitting.csv").read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
-    return {(line["dataset"], line["phase"]): line for line in csv.DictReader(lines)}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 from collections.abc import Iterable
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,8 @@ from texgs.core.io import read_json
 PHASES = ("surfels", "shading", "texture")
 
 
-def fits(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
-    """The metrics of the phases of fits, by path.
+def read(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
+    """All metrics, in the order of their paths.
 
     Raises:
         ArgumentError: if a file is no metrics file.
@@ -23,6 +25,19 @@ def fits(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
         metrics = read_json(path)
         if not isinstance(metrics, dict) or "numbers" not in metrics:
             raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
-        if metrics["stage"] in PHASES:
-            found.append((path, metrics))
+        found.append((path, metrics))
     return found
+
+
+def fits(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
+    """The metrics of the phases of fits; see `read`."""
+    return [(path, metrics) for path, metrics in read(paths) if metrics["stage"] in PHASES]
+
+
+def paper(name: str, keys: int = 1) -> dict[tuple[str, ...], dict[str, str]]:
+    """The paper's numbers of a table, by the values of its first columns; none for other tables."""
+    file = files("texgs.report").joinpath("paper", f"{name}.csv")
+    if not file.is_file():
+        return {}
+    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return {tuple(list(row.values())[:keys]): row for row in csv.DictReader(lines)}

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from importlib.resources import files
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
-from texgs.report.metrics_files import fits
+from texgs.report.metrics_files import fits, paper
 from texgs.report.table import Cell, Column, Table
 
 MATERIAL = ("ambient_median", "diffuse_median", "specular_median", "shininess_median")
@@ -63,7 +61,7 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
     beside = [PUBLISHED[key] for key in PUBLISHED if any(key in line for line in published.values())]
     rows = []
     for key, by_seed in sorted(groups.items(), key=lambda item: (*item[0][:3], natural(item[0][3]))):
-        line = published.get(key[3], {})
+        line = published.get((key[3],), {})
         theirs = [float(line[k]) if line.get(k) else None for k, c in PUBLISHED.items() if c in beside]
         rows.append([*key, *cells(list(by_seed.values())), *theirs])
     return Table(CAPTION, (*COLUMNS, *beside), rows)
@@ -91,13 +89,3 @@ def cells(runs: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[Cell]:
 def natural(name: str) -> tuple[float, str]:
     """Numbers in their order before words."""
     return (float(name), "") if name.isdigit() else (float("inf"), name)
-
-
-def paper(name: str) -> dict[str, dict[str, str]]:
-    """The paper's numbers by variant; none for a sweep that it does not have."""
-    file = files("texgs.report").joinpath("paper", f"{name}.csv")
-    if not file.is_file():
-        return {}
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    rows = list(csv.DictReader(lines))
-    return {next(iter(row.values())): row for row in rows}

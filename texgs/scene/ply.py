@@ -93,7 +93,7 @@ def read_ply(path: str | Path) -> Model:
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
             parameters["sh"] = _harmonics(vertices)
-            optics = Optics(low_pass=2.0, facing=False)
+            optics = Optics(low_pass=2.0)
         else:
             parameters |= _appearance(vertices, path.parent)
             optics = Optics(low_pass=2.0, material="paper", facing=False)

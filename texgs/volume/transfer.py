@@ -167,6 +167,28 @@ def split(tf: TransferFunction, ranges: Sequence[tuple[float, float]]) -> list[T
     return basic
 
 
+def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
+    """One transfer function that shows what the basic ones show together; `split` takes it apart again.
+
+    Raises:
+        ArgumentError: if two of them overlap, or there is none.
+    """
+    if not basic:
+        raise ArgumentError("transfer functions: expected at least one, got none")
+    check_disjoint(basic)
+    opacity: list[tuple[float, ...]] = []
+    color: list[tuple[float, ...]] = []
+    for tf in sorted(basic.values(), key=lambda each: each.support):
+        low, high = tf.support
+        points = list(_cut(tf.opacity, low, high))
+        if not opacity or opacity[-1][0] < low:  # transparent between two, also where one ends in a step
+            points = [(low, 0.0), *points] if points[0][1] > 0 else points
+            opacity += [(opacity[-1][0], 0.0)] if opacity and opacity[-1][1] > 0 else []
+        opacity += points
+        color += _cut(tf.color, low, high)
+    return TransferFunction(tuple(opacity), tuple(color))  # type: ignore[arg-type]
+
+
 def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
     """Require that no value is visible in two basic transfer functions; ranges may touch.
 

@@ -2,13 +2,14 @@
 import re
 import shlex
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 from texgs.cli.stages.tf import check_basic_tfs
-from texgs.config.code import code_digest
+from texgs.config.code import code_digest, digest
 from texgs.config.compose import compose
 from texgs.config.locate import tf_names
-from texgs.config.stage import STAGES, fit_folder, settings_file
+from texgs.config.stage import STAGES, fit_folder, for_tf, settings_file
 from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError, TexgsError
 
@@ -35,7 +36,7 @@ def overrides():
 
 
 def configurations(words):
-    """One for each data set, variant of the sweep and basic TF, each TF's views and files checked."""
+    """One for each data set and variant of the sweep."""
     names = compose(words).datasets
     found, known = [], set()
     for each in [(*words, f"dataset={name}") for name in names] or [words]:
@@ -44,24 +45,20 @@ def configurations(words):
         if base.dataset.name in known:
             raise ConfigError(f"datasets: expected different names, got {base.dataset.name} twice")
         known.add(base.dataset.name)
-        for variant in variants(each):
-            found += [compose((*variant, f"tf={name}")) for name in tf_names(base)]
-    for each in found:
-        starts_from_views = each.dataset.views_folder is not None
-        STAGES["surfels" if starts_from_views else "volume"].inputs(each)  # the data are there
+        found += [compose(variant) for variant in variants(each)]
     return found
 
 
 def jobs(configs):
-    """Settings file and input files of each job, by stage and folder."""
+    """Settings file and input files of each job, by stage and folder; those of each basic TF apart."""
     found = {}
-    for each in configs:
+    for config in configs:
+        by_tf = [for_tf(config, name) for name in tf_names(config)]
         for name, stage in STAGES.items():
-            if not stage.applies(each):
-                continue
-            job = settings_file(stage, each), stage.inputs(each)
-            if found.setdefault((name, stage.output(each).as_posix()), job) != job:
-                raise ConfigError(f"{stage.output(each)}: two variants go there; give one another name")
+            for each in (by_tf if stage.per_tf else [config]) if stage.applies(config) else ():
+                job = settings_file(stage, each), stage.inputs(each)
+                if found.setdefault((name, stage.output(each).as_posix()), job) != job:
+                    raise ConfigError(f"{stage.output(each)}: two variants go there; give one another name")
     return found
 
 
@@ -119,6 +116,6 @@ pathvars:
 
 wildcard_constraints:
     dataset="|".join(sorted({re.escape(each.dataset.name) for each in CONFIGS})),
-    tf="|".join(sorted({re.escape(each.tf) for each in CONFIGS})),
+    tf="|".join(sorted({re.escape(name) for each in CONFIGS for name in tf_names(each)})),
     views="|".join(sorted({re.escape(each.views.name) for each in CONFIGS})),
     fit="|".join(sorted({re.escape(fit_folder(each)) for each in CONFIGS})),

@@ -40,7 +40,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
     write_json(output / "volume.json", asdict(summary))
     numbers = {key: value for key, value in asdict(summary).items() if key != "histogram"}
-    return Outcome({**numbers, "voxels": summary.voxels})
+    size = (output / "volume.nrrd").stat().st_size / 2**20
+    return Outcome({**numbers, "voxels": summary.voxels, "volume_mib": size})
 
 
 def source(volume: dict[str, Any], path: Path | None) -> Source:

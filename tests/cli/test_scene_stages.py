@@ -1,0 +1,67 @@
+"""Compose, edit and time a scene of two basic models, from the volume on, by hand."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.cli.test_fit_stages import TINY
+from texgs.cli.main import main
+from texgs.scene.scene_file import read_scene
+
+WORDS = [word for word in TINY if not word.startswith(("dataset=", "fit.shading.iterations"))]
+WORDS = ["dataset=turbulence", "fit.shading.iterations=60", *WORDS]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """All three stages, which fit two models first."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("scene")
+        patch.chdir(folder)
+        assert main(["pse", *WORDS]) == 0
+        assert main(["timing", *WORDS]) == 0
+        yield folder / "results" / "turbulence" / "scene" / "demo"
+
+
+def numbers(results, stage):
+    return json.loads((results / stage / "metrics.by_hand.json").read_text())["numbers"]
+
+
+def test_the_scene_has_all_models_and_a_picture(results):
+    scene = read_scene(results / "compose" / "scene.yaml")
+    assert list(scene.models) == ["TF01", "TF02"]
+    assert len(scene.open()) == numbers(results, "compose")["surfels"]
+    picture = np.asarray(Image.open(results / "compose" / "scene.png"))
+    assert picture.min() < 200, "there is something to see"
+
+
+def test_edits_are_compared_with_the_volume(results):
+    found = numbers(results, "pse")
+    titles = [step["title"] for step in found["pse"]]
+    assert titles[:2] == ["as fitted", "TF02 alone"]
+    assert len(found["pse"]) == 6
+    assert len(found["relight"]) == 4
+    assert all(step["psnr"] > 12 for step in (*found["pse"], *found["relight"]))
+    assert found["pse"][0]["psnr"] > 16
+    for name in ("pse.png", "relight.png"):
+        assert (results / "pse" / name).stat().st_size > 5000
+    assert not read_scene(results / "pse" / "pse-1.yaml").models["TF01"].edit.visible
+
+
+def test_frames_are_timed_beside_the_volume(results):
+    found = numbers(results, "timing")
+    assert 0 < found["frame_mean_ms"] <= found["frame_max_ms"]
+    assert found["volume_mean_ms"] > 0
+    assert (found["width"], found["height"]) == (48, 48)
+
+
+def test_tables_and_report_have_them(results, monkeypatch, capsys):
+    monkeypatch.chdir(results.parents[3])
+    assert main(["tables"]) == 0
+    text = capsys.readouterr().out
+    assert "opacity of TF01 x 0.4" in text
+    assert "volume / scene" in text
+    assert main(["report"]) == 0
+    assert (results.parents[2] / "report.html").stat().st_size > 100_000

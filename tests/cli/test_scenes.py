@@ -1,0 +1,117 @@
+"""Scenes from the command line: rendered, edited, reported."""
+
+import json
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import yaml
+from PIL import Image
+
+from tests.scene.test_composition import ball
+from texgs.cli.main import main
+from texgs.scene.model_file import write_model
+from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """scene.yaml with two models."""
+    models = {}
+    for index, name in enumerate(("TF01", "TF02")):
+        path = write_model(tmp_path / f"{name}.safetensors", ball(index + 1))
+        models[name] = SceneModel(path)
+    return write_scene(tmp_path / "scene.yaml", Scene(models))
+
+
+def render(scene, output, *words):
+    return main(["render", str(scene), "--output", str(output), "--width", "40", *words])
+
+
+def test_one_view_and_its_default_name(scene):
+    assert main(["render", str(scene), "--width", "40", "--height", "30"]) == 0
+    assert Image.open(scene.with_suffix(".png")).size == (40, 30)
+
+
+@pytest.mark.parametrize("path", ["test", "orbit", "light"])
+def test_paths_are_films(scene, tmp_path, path):
+    assert render(scene, tmp_path / "turn", "--path", path, "--frames", "3") == 0
+    shown = [np.asarray(Image.open(tmp_path / "turn" / f"{i:04}.png")).astype(int) for i in range(3)]
+    assert all(np.abs(one - other).max() > 8 for one, other in pairwise(shown))
+
+
+def test_edits_show_and_are_data(scene, tmp_path):
+    edited = tmp_path / "new" / "edited.yaml"
+    words = [
+        "TF01.palette=#ff0000",
+        "TF02.visible=false",
+        "TF01.diffuse=0.5",
+        "light=30,-10",
+        "background=0,0,0",
+    ]
+    assert main(["edit", str(scene), *words, "--output", str(edited)]) == 0
+    found = read_scene(edited)
+    assert found.models["TF01"].edit.palette == (1, 0, 0)
+    assert not found.models["TF02"].edit.visible
+    assert (found.light.kind, found.light.azimuth, found.light.polar) == ("directional", 30, -10)
+    assert render(edited, tmp_path / "a.png") == 0
+    picture = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+    assert picture[0, 0].tolist() == [0, 0, 0]
+    assert picture[..., 0].sum() > 1.3 * picture[..., 2].sum()
+    back = tmp_path / "back.yaml"
+    undo = ["TF01.palette=", "TF02.visible=", "TF01.diffuse=", "light=headlight", "background=#ffffff"]
+    assert main(["edit", str(edited), *undo, "--output", str(back)]) == 0
+    assert yaml.safe_load(back.read_text()) == yaml.safe_load(scene.read_text())
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        ("TF03.opacity=1", "TF03.opacity=1: expected a model of the scene (TF01, TF02), got TF03"),
+        ("TF01.opasity=1", "TF01.opasity=1: models.TF01: no such key 'opasity', did you mean opacity?"),
+        ("TF01.opacity=-1", "TF01.opacity=-1: models.TF01.opacity: expected a factor from 0 to 1000, got -1"),
+        ("TF01.palette=red", "models.TF01.palette: expected three numbers from 0 to 1 or #rrggbb, got 'red'"),
+        ("light=up", "light=up: light: expected headlight, or azimuth and polar in degrees, got 'up'"),
+        ("TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
+        ("visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
+    ],
+)
+def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, capsys, word, message):
+    assert main(["edit", str(scene), word, "--output", str(tmp_path / "x.yaml")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "x.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--mode", "color"], "--mode: expected one of shaded, unshaded"),
+        (["--frames", "-1"], "--frames: expected at least 1, got -1"),
+        (["--radius", "0"], "radius: expected more than 0, got 0"),
+        (["--height", "-4"], "height: expected at least 1 pixel, got -4"),
+    ],
+)
+def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, words, message):
+    assert render(scene, tmp_path / "x.png", *words) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "x.png").exists()
+
+
+def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["report"]) == 2
+    assert "no metrics.json below results" in capsys.readouterr().err
+    folder = tmp_path / "results" / "engine" / "scene" / "quick" / "pse"
+    folder.mkdir(parents=True)
+    Image.new("RGB", (4, 4), "red").save(folder / "pse.png")
+    numbers = {"pse": [{"title": "a <b> edit", "psnr": 31.25, "ssim": 0.9}], "relight": [{"title": "light"}]}
+    record = {"stage": "pse", "dataset": "engine", "recipe": "quick", "variant": "", "seconds": 1.5}
+    versions = {"versions": {"python": "3.11", "texgs": "1"}, "code_sha": "abc"}
+    (folder / "metrics.json").write_text(json.dumps({**record, **versions, "numbers": numbers}))
+    assert main(["report"]) == 0
+    text = (tmp_path / "results" / "report.html").read_text()
+    assert "31.25" in text
+    assert "a &lt;b&gt; edit" in text
+    assert "not measured" in text, "the second edit was not compared"
+    assert text.count("data:image/png;base64,") == 1
+    assert "http" not in text.replace("http-equiv", ""), "the report needs no other file"

@@ -1,0 +1,55 @@
+import numpy as np
+import pytest
+from PIL import Image, ImageSequence
+
+from texgs.core.errors import ArgumentError
+from texgs.core.movie import write_frames
+
+
+def frames(count=4, height=33, width=47):
+    """Frames of one grey each, brighter by 40 from one to the next."""
+    return [np.full((height, width, 3), 40 * (i + 1), dtype=np.uint8) for i in range(count)]
+
+
+def test_one_picture(tmp_path):
+    picture = np.random.default_rng(0).integers(0, 256, (5, 7, 3), dtype=np.uint8)
+    path = write_frames(tmp_path / "new" / "a.png", [picture])
+    assert np.array_equal(np.asarray(Image.open(path)), picture)
+
+
+def test_a_folder_of_pictures(tmp_path):
+    write_frames(tmp_path / "turn", iter(frames(3)))
+    names = sorted(path.name for path in (tmp_path / "turn").iterdir())
+    assert names == ["0000.png", "0001.png", "0002.png"]
+    assert np.asarray(Image.open(tmp_path / "turn" / "0002.png"))[0, 0, 0] == 120
+
+
+def test_gif_and_mp4_hold_the_frames_at_their_rate(tmp_path):
+    av = pytest.importorskip("av")
+    write_frames(tmp_path / "a.gif", frames(), fps=20)
+    with Image.open(tmp_path / "a.gif") as gif:
+        shown = [np.asarray(frame.convert("RGB"))[5, 5, 0] for frame in ImageSequence.Iterator(gif)]
+        assert gif.info["duration"] == 50
+    assert shown == [40, 80, 120, 160]
+    write_frames(tmp_path / "a.mp4", frames(), fps=20)
+    with av.open(str(tmp_path / "a.mp4")) as film:
+        stream = film.streams.video[0]
+        decoded = [frame.to_ndarray(format="rgb24") for frame in film.decode(stream)]
+        assert float(stream.average_rate) == 20
+    assert [frame.shape for frame in decoded] == [(34, 48, 3)] * 4, "sizes of films are even"
+    assert np.allclose([frame.mean() for frame in decoded], [40, 80, 120, 160], atol=4)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "fps", "message"),
+    [
+        ("a.avi", 2, 25, r"expected \.png, \.gif, \.mp4 or a folder, got \.avi"),
+        ("a.png", 2, 25, "expected one frame, got several"),
+        ("a.mp4", 0, 25, "expected at least one frame, got none"),
+        ("a.mp4", 2, 0, "fps: expected more than 0, got 0"),
+    ],
+)
+def test_what_cannot_be_written(tmp_path, name, given, fps, message):
+    with pytest.raises(ArgumentError, match=message):
+        write_frames(tmp_path / name, frames(given), fps)
+    assert list(tmp_path.iterdir()) == []

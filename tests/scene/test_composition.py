@@ -1,0 +1,164 @@
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.scene.samples import sample
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.model import Model, Optics, raw_material
+from texgs.scene.render import render
+from texgs.volume.view_set import Light
+
+CAMERA = orbit(30, 20, 3, 40, 64, 48)
+SIDE = Light("directional", 100, 30)
+OUTPUTS = ("depth", "normal")
+
+
+def ball(seed, n=150, stage="texture", shared=True, middle=0.0):
+    """Random surfels on a ball, textured with up to 4x4 texels."""
+    g = torch.Generator().manual_seed(seed)
+    directions = torch.nn.functional.normalize(torch.randn(n, 3, generator=g), dim=1)
+    p = {
+        "means": 0.5 * directions + middle,
+        "quats": torch.randn(n, 4, generator=g),
+        "scales": torch.log(0.08 + 0.05 * torch.rand(n, 2, generator=g)),
+        "opacities": torch.randn(n, generator=g),
+        "colors": 0.2 * torch.rand(n, 3, generator=g),
+        **{k: x.repeat(1 if shared else n) for k, x in raw_material(0.4, 0.5, 0.2, 20.0, "bounded").items()},
+    }
+    if stage == "texture":
+        sizes = torch.randint(1, 5, (n, 2), generator=g, dtype=torch.int32)
+        counts = sizes.long().prod(1)
+        p |= {
+            "palette": torch.rand(3, generator=g) * 0.6,
+            "texels": 0.2 * torch.rand(int(counts.sum()), 3, generator=g),
+            "sizes": sizes,
+            "offsets": counts.cumsum(0) - counts,
+        }
+    return Model(p, Optics())
+
+
+def union(*models):
+    """One model with the surfels of all, whose material is per surfel and palette part of the offsets."""
+    p, count = {}, 0
+    parts = []
+    for model in models:
+        q = dict(model.parameters)
+        n = len(model)
+        q["colors"] = q["colors"] + q.pop("palette")
+        for name in ("ambient", "diffuse", "specular", "shininess"):
+            q[name] = q[name].expand(n)
+        q["offsets"] = q["offsets"] + count
+        count += len(q["texels"])
+        parts.append(q)
+    p = {name: torch.cat([q[name] for q in parts]) for name in parts[0]}
+    return Model({**p, "palette": torch.zeros(3)}, models[0].optics)
+
+
+@pytest.mark.parametrize("light", [Light("headlight"), SIDE])
+def test_one_model_unedited_is_the_model_bit_for_bit(light):
+    model = ball(1)
+    alone = render(model, CAMERA, light, outputs=OUTPUTS)
+    scene = Composition([model]).render(CAMERA, light, [Edit()], outputs=OUTPUTS)
+    for name in ("color", "alpha", *OUTPUTS):
+        assert torch.equal(getattr(scene, name), getattr(alone, name)), name
+
+
+@pytest.mark.parametrize("light", [Light("headlight"), SIDE])
+def test_a_scene_is_the_union_of_its_surfels(light):
+    models = [ball(1), ball(2, shared=False, middle=0.2), ball(3, middle=-0.1)]
+    expected = render(union(*models), CAMERA, light)
+    found = Composition(models).render(CAMERA, light)
+    assert_close(found.color, expected.color, atol=1e-6, rtol=0)
+    assert_close(found.alpha, expected.alpha, atol=1e-6, rtol=0)
+
+
+def test_hiding_is_removing_bit_for_bit():
+    models = [ball(1), ball(2, middle=0.2), ball(3, stage="shading", middle=-0.1)]
+    edits = [Edit(), Edit(visible=False), Edit()]
+    hidden = Composition(models).render(CAMERA, SIDE, edits, outputs=OUTPUTS)
+    removed = Composition([models[0], models[2]]).render(CAMERA, SIDE, outputs=OUTPUTS)
+    for name in ("color", "alpha", *OUTPUTS):
+        assert torch.equal(getattr(hidden, name), getattr(removed, name)), name
+
+
+def test_an_edit_is_the_model_with_other_numbers():
+    model = ball(4)
+    edit = Edit(palette=(0.1, 0.7, 0.2), opacity=0.4, ambient=0.5, diffuse=1.5, specular=2, shininess=0.5)
+    p = model.parameters
+    factors = {"ambient": 0.2, "diffuse": 0.75, "specular": 0.4, "shininess": 10.0}
+    opacities = torch.logit(0.4 * p["opacities"].sigmoid())
+    changed = {
+        "palette": torch.tensor(edit.palette),
+        "opacities": opacities,
+        **raw_material(**factors, kind="bounded"),
+    }
+    expected = render(Model({**p, **changed}, model.optics), CAMERA, SIDE)
+    assert_close(Composition([model]).render(CAMERA, SIDE, [edit]).color, expected.color, atol=2e-5, rtol=0)
+
+
+def test_an_opacity_above_one_is_one():
+    model = ball(5)
+    found = Composition([model]).render(CAMERA, SIDE, [Edit(opacity=1000.0)])
+    full = {**model.parameters, "opacities": torch.full((150,), 40.0)}
+    assert torch.equal(found.alpha, render(Model(full), CAMERA, SIDE).alpha)
+
+
+def test_edits_do_not_copy_texels():
+    scene = Composition([ball(1), ball(2)])
+    before = scene.texels.data_ptr()
+    scene.render(CAMERA, SIDE, [Edit(palette=(1, 0, 0)), Edit(opacity=0.5)])
+    assert scene.texels.data_ptr() == before
+
+
+def test_looks_of_the_material_are_its_factors():
+    """Where a surfel is opaque, blending shows what it has; factors of both models differ."""
+    models = [ball(1, n=2000), ball(2, n=2000, middle=0.0)]
+    edits = [Edit(diffuse=0.5), Edit(diffuse=0.5)]
+    found = Composition(models).render(CAMERA, SIDE, edits, look="diffuse")
+    assert_close(found.color, 0.25 * found.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
+
+
+def test_without_light_colours_are_those_of_palette_and_texels():
+    model = ball(1, n=3000)
+    flat = {**model.parameters, "texels": torch.zeros_like(model.parameters["texels"])}
+    flat["colors"] = torch.zeros_like(flat["colors"])
+    found = Composition([Model(flat)]).render(CAMERA, SIDE, look="unshaded", background=torch.zeros(3))
+    assert_close(found.color, found.alpha[..., None] * flat["palette"], atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("models", "edits", "message"),
+    [
+        ([], None, "models: expected at least one, got none"),
+        ([sample("surfels")], None, "expected stage shading or texture, got surfels"),
+        ([ball(1), Model(ball(2).parameters, Optics(2.0))], None, r"expected one low_pass, got 2.0 and 6.0"),
+        ([ball(1)], [Edit(), Edit()], "edits: expected one for each of 1 models, got 2"),
+        ([ball(1, stage="shading")], [Edit(palette=(0, 0, 0))], "palette: expected a model with a texture"),
+    ],
+)
+def test_what_cannot_be_composed(models, edits, message):
+    with pytest.raises(ArgumentError, match=message):
+        Composition(models).render(CAMERA, SIDE, edits)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"palette": (1, 2, 0)}, "palette: expected three numbers from 0 to 1 or #rrggbb"),
+        ({"palette": "#12345g"}, "palette: expected three numbers from 0 to 1 or #rrggbb, got '#12345g'"),
+        ({"opacity": -1}, "opacity: expected a factor from 0 to 1000, got -1"),
+        ({"diffuse": float("nan")}, "diffuse: expected a factor"),
+        ({"specular": True}, "specular: expected a factor"),
+        ({"visible": 1}, "visible: expected true or false, got 1"),
+    ],
+)
+def test_edits_out_of_range(values, message):
+    with pytest.raises(ArgumentError, match=message):
+        Edit(**values)
+
+
+def test_hexadecimal_colours():
+    assert Edit(palette="#ff0080").palette == pytest.approx((1, 0, 128 / 255))

@@ -1,0 +1,139 @@
+from dataclasses import replace
+
+import pytest
+import torch
+import yaml
+from safetensors.torch import load_file, save_file
+
+from tests.scene.samples import sample
+from tests.scene.test_composition import CAMERA, ball
+from texgs.core.errors import ArgumentError
+from texgs.scene.edits import Edit
+from texgs.scene.model_file import write_model
+from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.texture_file import write_texture
+from texgs.volume.view_set import Light
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Two models, a texture variant of the first, and scene.yaml in a folder beside."""
+    write_model(tmp_path / "a" / "model.safetensors", ball(1))
+    write_model(tmp_path / "b" / "model.safetensors", ball(2))
+    style = ball(1)
+    style = replace(style, parameters={**style.parameters, "texels": style.parameters["texels"] * 0.5})
+    write_texture(tmp_path / "a" / "style.safetensors", style, {"style": "half"})
+    return tmp_path
+
+
+def scene_in(folder):
+    first = SceneModel(
+        folder / "a" / "model.safetensors",
+        Edit(palette=(0.1, 0.2, 0.3), opacity=0.5),
+        folder / "a" / "style.safetensors",
+    )
+    second = SceneModel(folder / "b" / "model.safetensors", Edit(visible=False))
+    return Scene({"TF01": first, "TF02": second}, Light("directional", 30, -10), (0.0, 0.5, 1.0))
+
+
+def resolved(scene):
+    models = {
+        name: replace(x, file=x.file.resolve(), texture=x.texture and x.texture.resolve())
+        for name, x in scene.models.items()
+    }
+    return replace(scene, models=models)
+
+
+def test_what_is_saved_is_opened(folder):
+    path = write_scene(folder / "scenes" / "scene.yaml", scene_in(folder))
+    assert resolved(read_scene(path)) == resolved(scene_in(folder))
+    values = yaml.safe_load(path.read_text())
+    assert values["models"]["TF02"] == {"file": "../b/model.safetensors", "visible": False}, (
+        "only what is edited"
+    )
+
+
+def test_a_folder_may_move(folder):
+    write_scene(folder / "scenes" / "scene.yaml", scene_in(folder))
+    folder.rename(folder.with_name("elsewhere"))
+    scene = read_scene(folder.with_name("elsewhere") / "scenes" / "scene.yaml").open()
+    assert len(scene) == 300
+
+
+def test_a_variant_replaces_texels(folder):
+    scene = scene_in(folder)
+    styled = scene.open().render(CAMERA, edits=[Edit(), Edit(visible=False)]).color
+    half = ball(1)
+    half = replace(half, parameters={**half.parameters, "texels": half.parameters["texels"] * 0.5})
+    write_model(folder / "half.safetensors", half)
+    other = Scene({"x": SceneModel(folder / "half.safetensors")}).open().render(CAMERA).color
+    assert torch.equal(styled, other)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"texgs-scene": 2}, "texgs-scene: expected 1, got 2"),
+        ({"lights": "headlight"}, "the scene: no such key 'lights', did you mean light?"),
+        ({"light": {"azimut": 3}}, "light: expected headlight, or azimuth and polar in degrees"),
+        ({"light": {"polar": "up"}}, "light: expected headlight"),
+        ({"background": [0, 0]}, "background: expected three numbers from 0 to 1"),
+        ({"models": []}, r"models: expected a table of keys and values, got \[\]"),
+        ({"models": {}}, "models: expected at least one, got none"),
+        ({"models": {"A": {"opacity": 1}}}, "models.A.file: expected the path of a model, got None"),
+        (
+            {"models": {"A": {"file": "x", "opasity": 1}}},
+            "models.A: no such key 'opasity', did you mean opacity?",
+        ),
+        ({"models": {"A": {"file": "x", "opacity": -1}}}, "models.A.opacity: expected a factor from 0"),
+        ({"models": {"A": {"file": "x", "palette": [1, 1, 3]}}}, "models.A.palette: expected three numbers"),
+        ({"models": {"A": {"file": "x", "texture": 3}}}, "models.A.texture: expected the path of a texture"),
+    ],
+)
+def test_a_mistake_is_named_with_its_place(folder, change, message):
+    path = write_scene(folder / "scene.yaml", scene_in(folder))
+    path.write_text(yaml.safe_dump({**yaml.safe_load(path.read_text()), **change}))
+    with pytest.raises(ArgumentError, match=message):
+        read_scene(path)
+
+
+def test_files_that_are_no_scene(folder):
+    with pytest.raises(ArgumentError, match="no such file; texgs compose writes one"):
+        read_scene(folder / "none.yaml")
+    (folder / "bad.yaml").write_text("a: [1")
+    with pytest.raises(ArgumentError, match=r"bad\.yaml: expected a scene in YAML"):
+        read_scene(folder / "bad.yaml")
+    (folder / "text.yaml").write_text("hello")
+    with pytest.raises(ArgumentError, match="the scene: expected a table of keys and values, got 'hello'"):
+        read_scene(folder / "text.yaml")
+
+
+def test_models_and_variants_that_do_not_belong(folder):
+    missing = Scene({"A": SceneModel(folder / "none.safetensors")})
+    with pytest.raises(ArgumentError, match=r"models\.A: .*none\.safetensors: no such file"):
+        missing.open()
+    entry = SceneModel(folder / "b" / "model.safetensors", texture=folder / "a" / "style.safetensors")
+    with pytest.raises(ArgumentError, match=r"models\.B: .*expected a texture of this model, got one of 150"):
+        Scene({"B": entry}).open()
+    entry = replace(entry, texture=folder / "a" / "model.safetensors")
+    with pytest.raises(ArgumentError, match="expected a texgs-texture file, got safetensors of another kind"):
+        Scene({"B": entry}).open()
+    with pytest.raises(ArgumentError, match="expected a model of stage texture, got shading"):
+        write_texture(folder / "x", sample("shading"))
+
+
+def test_a_variant_that_is_damaged(folder):
+    style = folder / "a" / "style.safetensors"
+    entry = SceneModel(folder / "a" / "model.safetensors", texture=style)
+    whole = style.read_bytes()
+    style.write_bytes(whole[:100])
+    with pytest.raises(ArgumentError, match="expected a texgs-texture file, got"):
+        Scene({"A": entry}).open()
+    style.write_bytes(whole)
+    tensors = load_file(style)
+    save_file({**tensors, "texels": tensors["texels"][1:]}, style, {"texgs-texture": "{}"})
+    with pytest.raises(ArgumentError, match="expected texels and sizes that fit each other"):
+        Scene({"A": entry}).open()
+    save_file({**tensors, "texels": tensors["texels"] * torch.nan}, style, {"texgs-texture": "{}"})
+    with pytest.raises(ArgumentError, match="texels"):
+        Scene({"A": entry}).open()

@@ -1,0 +1,82 @@
+"""Edit a scene by words such as TF01.palette=#ff8800 and write it to a new file; nothing is trained."""
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The scene, the edits, the new file."""
+    parser.add_argument("scene", type=Path, help="scene.yaml")
+    parser.add_argument(
+        "overrides",
+        nargs="*",
+        metavar="KEY=VALUE",
+        help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
+        "diffuse, specular, shininess (factors) or texture (a file); light=headlight or light=AZIMUTH,POLAR; "
+        "background=#rrggbb; MODEL.KEY= takes an edit back",
+    )
+    parser.add_argument("--output", type=Path, required=True, help="the new scene.yaml")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the edited scene."""
+    from texgs.core.errors import ArgumentError
+    from texgs.scene.scene_file import read_scene, read_values, scene_of, write_scene
+
+    read_scene(arguments.scene)  # says what is wrong with it before anything is changed
+    values = read_values(arguments.scene)
+    for word in arguments.overrides:
+        try:
+            apply(values, word)
+            scene = scene_of(values, arguments.scene.parent)
+        except ArgumentError as error:
+            raise ArgumentError(f"{word}: {error}") from error
+    scene = scene_of(values, arguments.scene.parent)
+    print(write_scene(arguments.output, scene))
+    return 0
+
+
+def apply(values: dict[str, Any], word: str) -> None:
+    """Set one key of a scene's plain values.
+
+    Raises:
+        ArgumentError: if the word is no KEY=VALUE or names no model.
+    """
+    from texgs.core.errors import ArgumentError
+
+    key, is_edit, text = word.partition("=")
+    if not is_edit:
+        raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
+    table = values
+    if "." in key:
+        name, _, key = key.partition(".")
+        if name not in values["models"]:
+            raise ArgumentError(f"expected a model of the scene ({', '.join(values['models'])}), got {name}")
+        table = values["models"][name]
+    if text == "":
+        table.pop(key, None)
+    else:
+        table[key] = light(text) if key == "light" else plain(text)
+
+
+def plain(text: str) -> Any:
+    """A value as YAML has it; also r,g,b without brackets, and #rrggbb, which YAML takes for a comment."""
+    import yaml
+
+    from texgs.core.errors import ArgumentError
+
+    if text.startswith("#"):
+        return text
+    try:
+        return yaml.safe_load(f"[{text}]" if "," in text and not text.startswith("[") else text)
+    except yaml.YAMLError as error:
+        raise ArgumentError("expected a number, true, false, r,g,b or #rrggbb") from error
+
+
+def light(text: str) -> Any:
+    """A light as scene files have it."""
+    value = plain(text)
+    if isinstance(value, list) and len(value) == 2:
+        return dict(zip(("azimuth", "polar"), value, strict=True))
+    return value

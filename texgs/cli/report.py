@@ -1,0 +1,22 @@
+"""Write one HTML file with the pictures, tables and provenance of all jobs."""
+
+import argparse
+from pathlib import Path
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where the numbers are, and where the report goes."""
+    parser.add_argument("metrics", nargs="*", type=Path, help="metrics.json files (all below results/)")
+    parser.add_argument("--output", type=Path, default=Path("results/report.html"), help="(%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the report and print its path."""
+    from texgs.core.errors import ArgumentError
+    from texgs.report.html import write_report
+
+    paths = arguments.metrics or sorted(Path("results").rglob("metrics*.json"))
+    if not paths:
+        raise ArgumentError("report: no metrics.json below results; run something first, such as make demo")
+    print(write_report(arguments.output, paths))
+    return 0

@@ -1,0 +1,30 @@
+"""Stage `compose`: the basic models of a data set as one scene."""
+
+from pathlib import Path
+from typing import Any
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.core.camera import orbit
+from texgs.core.movie import write_frames
+from texgs.scene.frame import frame
+from texgs.scene.scene_file import Scene, SceneModel, write_scene
+
+FRONT = (-60.0, 20.0, 4.0311, 30.0)  # azimuth, polar, distance and field of view of the picture
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write scene.yaml, in which nothing is edited, and scene.png.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: model.safetensors of each basic TF, by its name.
+        output: folder.
+    """
+    scene = Scene({name: SceneModel(path) for name, path in inputs.items()})
+    write_scene(output / "scene.yaml", scene)
+    composition = scene.open()
+    camera = orbit(*FRONT, settings["image"], settings["image"])
+    picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
+    path = write_frames(output / "scene.png", [picture])
+    numbers = {"models": len(scene.models), "surfels": len(composition), "texels": len(composition.texels)}
+    return Outcome(numbers, [path])

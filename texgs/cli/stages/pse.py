@@ -1,0 +1,131 @@
+"""Stage `pse`: the photorealistic edits of the paper's figure, beside the same edits of the volume."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+import torch
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.volume_scene import VolumeScene
+from texgs.core.camera import Camera
+from texgs.core.progress import progress
+from texgs.metrics.image import psnr, ssim
+from texgs.report.strip import write_strip
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.scene_file import Scene, read_scene, write_scene
+from texgs.volume.cameras import orbit_path
+from texgs.volume.view_set import Light
+
+COMPARED = 6  # views around the object, one of which is shown
+POLAR = 20.0  # of these views, degrees
+SWEEP = (-60.0, -20.0, 20.0, 60.0)  # polar angles of the light, degrees
+
+
+@dataclass(frozen=True)
+class Step:
+    """One edited scene."""
+
+    title: str
+    scene: Scene
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write a scene file for each edit, pse.png and relight.png.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
+        output: folder.
+    """
+    scene, views = read_scene(inputs["scene"]), settings["views"]
+    composition = scene.open()
+    volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
+    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
+    cameras = orbit_path(COMPARED, POLAR, *lens)
+    found: dict[str, list[dict[str, Any]]] = {}
+    pictures = []
+    groups = {"pse": edits_of_the_paper(scene, palettes(composition)), "relight": light_sweep(scene)}
+    for group, steps in groups.items():
+        rows: dict[str, list[np.ndarray]] = {}
+        found[group] = []
+        for step in progress(steps, title=f"{settings['dataset']}: {group}", unit="edit"):
+            write_scene(output / f"{group}-{len(found[group])}.yaml", step.scene)
+            numbers, shown = compared(step, composition, volume, cameras)
+            found[group].append({"title": step.title, **numbers})
+            for name, image in shown.items():
+                rows.setdefault(name, []).append(image)
+        titles = [caption(entry) for entry in found[group]]
+        pictures.append(write_strip(output / f"{group}.png", rows, titles))
+    return Outcome({"views": COMPARED, **found}, pictures)
+
+
+def palettes(composition: Composition) -> list[tuple[float, ...]]:
+    """The palette of each model as fitted; black for a model without one."""
+    return [
+        (0.0, 0.0, 0.0) if part.palette is None else tuple(part.palette.tolist())
+        for part in composition.parts
+    ]
+
+
+def edits_of_the_paper(scene: Scene, fitted: Sequence[tuple[float, ...]]) -> list[Step]:
+    """Nothing, one model alone, opacity, colour, magnitude and direction of the light; each on its own."""
+    names = list(scene.models)
+    first, last = names[0], names[-1]
+    turned = {name: {"palette": (b, r, g)} for name, (r, g, b) in zip(names, fitted, strict=True)}
+    magnitude = {name: {"ambient": 0.7, "diffuse": 1.2, "specular": 2.0} for name in names}
+    alone = {name: {"visible": False} for name in names[:-1]}
+    steps = [Step("as fitted", scene)]
+    if len(names) > 1:
+        steps.append(Step(f"{last} alone", edited(scene, alone)))
+    steps.append(Step(f"opacity of {first} x 0.4", edited(scene, {first: {"opacity": 0.4}})))
+    steps.append(Step("other colours", edited(scene, turned)))
+    steps.append(Step("k_a x 0.7, k_d x 1.2, k_s x 2", edited(scene, magnitude)))
+    steps.append(Step("light from the side", replace(scene, light=Light("directional", -30.0, 40.0))))
+    return steps
+
+
+def light_sweep(scene: Scene) -> list[Step]:
+    """A light that moves from below the object to above it."""
+    return [
+        Step(f"light at {p:g} degrees", replace(scene, light=Light("directional", -90.0, p))) for p in SWEEP
+    ]
+
+
+def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
+    """The scene with edits of some models changed."""
+    models = {
+        name: replace(model, edit=Edit(**{**vars(model.edit), **changes.get(name, {})}))
+        for name, model in scene.models.items()
+    }
+    return replace(scene, models=models)
+
+
+def compared(
+    step: Step, composition: Composition, volume: VolumeScene | None, cameras: Sequence[Camera]
+) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+    """PSNR and SSIM against the volume over some views, and the first of these [H, W, 3] from each."""
+    found: dict[str, list[float]] = {"psnr": [], "ssim": []}
+    shown: dict[str, np.ndarray] = {}
+    background = torch.tensor(step.scene.background)
+    for camera in cameras if volume else cameras[:1]:
+        image = composition.render(camera, step.scene.light, step.scene.edits, background=background).color
+        shown.setdefault("scene", image.clamp(0, 1).numpy())
+        if volume is not None:
+            rgba = torch.from_numpy(
+                volume.render(camera, step.scene.light, step.scene.edits, palettes(composition))
+            )
+            truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background
+            shown.setdefault("volume", truth.clamp(0, 1).numpy())
+            found["psnr"].append(psnr(image, truth))
+            found["ssim"].append(ssim(image, truth))
+    return {name: fmean(values) for name, values in found.items() if values}, shown
+
+
+def caption(entry: Mapping[str, Any]) -> str:
+    """Title of a picture, with its PSNR where it was measured."""
+    return entry["title"] + (f", {entry['psnr']:.1f} dB" if "psnr" in entry else "")

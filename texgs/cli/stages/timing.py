@@ -1,0 +1,62 @@
+"""Stage `timing`: how long a frame of the scene takes, beside one of the volume in the same minute."""
+
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from statistics import fmean, median
+from typing import Any
+
+import torch
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.volume_scene import VolumeScene
+from texgs.core.camera import Camera
+from texgs.core.progress import progress
+from texgs.scene.scene_file import read_scene
+from texgs.volume.cameras import test_path
+
+WARM = 3  # frames before those that count
+VOLUME_FRAMES = 12  # of the volume, spread over the path: they take long, and differ little
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Measure; nothing but the numbers is written.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
+        output: folder.
+    """
+    scene, views = read_scene(inputs["scene"]), settings["views"]
+    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
+    cameras = test_path(views["test"]["count"], *lens)
+    composition = scene.open()
+    title = f"{settings['dataset']}: timing"
+    frames = milliseconds(lambda camera: composition.render(camera, scene.light, scene.edits), cameras, title)
+    numbers = {
+        "frame_mean_ms": fmean(frames),
+        "frame_max_ms": max(frames),
+        "frame_median_ms": median(frames),
+        "surfels": len(composition),
+        "width": views["width"],
+        "height": views["height"],
+        "threads": torch.get_num_threads(),
+    }
+    if "volume" in inputs:
+        volume = VolumeScene(settings, inputs["volume"])
+        some = cameras[:: max(1, len(cameras) // VOLUME_FRAMES)]
+        of_volume = milliseconds(lambda camera: volume.render(camera, scene.light), some, f"{title}, volume")
+        numbers |= {"volume_mean_ms": fmean(of_volume), "volume_max_ms": max(of_volume)}
+    return Outcome(numbers)
+
+
+def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:
+    """Milliseconds of each frame, the first ones not counted."""
+    for camera in cameras[:WARM]:
+        render(camera)
+    found = []
+    for camera in progress(cameras, title=title, unit="frame"):
+        start = time.perf_counter()
+        render(camera)
+        found.append(1e3 * (time.perf_counter() - start))
+    return found

@@ -1,0 +1,80 @@
+"""Frames as a picture, numbered pictures, an animated GIF or an MP4 film."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+from PIL import Image
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_atomic
+
+KINDS = (".png", ".gif", ".mp4")
+
+
+def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0) -> Path:
+    """Write frames as they come; the file appears when it is complete.
+
+    Args:
+        path: ends in .png for one frame, .gif or .mp4 for several; without an ending it is a folder, which
+            receives one PNG a frame.
+        frames: [H, W, 3] uint8, of one size.
+        fps: frames per second.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if the ending is another one, there is no frame, or several where one is expected.
+    """
+    path = Path(path)
+    if path.suffix not in ("", *KINDS):
+        raise ArgumentError(f"{path}: expected {', '.join(KINDS)} or a folder, got {path.suffix}")
+    if not fps > 0:
+        raise ArgumentError(f"fps: expected more than 0, got {fps}")
+    left = iter(frames)
+    first = next(left, None)
+    if first is None:
+        raise ArgumentError(f"{path}: expected at least one frame, got none")
+    every = chain([first], left)
+    if path.suffix == "":
+        for index, frame in enumerate(every):
+            _write_png(path / f"{index:04}.png", frame)
+    elif path.suffix == ".png":
+        if next(left, None) is not None:
+            raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")
+        _write_png(path, first)
+    else:
+        write = _write_gif if path.suffix == ".gif" else _write_mp4
+        write_atomic(path, lambda file: write(file, every, fps))
+    return path
+
+
+def _write_png(path: Path, frame: np.ndarray) -> None:
+    write_atomic(path, lambda file: Image.fromarray(frame).save(file, format="PNG"))
+
+
+def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
+    first, *rest = (Image.fromarray(frame) for frame in frames)
+    first.save(file, format="GIF", save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
+
+
+def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
+    """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even."""
+    import av
+
+    with av.open(file, "w", format="mp4") as container:
+        stream: Any = None
+        for frame in frames:
+            height, width = frame.shape[:2]
+            even = np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
+            if stream is None:
+                stream = container.add_stream("libx264", rate=round(fps))
+                stream.height, stream.width = even.shape[:2]
+                stream.pix_fmt, stream.options = "yuv420p", {"crf": "18"}
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
+        container.mux(stream.encode())

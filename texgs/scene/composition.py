@@ -1,0 +1,179 @@
+"""Basic models as one scene: geometry and texels are joined once, edits cost a frame no copy of them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.raster import Render, Texture, rasterize
+from texgs.raster.shading import blinn_phong_texture
+from texgs.scene.edits import Edit
+from texgs.scene.model import MATERIAL, Model, geometry, material
+from texgs.scene.render import light_direction, viewer
+from texgs.volume.view_set import Light
+
+Look = Literal["shaded", "unshaded", "ambient", "diffuse", "specular", "shininess"]
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """What edits and lights change of one model, ready for use."""
+
+    model: Model
+    colors: Tensor  # [N, 3] offsets from the palette
+    palette: Tensor | None  # [3]; None without texture
+    material: Mapping[str, Tensor]  # factors, [N] or [1]
+    opacities: Tensor  # [N]
+
+    @classmethod
+    def of(cls, model: Model) -> Part:
+        """The part of a relightable model.
+
+        Raises:
+            ArgumentError: if the model has no shading yet.
+        """
+        if model.stage == "surfels":
+            raise ArgumentError(
+                "model: expected stage shading or texture, got surfels; fit its shading first"
+            )
+        p = model.parameters
+        factors = material(p, model.optics.material)
+        return cls(model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid())
+
+    def colored(self, edit: Edit) -> Tensor:
+        """c_ind without texels [N, 3].
+
+        Raises:
+            ArgumentError: if a colour is given to a model without a palette.
+        """
+        if self.palette is None:
+            if edit.palette is not None:
+                raise ArgumentError("palette: expected a model with a texture; fit its texture first")
+            return self.colors
+        palette = self.palette if edit.palette is None else self.palette.new_tensor(edit.palette)
+        return self.colors + palette
+
+    def factors(self, edit: Edit) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """k_a, k_d, k_s and beta with the edit's factors."""
+        a, d, s, b = (self.material[name] * getattr(edit, name) for name in MATERIAL)
+        return a, d, s, b
+
+    def look(self, edit: Edit, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
+        """Base [N, 3] and gain [N]: colour of a fragment is base + gain * texel."""
+        p, optics, n = self.model.parameters, self.model.optics, len(self.model)
+        colors, (a, d, s, b) = self.colored(edit), self.factors(edit)
+        if look == "unshaded":
+            return colors, torch.ones_like(self.opacities)
+        if look != "shaded":
+            value = (a, d, s, b)[MATERIAL.index(look)].expand(n)
+            return value[:, None].expand(n, 3), torch.zeros_like(self.opacities)
+        seen_from, direction = viewer(camera, optics), light_direction(light, camera)
+        base, gain = blinn_phong_texture(
+            colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=optics.facing
+        )
+        return base.clamp(0, 1), gain
+
+    def opacity(self, edit: Edit) -> Tensor:
+        """Opacities [N] with the edit's factor; 0 where the model is hidden, so that nothing is drawn."""
+        return (self.opacities * (edit.opacity if edit.visible else 0.0)).clamp_max(1)
+
+
+class Composition:
+    """Basic models as one scene on one device.
+
+    Args:
+        models: relightable, with or without texture, all with the same low-pass filter.
+
+    Raises:
+        ArgumentError: if there is no model, one has no shading, or their filters differ.
+    """
+
+    def __init__(self, models: Sequence[Model]) -> None:
+        if not models:
+            raise ArgumentError("models: expected at least one, got none")
+        passes = sorted({model.optics.low_pass for model in models})
+        if len(passes) > 1:
+            raise ArgumentError(
+                f"models: expected one low_pass, got {' and '.join(map(str, passes))}; fit them by one recipe"
+            )
+        self.parts = [Part.of(model) for model in models]
+        self.options = models[0].optics.options
+        geometries = [geometry(model.parameters)[:3] for model in models]
+        self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
+        self.texels, self.sizes, self.offsets = joined_textures(models)
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    @torch.no_grad()
+    def render(
+        self,
+        camera: Camera,
+        light: Light = Light("headlight"),  # noqa: B008, it is frozen
+        edits: Sequence[Edit] | None = None,
+        *,
+        look: Look = "shaded",
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render all visible models.
+
+        Args:
+            camera: on the models' device.
+            light: shines on all models.
+            edits: one for each model; by default nothing is changed.
+            look: what colour shows: with light, without, or one factor of the material.
+            background: [3]; white by default, for a factor black.
+            outputs: of the rasterizer.
+
+        Raises:
+            ArgumentError: if the number of edits is not that of models, or one cannot be applied.
+        """
+        edits = [Edit()] * len(self.parts) if edits is None else edits
+        if len(edits) != len(self.parts):
+            raise ArgumentError(f"edits: expected one for each of {len(self.parts)} models, got {len(edits)}")
+        if look not in get_args(Look):
+            raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
+        pairs = list(zip(self.parts, edits, strict=True))
+        looks = [part.look(edit, camera, light, look) for part, edit in pairs]
+        base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
+        if background is None:
+            background = self.means.new_full((3,), float(look in ("shaded", "unshaded")))
+        return rasterize(
+            self.means,
+            self.quats,
+            self.scales,
+            torch.cat([part.opacity(edit) for part, edit in pairs]),
+            camera.viewmat,
+            camera.K,
+            camera.width,
+            camera.height,
+            texture=Texture(base, gain, self.texels, self.sizes, self.offsets),
+            background=background,
+            outputs=outputs,
+            options=self.options,
+        )
+
+
+def joined_textures(models: Sequence[Model]) -> tuple[Tensor, Tensor, Tensor]:
+    """Texels [T, 3], sizes [N, 2] and offsets [N] of all models; surfels without any get one texel of 0."""
+    texels, sizes, offsets, count = [], [], [], 0
+    for model in models:
+        p, n = model.parameters, len(model)
+        if "texels" in p:
+            own = (p["texels"], p["sizes"], p["offsets"])
+        else:
+            means = p["means"]
+            places = torch.arange(n, device=means.device)
+            own = (torch.zeros_like(means), torch.ones(n, 2, dtype=torch.int32, device=means.device), places)
+        texels.append(own[0])
+        sizes.append(own[1])
+        offsets.append(own[2] + count)
+        count += len(own[0])
+    return torch.cat(texels), torch.cat(sizes), torch.cat(offsets)

@@ -1,0 +1,61 @@
+"""Photorealistic edits of a basic model in a scene: numbers, applied anew to every frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from math import isfinite
+
+from texgs.core.errors import ArgumentError
+
+MOST = 1000.0  # of a factor: what is larger is a typing error
+
+
+@dataclass(frozen=True)
+class Edit:
+    """What a scene changes about one of its models; the defaults change nothing.
+
+    Raises:
+        ArgumentError: naming the value that is out of range.
+    """
+
+    visible: bool = True
+    palette: tuple[float, float, float] | None = None  # colour in [0, 1]; None: as fitted
+    opacity: float = 1.0  # factor on opacities, which stay at most 1
+    ambient: float = 1.0  # factors on k_a, k_d, k_s and beta
+    diffuse: float = 1.0
+    specular: float = 1.0
+    shininess: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.visible, bool):
+            raise ArgumentError(f"visible: expected true or false, got {self.visible!r}")
+        if self.palette is not None:
+            object.__setattr__(self, "palette", color("palette", self.palette))
+        for each in fields(self)[2:]:
+            value = getattr(self, each.name)
+            if not is_number(value) or not 0 <= value <= MOST:
+                raise ArgumentError(f"{each.name}: expected a factor from 0 to {MOST:g}, got {value!r}")
+
+
+def color(name: str, value: object) -> tuple[float, float, float]:
+    """Red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f".
+
+    Raises:
+        ArgumentError: naming the value.
+    """
+    found: object = value
+    if isinstance(value, str) and len(value) == 7 and value[0] == "#":
+        try:
+            found = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+        except ValueError:
+            found = value
+    numbers = found if isinstance(found, list | tuple) else ()
+    if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
+        raise ArgumentError(f"{name}: expected three numbers from 0 to 1 or #rrggbb, got {value!r}")
+    red, green, blue = (float(x) for x in numbers)
+    return red, green, blue
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a finite number; true and false are none."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

@@ -1,0 +1,85 @@
+"""Frames of a scene as people look at them: colours, normals, depth, alpha, material."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, get_args
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.raster import Render
+from texgs.scene.composition import Composition, Look
+from texgs.scene.edits import Edit
+from texgs.volume.view_set import Light
+
+Mode = Literal[
+    "shaded", "unshaded", "normal", "depth", "alpha", "ambient", "diffuse", "specular", "shininess"
+]
+SHININESS = 100.0  # shown as white
+
+
+def frame(
+    scene: Composition,
+    camera: Camera,
+    light: Light,
+    edits: Sequence[Edit],
+    mode: Mode = "shaded",
+    background: tuple[float, float, float] = (1.0, 1.0, 1.0),
+) -> np.ndarray:
+    """One frame [H, W, 3], uint8.
+
+    Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
+    frame, both over the background; alpha is white where opaque; factors of the material are grey over black,
+    shininess divided by 100.
+
+    Args:
+        scene: to show.
+        camera: from where; moved to the scene's device.
+        light: shines on it.
+        edits: one for each model.
+        mode: what to show.
+        background: behind it.
+
+    Raises:
+        ArgumentError: if the mode is unknown.
+    """
+    if mode not in get_args(Mode):
+        raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode}")
+    camera = camera.to(scene.means.device)
+    behind = scene.means.new_tensor(background)
+    look: Look = mode if mode in get_args(Look) else "unshaded"  # type: ignore[assignment]
+    outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
+    is_factor = mode in get_args(Look)[2:]
+    render = scene.render(
+        camera, light, edits, look=look, background=None if is_factor else behind, outputs=outputs
+    )
+    shown = pixels(render, mode, behind)
+    return shown.clamp(0, 1).mul(255).round().to(torch.uint8).cpu().numpy()
+
+
+def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:
+    """Colours [H, W, 3] of a mode."""
+    alpha = render.alpha[..., None]
+    if mode == "alpha":
+        return alpha.expand(-1, -1, 3)
+    if mode == "shininess":
+        return render.color / SHININESS
+    if mode == "normal":
+        return 0.5 * (render.normal + alpha) + (1 - alpha) * background  # type: ignore[operator]
+    if mode == "depth":
+        return 0.9 * relative_depth(render)[..., None] * alpha + (1 - alpha) * background
+    return render.color
+
+
+def relative_depth(render: Render) -> Tensor:
+    """Mean depth [H, W], 0 at the nearest and 1 at the farthest point that is not faint."""
+    depth = render.depth
+    seen = depth[render.alpha > 0.5]  # type: ignore[index]
+    if not len(seen):
+        return torch.zeros_like(render.alpha)
+    low, high = seen.min(), seen.max()
+    return ((depth - low) / (high - low).clamp_min(1e-6)).clamp(0, 1)  # type: ignore[operator]

@@ -1,0 +1,187 @@
+"""scene.yaml: basic models and what is edited about each; opening composes them and trains nothing."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import torch
+import yaml
+
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.io import write_bytes
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit, color, is_number
+from texgs.scene.model_file import read_model
+from texgs.scene.texture_file import with_texture
+from texgs.volume.view_set import Light
+
+VERSION = 1
+KEYS = ("texgs-scene", "light", "background", "models")
+EDITS = tuple(each.name for each in fields(Edit))
+MODEL_KEYS = ("file", "texture", *EDITS)
+WHITE = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class SceneModel:
+    """One model of a scene."""
+
+    file: Path  # model.safetensors
+    edit: Edit = field(default_factory=Edit)
+    texture: Path | None = None  # variant in place of the model's own texels
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Models by name in the order in which they were added, one light for all, and a background."""
+
+    models: Mapping[str, SceneModel]
+    light: Light = field(default_factory=lambda: Light("headlight"))
+    background: tuple[float, float, float] = WHITE
+
+    def __post_init__(self) -> None:
+        if not self.models:
+            raise ArgumentError("models: expected at least one, got none")
+
+    @property
+    def edits(self) -> list[Edit]:
+        """Of all models."""
+        return [model.edit for model in self.models.values()]
+
+    def open(self, device: torch.device | str = "cpu") -> Composition:
+        """Read and join the models.
+
+        Raises:
+            ArgumentError, ShapeError: naming the model and its file.
+        """
+        found = []
+        for name, entry in self.models.items():
+            try:
+                model = read_model(entry.file)
+                found.append(
+                    (model if entry.texture is None else with_texture(model, entry.texture)).to(device)
+                )
+            except TexgsError as error:
+                raise type(error)(f"models.{name}: {error}") from error
+        return Composition(found)
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Read a scene file. Files in it are relative to its folder.
+
+    Raises:
+        ArgumentError: if the file is missing or a key of it is not as it should be; says which.
+    """
+    path = Path(path)
+    values = read_values(path)
+    try:
+        return scene_of(values, path.parent)
+    except ArgumentError as error:
+        raise ArgumentError(f"{path}: {error}") from error
+
+
+def read_values(path: Path) -> Any:
+    """The plain values of a YAML file.
+
+    Raises:
+        ArgumentError: if it is missing or no YAML.
+    """
+    try:
+        return yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file; texgs compose writes one") from error
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ArgumentError(f"{path}: expected a scene in YAML, got {one_line(error)}") from error
+
+
+def scene_of(values: Any, folder: Path) -> Scene:
+    """The scene that the plain values of a scene file describe.
+
+    Args:
+        values: as `read_values` returns them.
+        folder: that files are relative to.
+
+    Raises:
+        ArgumentError: naming the key that is not as it should be.
+    """
+    known(values, KEYS, "the scene")
+    if values.get("texgs-scene") != VERSION:
+        raise ArgumentError(f"texgs-scene: expected {VERSION}, got {values.get('texgs-scene')!r}")
+    known(values.get("models"), None, "models")
+    models = {str(name): _model(f"models.{name}", x, folder) for name, x in values["models"].items()}
+    background = color("background", values.get("background", WHITE))
+    return Scene(models, _light(values.get("light", "headlight")), background)
+
+
+def write_scene(path: str | Path, scene: Scene) -> Path:
+    """Write a scene file in one step; what is not edited is left out. Files in it are relative to its folder.
+
+    Raises:
+        ArgumentError: if the file cannot be written.
+    """
+    path = Path(path)
+
+    def relative(file: Path) -> str:
+        return Path(os.path.relpath(file, path.parent)).as_posix()
+
+    models = {}
+    for name, entry in scene.models.items():
+        plain = asdict(Edit())
+        changed = {key: value for key, value in asdict(entry.edit).items() if value != plain[key]}
+        if "palette" in changed:
+            changed["palette"] = list(changed["palette"])
+        variant = {} if entry.texture is None else {"texture": relative(entry.texture)}
+        models[name] = {"file": relative(entry.file), **variant, **changed}
+    light: Any = "headlight"
+    if scene.light.kind == "directional":
+        light = {"azimuth": scene.light.azimuth, "polar": scene.light.polar}
+    values = {"texgs-scene": VERSION, "light": light, "background": list(scene.background), "models": models}
+    text = yaml.safe_dump(values, sort_keys=False, allow_unicode=True, default_flow_style=None)
+    return write_bytes(path, text.encode())
+
+
+def _model(where: str, values: Any, folder: Path) -> SceneModel:
+    known(values, MODEL_KEYS, where)
+    if not isinstance(values.get("file"), str):
+        raise ArgumentError(f"{where}.file: expected the path of a model, got {values.get('file')!r}")
+    texture = values.get("texture")
+    if texture is not None and not isinstance(texture, str):
+        raise ArgumentError(f"{where}.texture: expected the path of a texture variant, got {texture!r}")
+    try:
+        edit = Edit(**{key: value for key, value in values.items() if key in EDITS})
+    except ArgumentError as error:
+        raise ArgumentError(f"{where}.{error}") from error
+    return SceneModel(folder / values["file"], edit, None if texture is None else folder / texture)
+
+
+def _light(value: Any) -> Light:
+    if value == "headlight":
+        return Light("headlight")
+    if isinstance(value, dict) and set(value) <= {"azimuth", "polar"} and all(map(is_number, value.values())):
+        return Light("directional", **{key: float(angle) for key, angle in value.items()})
+    raise ArgumentError(f"light: expected headlight, or azimuth and polar in degrees, got {value!r}")
+
+
+def known(values: Any, keys: Collection[str] | None, where: str) -> None:
+    """Require a table, with known keys only.
+
+    Raises:
+        ArgumentError: naming what is no table or no key, and the key that is most like it.
+    """
+    if not isinstance(values, dict):
+        raise ArgumentError(f"{where}: expected a table of keys and values, got {values!r}")
+    for key in values if keys is not None else ():
+        if key not in keys:  # type: ignore[operator]
+            like = difflib.get_close_matches(str(key), list(keys or ()), n=1)
+            hint = f", did you mean {like[0]}?" if like else f"; expected {', '.join(keys or ())}"
+            raise ArgumentError(f"{where}: no such key {key!r}{hint}")
+
+
+def one_line(error: Exception) -> str:
+    """An error's message in one line."""
+    return " ".join(str(error).split())

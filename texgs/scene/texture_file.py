@@ -1,0 +1,78 @@
+"""Files of texture variants: other texels for a basic model, such as a style; its geometry stays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.io import write_bytes
+from texgs.scene.model import Model
+
+FORMAT = "texgs-texture"
+VERSION = 1
+
+
+def write_texture(path: str | Path, model: Model, metadata: Mapping[str, Any] | None = None) -> Path:
+    """Write the texels of a model, with the sizes of its textures to know it by, in one step.
+
+    Args:
+        path: target.
+        model: textured.
+        metadata: JSON, such as what the style is.
+
+    Raises:
+        ArgumentError: if the model has no texture, or the file cannot be written.
+    """
+    from safetensors.torch import save
+
+    if model.stage != "texture":
+        raise ArgumentError(f"{path}: expected a model of stage texture, got {model.stage}")
+    header = {FORMAT: json.dumps({"version": VERSION, "metadata": dict(metadata or {})}, allow_nan=False)}
+    tensors = {name: model.parameters[name].detach().cpu().contiguous() for name in ("texels", "sizes")}
+    return write_bytes(path, save(tensors, header))
+
+
+def with_texture(model: Model, path: str | Path) -> Model:
+    """The model with the texels of a variant.
+
+    Raises:
+        ArgumentError: if the file is missing, of another kind, or of another model.
+    """
+    found = _read(Path(path))
+    p = model.parameters
+    if model.stage != "texture" or not torch.equal(found["sizes"], p["sizes"].cpu()):
+        raise ArgumentError(
+            f"{path}: expected a texture of this model, got one of {len(found['sizes'])} surfels "
+            f"and {len(found['texels'])} texels; make it again from the model"
+        )
+    try:
+        check.finite(texels=found["texels"])
+    except TexgsError as error:
+        raise ArgumentError(f"{path}: {error}") from error
+    texels = found["texels"].to(p["texels"].device)
+    return replace(model, parameters={**p, "texels": texels})
+
+
+def _read(path: Path) -> dict[str, Tensor]:
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="pt") as file:
+            if FORMAT not in (file.metadata() or {}):
+                raise ArgumentError(f"{path}: expected a {FORMAT} file, got safetensors of another kind")
+            found = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file") from error
+    except (OSError, SafetensorError) as error:
+        raise ArgumentError(f"{path}: expected a {FORMAT} file, got {error}") from error
+    if set(found) != {"texels", "sizes"} or len(found["texels"]) != int(found["sizes"].long().prod(1).sum()):
+        raise ArgumentError(f"{path}: expected texels and sizes that fit each other; make it again")
+    return found
