@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.report.metrics_files import paper, read
-from texgs.report.table import Cell, Column, Table
+from texgs.report.table import UNPUBLISHED, Cell, Column, Table
 
 
 def datasets(paths: Iterable[str | Path]) -> Table:
@@ -20,8 +20,8 @@ def datasets(paths: Iterable[str | Path]) -> Table:
         Column("views px"),
         Column("basic scenes", 0),
         Column("ms / frame", 1),
-        Column("MiB (paper)", 1),
-        Column("ms / frame (paper)", 1),
+        Column("MiB (paper)", 1, UNPUBLISHED),
+        Column("ms / frame (paper)", 1, UNPUBLISHED),
     )
     published, volumes = paper("datasets"), {}
     views: dict[str, list[dict[str, Any]]] = defaultdict(list)
@@ -90,7 +90,7 @@ def model_size(paths: Iterable[str | Path]) -> Table:
         Column("basic scenes", 0),
         Column("primitives", 0),
         *(Column(title, 1) for title in titles),
-        *(Column(f"{title} (paper)", 1) for title in titles),
+        *(Column(f"{title} (paper)", 1, UNPUBLISHED) for title in titles),
     )
     published = paper("model_size")
     found: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)

@@ -12,14 +12,18 @@ from texgs.core.io import write_atomic
 
 INCHES = 2.4  # of a picture
 DPI = 150
+THRESHOLD = 0.02  # of the brightest value
+MARGIN = 4  # pixels
 
 
 def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titles: Sequence[str]) -> Path:
     """Write a PNG with rows of pictures and a title over each column.
 
+    All show the same part of theirs, the smallest square in which one differs from its corner.
+
     Args:
         path: target file.
-        rows: pictures [H, W, 3] by the name of the row, in [0, 1] or uint8; as many as titles.
+        rows: pictures [H, W, 3] of one size by the name of the row, in [0, 1] or uint8; as many as titles.
         titles: of the columns.
 
     Returns:
@@ -34,6 +38,7 @@ def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titl
     for name, pictures in rows.items():
         if len(pictures) != len(titles) or not titles:
             raise ArgumentError(f"{name}: expected {len(titles)} pictures, got {len(pictures)}")
+    box = content([picture for pictures in rows.values() for picture in pictures])
     size = (INCHES * len(titles), INCHES * len(rows) + 0.3)
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
@@ -41,7 +46,7 @@ def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titl
     for row, (name, pictures) in enumerate(rows.items()):
         for column, picture in enumerate(pictures):
             at = axes[row, column]
-            at.imshow(picture)
+            at.imshow(picture[box])
             at.set_xticks([])
             at.set_yticks([])
             if row == 0:
@@ -49,3 +54,16 @@ def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titl
             if column == 0:
                 at.set_ylabel(name, fontsize=9)
     return write_atomic(path, lambda file: figure.savefig(file, format="png", metadata={"Software": None}))
+
+
+def content(pictures: Sequence[np.ndarray]) -> tuple[slice, slice]:
+    """Rows and columns of the smallest square, or what fits of it, with all that is not background."""
+    seen = np.zeros(pictures[0].shape[:2], dtype=bool)
+    for picture in pictures:
+        seen |= np.abs(picture.astype(float) - picture[0, 0]).max(axis=2) > THRESHOLD * picture.max()
+    if not seen.any():
+        return slice(None), slice(None)
+    places = [np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0)]
+    side = max(int(at[-1] - at[0]) + 1 + 2 * MARGIN for at in places)
+    starts = [max(0, (int(at[0]) + int(at[-1]) + 1 - side) // 2) for at in places]
+    return slice(starts[0], starts[0] + side), slice(starts[1], starts[1] + side)

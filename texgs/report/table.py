@@ -12,6 +12,7 @@ from texgs.core.io import write_bytes
 
 Cell = str | float | int | None
 MISSING = "not measured"
+UNPUBLISHED = "-"  # in columns of the paper's numbers
 
 
 @dataclass(frozen=True)
@@ -20,11 +21,12 @@ class Column:
 
     title: str
     digits: int | None = None  # after the point; None: as they are
+    missing: str = MISSING  # in place of a cell that is None
 
     def text(self, cell: Cell) -> str:
         """A cell as people read it."""
         if cell is None:
-            return MISSING
+            return self.missing
         if isinstance(cell, str) or self.digits is None:
             return str(cell)
         return f"{cell:.{self.digits}f}"

@@ -1,0 +1,57 @@
+"""Frames of a composed scene: four textured models, unedited and edited."""
+
+from __future__ import annotations
+
+import torch
+
+from benchmarks import scenes
+from benchmarks.fit import DISTANCE
+from benchmarks.report import Section
+from benchmarks.settings import Settings
+from benchmarks.timing import Case, measure
+from texgs.core.camera import orbit
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.model import Model, Optics, raw_material
+from texgs.volume.view_set import Light
+
+MODELS, SURFELS, SIDE = 4, 30_000, 4  # models, surfels in each, texels along each side of a texture
+EDITS = [Edit(palette=(0.2, 0.6, 0.4)), Edit(opacity=0.5), Edit(diffuse=1.5), Edit(visible=False)]
+
+
+def run(settings: Settings) -> Section:
+    """Time frames as fitted and edited."""
+    section, cases = Section(), []
+    composition = Composition([model(seed, settings.device) for seed in range(MODELS)])
+    light = Light("directional", 30.0, 40.0)
+    for size in settings.sizes:
+        camera = orbit(-60.0, 25.0, DISTANCE, 30.0, size, size).to(settings.device)
+        for name, edits in (("as fitted", None), ("edited", EDITS)):
+            where = {"size": size, "surfels": len(composition), "scene": name}
+            show = lambda c=camera, e=edits: composition.render(c, light, e)  # noqa: E731
+            cases.append(Case("frame", where, {"frame": show}))
+    section.measurements = measure(cases, settings.rounds, settings.device, "scene")
+    return section
+
+
+def model(seed: int, device: torch.device) -> Model:
+    """A textured model of the generated scenes."""
+    made = {name: x.to(device) for name, x in scenes.surfels("opaque", SURFELS, seed).items()}
+    generator = torch.Generator().manual_seed(seed)
+    count = SIDE * SIDE
+    material = raw_material(0.3, 0.7, 0.3, 20.0, "bounded")
+    return Model(
+        {
+            "means": made["means"],
+            "quats": made["quats"],
+            "scales": made["scales"].log(),
+            "opacities": made["opacities"].logit(),
+            "colors": made["features"] - 0.5,
+            **{name: x.to(device) for name, x in material.items()},
+            "palette": torch.full((3,), 0.5, device=device),
+            "texels": 0.1 * torch.randn(SURFELS * count, 3, generator=generator).to(device),
+            "sizes": torch.full((SURFELS, 2), SIDE, dtype=torch.int32, device=device),
+            "offsets": count * torch.arange(SURFELS, device=device),
+        },
+        Optics(),
+    )

@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from texgs.core.errors import ArgumentError
+from texgs.report.strip import DPI, INCHES, content, write_strip
+
+
+def picture(rows, columns, size=(60, 80), value=0.2):
+    """White with a grey block."""
+    found = np.ones((*size, 3))
+    found[rows, columns] = value
+    return found
+
+
+def test_a_row_for_each_name_and_a_column_for_each_title(tmp_path):
+    rows = {
+        "scene": [picture(slice(20, 30), slice(30, 40))] * 3,
+        "volume": [picture(slice(20, 30), slice(30, 40))] * 3,
+    }
+    path = write_strip(tmp_path / "a.png", rows, ["one", "two", "three"])
+    width, height = Image.open(path).size
+    assert width == round(3 * INCHES * DPI)
+    assert height == round((2 * INCHES + 0.3) * DPI)
+    again = write_strip(tmp_path / "b.png", rows, ["one", "two", "three"])
+    assert path.read_bytes() == again.read_bytes()
+
+
+def test_all_show_the_square_around_what_any_shows():
+    pictures = [picture(slice(20, 24), slice(30, 34)), picture(slice(26, 30), slice(50, 54))]
+    rows, columns = content(pictures)
+    assert rows.stop - rows.start == columns.stop - columns.start == 24 + 8
+    assert rows.start < 20 < 30 < rows.stop
+    assert columns.start <= 30 < 54 <= columns.stop
+    assert content([np.ones((4, 4, 3))]) == (slice(None), slice(None))
+
+
+def test_rows_of_another_length_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="scene: expected 2 pictures, got 1"):
+        write_strip(tmp_path / "a.png", {"scene": [picture(0, 0)]}, ["one", "two"])
