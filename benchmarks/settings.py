@@ -57,7 +57,7 @@ def parse(arguments: list[str] | None = None) -> Settings:
     """
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
-        description="Measure the rasterizer, the losses, volume rendering, training steps and scenes; write JSON.",
+        description="Measure rasterizer, losses, volume rendering, training steps and scenes; write JSON.",
     )
     parser.add_argument(
         "--quick", action="store_true", help="few cases, each timed once: seconds, not minutes"

@@ -11,6 +11,7 @@ from texgs.fit.hull import hull_points, mean_colors, project
 from texgs.fit.images import load
 from texgs.fit.seeds import box_of, read_points, seed_surfels, surfels_at
 from texgs.fit.visible import shrunk
+from texgs.volume.grid import Grid
 from texgs.volume.view_set import ViewSet, read_views
 
 from .scenes import RADIUS, ball_images, cameras, images_of
@@ -253,3 +254,26 @@ def test_points_published_with_the_paper_are_near_what_its_views_show():
     parameters, colors = seed_surfels(images, views, "auto", 1, 0.1, 0.55, 0)
     assert len(parameters["means"]) == len(colors) > 9000
     assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15
+
+
+# --- voxels -----------------------------------------------------------------
+
+
+def test_voxels_of_the_volume_that_views_show():
+    """A ball of the value 1 in a grid: what is seen of it is its surface."""
+    at = np.linspace(-0.5, 0.5, 48)
+    z, y, x = np.meshgrid(at, at, at, indexing="ij")
+    inside = (x**2 + y**2 + z**2 < RADIUS**2).astype(np.float32)
+    tf = {"opacity": [[0.5, 0.0], [1.0, 1.0], [2.0, 1.0]], "color": [[0, 0.8, 0.4, 0.2]]}
+    options = {"kind": "voxels", "metadata": {"tf": tf}, "volume": Grid(inside), "count": 200}
+    surfels, colors = seeds(**options)
+    radius = surfels["means"].norm(dim=1)
+    assert len(colors) == 200
+    assert radius.max() < RADIUS * 1.35
+    assert float((radius > 0.6 * RADIUS).float().mean()) > 0.75
+
+
+def test_voxels_need_a_volume_and_a_transfer_function():
+    for options in ({"metadata": {"tf": {}}}, {"volume": Grid(np.zeros((2, 2, 2), np.float32))}):
+        with pytest.raises(ArgumentError, match=r"seeds\.kind=voxels needs a volume and views that name"):
+            seeds(kind="voxels", **options)

@@ -70,7 +70,7 @@ class Seeds:
     kind: str = key(
         "auto",
         "points of the views if there are any, else what is visible",
-        choices=("auto", "points", "visible", "hull", "random"),
+        choices=("auto", "points", "visible", "voxels", "hull", "random"),
     )
     count: int = key(10000, "surfels at the start; given points are taken as they are", least=1)
     opacity: float = key(0.1, "of each", least=0)

@@ -94,6 +94,12 @@ def view_set(config: DictConfig) -> dict[str, Path]:
     return {"views": (views_folder(config) or STAGES["views"].output(config)) / "transforms_train.json"}
 
 
+def seeded(config: DictConfig) -> dict[str, Path]:
+    """The views, and the volume where surfels start in its voxels."""
+    from_voxels = config.fit.seeds.kind == "voxels" and config.dataset.views_folder is None
+    return {**view_set(config), **(prepared_volume(config) if from_voxels else {})}
+
+
 def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
     """The model that a stage of the fit writes, and the views."""
     return lambda config: {"model": STAGES[stage].output(config) / "model.safetensors", **view_set(config)}
@@ -214,8 +220,8 @@ STAGES = {
                 "phase": config.fit.surfels,
             },
             folder="{dataset}/{tf}/{fit}/surfels",
-            inputs=view_set,
-            needs=("views",),
+            inputs=seeded,
+            needs=("volume", "views"),
             per_tf=True,
         ),
         Stage(

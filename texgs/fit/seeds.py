@@ -12,17 +12,27 @@ from texgs.core.errors import ArgumentError
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
 from texgs.fit.images import Images
 from texgs.fit.visible import CANDIDATES, most_seen
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
+from texgs.volume.voxels import visible_voxels
 
 POINTS = "points3d.ply"  # in a folder of views
-KINDS = ("auto", "points", "visible", "hull", "random")
+KINDS = ("auto", "points", "visible", "voxels", "hull", "random")
 MARGIN = 0.02  # of the box around the data, relative to its longest side
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
 
 
 def seed_surfels(
-    images: Images, views: ViewSet, kind: str, count: int, opacity: float, half_size: float, seed: int
+    images: Images,
+    views: ViewSet,
+    kind: str,
+    count: int,
+    opacity: float,
+    half_size: float,
+    seed: int,
+    volume: Grid | None = None,
 ) -> tuple[dict[str, Tensor], Tensor]:
     """Raw geometry of the first surfels, and their colours.
 
@@ -33,12 +43,14 @@ def seed_surfels(
         images: training views.
         views: the same with their folder and metadata.
         kind: "points" in the folder's points3d.ply, all of them; "hull", points that no view sees through;
-            "visible", those of them that a quick fit finds to be seen; "random" in the box; "auto", points if
-            there are any, else visible.
+            "visible", those of them that a quick fit finds to be seen; "voxels", the same from the volume's
+            samples that the views' transfer function shows; "random" in the box; "auto", points if there are
+            any, else visible.
         count: of surfels; points are taken as they are.
         opacity: of each, between 0 and 1; for "visible", before the quick fit.
         half_size: half the side of the box, where the views' metadata has no `aabb`, world units.
         seed: of random numbers; the same one gives the same surfels.
+        volume: that the views show; for "voxels".
 
     Returns:
         `means`, `quats`, `scales` and `opacities` by name, and colours [N, 3] in [0, 1].
@@ -57,6 +69,8 @@ def seed_surfels(
     colors: Tensor | None = None
     if kind == "points":
         points, colors = read_points(given)
+    elif kind == "voxels":
+        points, colors = shown_voxels(volume, views, CANDIDATES * count, seed)
     elif kind == "random":
         points = random_points(box_of(views, half_size), count, generator)
     else:
@@ -65,7 +79,25 @@ def seed_surfels(
     if colors is None:
         colors = mean_colors(images, points)
     surfels = surfels_at(points, opacity, generator)
-    return most_seen(surfels, colors, images, count, seed) if kind == "visible" else (surfels, colors)
+    if kind not in ("visible", "voxels"):
+        return surfels, colors
+    return most_seen(surfels, colors, images, count, seed)
+
+
+def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> tuple[Tensor, Tensor]:
+    """Points and colours [N, 3] of a volume where the views' transfer function shows it.
+
+    Raises:
+        ArgumentError: if there is no volume or no transfer function.
+    """
+    if volume is None or "tf" not in views.metadata:
+        raise ArgumentError(
+            f"{views.folder}: seeds.kind=voxels needs a volume and views that name their transfer function; "
+            "seeds.kind=visible needs neither"
+        )
+    tf = TransferFunction.from_dict(views.metadata["tf"])
+    points, colors = visible_voxels(volume, tf, count, seed)
+    return torch.from_numpy(points), torch.from_numpy(colors)
 
 
 def box_of(views: ViewSet, half_size: float) -> Box:

@@ -13,7 +13,7 @@ rule figures:
 
 rule surfels:
     input:
-        unpack(lambda wildcards: {"views": inputs("surfels", wildcards)["views"]}),
+        unpack(lambda wildcards: inputs("surfels", wildcards)),
     output:
         model="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
         metrics="<results>/{dataset}/{tf}/{fit}/surfels/metrics.json",
@@ -26,8 +26,9 @@ rule surfels:
         settings=lambda wildcards: settings("surfels", wildcards),
         code=STAGES["surfels"].code,
         folder=subpath(output.metrics, parent=True),
+        files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
     shell:
-        "texgs surfels --settings {params.settings:q} --input views={input.views:q} "
+        "texgs surfels --settings {params.settings:q} --input {params.files:q} "
         "--output {params.folder:q} 2>&1 | tee {log:q}"
 
 

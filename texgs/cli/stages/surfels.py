@@ -13,6 +13,7 @@ from texgs.fit.images import load
 from texgs.fit.seeds import seed_surfels
 from texgs.scene.model import Model, Optics
 from texgs.scene.model_file import write_model
+from texgs.volume.nrrd_file import open_grid
 from texgs.volume.view_set import read_views
 
 
@@ -21,7 +22,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 
     Args:
         settings: what the stage reads of the configuration.
-        inputs: `views`, the transforms_train.json.
+        inputs: `views`, the transforms_train.json; for seeds in voxels also `volume`, the volume.nrrd.
         output: folder.
     """
     fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: surfels"
@@ -31,7 +32,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     local_viewer = bool(shading.get("local_viewer", True))
     optics = Optics(fit["low_pass"], fit["activation"], local_viewer, fit["facing"])
     phase = phase_from(settings["phase"])
-    parameters, colors = seed_surfels(images, views, **fit["seeds"], seed=fit["seed"])
+    volume = open_grid(inputs["volume"]) if "volume" in inputs else None
+    parameters, colors = seed_surfels(images, views, **fit["seeds"], seed=fit["seed"], volume=volume)
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
