@@ -25,13 +25,17 @@ rule all:
     input:
         rules.volumes.input,
         rules.sheets.input,
-        rules.figures.input if SWEEP is None else [],
-        rules.scenes.input if SWEEP is None else [],
+        rules.figures.input,
+        rules.scenes.input,
         rules.tables.output,
-        rules.report.output if SWEEP is None else [],
+        rules.report.output if TABLES else [],
+        collect("<results>/tables/{sweep}.csv", sweep=SWEEPS),
 
 
 onsuccess:
-    print(f"Done: {RESULTS}/{'report.html' if SWEEP is None else f'tables/{SWEEP}.md'}")
+    print(
+        "Done:",
+        *([f"{RESULTS}/report.html"] if TABLES else [f"{RESULTS}/tables/{name}.md" for name in SWEEPS]),
+    )
     if STORE is not None and STORE.startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")

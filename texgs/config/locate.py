@@ -4,14 +4,14 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
-from texgs.core.errors import ConfigError
+from texgs.core.errors import ConfigError, MissingDataError
 
 
 def source_file(config: DictConfig) -> Path | None:
     """The volume's file, or folder of slices; None if it is generated or still to be downloaded.
 
     Raises:
-        ConfigError: if it is not there and cannot be downloaded; says how to get it.
+        MissingDataError: if it is not there and cannot be downloaded; says how to get it.
     """
     dataset, volume = config.dataset, config.dataset.volume
     if dataset.views_folder is not None:
@@ -30,7 +30,7 @@ def source_file(config: DictConfig) -> Path | None:
         return path
     if volume.url:
         return None
-    raise ConfigError(
+    raise MissingDataError(
         f"data set {dataset.name}: {path} is not there; {volume.obtain or 'put it there'}, "
         "or name its folder with data_folder=FOLDER or TEXGS_DATA"
     )
@@ -40,13 +40,13 @@ def views_folder(config: DictConfig) -> Path | None:
     """Folder of the views that a data set without volume starts from, for `config.tf`; None with a volume.
 
     Raises:
-        ConfigError: if the folder has no views; says how to get them.
+        MissingDataError: if the folder has no views; says how to get them.
     """
     if config.dataset.views_folder is None:
         return None
     folder = Path(config.data_folder, config.dataset.views_folder, config.tf or "")
     if not (folder / "transforms_train.json").is_file():
-        raise ConfigError(
+        raise MissingDataError(
             f"data set {config.dataset.name}: no views in {folder}; "
             f"{config.dataset.volume.obtain or 'put them there, with a file transforms_train.json'}, "
             "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
@@ -74,6 +74,7 @@ def tf_names(config: DictConfig) -> list[str]:
 
     Raises:
         ConfigError: if there are none, or not the one chosen.
+        MissingDataError: if there is no folder of views.
     """
     if config.tf is not None:
         if config.dataset.views_folder is None:
@@ -84,7 +85,7 @@ def tf_names(config: DictConfig) -> list[str]:
         folder = Path(config.data_folder, config.dataset.views_folder)
         names = sorted(path.parent.name for path in folder.glob("*/transforms_train.json"))
         if not names:
-            raise ConfigError(
+            raise MissingDataError(
                 f"data set {config.dataset.name}: no folder of views in {folder}; "
                 f"{config.dataset.volume.obtain or 'put one there per basic TF'}, "
                 "or name the folder above with data_folder=FOLDER or TEXGS_DATA"

@@ -163,6 +163,10 @@ class Config:
     views: Views = key(Views, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")
     sweep: Sweep = key(Sweep, "variants of the experiment")
+    sweeps: dict[str, str] = field(
+        default_factory=dict,
+        metadata={"help": "sweeps of a whole experiment beside its data sets: the data set of each"},
+    )
     variant: str = key("", "which of the sweep this is, in the folder of its fits")
     tracking: Tracking = key(Tracking, "where runs are recorded")
     device: Device = key(Device, "what the work runs on")

@@ -29,5 +29,9 @@ class ConfigError(TexgsError, ValueError):
     """A key of the configuration is unknown, or its value is not one that is possible."""
 
 
+class MissingDataError(ConfigError):
+    """A data set's files are not on this machine; the message says how to get them."""
+
+
 class FitError(TexgsError, ArithmeticError):
     """A fit cannot go on."""

@@ -11,7 +11,7 @@ from texgs.config.compose import compose
 from texgs.config.locate import tf_names
 from texgs.config.stage import STAGES, fit_folder, for_tf, settings_file
 from texgs.config.sweep import variants
-from texgs.core.errors import ConfigError, TexgsError
+from texgs.core.errors import ConfigError, MissingDataError, TexgsError
 
 GROUPS = ("experiment", "dataset", "views", "fit", "sweep", "device", "tracking")
 
@@ -35,31 +35,46 @@ def overrides():
         raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
 
 
-def configurations(words):
-    """One for each data set and variant of the sweep."""
-    names = compose(words).datasets
-    found, known = [], set()
-    for each in [(*words, f"dataset={name}") for name in names] or [words]:
-        base = compose(each)
-        check_basic_tfs(base.dataset)
-        if base.dataset.name in known:
-            raise ConfigError(f"datasets: expected different names, got {base.dataset.name} twice")
-        known.add(base.dataset.name)
-        found += [compose(variant) for variant in variants(each)]
+def experiments(words):
+    """Configurations by the name of their sweep; None for those of none: one for each data set and variant."""
+    base = compose(words)
+    names = [(*words, f"dataset={name}") for name in base.datasets] or [words]
+    repeated = [name for name in base.datasets if base.datasets.count(name) > 1]
+    if repeated:
+        raise ConfigError(f"datasets: expected different names, got {repeated[0]} twice")
+    found = {}
+    for each in names:
+        config = compose(each)
+        name = config.sweep.name if config.sweep.variants else None
+        found.setdefault(name, []).extend(compose(variant) for variant in variants(each))
+    for name, dataset in base.sweeps.items():
+        found[name] = [
+            compose(variant) for variant in variants((*words, f"dataset={dataset}", f"sweep={name}"))
+        ]
     return found
 
 
 def jobs(configs):
-    """Settings file and input files of each job, by stage and folder; those of each basic TF apart."""
-    found = {}
+    """Settings file and input files of each job, by stage and folder; and what is missing for some."""
+    found, missing = {}, []
     for config in configs:
-        by_tf = [for_tf(config, name) for name in tf_names(config)]
+        check_basic_tfs(config.dataset)
+        try:
+            by_tf = [for_tf(config, name) for name in tf_names(config)]
+        except MissingDataError as error:
+            missing.append(str(error))
+            continue
         for name, stage in STAGES.items():
             for each in (by_tf if stage.per_tf else [config]) if stage.applies(config) else ():
-                job = settings_file(stage, each), stage.inputs(each)
-                if found.setdefault((name, stage.output(each).as_posix()), job) != job:
+                try:
+                    files = stage.inputs(each)
+                except MissingDataError as error:
+                    missing.append(str(error))
+                    files = {}
+                made = settings_file(stage, each), files
+                if found.setdefault((name, stage.output(each).as_posix()), made) != made:
                     raise ConfigError(f"{stage.output(each)}: two variants go there; give one another name")
-    return found
+    return found, list(dict.fromkeys(missing))
 
 
 def job(stage, wildcards):
@@ -78,21 +93,29 @@ def inputs(stage, wildcards):
     return {name: path.as_posix() for name, path in job(stage, wildcards)[1].items()}
 
 
-def done(*stages):
-    """The metrics files of all jobs of some stages."""
-    return sorted(f"{folder}/metrics.json" for stage, folder in JOBS if stage in stages)
+def done(*stages, sweep=None):
+    """The metrics files of all jobs of some stages, of a sweep or of none."""
+    return sorted(f"{folder}/metrics.json" for stage, folder in OF_SWEEP.get(sweep, ()) if stage in stages)
 
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
     WORDS = overrides()
     CONFIG = compose(WORDS)
-    CONFIGS = configurations(WORDS)
+    EXPERIMENTS = experiments(WORDS)
+    CONFIGS = [config for configs in EXPERIMENTS.values() for config in configs]
     RESULTS = CONFIG.results
-    JOBS = jobs(CONFIGS)
+    JOBS, MISSING = jobs(CONFIGS)
+    OF_SWEEP = {sweep: set(jobs(configs)[0]) for sweep, configs in EXPERIMENTS.items()}
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
+
+# Missing files are told together and before any job; a dry run shows what would be done with them.
+if MISSING:
+    print("\n".join(f"texgs: {line}" for line in MISSING), file=sys.stderr)
+    if not any(re.fullmatch(r"--dry-?run|--lint|-[a-zA-Z]*n[a-zA-Z]*", word) for word in sys.argv):
+        sys.exit(2)
 
 STORE = CONFIG.tracking.uri
 GPU = int(CONFIG.device.mapper == "gpu")  # a volume mapper's
@@ -115,7 +138,8 @@ pathvars:
 
 
 wildcard_constraints:
+    sweep="|".join(map(re.escape, filter(None, EXPERIMENTS))) or "no-sweep",
     dataset="|".join(sorted({re.escape(each.dataset.name) for each in CONFIGS})),
-    tf="|".join(sorted({re.escape(name) for each in CONFIGS for name in tf_names(each)})),
+    tf="[A-Za-z][A-Za-z0-9_-]*",
     views="|".join(sorted({re.escape(each.views.name) for each in CONFIGS})),
     fit="|".join(sorted({re.escape(fit_folder(each)) for each in CONFIGS})),

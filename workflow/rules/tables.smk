@@ -1,24 +1,36 @@
 # Tables and the report, from the metrics files of jobs.
 
 
-SWEEP = CONFIG.sweep.name if CONFIG.sweep.variants else None
-TABLES = [SWEEP] if SWEEP else ["fitting", "datasets", "rendering", "model_size", "edits"]
+SWEEPS = sorted(filter(None, EXPERIMENTS))
+TABLES = ["fitting", "datasets", "rendering", "model_size", "edits"] if None in EXPERIMENTS else []
 
 
 rule tables:
     input:
-        done("volume", "views", "surfels", "shading", "texture"),
-        done("pse", "timing") if SWEEP is None else [],
+        done("volume", "views", "surfels", "shading", "texture", "pse", "timing"),
     output:
         collect("<results>/tables/{name}.{format}", name=TABLES, format=("csv", "md", "tex")),
     log:
-        f"<logs>/tables-{TABLES[0]}.log",
+        "<logs>/tables.log",
     params:
         code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
-        sweep=f"--sweep {shlex.quote(SWEEP)}" if SWEEP else "",
     shell:
-        "texgs tables {input:q} {params.sweep} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+
+
+rule sweep:
+    input:
+        lambda wildcards: done("surfels", "shading", "texture", sweep=wildcards.sweep),
+    output:
+        collect("<results>/tables/{{sweep}}.{format}", format=("csv", "md", "tex")),
+    log:
+        "<logs>/tables-{sweep}.log",
+    params:
+        code=code_digest("texgs.cli.tables"),
+        folder=subpath(output[0], parent=True),
+    shell:
+        "texgs tables {input:q} --sweep {wildcards.sweep:q} --output {params.folder:q} 2>&1 | tee {log:q}"
 
 
 rule report:
