@@ -29,13 +29,17 @@ rule all:
         rules.scenes.input,
         rules.tables.output,
         rules.report.output if TABLES else [],
-        collect("<results>/tables/{sweep}.csv", sweep=SWEEPS),
+        collect("<results>/tables/sweep-{sweep}.csv", sweep=SWEEPS),
 
 
 onsuccess:
     print(
         "Done:",
-        *([f"{RESULTS}/report.html"] if TABLES else [f"{RESULTS}/tables/{name}.md" for name in SWEEPS]),
+        *(
+            [f"{RESULTS}/report.html"]
+            if TABLES
+            else [f"{RESULTS}/tables/sweep-{name}.md" for name in SWEEPS]
+        ),
     )
     if STORE is not None and STORE.startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")

@@ -136,7 +136,7 @@ def test_figure_without_test_views_shows_training_views(folder, monkeypatch):
 def test_a_gpu_that_is_not_there_is_one_sentence(folder, capsys, monkeypatch):
     monkeypatch.setattr("torch.cuda.is_available", lambda: False)
     assert main(["shading", *TINY, "device.name=cuda"]) == 2
-    assert "device=cuda: torch sees no GPU; leave it out to fit on the CPU" in capsys.readouterr().err
+    assert "device=cuda: torch sees no GPU; leave it out to work on the CPU" in capsys.readouterr().err
 
 
 def test_a_finished_phase_leaves_no_checkpoint(folder, monkeypatch):

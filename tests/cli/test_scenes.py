@@ -12,6 +12,7 @@ from tests.scene.test_composition import ball
 from texgs.cli.main import main
 from texgs.scene.model_file import write_model
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.texture_file import write_texture
 
 
 @pytest.fixture
@@ -28,9 +29,11 @@ def render(scene, output, *words):
     return main(["render", str(scene), "--output", str(output), "--width", "40", *words])
 
 
-def test_one_view_and_its_default_name(scene):
+def test_one_view_and_its_default_name(scene, tmp_path, monkeypatch):
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
     assert main(["render", str(scene), "--width", "40", "--height", "30"]) == 0
-    assert Image.open(scene.with_suffix(".png")).size == (40, 30)
+    assert Image.open("scene.png").size == (40, 30)
 
 
 @pytest.mark.parametrize("path", ["test", "orbit", "light"])
@@ -72,6 +75,7 @@ def test_edits_show_and_are_data(scene, tmp_path):
         ("TF01.opacity=-1", "TF01.opacity=-1: models.TF01.opacity: expected a factor from 0 to 1000, got -1"),
         ("TF01.palette=red", "models.TF01.palette: expected three numbers from 0 to 1 or #rrggbb, got 'red'"),
         ("light=up", "light=up: light: expected headlight, or azimuth and polar in degrees, got 'up'"),
+        ("TF01.texture=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
         ("visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
     ],
@@ -86,7 +90,9 @@ def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, capsys, word, mess
     ("words", "message"),
     [
         (["--mode", "color"], "--mode: expected one of shaded, unshaded"),
-        (["--frames", "-1"], "--frames: expected at least 1, got -1"),
+        (["--frames", "0"], "--frames: expected at least 1, got 0"),
+        (["--height", "0"], "height: expected at least 1 pixel, got 0"),
+        (["--fps", "inf"], "fps: expected more than 0 and at most 240, got inf"),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
         (["--height", "-4"], "height: expected at least 1 pixel, got -4"),
     ],
@@ -97,6 +103,40 @@ def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, words, message):
     assert not (tmp_path / "x.png").exists()
 
 
+def test_names_that_yaml_takes_for_numbers_or_that_have_dots(scene, tmp_path):
+    values = yaml.safe_load(scene.read_text())
+    values["models"] = {42: values["models"]["TF01"], "v1.2": values["models"]["TF02"]}
+    scene.write_text(yaml.safe_dump(values))
+    words = ["42.opacity=0.5", "v1.2.opacity=0.25"]
+    assert main(["edit", str(scene), *words, "--output", str(tmp_path / "new.yaml")]) == 0
+    assert [x.edit.opacity for x in read_scene(tmp_path / "new.yaml").models.values()] == [0.5, 0.25]
+
+
+def test_a_file_is_named_from_where_one_is_and_found_through_a_link(scene, tmp_path, monkeypatch):
+    (tmp_path / "styles" / "deep").mkdir(parents=True)
+    write_texture(tmp_path / "styles" / "a.safetensors", ball(1))
+    (tmp_path / "link").symlink_to(tmp_path / "styles" / "deep")
+    monkeypatch.chdir(tmp_path / "styles")
+    assert (
+        main(
+            ["edit", str(scene), "TF01.texture=a.safetensors", "--output", str(tmp_path / "link" / "b.yaml")]
+        )
+        == 0
+    )
+    assert render(tmp_path / "link" / "b.yaml", tmp_path / "b.png") == 0
+
+
+def test_a_folder_is_no_file(scene, tmp_path, capsys):
+    assert main(["edit", str(scene), "--output", str(tmp_path)]) == 2
+    assert "expected the name of a file, got a folder" in capsys.readouterr().err
+
+
+def test_a_gpu_that_is_not_there(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr("torch.cuda.is_available", lambda: False)
+    assert render(scene, tmp_path / "a.png", "--device", "cuda") == 2
+    assert "torch sees no GPU" in capsys.readouterr().err
+
+
 def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["report"]) == 2
@@ -104,7 +144,11 @@ def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
     folder = tmp_path / "results" / "engine" / "scene" / "quick" / "pse"
     folder.mkdir(parents=True)
     Image.new("RGB", (4, 4), "red").save(folder / "pse.png")
-    numbers = {"pse": [{"title": "a <b> edit", "psnr": 31.25, "ssim": 0.9}], "relight": [{"title": "light"}]}
+    numbers = {
+        "pse": [{"title": "a <b> edit", "psnr": 31.25, "ssim": 0.9}],
+        "relight": [{"title": "light"}],
+        "views": 6,
+    }
     record = {"stage": "pse", "dataset": "engine", "recipe": "quick", "variant": "", "seconds": 1.5}
     versions = {"versions": {"python": "3.11", "texgs": "1"}, "code_sha": "abc"}
     (folder / "metrics.json").write_text(json.dumps({**record, **versions, "numbers": numbers}))

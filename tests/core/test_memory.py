@@ -1,10 +1,11 @@
+import platform
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
-from texgs.core.memory import STATUS, keep_freed_memory, peak_memory
+from texgs.core.memory import STATUS, peak_memory
 
 
 def test_an_array_counts():
@@ -40,9 +41,6 @@ else:
         words = [sys.executable, "-c", code.replace("KEEP", keep)]
         faults.append(int(subprocess.run(words, capture_output=True, text=True, check=True).stdout))
     if faults[0] < 0:
+        assert platform.libc_ver()[0] != "glibc"
         pytest.skip("the C library is not glibc")
     assert faults[0] < 0.5 * faults[1]
-
-
-def test_asking_twice_is_harmless():
-    assert keep_freed_memory() == keep_freed_memory()

@@ -46,10 +46,26 @@ def test_gif_and_mp4_hold_the_frames_at_their_rate(tmp_path):
         ("a.avi", 2, 25, r"expected \.png, \.gif, \.mp4 or a folder, got \.avi"),
         ("a.png", 2, 25, "expected one frame, got several"),
         ("a.mp4", 0, 25, "expected at least one frame, got none"),
-        ("a.mp4", 2, 0, "fps: expected more than 0, got 0"),
+        ("a.mp4", 2, 0, "fps: expected more than 0 and at most 240, got 0"),
     ],
 )
 def test_what_cannot_be_written(tmp_path, name, given, fps, message):
     with pytest.raises(ArgumentError, match=message):
         write_frames(tmp_path / name, frames(given), fps)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_rate_that_is_no_whole_number_and_a_size_that_no_film_has(tmp_path):
+    av = pytest.importorskip("av")
+    write_frames(tmp_path / "a.mp4", frames(), fps=2.5)
+    with av.open(str(tmp_path / "a.mp4")) as film:
+        assert float(film.streams.video[0].average_rate) == 2.5
+    with pytest.raises(ArgumentError, match="MP4: 17000 x 16 pixels cannot be encoded"):
+        write_frames(tmp_path / "b.mp4", frames(2, 16, 17000))
+    assert not (tmp_path / "b.mp4").exists()
+
+
+def test_a_shorter_film_leaves_no_pictures_of_a_longer_one(tmp_path):
+    write_frames(tmp_path / "turn", frames(4))
+    write_frames(tmp_path / "turn", frames(2))
+    assert sorted(path.name for path in (tmp_path / "turn").iterdir()) == ["0000.png", "0001.png"]

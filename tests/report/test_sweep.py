@@ -7,17 +7,26 @@ from texgs.report.sweep import sweep
 from texgs.report.table import Table
 
 
-def run(folder, variant, seed=0, psnr=30.0, phases=("surfels", "shading", "texture")):
+def run(
+    folder,
+    variant,
+    seed=0,
+    psnr=30.0,
+    phases=("surfels", "shading", "texture"),
+    dataset="engine",
+    sweep="mine",
+):
     """Metrics files of one fit."""
     paths = []
     for phase in phases:
-        path = folder / f"{variant}-{seed}-{phase}.json"
+        path = folder / f"{dataset}-{variant}-{seed}-{phase}.json"
         numbers = {"fit_seconds": 60.0, "surfels": 1000}
         if phase == "texture":
             numbers |= {"psnr": psnr, "train_psnr": psnr + 1, "ssim": 0.9}
         if phase == "shading":
             numbers |= {f"{name}_median": 0.5 for name in ("ambient", "diffuse", "specular", "shininess")}
-        record = {"stage": phase, "dataset": "engine", "tf": "TF01", "recipe": "quick", "variant": variant}
+        record = {"stage": phase, "dataset": dataset, "tf": "TF01", "recipe": "quick"}
+        record |= {"variant": variant, "sweep": sweep}
         path.write_text(json.dumps({**record, "seed": seed, "peak_memory_mib": 1024.0, "numbers": numbers}))
         paths.append(path)
     return paths
@@ -40,14 +49,21 @@ def test_means_and_spread_over_seeds(tmp_path):
     assert "PSNR (paper)" not in [c.title for c in table.columns]
 
 
-def test_numbers_of_the_paper_stand_beside_the_variants_in_their_order(tmp_path):
-    paths = [path for name in ("162", "42", "92") for path in run(tmp_path, name)]
+def test_numbers_of_the_paper_stand_beside_the_variants_of_its_data_set_in_their_order(tmp_path):
+    options = {"dataset": "ionization", "sweep": "views"}
+    paths = [path for name in ("162", "42", "92") for path in run(tmp_path, name, **options)]
     table = sweep(paths, "views")
     assert column(table, "variant") == ["42", "92", "162"]
     assert column(table, "PSNR (paper)") == [29.33, 30.95, 31.64]
     assert column(table, "primitives (paper)")[0] == 60172
-    table = sweep(run(tmp_path, "400") + run(tmp_path, "77"), "resolution")
+    options = {"dataset": "supernova", "sweep": "resolution"}
+    table = sweep(run(tmp_path, "400", **options) + run(tmp_path, "77", **options), "resolution")
     assert column(table, "PSNR, training (paper)") == [None, 27.91], "77 is not the paper's"
+
+
+def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):
+    table = sweep(run(tmp_path, "42", sweep="views"), "views")
+    assert not [c.title for c in table.columns if "paper" in c.title]
 
 
 def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
@@ -56,8 +72,9 @@ def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
     assert set(table.rows[0][5:]) == {None}
 
 
-def test_fits_of_no_sweep_do_not_count_and_other_files_are_named(tmp_path):
-    assert sweep(run(tmp_path, ""), "mine").rows == []
+def test_fits_of_another_sweep_do_not_count_and_other_files_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="sweep mine: no fit of it among the metrics files; run it first"):
+        sweep(run(tmp_path, "a", sweep="other"), "mine")
     (tmp_path / "x.json").write_text("[]")
     with pytest.raises(ArgumentError, match=r"x\.json: expected the metrics of a job"):
         sweep([tmp_path / "x.json"], "mine")

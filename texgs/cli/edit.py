@@ -1,6 +1,7 @@
 """Edit a scene by words such as TF01.palette=#ff8800 and write it to a new file; nothing is trained."""
 
 import argparse
+import os
 from pathlib import Path
 from typing import Any
 
@@ -26,9 +27,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     read_scene(arguments.scene)  # says what is wrong with it before anything is changed
     values = read_values(arguments.scene)
+    values["models"] = {str(name): entry for name, entry in values["models"].items()}
     for word in arguments.overrides:
         try:
-            apply(values, word)
+            apply(values, word, arguments.scene.parent)
             scene = scene_of(values, arguments.scene.parent)
         except ArgumentError as error:
             raise ArgumentError(f"{word}: {error}") from error
@@ -37,8 +39,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def apply(values: dict[str, Any], word: str) -> None:
-    """Set one key of a scene's plain values.
+def apply(values: dict[str, Any], word: str, folder: Path) -> None:
+    """Set one key of a scene's plain values; files in them are relative to the folder.
 
     Raises:
         ArgumentError: if the word is no KEY=VALUE or names no model.
@@ -50,14 +52,29 @@ def apply(values: dict[str, Any], word: str) -> None:
         raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
     table = values
     if "." in key:
-        name, _, key = key.partition(".")
+        name, _, key = key.rpartition(".")
         if name not in values["models"]:
             raise ArgumentError(f"expected a model of the scene ({', '.join(values['models'])}), got {name}")
         table = values["models"][name]
     if text == "":
         table.pop(key, None)
+    elif key in ("file", "texture"):
+        table[key] = file(text, folder)
     else:
         table[key] = light(text) if key == "light" else plain(text)
+
+
+def file(text: str, folder: Path) -> str:
+    """A file, named from where one is, as scenes in a folder name it.
+
+    Raises:
+        ArgumentError: if it is not there.
+    """
+    from texgs.core.errors import ArgumentError
+
+    if not Path(text).is_file():
+        raise ArgumentError(f"expected a file that is there, got {text}")
+    return Path(os.path.relpath(Path(text).resolve(), folder.resolve())).as_posix()
 
 
 def plain(text: str) -> Any:

@@ -26,6 +26,7 @@ from texgs.core.io import read_json, write_json
 from texgs.core.memory import peak_memory
 
 STAMP = ".job.json"
+FILES = ".files.json"  # names of what the job wrote
 METRICS = "metrics.json"  # its presence tells the workflow that a job is done
 BY_HAND = "metrics.by_hand.json"  # the same of a job that the workflow does not know of
 PACKAGES = ("torch", "numpy", "vtk", "pyvista")
@@ -133,6 +134,9 @@ def _execute(job: Job, tracking: str | None, experiment: str, metrics_name: str)
         )
         seconds = time.perf_counter() - start
         metrics = {**record(job, identity, seconds), "run": run.id, "numbers": outcome.numbers}
+        write_json(
+            job.output / FILES, sorted({METRICS, BY_HAND, *(path.name for path in job.output.iterdir())})
+        )
         write_json(job.output / metrics_name, metrics)
         run.log(
             {"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(outcome.numbers)}
@@ -160,8 +164,21 @@ def claim(output: Path, identity: dict[str, Any]) -> None:
             raise ArgumentError(
                 f"{output}: expected an empty folder or one of texgs, got other files; move them away"
             )
+        if own := foreign_files(output):
+            raise ArgumentError(
+                f"{output}: the job is to be done again, but the folder also holds {', '.join(own[:3])}; "
+                "move what is yours away"
+            )
         shutil.rmtree(output)
     write_json(stamp, identity)
+
+
+def foreign_files(output: Path) -> list[str]:
+    """Files in the folder of a finished job that it did not write."""
+    if not (output / FILES).exists():
+        return []  # unfinished, or of no job at all
+    written = {*read_json(output / FILES), STAMP, FILES}
+    return sorted({path.name for path in output.iterdir()} - written)
 
 
 def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]:
@@ -182,9 +199,11 @@ def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]
 
 
 def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the recipe and of the variant of a sweep, where the stage is of a fit."""
+    """Names of the recipe, of the sweep and of its variant, where the stage is of a fit."""
     fit = settings.get("fit", {})
-    return {"recipe": fit["name"], "variant": fit["variant"]} if "variant" in fit else {}
+    if "variant" not in fit:
+        return {}
+    return {"recipe": fit["name"], "variant": fit["variant"], "sweep": fit["sweep"]}
 
 
 def gpu_name() -> str:

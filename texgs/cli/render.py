@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--output",
         type=Path,
-        help=".png, .gif, .mp4 or a folder; default SCENE.png, or .mp4 for several frames",
+        help=".png, .gif, .mp4 or a folder; default SCENE.png here, or .mp4 for several frames",
     )
     parser.add_argument(
         "--mode",
@@ -29,8 +29,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light 61")
     parser.add_argument("--width", type=int, default=800, help="pixels (%(default)s)")
     parser.add_argument("--height", type=int, help="pixels; default the width")
-    parser.add_argument("--azimuth", type=float, default=30.0, help="of the camera, degrees (%(default)s)")
-    parser.add_argument("--polar", type=float, default=20.0, help="above the horizon, degrees (%(default)s)")
+    parser.add_argument(
+        "--azimuth",
+        type=float,
+        default=30.0,
+        help="of the camera, degrees (%(default)s); on an orbit of the first; not of path test",
+    )
+    parser.add_argument(
+        "--polar", type=float, default=20.0, help="above the horizon, degrees (%(default)s); not of path test"
+    )
     parser.add_argument("--radius", type=float, default=4.0311, help="distance, world units (%(default)s)")
     parser.add_argument(
         "--fov", type=float, default=30.0, help="vertical field of view, degrees (%(default)s)"
@@ -41,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Render and write."""
+    from texgs.core.device import torch_device
     from texgs.core.errors import ArgumentError
     from texgs.core.movie import write_frames
     from texgs.core.progress import progress
@@ -52,8 +60,8 @@ def run(arguments: argparse.Namespace) -> int:
     scene = read_scene(arguments.scene)
     shots = list(shots_of(arguments, scene.light))
     suffix = ".png" if len(shots) == 1 else ".mp4"
-    output = arguments.output or arguments.scene.with_suffix(suffix)
-    composition = scene.open(arguments.device)
+    output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
+    composition = scene.open(torch_device(arguments.device))
     frames = (
         frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
         for camera, light in progress(shots, title=str(output), unit="frame")
@@ -70,17 +78,19 @@ def shots_of(arguments: argparse.Namespace, light: "Light") -> "Iterator[tuple[C
     """
     from texgs.core.camera import orbit
     from texgs.core.errors import ArgumentError
-    from texgs.volume.cameras import orbit_path, test_path
+    from texgs.volume.cameras import test_path
     from texgs.volume.view_set import Light
 
-    count = arguments.frames or PATHS[arguments.path]
+    count = PATHS[arguments.path] if arguments.frames is None else arguments.frames
     if count < 1:
         raise ArgumentError(f"--frames: expected at least 1, got {count}")
-    lens = (arguments.radius, arguments.fov, arguments.width, arguments.height or arguments.width)
+    height = arguments.width if arguments.height is None else arguments.height
+    lens = (arguments.radius, arguments.fov, arguments.width, height)
     if arguments.path == "test":
         return ((camera, light) for camera in test_path(count, *lens))
     if arguments.path == "orbit":
-        return ((camera, light) for camera in orbit_path(count, arguments.polar, *lens))
+        turn = (arguments.azimuth + 360 * i / count for i in range(count))
+        return ((orbit(azimuth, arguments.polar, *lens), light) for azimuth in turn)
     camera = orbit(arguments.azimuth, arguments.polar, *lens)
     if arguments.path == "view":
         return ((camera, light) for _ in range(count))

@@ -1,6 +1,7 @@
 """Write the tables that some metrics files hold, as CSV, Markdown and LaTeX."""
 
 import argparse
+import re
 from pathlib import Path
 
 
@@ -13,13 +14,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the tables and print them."""
+    from texgs.core.errors import ArgumentError
     from texgs.report.fitting import fitting
     from texgs.report.scene_tables import SCENE_TABLES
     from texgs.report.sweep import sweep
 
     paths = arguments.metrics or sorted(Path("results").rglob("metrics*.json"))
+    if not paths:
+        raise ArgumentError("tables: no metrics.json below results; run something first, such as make demo")
+    if arguments.sweep and not re.fullmatch(r"[A-Za-z0-9_-]+", arguments.sweep):
+        raise ArgumentError(f"--sweep: expected letters, digits, _ or -, got {arguments.sweep!r}")
     if arguments.sweep:
-        tables = {arguments.sweep: sweep(paths, arguments.sweep)}
+        tables = {f"sweep-{arguments.sweep}": sweep(paths, arguments.sweep)}
     else:
         tables = {"fitting": fitting(paths), **{name: make(paths) for name, make in SCENE_TABLES.items()}}
     for name, table in tables.items():

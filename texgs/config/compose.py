@@ -77,8 +77,13 @@ def check(config: DictConfig) -> None:
     """
     check_name("dataset.name", config.dataset.name)
     check_name("fit.name", config.fit.name)
-    if not re.fullmatch(r"[A-Za-z0-9_-]*", config.variant):
-        raise ConfigError(f"variant: expected letters, digits, _ or -, got {config.variant!r}")
+    for key, name in (("variant", config.variant), ("sweep.name", config.sweep.name)):
+        if not re.fullmatch(r"[A-Za-z0-9_-]*", name):
+            raise ConfigError(f"{key}: expected letters, digits, _ or -, got {name!r}")
+    if re.fullmatch("sheet|views.*", config.fit.name):
+        raise ConfigError(f"fit.name: {config.fit.name} is a folder of texgs; choose another name")
+    if not re.fullmatch("views(-.*)?", config.views.name):
+        raise ConfigError(f"views.name: expected views or views-..., got {config.views.name}")
     check_name("views.name", config.views.name)
     for tf in config.dataset.basic_tfs:
         check_name("dataset.basic_tfs", tf)

@@ -13,6 +13,7 @@ from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.code import code_digest, digest
 from texgs.config.locate import basic_tf, source_file, tf_names, views_folder
+from texgs.core.errors import ConfigError
 from texgs.core.io import write_atomic
 
 
@@ -44,6 +45,8 @@ class Stage:
         """Whether the data set goes through this stage: one of views has no volume."""
         if self.name == "sheet":  # of the views of a sweep there is none
             return bool(config.views.name == "views")
+        if self.name in ("compose", "pse", "timing"):  # of all basic TFs
+            return config.tf is None
         return config.dataset.views_folder is None or self.name not in ("volume", "transfer", "views")
 
     def output(self, config: DictConfig) -> Path:
@@ -115,7 +118,13 @@ def for_tf(config: DictConfig, name: str) -> DictConfig:
 
 
 def all_models(config: DictConfig) -> dict[str, Path]:
-    """The textured models of all basic TFs, by name."""
+    """The textured models of all basic TFs, by name.
+
+    Raises:
+        ConfigError: if one basic TF is chosen.
+    """
+    if config.tf is not None:
+        raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
     return {
         name: STAGES["texture"].output(for_tf(config, name)) / "model.safetensors"
         for name in tf_names(config)
@@ -140,8 +149,16 @@ def scene_settings(config: DictConfig) -> dict[str, Any]:
 
 
 def fit_label(config: DictConfig) -> dict[str, Any]:
-    """Which fit a scene is made of, for its metrics."""
-    return {"fit": {"name": config.fit.name, "variant": config.variant, "seed": config.fit.seed}}
+    """Which fit this is, and what it runs on."""
+    return {
+        "fit": {
+            "name": config.fit.name,
+            "seed": config.fit.seed,
+            "sweep": config.sweep.name,
+            "variant": config.variant,
+            "device": config.device.name,
+        }
+    }
 
 
 def view_settings(config: DictConfig) -> dict[str, Any]:
@@ -160,13 +177,8 @@ def models(config: DictConfig) -> dict[str, Path]:
 
 def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
     """What a stage of the fit reads: what holds for all of them, and its own parts."""
-    common = ("name", "seed", "reduce")
     return lambda config: {
-        "fit": {
-            **{part: config.fit[part] for part in (*common, *parts)},
-            "variant": config.variant,
-            "device": config.device.name,
-        }
+        "fit": {**fit_label(config)["fit"], **{part: config.fit[part] for part in ("reduce", *parts)}}
     }
 
 
@@ -250,7 +262,7 @@ STAGES = {
             "texgs.cli.stages.figure",
             select=lambda config: {
                 "fit": {
-                    "name": config.fit.name,
+                    **fit_label(config)["fit"],
                     "reduce": config.fit.reduce,
                     "surfels_iterations": config.fit.surfels.iterations,
                 }

@@ -19,18 +19,14 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
         raise ConfigError("sweep.seeds: expected at least one, got none")
     found = []
     for name, changes in sweep.variants.items():
+        if not name:
+            raise ConfigError("sweep.variants: expected a name for each variant, got an empty one")
         for change in changes:
-            if change.split("=")[0].lstrip("+") in (
-                "results",
-                "dataset",
-                "tf",
-                "tracking",
-                "sweep",
-                "variant",
-            ):
+            key = change.split("=")[0].lstrip("+")
+            if key.split(".")[0] not in ("views", "fit", "device") or key == "fit.seed":
                 raise ConfigError(
                     f"sweep.variants.{name}: expected overrides of views, fit or device, got {change}; "
-                    "the rest is the same for all variants"
+                    "seeds go to sweep.seeds, the rest is the same for all variants"
                 )
         keys = [change.split("=")[0] for change in changes]
         has_views = any(key.startswith("views") for key in keys) and "views.name" not in keys

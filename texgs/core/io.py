@@ -44,6 +44,8 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
         scratch.unlink(missing_ok=True)
         if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise ArgumentError(f"{path}: no space left there; free some or choose another folder") from error
+        if path.is_dir():
+            raise ArgumentError(f"{path}: expected the name of a file, got a folder; add a name") from error
         raise
     return path
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from fractions import Fraction
 from itertools import chain
 from pathlib import Path
 from typing import IO, Any
@@ -14,6 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 
 KINDS = (".png", ".gif", ".mp4")
+MOST_FPS = 240.0
 
 
 def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0) -> Path:
@@ -34,23 +36,28 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
     path = Path(path)
     if path.suffix not in ("", *KINDS):
         raise ArgumentError(f"{path}: expected {', '.join(KINDS)} or a folder, got {path.suffix}")
-    if not fps > 0:
-        raise ArgumentError(f"fps: expected more than 0, got {fps}")
+    if not 0 < fps <= MOST_FPS:
+        raise ArgumentError(f"fps: expected more than 0 and at most {MOST_FPS:g}, got {fps}")
     left = iter(frames)
     first = next(left, None)
     if first is None:
         raise ArgumentError(f"{path}: expected at least one frame, got none")
     every = chain([first], left)
     if path.suffix == "":
-        for index, frame in enumerate(every):
-            _write_png(path / f"{index:04}.png", frame)
+        count = 0
+        for frame in every:
+            _write_png(path / f"{count:04}.png", frame)
+            count += 1
+        while (earlier := path / f"{count:04}.png").exists():  # of a longer film
+            earlier.unlink()
+            count += 1
     elif path.suffix == ".png":
         if next(left, None) is not None:
             raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")
         _write_png(path, first)
     else:
         write = _write_gif if path.suffix == ".gif" else _write_mp4
-        write_atomic(path, lambda file: write(file, every, fps))
+        write_atomic(path, lambda file: write(file, chain([first], left), fps))
     return path
 
 
@@ -60,20 +67,37 @@ def _write_png(path: Path, frame: np.ndarray) -> None:
 
 def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
     first, *rest = (Image.fromarray(frame) for frame in frames)
-    first.save(file, format="GIF", save_all=True, append_images=rest, duration=round(1000 / fps), loop=0)
+    first.save(
+        file, format="GIF", save_all=True, append_images=rest, duration=max(20, round(1000 / fps)), loop=0
+    )
 
 
 def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
-    """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even."""
+    """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even.
+
+    Raises:
+        ArgumentError: if the codec does not take the size.
+    """
     import av
 
+    first = next(frames)
+    try:
+        _encode(av, file, chain([first], frames), fps)
+    except av.error.FFmpegError as error:
+        height, width = first.shape[:2]
+        raise ArgumentError(
+            f"MP4: {width} x {height} pixels cannot be encoded ({error.strerror}); write a folder of pictures"
+        ) from error
+
+
+def _encode(av: Any, file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
     with av.open(file, "w", format="mp4") as container:
         stream: Any = None
         for frame in frames:
             height, width = frame.shape[:2]
             even = np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
             if stream is None:
-                stream = container.add_stream("libx264", rate=round(fps))
+                stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
                 stream.height, stream.width = even.shape[:2]
                 stream.pix_fmt, stream.options = "yuv420p", {"crf": "18"}
             container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))

@@ -55,7 +55,7 @@ def content_box(planes: np.ndarray) -> Box:
 
 @torch.no_grad()
 def surfel_box(parameters: Mapping[str, Tensor], optics: Optics, camera: Camera) -> Box:
-    """A box around all that surfels can draw: their bounding spheres, projected.
+    """A box around all that surfels can draw: their bounding spheres, projected. A GPU is waited for once.
 
     The whole image where a sphere reaches behind the camera, or a value is not finite.
     """
@@ -63,7 +63,8 @@ def surfel_box(parameters: Mapping[str, Tensor], optics: Optics, camera: Camera)
     means = parameters["means"]
     if not len(means):
         return Box(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
-    x, y, z = (means @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]).unbind(dim=1)
+    viewmat = camera.viewmat.to(means.device)
+    x, y, z = (means @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(dim=1)
     reach = REACH * parameters["scales"].amax(dim=1).exp()
     near, far = z - reach, z + reach
     bounds = [near.min()]

@@ -70,9 +70,8 @@ class Images:
 
     def visible(self, index: int, parameters: Mapping[str, Tensor], optics: Optics) -> Target:
         """The part of a view in which it or the surfels show anything, on the surfels' device."""
-        device = parameters["means"].device
-        around = surfel_box(parameters, optics, self.cameras[index].to(device))
-        return self.target(index, device, around)
+        around = surfel_box(parameters, optics, self.cameras[index])
+        return self.target(index, parameters["means"].device, around)
 
 
 def load(views: Sequence[View], reduce: int = 1) -> Images:

@@ -20,7 +20,7 @@ from texgs.scene.model import MATERIAL, Optics
 
 USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
 SMALLEST = 1e-3  # distance, world units
-CHECKED_EVERY = 100  # iterations between looks at the loss: a GPU need not wait in between
+CHECKED_EVERY = 100  # iterations between looks at the loss and all parameters
 
 
 @dataclass(frozen=True)
@@ -74,6 +74,7 @@ class Fit:
         self.optics, self.images, self.phase, self.seed = optics, images, phase, seed
         self.iteration = 0
         self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
+        self.losses: list[float] = []  # that were looked at, every CHECKED_EVERY iterations and at the end
         size = extent(images, parameters["means"])
         self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
         means = self.parameters["means"]
@@ -96,6 +97,7 @@ class Fit:
             if is_looked_at:
                 require_finite(self.iteration, {"loss": loss, **self.parameters})
             value = float(loss) if is_looked_at else None
+            self.losses += [] if value is None else [value]
             yield Progress(self.iteration, len(self.parameters["means"]), value)
 
     def step(self) -> Tensor:
@@ -137,7 +139,7 @@ class Fit:
         """Everything a resumed run needs, as tensors."""
         control = {"control.gradients": self.control.gradients, "control.counts": self.control.counts}
         clock = {"iteration": torch.tensor(self.iteration), "seconds": torch.tensor(self.seconds).double()}
-        return {**self.optimizer.state(), **control, **clock}
+        return {**self.optimizer.state(), **control, **clock, "losses": torch.tensor(self.losses).double()}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
         """Go on from what `state` returned."""
@@ -147,6 +149,7 @@ class Fit:
         self.control.counts = state["control.counts"].to(device, copy=True)
         self.iteration = int(state["iteration"])
         self.seconds = float(state["seconds"])
+        self.losses = state["losses"].tolist()
 
 
 def require_finite(iteration: int, tensors: Mapping[str, Tensor]) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from texgs.core.io import write_bytes
 from texgs.report.fitting import fitting
 from texgs.report.metrics_files import PHASES, read
-from texgs.report.scene_tables import SCENE_TABLES
+from texgs.report.scene_tables import SCENE_TABLES, label
 from texgs.report.table import Table
 
 PICTURES = {  # files beside the metrics of a stage, and what they show
@@ -71,8 +71,12 @@ def sections(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> dict[str, list[d
         for name, words in PICTURES[metrics["stage"]].items():
             picture = path.with_name(name)
             if picture.is_file():
-                label = " ".join(str(metrics[key]) for key in ("tf", "recipe", "variant") if metrics.get(key))
-                entry = {"uri": data_uri(picture.read_bytes()), "label": label, "words": words}
+                words_before = (metrics.get("tf"), label(metrics))
+                entry = {
+                    "uri": data_uri(picture.read_bytes()),
+                    "label": " ".join(filter(None, words_before)),
+                    "words": words,
+                }
                 found.setdefault(metrics["dataset"], []).append(entry)
     return dict(sorted(found.items()))
 
@@ -91,7 +95,9 @@ def curves(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> bytes:
     for metrics in found:
         losses, total = metrics["numbers"]["losses"], metrics["numbers"]["iterations"]
         steps = [total * (i + 1) / len(losses) for i in range(len(losses))]
-        axes.semilogy(steps, losses, label=f"{metrics['dataset']}/{metrics['tf']} {metrics['stage']}")
+        axes.semilogy(
+            steps, losses, label=f"{metrics['dataset']}/{metrics['tf']} {label(metrics)} {metrics['stage']}"
+        )
     axes.set_xlabel("iterations")
     axes.set_ylabel("loss of one view")
     axes.legend(fontsize=7)

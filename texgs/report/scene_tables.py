@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,36 +19,31 @@ def datasets(paths: Iterable[str | Path]) -> Table:
         Column("volume MiB", 1),
         Column("views px"),
         Column("basic scenes", 0),
+        Column("device"),
         Column("ms / frame", 1),
         Column("MiB (paper)", 1, UNPUBLISHED),
         Column("ms / frame (paper)", 1, UNPUBLISHED),
     )
-    published, volumes = paper("datasets"), {}
-    views: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    published = paper("datasets")
+    volumes: dict[str, dict[str, Any]] = {}
+    views: dict[tuple[str, str, str], dict[str, float | None]] = defaultdict(dict)
     for _, metrics in read(paths):
+        n = metrics["numbers"]
         if metrics["stage"] == "volume":
-            volumes[metrics["dataset"]] = metrics["numbers"]
+            volumes[metrics["dataset"]] = n
         if metrics["stage"] == "views":
-            views[metrics["dataset"]].append(metrics["numbers"])
+            size = f"{n['width']}x{n['height']}"
+            views[metrics["dataset"], size, metrics["device"]][metrics["tf"]] = n.get("frame_ms")
     rows: list[list[Cell]] = []
-    for name, volume in sorted(volumes.items()):
-        shown, theirs = views[name], published.get((name,), {})
-        times = [numbers["frame_ms"] for numbers in shown if "frame_ms" in numbers]
+    for (name, size, device), by_tf in sorted(views.items()):
+        volume, theirs = volumes.get(name), published.get((name,), {})
+        times = [ms for ms in by_tf.values() if ms is not None]
+        of_volume = ["x".join(map(str, volume["dims"])), volume["volume_mib"]] if volume else [None, None]
+        mean = sum(times) / len(times) if times else None
         rows.append(
-            [
-                name,
-                "x".join(map(str, volume["dims"])),
-                volume["volume_mib"],
-                f"{shown[0]['width']}x{shown[0]['height']}" if shown else None,
-                len(shown),
-                sum(times) / len(times) if times else None,
-                number(theirs, "volume_mib"),
-                number(theirs, "dvr_ms"),
-            ]
+            [name, *of_volume, size, len(by_tf), device, mean, *numbers(theirs, "volume_mib", "dvr_ms")]
         )
-    return Table(
-        "Volume rendering of single basic TFs, on the CPU. The paper: on an RTX 4090.", columns, rows
-    )
+    return Table("Volume rendering of single basic TFs. The paper: on an RTX 4090.", columns, rows)
 
 
 def rendering(paths: Iterable[str | Path]) -> Table:
@@ -58,6 +53,7 @@ def rendering(paths: Iterable[str | Path]) -> Table:
         Column("recipe"),
         Column("primitives", 0),
         Column("pixels"),
+        Column("device"),
         Column("threads", 0),
         Column("mean ms", 2),
         Column("max ms", 2),
@@ -68,12 +64,10 @@ def rendering(paths: Iterable[str | Path]) -> Table:
     for _, metrics in read(paths):
         if metrics["stage"] == "timing":
             n, volume = metrics["numbers"], metrics["numbers"].get("volume_mean_ms")
-            size, ratio = (
-                f"{n['width']}x{n['height']}",
-                None if volume is None else volume / n["frame_mean_ms"],
-            )
-            cells = [n["surfels"], size, n["threads"], n["frame_mean_ms"], n["frame_max_ms"], volume, ratio]
-            rows.append([metrics["dataset"], label(metrics), *cells])
+            ratio = None if volume is None else volume / n["frame_mean_ms"]
+            where = [n["surfels"], f"{n['width']}x{n['height']}", metrics["device"], n["threads"]]
+            times = [n["frame_mean_ms"], n["frame_max_ms"], volume, ratio]
+            rows.append([metrics["dataset"], label(metrics), *where, *times])
     caption = (
         "Test path. The paper, means over scenes on an RTX 4090: 11.82 ms at 800x800, 7.21 ms at 512x512."
     )
@@ -99,8 +93,8 @@ def model_size(paths: Iterable[str | Path]) -> Table:
             found[metrics["dataset"], label(metrics)].append(metrics["numbers"])
     rows: list[list[Cell]] = []
     for (name, recipe), parts in sorted(found.items()):
-        sums = [sum(numbers[key] for numbers in parts) for key in ("surfels", *groups)]
-        theirs = [number(published.get((name,), {}), key) for key in groups]
+        sums = [sum(each[key] for each in parts) for key in ("surfels", *groups)]
+        theirs = numbers(published.get((name,), {}), *groups)
         rows.append([name, recipe, len(parts), *sums, *theirs])
     return Table("Sums over the basic scenes, 32 bits a value.", columns, rows)
 
@@ -111,6 +105,7 @@ def edits(paths: Iterable[str | Path]) -> Table:
         Column("data set"),
         Column("recipe"),
         Column("edit"),
+        Column("views", 0),
         Column("PSNR", 2),
         Column("SSIM", 4),
     )
@@ -118,19 +113,20 @@ def edits(paths: Iterable[str | Path]) -> Table:
     for _, metrics in read(paths):
         if metrics["stage"] == "pse":
             for step in (*metrics["numbers"]["pse"], *metrics["numbers"]["relight"]):
-                quality = [step.get("psnr"), step.get("ssim")]
+                quality = [metrics["numbers"]["views"], step.get("psnr"), step.get("ssim")]
                 rows.append([metrics["dataset"], label(metrics), step["title"], *quality])
     return Table("Views around the object; nothing is trained for an edit.", columns, rows)
 
 
-def label(metrics: dict[str, Any]) -> str:
-    """Recipe and variant, as they stand in tables."""
-    return "-".join(part for part in (metrics.get("recipe", ""), metrics.get("variant", "")) if part)
+def label(metrics: Mapping[str, Any]) -> str:
+    """Recipe, variant and a seed other than 0, as they stand in tables."""
+    seed = f"s{metrics['seed']}" if metrics.get("seed") else ""
+    return "-".join(part for part in (metrics.get("recipe", ""), metrics.get("variant", ""), seed) if part)
 
 
-def number(line: dict[str, str], key: str) -> float | None:
-    """A number of the paper, where it has one."""
-    return float(line[key]) if line.get(key) else None
+def numbers(line: dict[str, str], *keys: str) -> list[float | None]:
+    """Numbers of the paper, where it has them."""
+    return [float(line[key]) if line.get(key) else None for key in keys]
 
 
 SCENE_TABLES = {"datasets": datasets, "rendering": rendering, "model_size": model_size, "edits": edits}

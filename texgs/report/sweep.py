@@ -8,6 +8,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
+from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import fits, paper
 from texgs.report.table import UNPUBLISHED, Cell, Column, Table
 
@@ -44,24 +45,29 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
     """The table of the variants among some metrics files.
 
     Args:
-        paths: metrics files; those of fits without a variant do not count.
-        name: of the sweep; the paper's numbers stand beside those of the same name, where it has them.
+        paths: metrics files; those of other fits do not count.
+        name: of the sweep; the paper's numbers stand beside those of its data set, where it has them.
 
     Raises:
-        ArgumentError: if a file is no metrics file.
+        ArgumentError: if a file is no metrics file, or none is of the sweep.
     """
     groups: dict[tuple[str, ...], dict[int, dict[str, dict[str, Any]]]] = defaultdict(
         lambda: defaultdict(dict)
     )
     for _, metrics in fits(paths):
-        if metrics.get("variant"):
+        if metrics.get("variant") and metrics["sweep"] == name:
             key = tuple(metrics[part] for part in ("dataset", "tf", "recipe", "variant"))
             groups[key][metrics["seed"]][metrics["stage"]] = metrics
-    published = paper(name)
-    beside = [PUBLISHED[key] for key in PUBLISHED if any(key in line for line in published.values())]
+    if not groups:
+        raise ArgumentError(f"sweep {name}: no fit of it among the metrics files; run it first")
+    published = paper(name, keys=2)
+    lines = [
+        published[dataset, variant] for dataset, _, _, variant in groups if (dataset, variant) in published
+    ]
+    beside = [PUBLISHED[key] for key in PUBLISHED if any(key in line for line in lines)]
     rows = []
     for key, by_seed in sorted(groups.items(), key=lambda item: (*item[0][:3], natural(item[0][3]))):
-        line = published.get((key[3],), {})
+        line = published.get((key[0], key[3]), {})
         theirs = [float(line[k]) if line.get(k) else None for k, c in PUBLISHED.items() if c in beside]
         rows.append([*key, *cells(list(by_seed.values())), *theirs])
     return Table(CAPTION, (*COLUMNS, *beside), rows)

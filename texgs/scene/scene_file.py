@@ -127,7 +127,7 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     path = Path(path)
 
     def relative(file: Path) -> str:
-        return Path(os.path.relpath(file, path.parent)).as_posix()
+        return Path(os.path.relpath(file.resolve(), path.parent.resolve())).as_posix()
 
     models = {}
     for name, entry in scene.models.items():

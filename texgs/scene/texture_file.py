@@ -73,6 +73,7 @@ def _read(path: Path) -> dict[str, Tensor]:
         raise ArgumentError(f"{path}: no such file") from error
     except (OSError, SafetensorError) as error:
         raise ArgumentError(f"{path}: expected a {FORMAT} file, got {error}") from error
-    if set(found) != {"texels", "sizes"} or len(found["texels"]) != int(found["sizes"].long().prod(1).sum()):
+    shapes = [found[name].shape[1:] for name in ("texels", "sizes") if name in found]
+    if shapes != [(3,), (2,)] or len(found["texels"]) != int(found["sizes"].long().prod(1).sum()):
         raise ArgumentError(f"{path}: expected texels and sizes that fit each other; make it again")
     return found

@@ -118,7 +118,7 @@ if MISSING:
         sys.exit(2)
 
 STORE = CONFIG.tracking.uri
-GPU = int(CONFIG.device.mapper == "gpu")  # a volume mapper's
+MAPPER_GPU, FIT_GPU = int(CONFIG.device.mapper == "gpu"), int(CONFIG.device.name == "cuda")
 
 # In front of the commands, not a parameter of the rules: where runs are recorded changes no result.
 ENVIRONMENT = (

@@ -22,6 +22,8 @@ rule surfels:
     benchmark:
         "<benchmarks>/{dataset}/{tf}/{fit}/surfels.tsv"
     threads: 4
+    resources:
+        gpu=FIT_GPU,
     params:
         settings=lambda wildcards: settings("surfels", wildcards),
         code=STAGES["surfels"].code,
@@ -44,6 +46,8 @@ rule shading:
     benchmark:
         "<benchmarks>/{dataset}/{tf}/{fit}/shading.tsv"
     threads: 4
+    resources:
+        gpu=FIT_GPU,
     params:
         settings=lambda wildcards: settings("shading", wildcards),
         code=STAGES["shading"].code,
@@ -65,6 +69,8 @@ rule texture:
     benchmark:
         "<benchmarks>/{dataset}/{tf}/{fit}/texture.tsv"
     threads: 4
+    resources:
+        gpu=FIT_GPU,
     params:
         settings=lambda wildcards: settings("texture", wildcards),
         code=STAGES["texture"].code,

@@ -48,7 +48,7 @@ rule pse:
         "2>&1 | tee {log:q}"
 
 
-# Alone on the machine: other jobs would be measured with it.
+# As many threads as most machines have: other jobs would be measured with it.
 rule timing:
     input:
         unpack(lambda wildcards: inputs("timing", wildcards)),
@@ -56,7 +56,9 @@ rule timing:
         metrics="<results>/{dataset}/scene/{fit}/timing/metrics.json",
     log:
         "<logs>/{dataset}/scene/{fit}/timing.log",
-    threads: workflow.cores
+    threads: 16
+    resources:
+        gpu=FIT_GPU,
     params:
         settings=lambda wildcards: settings("timing", wildcards),
         code=STAGES["timing"].code,

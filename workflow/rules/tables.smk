@@ -23,7 +23,7 @@ rule sweep:
     input:
         lambda wildcards: done("surfels", "shading", "texture", sweep=wildcards.sweep),
     output:
-        collect("<results>/tables/{{sweep}}.{format}", format=("csv", "md", "tex")),
+        collect("<results>/tables/sweep-{{sweep}}.{format}", format=("csv", "md", "tex")),
     log:
         "<logs>/tables-{sweep}.log",
     params:

@@ -20,6 +20,8 @@ rule views:
     benchmark:
         "<benchmarks>/{dataset}/{tf}/{views}.tsv"
     threads: 4
+    resources:
+        gpu=MAPPER_GPU,
     params:
         settings=lambda wildcards: settings("views", wildcards),
         code=STAGES["views"].code,

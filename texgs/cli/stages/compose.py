@@ -5,6 +5,7 @@ from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
 from texgs.core.camera import orbit
+from texgs.core.device import torch_device
 from texgs.core.movie import write_frames
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import Scene, SceneModel, write_scene
@@ -22,7 +23,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     """
     scene = Scene({name: SceneModel(path) for name, path in inputs.items()})
     write_scene(output / "scene.yaml", scene)
-    composition = scene.open()
+    composition = scene.open(torch_device(settings["fit"]["device"]))
     camera = orbit(*FRONT, settings["image"], settings["image"])
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     path = write_frames(output / "scene.png", [picture])

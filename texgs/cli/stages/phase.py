@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
-from texgs.core.errors import DeviceError
 from texgs.core.progress import progress
 from texgs.fit import checkpoint
 from texgs.fit.images import Images
@@ -26,17 +25,6 @@ def phase_from(values: Mapping[str, Any]) -> Phase:
     """A phase from the plain values of its settings."""
     parts = {"rates": Rates, "losses": Losses, "densify": Densify}
     return Phase(**{**values, **{name: kind(**values[name]) for name, kind in parts.items()}})
-
-
-def device_of(fit: Mapping[str, Any]) -> torch.device:
-    """The device that a recipe asks for.
-
-    Raises:
-        DeviceError: if torch sees no GPU.
-    """
-    if fit["device"] == "cuda" and not torch.cuda.is_available():
-        raise DeviceError("device=cuda: torch sees no GPU; leave it out to fit on the CPU, see texgs doctor")
-    return torch.device(fit["device"])
 
 
 def gpu_memory(device: torch.device) -> dict[str, float]:
@@ -58,7 +46,7 @@ def run_phase(
     """Run the loop from the last checkpoint in the folder, if there is one.
 
     Returns:
-        The model, the seconds of all runs together, and the losses that this one looked at.
+        The model, the seconds of all runs together, and the losses that they looked at.
     """
     fit = Fit(parameters, optics, images, phase, seed)
     folder = output / CHECKPOINT
@@ -66,16 +54,14 @@ def run_phase(
         fit.restore(state)
     saved = time.monotonic()
     start = saved - fit.seconds
-    losses = []
     steps = phase.iterations - fit.iteration
-    for done in progress(fit.run(), steps, title=title, unit="view") if steps else ():
-        losses += [done.loss] if done.loss is not None else []
+    for _ in progress(fit.run(), steps, title=title, unit="view") if steps else ():
         if time.monotonic() - saved > SAVED_EVERY:
             fit.seconds = time.monotonic() - start
             checkpoint.save(folder, fit)
             saved = time.monotonic()
     seconds = time.monotonic() - start
-    return Model({name: x.detach() for name, x in fit.parameters.items()}, optics), seconds, losses
+    return Model({name: x.detach() for name, x in fit.parameters.items()}, optics), seconds, fit.losses
 
 
 def quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:

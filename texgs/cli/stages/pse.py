@@ -12,6 +12,7 @@ import torch
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.volume_scene import VolumeScene
 from texgs.core.camera import Camera
+from texgs.core.device import torch_device
 from texgs.core.progress import progress
 from texgs.metrics.image import psnr, ssim
 from texgs.report.strip import write_strip
@@ -43,7 +44,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         output: folder.
     """
     scene, views = read_scene(inputs["scene"]), settings["views"]
-    composition = scene.open()
+    composition = scene.open(torch_device(settings["fit"]["device"]))
     volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
     cameras = orbit_path(COMPARED, POLAR, *lens)
@@ -111,15 +112,18 @@ def compared(
     """PSNR and SSIM against the volume over some views, and the first of these [H, W, 3] from each."""
     found: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
-    background = torch.tensor(step.scene.background)
+    background = composition.means.new_tensor(step.scene.background)
     for camera in cameras if volume else cameras[:1]:
-        image = composition.render(camera, step.scene.light, step.scene.edits, background=background).color
+        image = composition.render(
+            camera.to(background.device), step.scene.light, step.scene.edits, background=background
+        ).color
+        image = image.cpu()
         shown.setdefault("scene", image.clamp(0, 1).numpy())
         if volume is not None:
             rgba = torch.from_numpy(
                 volume.render(camera, step.scene.light, step.scene.edits, palettes(composition))
             )
-            truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background
+            truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
             found["psnr"].append(psnr(image, truth))
             found["ssim"].append(ssim(image, truth))
@@ -127,5 +131,5 @@ def compared(
 
 
 def caption(entry: Mapping[str, Any]) -> str:
-    """Title of a picture, with its PSNR where it was measured."""
-    return entry["title"] + (f", {entry['psnr']:.1f} dB" if "psnr" in entry else "")
+    """Title of a picture, with the mean PSNR of all views where it was measured."""
+    return entry["title"] + (f"\nmean of {COMPARED} views: {entry['psnr']:.1f} dB" if "psnr" in entry else "")

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import CHECKPOINT, device_of, gpu_memory, phase_from, quality, run_phase
+from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
+from texgs.core.device import torch_device
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import base_color
 from texgs.fit.images import load
@@ -24,7 +25,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         output: folder.
     """
     fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: shading"
-    device = device_of(fit)
+    device = torch_device(fit["device"])
     views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
     images = load(views.train, fit["reduce"])
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}

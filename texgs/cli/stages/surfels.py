@@ -6,7 +6,8 @@ from typing import Any
 import torch
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import CHECKPOINT, device_of, gpu_memory, phase_from, quality, run_phase
+from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
+from texgs.core.device import torch_device
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import join, split, zeroth
 from texgs.fit.images import load
@@ -37,7 +38,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
-    device = device_of(fit)
+    device = torch_device(fit["device"])
     start = {name: x.to(device) for name, x in {**parameters, **split(sh)}.items()}
     model, seconds, losses = run_phase(start, optics, images, phase, fit["seed"], output, title)
     model = Model(join(model.parameters), optics, {"dataset": settings["dataset"], "tf": settings["tf"]})

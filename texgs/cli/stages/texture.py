@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import device_of, gpu_memory, quality, training_quality
+from texgs.cli.stages.phase import gpu_memory, quality, training_quality
+from texgs.core.device import torch_device
 from texgs.fit.images import load
 from texgs.fit.texels import texturize
 from texgs.scene.model_file import read_model, write_model
@@ -22,7 +23,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         output: folder.
     """
     fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: texture"
-    device = device_of(fit)
+    device = torch_device(fit["device"])
     views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
     images = load(views.train, fit["reduce"])
     start = time.monotonic()

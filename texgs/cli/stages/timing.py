@@ -11,6 +11,7 @@ import torch
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.volume_scene import VolumeScene
 from texgs.core.camera import Camera
+from texgs.core.device import torch_device
 from texgs.core.progress import progress
 from texgs.scene.scene_file import read_scene
 from texgs.volume.cameras import test_path
@@ -30,9 +31,12 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     scene, views = read_scene(inputs["scene"]), settings["views"]
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
     cameras = test_path(views["test"]["count"], *lens)
-    composition = scene.open()
+    composition = scene.open(torch_device(settings["fit"]["device"]))
     title = f"{settings['dataset']}: timing"
-    frames = milliseconds(lambda camera: composition.render(camera, scene.light, scene.edits), cameras, title)
+    device = composition.means.device
+    frames = milliseconds(
+        lambda camera: composition.render(camera.to(device), scene.light, scene.edits), cameras, title
+    )
     numbers = {
         "frame_mean_ms": fmean(frames),
         "frame_max_ms": max(frames),
@@ -45,7 +49,9 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     if "volume" in inputs:
         volume = VolumeScene(settings, inputs["volume"])
         some = cameras[:: max(1, len(cameras) // VOLUME_FRAMES)]
-        of_volume = milliseconds(lambda camera: volume.render(camera, scene.light), some, f"{title}, volume")
+        of_volume = milliseconds(
+            lambda camera: volume.render(camera, scene.light, scene.edits), some, f"{title}, volume"
+        )
         numbers |= {"volume_mean_ms": fmean(of_volume), "volume_max_ms": max(of_volume)}
     return Outcome(numbers)
 
@@ -58,5 +64,7 @@ def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], 
     for camera in progress(cameras, title=title, unit="frame"):
         start = time.perf_counter()
         render(camera)
+        if torch.cuda.is_available():
+            torch.cuda.synchronize()
         found.append(1e3 * (time.perf_counter() - start))
     return found

@@ -62,6 +62,8 @@ class VolumeScene:
         for index, (name, edit) in enumerate(zip(self.tfs, edits, strict=True)):
             if edit.visible and edit.opacity > 0:
                 shown[name] = edited(self.tfs[name], edit, palettes[index] if edit.palette else ())
+        if not shown:
+            return np.zeros((camera.height, camera.width, 4), dtype=np.float32)
         first = next(edit for edit in edits if edit.visible and edit.opacity > 0)
         names = ("ambient", "diffuse", "specular", "shininess")
         factors = {name: getattr(self.look, name) * getattr(first, name) for name in names}
