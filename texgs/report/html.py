@@ -26,6 +26,7 @@ PICTURES = {  # files beside the metrics of a stage, and what they show
     "figure": {"figure.png": "Test views, the phases of the fit, errors, normals, depth and material."},
 }
 ORDER = tuple(PICTURES)
+NARROW = ("scene.png", "transfer.png")  # readable at any width; the others scroll on a narrow window
 JOB = ("stage", "dataset", "tf", "recipe", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
 
@@ -73,6 +74,7 @@ def sections(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> dict[str, list[d
             if picture.is_file():
                 words_before = (metrics.get("tf"), label(metrics))
                 entry = {
+                    "kind": "" if name in NARROW else "wide",
                     "uri": data_uri(picture.read_bytes()),
                     "label": " ".join(filter(None, words_before)),
                     "words": words,
