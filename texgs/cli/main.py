@@ -30,6 +30,7 @@ VERBS = {
     **STAGE_VERBS,
     "edit": "change colours, opacities and lights of a scene",
     "render": "render a scene to PNG, GIF or MP4",
+    "export": "export a scene or a model as Gaussians, points, a mesh or a compact file",
     "tables": "write the tables that metrics files hold",
     "report": "write one HTML file with the pictures, tables and provenance of all jobs",
     "doctor": "show what is installed, what is missing and what to do about it",

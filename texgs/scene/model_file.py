@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,17 @@ def write_model(path: str | Path, model: Model) -> Path:
     """
     from safetensors.numpy import save
 
+    text = json.dumps(describe(path, model))
+    arrays = {name: x.detach().cpu().contiguous().numpy() for name, x in model.parameters.items()}
+    return write_bytes(path, save(arrays, {FORMAT: text}))
+
+
+def describe(path: str | Path, model: Model) -> dict[str, Any]:
+    """What a file at `path` says about a model besides its tensors, in JSON, once these can be written.
+
+    Raises:
+        ArgumentError, ShapeError: as `write_model`.
+    """
     _check(path, model, model.stage)
     description = {
         "version": VERSION,
@@ -52,11 +64,10 @@ def write_model(path: str | Path, model: Model) -> Path:
         "metadata": dict(model.metadata),
     }
     try:
-        text = json.dumps(description, allow_nan=False)
+        json.dumps(description, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise ArgumentError(f"{path}: metadata cannot be written as JSON: {error}") from error
-    arrays = {name: x.detach().cpu().contiguous().numpy() for name, x in model.parameters.items()}
-    return write_bytes(path, save(arrays, {FORMAT: text}))
+    return description
 
 
 def read_model(path: str | Path) -> Model:
@@ -67,7 +78,15 @@ def read_model(path: str | Path) -> Model:
             newer version, or a tensor is missing, unknown, not finite or of another type or shape.
     """
     path = Path(path)
-    description, tensors = _open(path)
+    return model_of(path, *_open(path))
+
+
+def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Model:
+    """The model that the tensors of a file and what `describe` says about them make.
+
+    Raises:
+        ArgumentError, ShapeError: as `read_model`.
+    """
     try:
         stage, optics = str(description["stage"]), _optics(description["optics"])
         model = Model(tensors, optics, dict(description["metadata"]))

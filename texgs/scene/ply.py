@@ -17,6 +17,7 @@ from texgs.core.rotation import quats_to_matrices
 from texgs.raster.spherical_harmonics import DEGREES
 from texgs.scene.model import Model, Optics, material
 from texgs.scene.release_texture import read_texture
+from texgs.scene.texels import mean_texels
 
 FLAVOURS = ("2dgs", "3dgs", "release")
 Y00 = 0.5 / math.sqrt(math.pi)  # the constant harmonic
@@ -135,10 +136,7 @@ def _color(p: Mapping[str, Tensor]) -> Tensor:
     """Colour of each surfel without light [N, 3]; in float64, so that harmonics of it are rounded once."""
     if "texels" not in p:
         return p["colors"].double()
-    running = torch.cat([p["texels"].new_zeros(1, 3).double(), p["texels"].double().cumsum(0)])  # [T + 1, 3]
-    counts = p["sizes"].long().prod(1)  # [N]
-    means = (running[p["offsets"] + counts] - running[p["offsets"]]) / counts[:, None]
-    return p["colors"].double() + p["palette"].double() + means
+    return p["colors"].double() + p["palette"].double() + mean_texels(p)
 
 
 def _release_material(model: Model) -> dict[str, Tensor]:

@@ -14,9 +14,9 @@ import yaml
 
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
+from texgs.scene.compact import open_model
 from texgs.scene.composition import Composition
 from texgs.scene.edits import Edit, color, is_number
-from texgs.scene.model_file import read_model
 from texgs.scene.texture_file import with_texture
 from texgs.volume.view_set import Light
 
@@ -31,7 +31,7 @@ WHITE = (1.0, 1.0, 1.0)
 class SceneModel:
     """One model of a scene."""
 
-    file: Path  # model.safetensors
+    file: Path  # lossless or compact
     edit: Edit = field(default_factory=Edit)
     texture: Path | None = None  # variant in place of the model's own texels
 
@@ -62,7 +62,7 @@ class Scene:
         found = []
         for name, entry in self.models.items():
             try:
-                model = read_model(entry.file)
+                model = open_model(entry.file)
                 found.append(
                     (model if entry.texture is None else with_texture(model, entry.texture)).to(device)
                 )

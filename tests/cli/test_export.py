@@ -1,0 +1,110 @@
+"""Exports from the command line."""
+
+import numpy as np
+import pytest
+import torch
+
+from tests.scene.ply_files import vertices
+from tests.scene.samples import sample
+from tests.scene.test_composition import ball
+from texgs.cli.main import main
+from texgs.scene.compact import read_compact
+from texgs.scene.edits import Edit
+from texgs.scene.model_file import write_model
+from texgs.scene.ply import read_ply
+from texgs.scene.scene_file import Scene, SceneModel, write_scene
+
+
+@pytest.fixture
+def model(tmp_path):
+    return write_model(tmp_path / "a.safetensors", ball(1))
+
+
+@pytest.fixture
+def scene(tmp_path, model):
+    """scene.yaml with two models, one of which is red."""
+    other = write_model(tmp_path / "b.safetensors", ball(2, n=80))
+    edit = Edit(palette=(1, 0, 0), opacity=0.5)
+    return write_scene(tmp_path / "scene.yaml", Scene({"A": SceneModel(model), "B": SceneModel(other, edit)}))
+
+
+def export(source, target, *words):
+    return main(["export", str(source), "--to", str(target), *words])
+
+
+@pytest.mark.parametrize("kind", ["3dgs", "2dgs"])
+def test_gaussians_of_a_scene_are_those_of_its_models(scene, tmp_path, kind, capsys):
+    assert export(scene, tmp_path / "out.ply", "--kind", kind) == 0
+    assert capsys.readouterr().out.strip() == str(tmp_path / "out.ply")
+    found = read_ply(tmp_path / "out.ply").parameters
+    assert len(found["means"]) == 230
+    assert ("scale_2" in vertices(tmp_path / "out.ply").dtype.names) == (kind == "3dgs")
+    own = ball(2, n=80).parameters["opacities"].sigmoid()
+    torch.testing.assert_close(found["opacities"][150:].sigmoid(), 0.5 * own)
+
+
+def test_the_ending_chooses(model, tmp_path):
+    assert export(model, tmp_path / "m.ply") == 0
+    assert "scale_2" in vertices(tmp_path / "m.ply").dtype.names
+    assert export(model, tmp_path / "m.texgs") == 0
+    assert len(read_compact(tmp_path / "m.texgs")) == 150
+    assert export(tmp_path / "m.texgs", tmp_path / "again.ply", "--kind", "release") == 0
+    assert "ambient_factor" in vertices(tmp_path / "again.ply").dtype.names
+
+
+def test_textures_of_surfels_that_nobody_sees_are_dropped(tmp_path):
+    hidden = ball(3)
+    p = dict(hidden.parameters)
+    p["opacities"] = p["opacities"].clone()
+    p["opacities"][:50] = -20.0
+    source = write_model(tmp_path / "m.safetensors", type(hidden)(p, hidden.optics))
+    assert export(source, tmp_path / "m.texgs", "--drop-unseen", "--views", "12", "--size", "64") == 0
+    sizes = read_compact(tmp_path / "m.texgs").parameters["sizes"]
+    assert bool((sizes[:50] == 1).all())
+    assert not bool((sizes[50:] == 1).all())
+
+
+def test_points_of_a_scene(scene, tmp_path):
+    assert export(scene, tmp_path / "p.ply", "--kind", "points", "--opacity", "0.3") == 0
+    found = vertices(tmp_path / "p.ply")
+    counts = [
+        int((scale * ball(*of).parameters["opacities"].sigmoid() >= 0.3).sum())
+        for scale, of in ((1, (1,)), (0.5, (2, 80)))
+    ]
+    assert len(found) == sum(counts)
+    reds = found[counts[0] :]
+    assert reds["red"].mean() > 240 > 3 * reds["blue"].mean()
+
+
+@pytest.mark.parametrize("kind", ["scene", "model", "surfels"])
+def test_a_mesh(scene, model, tmp_path, kind):
+    library = pytest.importorskip("open3d", exc_type=ImportError)
+    surfels = write_model(tmp_path / "s.safetensors", sample("surfels", n=400))
+    source = {"scene": scene, "model": model, "surfels": surfels}[kind]
+    words = ["--views", "12", "--size", "128", "--voxel", "0.02", "--kind", "mesh"]
+    assert export(source, tmp_path / "mesh.ply", *words) == 0
+    mesh = library.io.read_triangle_mesh(str(tmp_path / "mesh.ply"))
+    assert len(mesh.triangles) > 500
+    assert np.asarray(mesh.vertex_colors).max() > 0.1
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--to", "x.obj"], "--to: expected a file that ends in .ply or .texgs, got x.obj"),
+        (["--to", "x.ply", "--kind", "compact"], "--to: expected a file that ends in .texgs, got x.ply"),
+        (["--to", "x.texgs", "--kind", "mesh"], "--to: expected a file that ends in .ply, got x.texgs"),
+        (["--to", "x.texgs"], "--kind compact: expected a model file, got"),
+        (["--to", "x.ply", "--kind", "release"], "--kind release: expected a model file, got"),
+        (
+            ["--to", "x.ply", "--kind", "mesh", "--views", "13"],
+            "--views: expected 12, 42, 92, 162 or another",
+        ),
+        (["--to", "x.ply", "--kind", "points", "--opacity", "1"], "expected surfels with an opacity of 1 at"),
+    ],
+)
+def test_a_mistake_writes_nothing(scene, tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", str(scene), *words]) == 2
+    assert message in capsys.readouterr().err
+    assert not list(tmp_path.glob("x.*"))

@@ -1,0 +1,264 @@
+import json
+import lzma
+from contextlib import suppress
+from dataclasses import replace
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from safetensors.numpy import load, save
+
+from tests.scene.samples import STAGES, same, sample
+from tests.scene.test_composition import CAMERA, ball
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, ShapeError, TexgsError
+from texgs.core.rotation import quats_to_matrices
+from texgs.metrics.image import psnr
+from texgs.scene.compact import STEP, open_model, read_compact, seen_surfels, write_compact
+from texgs.scene.model_file import write_model
+from texgs.scene.render import render
+from texgs.scene.scene_file import Scene, SceneModel
+
+
+def changed(model, **parameters):
+    return replace(model, parameters={**model.parameters, **parameters})
+
+
+def rewritten(path, **header):
+    """A valid file with some keys of its first line changed."""
+    line, _, packed = write_compact(path, sample()).read_bytes().partition(b"\n")
+    path.write_bytes(
+        json.dumps({**json.loads(line), **header}, separators=(",", ":")).encode() + b"\n" + packed
+    )
+    return path
+
+
+@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("shared", [False, True])
+def test_every_tensor_comes_back_within_its_bound(tmp_path, stage, shared):
+    model = sample(stage, shared=shared, low_pass=2.5, material="paper", local_viewer=False)
+    found = read_compact(write_compact(tmp_path / "new" / "model.texgs", model))
+    assert (found.stage, found.optics, found.metadata) == (stage, model.optics, model.metadata)
+    given, got = dict(model.parameters), dict(found.parameters)
+    assert given.keys() == got.keys()
+    for name in {"means", "palette", "sizes", "offsets"} & given.keys():
+        assert torch.equal(got.pop(name), given.pop(name)), name
+    rotations = [quats_to_matrices(p.pop("quats")) for p in (got, given)]
+    assert float((rotations[0] - rotations[1]).abs().max()) < 2e-3
+    if stage == "texture":
+        assert float((got.pop("texels") - given.pop("texels")).abs().max()) <= STEP / 2
+    for name, values in given.items():
+        bound = 0 if shared and values.shape == (1,) else 2**-11 * values.abs() + 2**-24
+        assert bool(((got[name] - values).abs() <= bound).all()), name
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    texels=st.lists(st.floats(-6e4, 6e4, width=32), min_size=3, max_size=3),
+    step=st.sampled_from([1 / 128, 1 / 64, 0.1]),
+)
+def test_no_texel_is_off_by_more_than_half_a_step(tmp_path_factory, texels, step):
+    model = sample(n=1)
+    p = {"texels": torch.tensor([texels]), "sizes": torch.ones(1, 2, dtype=torch.int32)}
+    model = changed(model, **p)
+    found = read_compact(write_compact(tmp_path_factory.mktemp("m") / "m", model, step=step))
+    error = (found.parameters["texels"] - p["texels"]).abs()
+    assert bool((error <= step / 2 + 2**-23 * p["texels"].abs()).all())
+
+
+def test_textures_in_any_order_come_back_one_after_the_other(tmp_path):
+    model = sample(n=4)
+    p = model.parameters
+    order = torch.tensor([2, 0, 3, 1])
+    shuffled = changed(model, sizes=p["sizes"][order], offsets=p["offsets"][order])
+    found = read_compact(write_compact(tmp_path / "m", shuffled)).parameters
+    for n, old in enumerate(order.tolist()):
+        count = int(p["sizes"][old].prod())
+        got = found["texels"][found["offsets"][n] :][:count]
+        assert float((got - p["texels"][p["offsets"][old] :][:count]).abs().max()) <= STEP / 2
+
+
+def test_colors_hardly_change_and_the_file_is_an_eighth(tmp_path):
+    model = ball(1, n=3000)
+    p = model.parameters
+    sizes = torch.full_like(p["sizes"], 8)
+    g = torch.Generator().manual_seed(0)
+    # Channels are alike, as those of fitted textures, which correct light and shade, are.
+    texels = 0.03 * torch.randn(3000 * 64, 1, generator=g) + 0.002 * torch.randn(3000 * 64, 3, generator=g)
+    model = changed(model, sizes=sizes, offsets=torch.arange(3000) * 64, texels=texels)
+    path = write_compact(tmp_path / "m", model)
+    found = read_compact(path)
+    assert path.stat().st_size < texels.nbytes / 8
+    for azimuth in (0, 120, 240):
+        camera = orbit(azimuth, 20, 3, 40, 128, 128)
+        one, other = (render(m, camera).color for m in (model, found))
+        assert psnr(other, one) > 54.3, "costs a model at 38 dB less than 0.1 dB"
+
+
+def test_a_model_of_38_db_loses_less_than_a_tenth(tmp_path):
+    model = ball(2, n=500)
+    found = read_compact(write_compact(tmp_path / "m", model))
+    exact = render(model, CAMERA).color
+    noise = torch.randn(exact.shape, generator=torch.Generator().manual_seed(1))
+    target = exact + 10 ** (-38 / 20) * noise  # an image that the model explains to 38 dB
+    assert psnr(exact, target) - psnr(render(found, CAMERA).color, target) < 0.1
+
+
+def test_unseen_surfels_keep_one_mean_texel(tmp_path):
+    model = ball(1)
+    p = model.parameters
+    seen = torch.rand(len(model), generator=torch.Generator().manual_seed(0)) > 0.5
+    found = read_compact(write_compact(tmp_path / "m", model, seen)).parameters
+    assert torch.equal(found["sizes"][seen], p["sizes"][seen])
+    assert bool((found["sizes"][~seen] == 1).all())
+    for n in range(len(model)):
+        count = int(p["sizes"][n].prod())
+        old = p["texels"][p["offsets"][n] :][:count]
+        new = found["texels"][found["offsets"][n] :][: int(found["sizes"][n].prod())]
+        assert float((new - (old if seen[n] else old.mean(0))).abs().max()) <= STEP / 2 + 1e-6
+    one_stage = sample("shading")
+    found = read_compact(write_compact(tmp_path / "s", one_stage, torch.zeros(7, dtype=torch.bool)))
+    assert len(found) == 7, "a model without texture has none to drop"
+
+
+def test_a_surfel_behind_an_opaque_wall_is_unseen():
+    depths = torch.tensor([0.12, 0.11, 0.1, -0.1])  # three, because the alpha of one is at most 0.99
+    n = len(depths)
+    p = {
+        "means": depths[:, None] * torch.tensor([0.0, 0.0, 1.0]),
+        "quats": torch.tensor([[1.0, 0, 0, 0]]).repeat(n, 1),
+        "scales": torch.log(torch.tensor([0.5, 0.5, 0.5, 0.01]))[:, None].repeat(1, 2),
+        "opacities": torch.full((n,), 16.0),
+        "sh": torch.zeros(n, 1, 3),
+    }
+    model = replace(sample("surfels"), parameters=p)
+    front, back = (orbit(azimuth, 0, 3, 20, 64, 64) for azimuth in (-90, 90))
+    assert seen_surfels(model, [front]).tolist()[2:] == [True, False]
+    assert seen_surfels(model, [front, back]).tolist()[2:] == [True, True]
+
+
+def test_what_half_precision_cannot_hold_stays(tmp_path):
+    model = sample("shading")
+    colors = model.parameters["colors"] * 1e6
+    found = read_compact(write_compact(tmp_path / "m", changed(model, colors=colors)))
+    assert torch.equal(found.parameters["colors"], colors)
+
+
+def test_no_surfels_are_a_model_and_the_same_model_gives_the_same_bytes(tmp_path):
+    model = sample(n=0)
+    assert same(read_compact(write_compact(tmp_path / "m", model)), model)
+    assert (
+        write_compact(tmp_path / "a", sample()).read_bytes()
+        == write_compact(tmp_path / "b", sample()).read_bytes()
+    )
+
+
+def test_the_format_is_public(tmp_path):
+    line, _, packed = write_compact(tmp_path / "m", sample(low_pass=3.0)).read_bytes().partition(b"\n")
+    header = json.loads(line)
+    assert (header["texgs-compact"], header["step"], header["model"]["stage"]) == (1, STEP, "texture")
+    stored = load(lzma.decompress(packed))
+    assert stored["codes"].dtype == "uint8"
+    assert stored["codes"].shape[1:] == (3, len(sample().parameters["texels"]))
+
+
+def test_scenes_open_either_kind_of_file(tmp_path):
+    lossless, compact = write_model(tmp_path / "a", ball(1)), write_compact(tmp_path / "b", ball(1))
+    assert same(open_model(lossless), ball(1))
+    assert same(open_model(compact), read_compact(compact))
+    scenes = [Scene({"x": SceneModel(path)}).open().render(CAMERA).color for path in (lossless, compact)]
+    assert 0 < float((scenes[0] - scenes[1]).abs().max()) < 0.02
+    with pytest.raises(ArgumentError, match="none: no such file"):
+        open_model(tmp_path / "none")
+
+
+@pytest.mark.parametrize("kept", [0.0, 0.05, 0.5, 0.9, 0.999])
+def test_a_file_cut_anywhere_is_refused(tmp_path, kept):
+    path = write_compact(tmp_path / "m", sample())
+    data = path.read_bytes()
+    path.write_bytes(data[: int(kept * len(data))])
+    with pytest.raises(ArgumentError, match=f"{path}: expected"):
+        read_compact(path)
+
+
+@settings(max_examples=100, deadline=None)
+@given(place=st.floats(0, 1, exclude_max=True), value=st.integers(0, 255))
+def test_a_changed_byte_gives_a_model_or_a_sentence(tmp_path_factory, place, value):
+    path = write_compact(tmp_path_factory.mktemp("m") / "m", sample(n=2))
+    data = bytearray(path.read_bytes())
+    start = data.index(b"\n") + 1
+    is_damaged = data[int(place * len(data))] != value
+    data[int(place * len(data))] = value
+    path.write_bytes(data)
+    if is_damaged and int(place * len(data)) >= start:
+        with pytest.raises(ArgumentError, match="cut short or damaged"):
+            read_compact(path)
+    else:
+        with suppress(TexgsError):
+            read_compact(path)
+
+
+def packed(path, data):
+    line = write_compact(path, sample()).read_bytes().partition(b"\n")[0]
+    path.write_bytes(line + b"\n" + lzma.compress(data))
+    return path
+
+
+def test_files_that_are_no_compact_model_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="none: no such file"):
+        read_compact(tmp_path / "none")
+    with pytest.raises(ArgumentError, match="cannot be read"):
+        read_compact(tmp_path)
+    for content in (b"", b"ply\n", b'{"a":1}\n'):
+        (tmp_path / "m").write_bytes(content)
+        with pytest.raises(ArgumentError, match="expected a texgs-compact file, got one of another format"):
+            read_compact(tmp_path / "m")
+    with pytest.raises(ArgumentError, match="another format"):
+        read_compact(write_model(tmp_path / "m", sample()))
+    with pytest.raises(ArgumentError, match="cut short or damaged"):
+        read_compact(packed(tmp_path / "m", b"no safetensors"))
+    whole = load(lzma.decompress(write_compact(tmp_path / "m", sample()).read_bytes().partition(b"\n")[2]))
+    for wrong in (
+        {"codes": whole["codes"][0]},
+        {"codes": whole["codes"].astype("f4")},
+        {"sizes": whole["means"]},
+    ):
+        with pytest.raises(TexgsError, match=str(tmp_path / "m")):
+            read_compact(packed(tmp_path / "m", save({**whole, **wrong})))
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"texgs-compact": 2}, "expected version 1 of the format at most, got 2; update texgs"),
+        ({"texgs-compact": "new"}, "expected version, step and model in its first line"),
+        ({"step": 0}, "expected version, step and model in its first line"),
+        ({"step": "fine"}, "expected version, step and model in its first line"),
+        ({"model": 3}, "expected version, step and model in its first line"),
+        ({"model": {"stage": "texture"}}, "expected stage, optics and metadata in the header"),
+    ],
+)
+def test_a_first_line_that_cannot_be_used_is_named(tmp_path, change, message):
+    with pytest.raises(ArgumentError, match=message):
+        read_compact(rewritten(tmp_path / "m", **change))
+
+
+def test_what_cannot_be_written_is_named_and_leaves_nothing(tmp_path):
+    model = sample()
+    bad = [
+        (
+            changed(model, texels=model.parameters["texels"] + 1e6),
+            {},
+            "texels: expected at most 65536, got 1e",
+        ),
+        (changed(model, means=model.parameters["means"] * torch.nan), {}, "means: expected finite values"),
+        (model, {"step": 0}, "step: expected a part of the colour range"),
+        (model, {"seen": torch.ones(7)}, "seen: expected bool, got torch.float32"),
+    ]
+    for given_model, words, message in bad:
+        with pytest.raises(ArgumentError, match=message):
+            write_compact(tmp_path / "m", given_model, **words)
+    with pytest.raises(ShapeError, match=r"seen: expected \[7\], got \[3\]"):
+        write_compact(tmp_path / "m", model, torch.ones(3, dtype=torch.bool))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,100 @@
+import numpy as np
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.scene.ply_files import vertices
+from tests.scene.samples import sample
+from tests.scene.test_composition import CAMERA, ball
+from texgs.core.errors import ArgumentError
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.export import joined, write_points
+from texgs.scene.model import Model
+from texgs.scene.ply import read_ply, write_ply
+from texgs.scene.render import render
+from texgs.scene.texels import mean_texels, owners
+
+EDITS = [Edit(palette=(0.9, 0.1, 0.4), opacity=0.6), Edit(visible=False), Edit(opacity=3.0)]
+
+
+def plain(seed):
+    """A ball with a texture that is constant on each surfel, so that one colour each is the whole of it."""
+    p = dict(ball(seed).parameters)
+    first = p["texels"][p["offsets"]]
+    p["texels"] = first.repeat_interleave(p["sizes"].long().prod(1), dim=0)
+    return Model(p, ball(seed).optics)
+
+
+def test_owners_and_means_by_brute_force():
+    p = dict(sample(n=5).parameters)
+    order = torch.tensor([3, 0, 4, 1, 2])  # textures lie in another order than surfels, with a gap before
+    p["sizes"], p["offsets"] = p["sizes"][order], p["offsets"][order] + 2
+    p["texels"] = torch.cat([torch.full((2, 3), torch.nan), p["texels"]])
+    place, surfel = owners(p)
+    expected = [
+        (int(offset) + k, n)
+        for n, (offset, size) in enumerate(zip(p["offsets"], p["sizes"], strict=True))
+        for k in range(int(size.prod()))
+    ]
+    assert list(zip(place.tolist(), surfel.tolist(), strict=True)) == expected
+    p["texels"] = p["texels"].nan_to_num()
+    by_hand = [p["texels"][place[surfel == n]].double().mean(0) for n in range(5)]
+    assert_close(mean_texels(p), torch.stack(by_hand))
+
+
+def test_joined_surfels_look_like_the_edited_scene_without_light():
+    models = [plain(1), plain(2), ball(3, stage="shading", middle=0.1)]
+    scene = Composition(models)
+    expected = scene.render(CAMERA, edits=EDITS, look="unshaded")
+    surfels = joined(scene.parts, EDITS)
+    assert (len(surfels), surfels.stage) == (300, "surfels")
+    found = render(surfels, CAMERA)
+    assert_close(found.alpha, expected.alpha, atol=1e-5, rtol=0)
+    assert_close(found.color, expected.color, atol=1e-5, rtol=0)
+
+
+def test_a_scene_goes_through_a_file_of_gaussians(tmp_path):
+    surfels = joined(Composition([plain(1), plain(2)]).parts, [Edit(), Edit(opacity=0.5)])
+    back = read_ply(write_ply(tmp_path / "scene.ply", surfels, "3dgs"))
+    for name, values in surfels.parameters.items():
+        assert torch.equal(back.parameters[name], values), name
+
+
+def test_nothing_visible_is_refused():
+    parts = Composition([ball(1)]).parts
+    for edit in (Edit(visible=False), Edit(opacity=0)):
+        with pytest.raises(ArgumentError, match="expected at least one visible surfel, got none"):
+            joined(parts, [edit])
+    with pytest.raises(ArgumentError, match="edits: expected one for each of 1 models, got 2"):
+        joined(parts, EDITS[:2])
+
+
+def test_points_are_means_and_mean_colors_of_opaque_surfels(tmp_path):
+    model = ball(1)
+    p = model.parameters
+    found = vertices(write_points(tmp_path / "points.ply", model, 0.6))
+    opaque = (torch.sigmoid(p["opacities"]) >= 0.6).nonzero()[:, 0]
+    assert 0 < len(opaque) == len(found) < len(model)
+    for point, n in zip(found, opaque.tolist(), strict=True):
+        texels = p["texels"][p["offsets"][n] :][: int(p["sizes"][n].prod())]
+        color = (p["colors"][n] + p["palette"] + texels.mean(0)).clamp(0, 1) * 255
+        assert [point[axis] for axis in "xyz"] == p["means"][n].tolist()
+        got = np.array([point["red"], point["green"], point["blue"]], np.float64)
+        assert np.abs(got - color.numpy()).max() <= 0.51
+
+
+def test_points_before_shading_have_the_constant_harmonic(tmp_path):
+    model = sample("surfels", n=9)
+    found = vertices(write_points(tmp_path / "points.ply", model, 0.0))
+    color = (0.5 + 0.28209479 * model.parameters["sh"][:, 0]).clamp(0, 1) * 255
+    got = np.stack([found[name] for name in ("red", "green", "blue")], axis=1)
+    assert np.abs(got - color.numpy()).max() <= 0.51
+
+
+def test_a_scene_without_opaque_surfels_has_no_points(tmp_path):
+    with pytest.raises(
+        ArgumentError, match=r"expected surfels with an opacity of 0\.9999 at least, got 0\.\d+ at"
+    ):
+        write_points(tmp_path / "points.ply", ball(1), 0.9999)
+    assert not list(tmp_path.iterdir())

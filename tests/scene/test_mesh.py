@@ -1,0 +1,134 @@
+import sys
+
+import numpy as np
+import pytest
+import torch
+
+from tests.scene.ply_files import vertices
+from tests.scene.samples import sample
+from texgs.core.errors import ArgumentError
+from texgs.raster import Render
+from texgs.scene.mesh import Mesh, fuse, write_mesh
+from texgs.scene.model import Model, Optics
+from texgs.scene.render import render
+from texgs.volume.cameras import geodesic_vertices, icosphere
+
+RADIUS, VOXEL = 0.4, 1 / 128
+VIEWS = icosphere(2, 4.0311, 30, 256, 256)  # pixels about as wide as a voxel
+RED = torch.tensor([1.0, 0.25, 0.0])
+
+
+def open3d():
+    return pytest.importorskip("open3d", exc_type=ImportError)
+
+
+def ball(opacity=8.0):
+    """Opaque surfels side by side on a sphere, all of one colour."""
+    normals = torch.from_numpy(geodesic_vertices(24)).float()  # [N, 3]
+    n = len(normals)
+    # The quaternion that turns z to the normal: (1 + z, z x normal).
+    quats = torch.stack([1 + normals[:, 2], -normals[:, 1], normals[:, 0], torch.zeros(n)], dim=1)
+    quats[normals[:, 2] < -0.9999] = torch.tensor([0.0, 1.0, 0.0, 0.0])
+    return Model(
+        {
+            "means": RADIUS * normals,
+            "quats": quats,
+            "scales": torch.full((n, 2), np.log(0.01)),
+            "opacities": torch.full((n,), opacity),
+            "sh": ((RED - 0.5) / 0.28209479).expand(n, 1, 3).clone(),
+        },
+        Optics(),
+    )
+
+
+def show(model):
+    return lambda camera: render(model, camera, background=torch.zeros(3), outputs=("median",))
+
+
+def exact(camera):
+    """A sphere by ray casting, through pixel centres at +0.5."""
+    u, v = torch.meshgrid(torch.arange(256) + 0.5, torch.arange(256) + 0.5, indexing="xy")
+    rays = torch.stack([u, v, torch.ones_like(u)], dim=-1).double() @ camera.K.double().inverse().T
+    middle = camera.viewmat[:3, 3].double()
+    a, b, c = rays.square().sum(-1), rays @ middle, middle @ middle - RADIUS**2
+    hit = b * b > a * c
+    depth = torch.where(hit, (b - (b * b - a * c).clamp_min(0).sqrt()) / a, 0).float()
+    return Render(hit[..., None] * RED, hit.float(), median=depth)
+
+
+def signed_volume(mesh):
+    """Positive where triangles turn left seen from outside."""
+    a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+    return (np.cross(a, b) * c).sum() / 6
+
+
+def centroid(mesh):
+    """Of the surface; vertices are denser where it is aligned with the grid."""
+    a, b, c = mesh.vertices[mesh.triangles].astype(np.float64).transpose(1, 0, 2)
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return (areas[:, None] * (a + b + c)).sum(0) / (3 * areas.sum())
+
+
+def test_exact_depth_becomes_a_sphere():
+    open3d()
+    mesh = fuse(exact, VIEWS, VOXEL)
+    radii = np.linalg.norm(mesh.vertices, axis=1)
+    assert np.abs(radii - RADIUS).max() < VOXEL
+    assert abs(radii.mean() - RADIUS) < 0.05 * VOXEL
+    assert np.abs(centroid(mesh)).max() < 0.02 * VOXEL, "pixel centres are where our cameras have them"
+    assert signed_volume(mesh) == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.01)
+    assert np.abs(mesh.colors - 255 * RED.numpy()).max() <= 1
+
+
+def test_a_ball_of_surfels_becomes_a_sphere():
+    open3d()
+    mesh = fuse(show(ball()), VIEWS, VOXEL)
+    radii = np.linalg.norm(mesh.vertices, axis=1)
+    # Discs that touch a sphere stand out from it, and at its rim each is wider than a pixel.
+    assert 0 < radii.mean() - RADIUS < 0.4 * VOXEL
+    assert np.abs(radii - RADIUS).max() < VOXEL
+    assert signed_volume(mesh) == pytest.approx(4 / 3 * np.pi * RADIUS**3, rel=0.03)
+    assert np.abs(mesh.colors.mean(0) - 255 * RED.numpy()).max() < 3
+
+
+def test_open3d_reads_the_file(tmp_path):
+    library = open3d()
+    mesh = Mesh(
+        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32),
+        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
+        np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [51, 102, 153]], np.uint8),
+    )
+    found = library.io.read_triangle_mesh(str(write_mesh(tmp_path / "new" / "mesh.ply", mesh)))
+    assert np.array_equal(np.asarray(found.vertices), mesh.vertices)
+    assert np.array_equal(np.asarray(found.triangles), mesh.triangles)
+    assert np.array_equal(np.asarray(found.vertex_colors) * 255, mesh.colors)
+
+
+def test_plyfile_reads_the_file(tmp_path):
+    mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.eye(3, dtype=np.uint8) * 200)
+    found = vertices(write_mesh(tmp_path / "mesh.ply", mesh))
+    assert found["x"].tolist() == [1, 0, 0]
+    assert found["green"].tolist() == [0, 200, 0]
+
+
+def test_what_lets_light_through_has_no_surface():
+    open3d()
+    faint = ball(opacity=-4.0)
+    with pytest.raises(
+        ArgumentError, match="expected a surface that lets less than half of the light through"
+    ):
+        fuse(show(faint), VIEWS[:3], VOXEL)
+
+
+def test_mistakes_are_named(monkeypatch):
+    with pytest.raises(ArgumentError, match="voxel: expected a length above 0, got 0"):
+        fuse(show(ball()), VIEWS, 0)
+    monkeypatch.setitem(sys.modules, "open3d", None)
+    with pytest.raises(ArgumentError, match=r"needs Open3D, which .* install the extra texgs\[mesh\]"):
+        fuse(show(ball()), VIEWS, VOXEL)
+
+
+def test_renders_without_median_are_refused():
+    open3d()
+    with pytest.raises(ArgumentError, match="show: expected renders with median"):
+        fuse(lambda camera: render(sample("surfels"), camera), VIEWS, VOXEL)

@@ -1,0 +1,137 @@
+"""Export a scene or a model for other programs: Gaussians, points or a mesh, or as a compact model file."""
+
+import argparse
+from collections.abc import Callable, Sequence
+from math import isqrt
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from texgs.core.camera import Camera
+    from texgs.raster import Render
+    from texgs.scene.composition import Composition
+    from texgs.scene.edits import Edit
+    from texgs.scene.model import Model
+
+KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
+DEFAULTS = {".ply": "3dgs", ".texgs": "compact"}
+RADIUS, FOV = 4.0311, 30.0  # of views: world units, vertical degrees
+OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to export, and where to."""
+    parser.add_argument("source", type=Path, help="scene.yaml or a model file")
+    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=".ply, or .texgs for compact")
+    parser.add_argument(
+        "--kind",
+        choices=KINDS,
+        help="3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with "
+        "colours, mesh, or compact; default 3dgs for .ply, compact for .texgs",
+    )
+    parser.add_argument("--opacity", type=float, default=0.5, help="least of points (%(default)s)")
+    parser.add_argument("--voxel", type=float, default=1 / 256, help="of a mesh, world units (%(default)s)")
+    parser.add_argument("--views", type=int, default=92, help="that a mesh is made from (%(default)s)")
+    parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
+    parser.add_argument(
+        "--drop-unseen", action="store_true", help="compact: no texture for surfels that none of --views sees"
+    )
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the file."""
+    from texgs.scene.compact import open_model
+    from texgs.scene.scene_file import read_scene
+
+    kind = kind_of(arguments)
+    if arguments.source.suffix in (".yaml", ".yml"):
+        scene = read_scene(arguments.source)
+        print(of_scene(arguments, scene.open(arguments.device), scene.edits, kind))
+    else:
+        print(of_model(arguments, open_model(arguments.source).to(arguments.device), kind))
+    return 0
+
+
+def kind_of(arguments: argparse.Namespace) -> str:
+    """What to export.
+
+    Raises:
+        ArgumentError: if the ending of the file is of another kind, or a scene has no such thing.
+    """
+    from texgs.core.errors import ArgumentError
+
+    ending = arguments.to.suffix
+    kind: str | None = arguments.kind or DEFAULTS.get(ending)
+    expected = {None: ".ply or .texgs", "compact": ".texgs"}.get(kind, ".ply")
+    if kind is None or ending != expected:
+        raise ArgumentError(f"--to: expected a file that ends in {expected}, got {arguments.to}")
+    if kind in OF_MODELS and arguments.source.suffix in (".yaml", ".yml"):
+        raise ArgumentError(
+            f"--kind {kind}: expected a model file, got {arguments.source}; export its models one by one"
+        )
+    return kind
+
+
+def of_scene(arguments: argparse.Namespace, scene: "Composition", edits: "Sequence[Edit]", kind: str) -> Path:
+    """Export the visible models of a scene as one."""
+    from texgs.scene.export import joined, write_points
+    from texgs.scene.ply import write_ply
+
+    if kind == "mesh":
+        black = scene.means.new_zeros(3)
+        return write_fused(
+            arguments,
+            lambda camera: scene.render(
+                camera, edits=edits, look="unshaded", background=black, outputs=("median",)
+            ),
+        )
+    surfels = joined(scene.parts, edits)
+    if kind == "points":
+        return write_points(arguments.to, surfels, arguments.opacity)
+    return write_ply(arguments.to, surfels, kind)
+
+
+def of_model(arguments: argparse.Namespace, model: "Model", kind: str) -> Path:
+    """Export one model; Gaussians with all that they can hold of it."""
+    from texgs.scene.compact import seen_surfels, write_compact
+    from texgs.scene.composition import Composition
+    from texgs.scene.edits import Edit
+    from texgs.scene.export import write_points
+    from texgs.scene.ply import write_ply
+    from texgs.scene.render import render
+
+    if kind == "compact":
+        seen = seen_surfels(model, cameras(arguments)) if arguments.drop_unseen else None
+        return write_compact(arguments.to, model, seen)
+    if kind == "points":
+        return write_points(arguments.to, model, arguments.opacity)
+    if kind != "mesh":
+        return write_ply(arguments.to, model, kind)
+    if model.stage != "surfels":
+        return of_scene(arguments, Composition([model]), [Edit()], kind)
+    black = model.parameters["means"].new_zeros(3)
+    return write_fused(arguments, lambda camera: render(model, camera, background=black, outputs=("median",)))
+
+
+def write_fused(arguments: argparse.Namespace, show: "Callable[[Camera], Render]") -> Path:
+    """Write the mesh of what `show` renders."""
+    from texgs.scene.mesh import fuse, write_mesh
+
+    placed = [camera.to(arguments.device) for camera in cameras(arguments)]
+    return write_mesh(arguments.to, fuse(show, placed, arguments.voxel))
+
+
+def cameras(arguments: argparse.Namespace) -> "list[Camera]":
+    """As far from the scene as the paper's training views.
+
+    Raises:
+        ArgumentError: if no icosphere has so many views.
+    """
+    from texgs.core.errors import ArgumentError
+    from texgs.volume.cameras import icosphere
+
+    frequency = isqrt(max(arguments.views - 2, 0) // 10)
+    if frequency < 1 or 10 * frequency**2 + 2 != arguments.views:
+        raise ArgumentError(f"--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {arguments.views}")
+    return icosphere(frequency, RADIUS, FOV, arguments.size, arguments.size)

@@ -1,0 +1,221 @@
+"""Compact files of basic models: texels in fixed steps, the rest in half precision, packed by xz."""
+
+from __future__ import annotations
+
+import json
+import lzma
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from texgs.core import check
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_bytes
+from texgs.scene.model import Model
+from texgs.scene.model_file import describe, model_of, read_model
+from texgs.scene.render import render
+from texgs.scene.texels import mean_texels, owners
+
+FORMAT = "texgs-compact"
+VERSION = 1
+MAGIC = b'{"texgs-compact":'
+STEP = 1 / 128  # of texels: none is off by more than 1/256, a level of an 8-bit picture
+MOST_STEPS = 2**23  # of a texel; float32 holds so many exactly
+LISTS = ("texels", "sizes", "offsets")
+EXACT = ("means", "palette")  # half precision would move surfels by up to a tenth of a pixel at 800x800
+WRONG = (KeyError, RuntimeError, TypeError, ValueError)  # what tensors of a wrong name, type or shape raise
+MEMORY = 2**28  # bytes that unpacking may use besides its result; these files need 9 MiB
+
+
+def write_compact(path: str | Path, model: Model, seen: Tensor | None = None, *, step: float = STEP) -> Path:
+    """Create or replace a compact model file in one step; the same model gives the same bytes.
+
+    Means and palette stay exact, and so does a material that all surfels share. Texels are rounded to
+    multiples of `step`, all else to half precision. The file is one line of JSON (what a model file has in
+    its header) and then, packed by xz, which also finds damage, a safetensors file.
+
+    Args:
+        path: target, by custom `model.texgs`.
+        model: any stage, on any device.
+        seen: [N] bool, surfels that keep their texture; others get one texel, the mean of it. All by default.
+        step: of texels; each is off by half of it at most.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError, ShapeError: if the model could not be read back, `seen` does not fit it, a texel is
+            beyond 2^23 steps, or the file cannot be written.
+    """
+    from safetensors.numpy import save
+
+    header = {FORMAT: VERSION, "step": step, "model": describe(path, model)}
+    if not 0 < step < 1:
+        raise ArgumentError(f"step: expected a part of the colour range from 0 to 1, got {step}")
+    model = model.to("cpu")
+    if seen is not None:
+        model = _without_unseen(model, seen.cpu())
+    stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
+    if model.stage == "texture":
+        stored |= _texture(path, model.parameters, step)
+    packed = lzma.compress(save(stored), preset=6)
+    return write_bytes(path, json.dumps(header, separators=(",", ":")).encode() + b"\n" + packed)
+
+
+def read_compact(path: str | Path) -> Model:
+    """Read a compact model file to the CPU. Nothing in it is executed.
+
+    Raises:
+        ArgumentError, ShapeError: if the file is missing, damaged, of another format or a newer version.
+    """
+    from safetensors import SafetensorError
+    from safetensors.numpy import load
+
+    path = Path(path)
+    try:
+        line, _, packed = path.read_bytes().partition(b"\n")
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file") from error
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+    header = _header(path, line)
+    try:
+        stored = load(lzma.decompress(packed, lzma.FORMAT_XZ, MEMORY))
+        parameters = _parameters(stored, float(header["step"]))
+    except (lzma.LZMAError, SafetensorError, *WRONG) as error:
+        raise ArgumentError(
+            f"{path}: expected a whole {FORMAT} file, got one cut short or damaged; copy or write it again"
+        ) from error
+    return model_of(path, header["model"], parameters)
+
+
+def open_model(path: str | Path) -> Model:
+    """Read a model file of either kind, lossless or compact, told apart by how it begins.
+
+    Raises:
+        ArgumentError, ShapeError: as `read_model` and `read_compact`.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            is_compact = file.read(len(MAGIC)) == MAGIC
+    except OSError:
+        is_compact = False  # the reader says what is wrong
+    return read_compact(path) if is_compact else read_model(path)
+
+
+@torch.no_grad()
+def seen_surfels(model: Model, cameras: Sequence[Camera]) -> Tensor:
+    """Which surfels [N] bool are blended into a pixel of any view.
+
+    Edits that make a model more transparent can show others.
+    """
+    seen = torch.zeros_like(model.parameters["opacities"], dtype=torch.bool)
+    for camera in cameras:
+        statistics = render(model, camera.to(seen.device), outputs=("statistics",)).statistics
+        seen |= statistics.pixels > 0  # type: ignore[union-attr]
+    return seen
+
+
+# -- writing ---
+
+
+def _without_unseen(model: Model, seen: Tensor) -> Model:
+    """The model with one texel, the mean, for each unseen surfel."""
+    check.shape("seen", seen, "N", N=len(model))
+    if seen.dtype != torch.bool:
+        raise ArgumentError(f"seen: expected bool, got {seen.dtype}; compare it with a threshold")
+    if model.stage != "texture":
+        return model
+    p = model.parameters
+    place, surfel = owners(p)
+    counts = p["sizes"].long().prod(1)  # [N]
+    first = counts.cumsum(0) - counts  # [N]
+    texels, kept = p["texels"][place], seen[surfel]
+    texels[first[~seen]] = mean_texels(p)[~seen].to(texels)
+    kept[first] = True
+    sizes = torch.where(seen[:, None], p["sizes"], 1)
+    texture = {"texels": texels[kept], "sizes": sizes, "offsets": _offsets(sizes)}
+    return replace(model, parameters={**p, **texture})
+
+
+def _rounded(name: str, values: Tensor) -> np.ndarray:
+    """Values in half precision where that can hold them."""
+    if name == "quats":
+        values = normalize(values, dim=1)  # any length is the same rotation, but half has few of them
+    half = values.half()
+    exact = name in EXACT or values.shape == (1,) or not bool(half.isfinite().all())
+    return (values if exact else half).contiguous().numpy()
+
+
+def _texture(path: str | Path, p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
+    """Sizes, and texels in steps as green, red - green and blue - green, because channels are much alike.
+
+    `codes` [B, 3, T] uint8 are bytes of whole numbers whose last bit is the sign, from low to high: all
+    planes but the first are nearly all zero.
+    """
+    texels = p["texels"].detach()[owners(p)[0]]
+    steps = (texels.double() / step).round()
+    if bool((steps.abs() > MOST_STEPS).any()):
+        raise ArgumentError(
+            f"{path}: texels: expected at most {MOST_STEPS * step:g}, got {float(texels.abs().max()):g}; "
+            "write a lossless model file"
+        )
+    red, green, blue = steps.int().T
+    whole = torch.stack([green, red - green, blue - green])  # [3, T]
+    signed = whole << 1 ^ whole >> 31
+    width = 1 + sum(bool((signed >> 8 * k).any()) for k in (1, 2, 3))
+    planes = [signed >> 8 * k & 255 for k in range(width)]
+    return {"codes": torch.stack(planes).byte().numpy(), "sizes": p["sizes"].detach().contiguous().numpy()}
+
+
+def _offsets(sizes: Tensor) -> Tensor:
+    """Of textures [N] that lie surfel after surfel."""
+    counts = sizes.long().prod(1)
+    return counts.cumsum(0) - counts
+
+
+# -- reading ---
+
+
+def _header(path: Path, line: bytes) -> dict[str, Any]:
+    """The first line; its version is judged before the rest."""
+    if not line.startswith(MAGIC):
+        raise ArgumentError(f"{path}: expected a {FORMAT} file, got one of another format; read_model reads "
+                            "lossless ones")  # fmt: skip
+    try:
+        header: dict[str, Any] = json.loads(line)
+        version = int(str(header[FORMAT]))
+        known = version > VERSION or 0 < float(header["step"]) < 1
+    except (KeyError, TypeError, ValueError):
+        version, known = 0, False
+    if version > VERSION:
+        raise ArgumentError(
+            f"{path}: expected version {VERSION} of the format at most, got {version}; update texgs"
+        )
+    if not known or not isinstance(header.get("model"), dict):
+        raise ArgumentError(f"{path}: expected version, step and model in its first line; write it again")
+    return header
+
+
+def _parameters(stored: dict[str, np.ndarray], step: float) -> dict[str, Tensor]:
+    """Tensors of a model, float32, as `write_compact` has stored them; raises one of WRONG."""
+    codes = stored.pop("codes", None)
+    parameters = {name: torch.from_numpy(x.copy()) for name, x in stored.items()}
+    if codes is not None:
+        if codes.dtype != np.uint8:
+            raise TypeError("codes")
+        signed = torch.zeros(codes.shape[1:], dtype=torch.int32)  # [3, T]
+        for k, plane in enumerate(codes):
+            signed |= torch.from_numpy(plane.astype(np.int32) << 8 * k)
+        green, red, blue = (signed >> 1) ^ -(signed & 1)
+        texels = torch.stack([green + red, green, green + blue], dim=1) * step
+        parameters |= {"texels": texels, "offsets": _offsets(parameters["sizes"])}
+    return {name: x.float() if x.dtype == torch.float16 else x for name, x in parameters.items()}
