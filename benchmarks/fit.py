@@ -20,7 +20,7 @@ from texgs.scene.model import Model, Optics, raw_material
 from texgs.scene.render import render
 from texgs.volume.view_set import Light
 
-SIZES = {400: 15_000, 800: 40_000}  # surfels by image size
+SURFELS = {400: 15_000, 800: 40_000}  # by image size; for other sizes those of the settings
 VIEWS = 8
 DISTANCE = 2 * 4.0311  # as the paper's cameras see an object of side 2
 PROFILED = 40  # steps
@@ -39,15 +39,14 @@ def run(settings: Settings) -> Section:
     """Time whole steps, then profile some for their parts."""
     keep_freed_memory()  # as the command line does
     section = Section()
-    fits = {size: training(size, n, settings.device) for size, n in SIZES.items() if size in settings.sizes}
-    if not fits:
-        section.skip("training steps", f"--sizes has none of {', '.join(map(str, SIZES))}")
+    counts = {size: SURFELS.get(size, settings.n_surfels) for size in settings.sizes}
+    fits = {size: training(size, n, settings.device) for size, n in counts.items()}
     cases = [
-        Case("step", {"size": size, "surfels": SIZES[size]}, {"step": fit.step}) for size, fit in fits.items()
+        Case("step", {"size": size, "surfels": counts[size]}, {"step": fits[size].step}) for size in counts
     ]
     section.measurements = measure(cases, settings.rounds, settings.device, "fit")
     for size, fit in fits.items():
-        where = {"size": size, "surfels": SIZES[size]}
+        where = {"size": size, "surfels": counts[size]}
         for name, ms in parts(fit).items():
             section.measurements.append(Measurement(f"part {name}", where, "ms", ms, ms, PROFILED))
     return section
