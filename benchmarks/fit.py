@@ -31,7 +31,7 @@ PARTS = {  # by what the profiler's names contain; the first that fits
     "rasterizer, backward": ("RasterizeFunctionBackward",),
     "losses": ("_FusedLoss", "_FusedLossBackward"),
     "shading": ("_BlinnPhong", "_BlinnPhongBackward"),
-    "Adam": ("Adam", "adam"),
+    "Adam": ("aten::_fused_adam_", "Optimizer.step#Adam.step", "Optimizer.zero_grad#Adam.zero_grad"),
 }
 
 
@@ -97,6 +97,6 @@ def parts(fit: Fit) -> dict[str, float]:
 def part(name: str) -> str:
     """The part that an event belongs to."""
     for known, names in PARTS.items():
-        if name in names or any(name.startswith(f"{x}#") for x in names):
+        if name in names:
             return known
     return "everything else"
