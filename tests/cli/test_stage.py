@@ -166,7 +166,8 @@ def test_a_killed_job_goes_on_where_it_was(folder, tmp_path, monkeypatch):
 
 def test_a_job_of_the_workflow(folder, capsys):
     from texgs.config.compose import compose
-    from texgs.config.stage import STAGES, settings_file
+    from texgs.config.stage import settings_file
+    from texgs.config.stages import STAGES
 
     settings = settings_file(STAGES["volume"], compose(tuple(TINY)))
     output = folder / "elsewhere"

@@ -58,7 +58,7 @@ def test_what_is_not_imported_does_not_count(tree):
 
 
 def test_stages_exist_and_differ():
-    from texgs.config.stage import STAGES
+    from texgs.config.stages import STAGES
 
     digests = {stage.code for stage in STAGES.values()}
     assert len(digests) == len(STAGES)

@@ -3,7 +3,8 @@ from omegaconf import OmegaConf
 
 from texgs.config.compose import compose
 from texgs.config.locate import source_file, tf_names, views_folder
-from texgs.config.stage import STAGES, settings_digest, settings_file
+from texgs.config.stage import settings_digest, settings_file
+from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
 
 

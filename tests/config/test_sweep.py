@@ -1,7 +1,8 @@
 import pytest
 
 from texgs.config.compose import compose, members
-from texgs.config.stage import STAGES, fit_folder
+from texgs.config.stage import fit_folder
+from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError
 

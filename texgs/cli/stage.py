@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
-    from texgs.config.stage import STAGES
+    from texgs.config.stages import STAGES
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
@@ -66,7 +66,8 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
     from texgs.cli.job import BY_HAND, Job, discard, execute
     from texgs.config.locate import tf_names
-    from texgs.config.stage import STAGES, for_tf
+    from texgs.config.stage import for_tf
+    from texgs.config.stages import STAGES
 
     stage = STAGES[name]
     inputs = stage.inputs(config)
@@ -91,7 +92,7 @@ def run_settings(arguments: argparse.Namespace) -> int:
     from yaml import YAMLError
 
     from texgs.cli.job import Job, adopt, execute
-    from texgs.config.stage import STAGES
+    from texgs.config.stages import STAGES
 
     if arguments.overrides or arguments.output is None:
         raise ArgumentError("a job: expected --settings and --output and no KEY=VALUE; see --help")

@@ -9,7 +9,8 @@ from texgs.cli.stages.tf import check_basic_tfs
 from texgs.config.code import code_digest, digest
 from texgs.config.compose import compose
 from texgs.config.locate import tf_names
-from texgs.config.stage import STAGES, fit_folder, for_tf, settings_file
+from texgs.config.stage import fit_folder, for_tf, settings_file
+from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError, MissingDataError, TexgsError
 
