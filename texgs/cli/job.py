@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import getpass
 import importlib
-import os
-import platform
 import shutil
-import subprocess
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from filelock import FileLock, Timeout
 
-from texgs import __version__, track
+from texgs import track
+from texgs.cli.provenance import git_revision, record, user
 from texgs.cli.stages.outcome import Outcome
 from texgs.config.stage import Stage, settings_digest
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
-from texgs.core.memory import peak_memory
 
 STAMP = ".job.json"
 FILES = ".files.json"  # names of what the job wrote
 METRICS = "metrics.json"  # its presence tells the workflow that a job is done
 BY_HAND = "metrics.by_hand.json"  # the same of a job that the workflow does not know of
-PACKAGES = ("torch", "numpy", "vtk", "pyvista")
 
 
 @dataclass(frozen=True)
@@ -133,7 +127,7 @@ def _execute(job: Job, tracking: str | None, experiment: str, metrics_name: str)
             job.settings, dict(job.inputs), job.output
         )
         seconds = time.perf_counter() - start
-        metrics = {**record(job, identity, seconds), "run": run.id, "numbers": outcome.numbers}
+        metrics = {**record(job.settings, identity, seconds), "run": run.id, "numbers": outcome.numbers}
         write_json(
             job.output / FILES, sorted({METRICS, BY_HAND, *(path.name for path in job.output.iterdir())})
         )
@@ -179,82 +173,6 @@ def foreign_files(output: Path) -> list[str]:
         return []  # unfinished, or of no job at all
     written = {*read_json(output / FILES), STAMP, FILES}
     return sorted({path.name for path in output.iterdir()} - written)
-
-
-def record(job: Job, identity: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """Where and how a result came about."""
-    return {
-        "stage": job.stage.name,
-        **{key: job.settings[key] for key in ("dataset", "tf") if key in job.settings},
-        **recipe(job.settings),
-        "seconds": seconds,
-        "peak_memory_mib": peak_memory() / 2**20,
-        "device": device(job.settings),
-        "seed": seed(job.settings),
-        "config_sha": identity["settings"],
-        "code_sha": identity["code"],
-        "git_sha": git_revision(),
-        "versions": versions(),
-    }
-
-
-def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the recipe, of the sweep and of its variant, where the stage is of a fit."""
-    fit = settings.get("fit", {})
-    if "variant" not in fit:
-        return {}
-    return {"recipe": fit["name"], "variant": fit["variant"], "sweep": fit["sweep"]}
-
-
-def gpu_name() -> str:
-    """Of the GPU that fits run on."""
-    import torch  # the jobs that need it have it already
-
-    return str(torch.cuda.get_device_name())
-
-
-def device(settings: Mapping[str, Any]) -> str:
-    """What did the work."""
-    if settings.get("fit", {}).get("device") == "cuda":
-        return gpu_name()
-    by_gpu = settings.get("views", {}).get("mapper") == "gpu"
-    return "OpenGL" if by_gpu else f"{platform.machine()} CPU"
-
-
-def seed(settings: Mapping[str, Any]) -> int | None:
-    """The seed of the stage's random numbers, where it has one."""
-    parts = [settings.get(name, {}) for name in ("fit", "volume")]
-    return next((part["seed"] for part in parts if "seed" in part), None)
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python, texgs and what results depend on most."""
-    found = {"python": platform.python_version(), "texgs": __version__}
-    for package in PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            continue
-    return found
-
-
-def user() -> str:
-    """Who runs this; a number where the system has no name for it."""
-    try:
-        return getpass.getuser()
-    except (KeyError, OSError):
-        return str(os.getuid())
-
-
-def git_revision() -> str:
-    """Commit of the source tree, with "+" where files differ from it; "unknown" outside a clone."""
-    folder = Path(__file__).parent
-    command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
-    except (OSError, subprocess.SubprocessError):
-        return "unknown"
-    return done.stdout.strip()
 
 
 def series(numbers: Mapping[str, Any]) -> Iterator[dict[str, float]]:

@@ -98,9 +98,9 @@ def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -
     import numpy as np
 
     from texgs.core.io import read_json
+    from texgs.volume.basic_tfs import check_disjoint
     from texgs.volume.suggest import suggest
     from texgs.volume.tf_files import read_tf
-    from texgs.volume.transfer import check_disjoint
 
     summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     if files:

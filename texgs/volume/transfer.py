@@ -1,9 +1,8 @@
-"""Transfer functions: what colour and opacity a scalar value has, and basic ones that share a volume."""
+"""Transfer functions: what colour and opacity a scalar value has."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 from numbers import Real
 from typing import Any
 
@@ -69,10 +68,10 @@ class TransferFunction:
             [..., 4] r, g, b and opacity in [0, 1], straight alpha.
         """
         values = np.asarray(values, dtype=np.float64)
-        opacity = _right_limit(self.opacity, values)  # [..., 1]
+        opacity = right_limit(self.opacity, values)  # [..., 1]
         outside = (values < self.opacity[0][0]) | (values > self.opacity[-1][0])
         opacity[outside] = 0
-        return np.nan_to_num(np.concatenate([_right_limit(self.color, values), opacity], axis=-1))
+        return np.nan_to_num(np.concatenate([right_limit(self.color, values), opacity], axis=-1))
 
     def scaled(self, low: float, high: float) -> "TransferFunction":
         """Map a function given on fractions of the data range to data values: 0 -> low, 1 -> high.
@@ -80,7 +79,7 @@ class TransferFunction:
         Raises:
             ArgumentError: if the range is empty or a point lies outside [0, 1].
         """
-        _check_range("range", (low, high))
+        check_range("range", (low, high))
         for name, points in (("opacity", self.opacity), ("color", self.color)):
             for i, (fraction, *_) in enumerate(points):
                 if not 0 <= fraction <= 1:
@@ -139,90 +138,18 @@ class TransferFunction:
         return TransferFunction(data["opacity"], data["color"])
 
 
-def split(tf: TransferFunction, ranges: Sequence[tuple[float, float]]) -> list[TransferFunction]:
-    """Cut a transfer function into basic ones.
-
-    Inside each open range the basic function equals the whole, outside the closed range it is transparent.
-
-    Args:
-        tf: the whole.
-        ranges: (low, high) per basic function, in data units; they may touch but not overlap.
+def check_range(name: str, range_: tuple[float, float]) -> None:
+    """Require a range that is not empty, with finite ends.
 
     Raises:
-        ArgumentError: naming a range that is empty, overlaps another, or in which all is transparent.
+        ArgumentError: naming it.
     """
-    for i, range_ in enumerate(ranges):
-        _check_range(f"ranges[{i}]", range_)
-    _check_no_overlap({f"ranges[{i}]": range_ for i, range_ in enumerate(ranges)})
-    basic = []
-    for i, (low, high) in enumerate(ranges):
-        first, last = max(low, tf.opacity[0][0]), min(high, tf.opacity[-1][0])
-        opacity = _cut(tf.opacity, first, last) if first < last else ()
-        if not any(alpha > 0 for _, alpha in opacity):
-            raise ArgumentError(
-                f"ranges[{i}]: expected a range with opacity above 0, got {_text(ranges[i])}; "
-                f"the transfer function is visible in {_text(tf.support)}"
-            )
-        basic.append(TransferFunction(opacity, _cut(tf.color, low, high)))
-    return basic
-
-
-def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
-    """One transfer function that shows what the basic ones show together; `split` takes it apart again.
-
-    Raises:
-        ArgumentError: if two of them overlap, or there is none.
-    """
-    if not basic:
-        raise ArgumentError("transfer functions: expected at least one, got none")
-    check_disjoint(basic)
-    opacity: list[tuple[float, ...]] = []
-    color: list[tuple[float, ...]] = []
-    for tf in sorted(basic.values(), key=lambda each: each.support):
-        low, high = tf.support
-        points = list(_cut(tf.opacity, low, high))
-        if not opacity or opacity[-1][0] < low:  # transparent between two, also where one ends in a step
-            points = [(low, 0.0), *points] if points[0][1] > 0 else points
-            opacity += [(opacity[-1][0], 0.0)] if opacity and opacity[-1][1] > 0 else []
-        opacity += points
-        color += _cut(tf.color, low, high)
-    return TransferFunction(tuple(opacity), tuple(color))  # type: ignore[arg-type]
-
-
-def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
-    """Require that no value is visible in two basic transfer functions; ranges may touch.
-
-    Raises:
-        ArgumentError: naming two that overlap, and where each is visible.
-    """
-    _check_no_overlap({name: tf.support for name, tf in basic.items()})
-
-
-def _check_no_overlap(ranges: Mapping[str, tuple[float, float]]) -> None:
-    for (name, one), (other, two) in combinations(ranges.items(), 2):
-        if max(one[0], two[0]) < min(one[1], two[1]):
-            raise ArgumentError(
-                f"{name} and {other}: expected ranges of values that do not overlap, got {_text(one)} and "
-                f"{_text(two)}; cut one of them"
-            )
-
-
-def _check_range(name: str, range_: tuple[float, float]) -> None:
     low, high = range_
     if not (-MAXIMUM <= low < high <= MAXIMUM):
-        raise ArgumentError(f"{name}: expected low < high, both finite, got {_text(range_)}")
+        raise ArgumentError(f"{name}: expected low < high, both finite, got {row_text(range_)}")
 
 
-def _cut(points: Sequence[tuple[float, ...]], low: float, high: float) -> Any:
-    """The points between two values, and the limits at them from inside."""
-    inside = [point for point in points if low < point[0] < high]
-    # Mirrored, the limit from the left becomes the one from the right.
-    mirrored = [(-value, *rest) for value, *rest in reversed(points)]
-    start, end = _right_limit(points, np.array(low)), _right_limit(mirrored, np.array(-high))
-    return ((low, *start.tolist()), *inside, (high, *end.tolist()))
-
-
-def _right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
+def right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
     """Interpolate [..., C] linearly, constant outside the points; at a step the second point holds."""
     table = np.array(points)
     columns = [np.interp(values, table[:, 0], column) for column in table[:, 1:].T]
@@ -239,11 +166,11 @@ def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[fl
     for i, row in enumerate(rows):
         where = f"{name}[{i}]"
         if len(row) != channels.count(",") + 2 or not all(isinstance(x, Real) for x in row):
-            raise ArgumentError(f"{where}: expected the numbers (value, {channels}), got {_text(row)}")
+            raise ArgumentError(f"{where}: expected the numbers (value, {channels}), got {row_text(row)}")
         if not all(-MAXIMUM <= x <= MAXIMUM for x in row):
-            raise ArgumentError(f"{where}: expected finite numbers, got {_text(row)}")
+            raise ArgumentError(f"{where}: expected finite numbers, got {row_text(row)}")
         if not all(0 <= x <= 1 for x in row[1:]):
-            raise ArgumentError(f"{where}: expected {channels} in [0, 1], got {_text(row[1:])}")
+            raise ArgumentError(f"{where}: expected {channels} in [0, 1], got {row_text(row[1:])}")
         if i > 0 and row[0] < rows[i - 1][0]:
             raise ArgumentError(
                 f"{where}: expected values in ascending order, got {row[0]:.9g} after {rows[i - 1][0]:.9g}; "
@@ -256,6 +183,6 @@ def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[fl
     return tuple(tuple(map(float, row)) for row in rows)
 
 
-def _text(row: Iterable[Any]) -> str:
+def row_text(row: Iterable[Any]) -> str:
     """A point or range as people write it."""
     return f"({', '.join(f'{x:.9g}' if isinstance(x, float) else repr(x) for x in row)})"

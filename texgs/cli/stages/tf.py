@@ -3,7 +3,8 @@
 from typing import Any
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.transfer import TransferFunction, check_disjoint
+from texgs.volume.basic_tfs import check_disjoint
+from texgs.volume.transfer import TransferFunction
 
 
 def in_data_values(

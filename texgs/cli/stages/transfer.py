@@ -8,9 +8,9 @@ import numpy as np
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.tf import in_data_values
 from texgs.core.io import read_json
+from texgs.volume.basic_tfs import check_disjoint
 from texgs.volume.tf_files import write_paraview
 from texgs.volume.tf_plot import plot
-from texgs.volume.transfer import check_disjoint
 
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:

@@ -13,9 +13,10 @@ from texgs.core.camera import Camera
 from texgs.core.io import read_json
 from texgs.scene.edits import Edit
 from texgs.volume.appearance import Appearance
+from texgs.volume.basic_tfs import combine
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.render import Mapper
-from texgs.volume.transfer import TransferFunction, combine
+from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import Light
 
 

@@ -1,0 +1,98 @@
+"""Where numbers come from: what ran, on what, from which source and settings."""
+
+from __future__ import annotations
+
+import getpass
+import os
+import platform
+import subprocess
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from texgs import __version__
+from texgs.core.memory import peak_memory
+
+PACKAGES = ("torch", "numpy", "vtk", "pyvista")
+
+
+def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+    """Where and how the result of a job came about.
+
+    Args:
+        settings: of the job.
+        identity: digests of its settings and code.
+        seconds: that its work took.
+    """
+    return {
+        **{key: settings[key] for key in ("stage", "dataset", "tf") if key in settings},
+        **recipe(settings),
+        "seconds": seconds,
+        "peak_memory_mib": peak_memory() / 2**20,
+        "device": device(settings),
+        "seed": seed(settings),
+        "config_sha": identity["settings"],
+        "code_sha": identity["code"],
+        "git_sha": git_revision(),
+        "versions": versions(),
+    }
+
+
+def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
+    """Names of the recipe, of the sweep and of its variant, where the stage is of a fit."""
+    fit = settings.get("fit", {})
+    if "variant" not in fit:
+        return {}
+    return {"recipe": fit["name"], "variant": fit["variant"], "sweep": fit["sweep"]}
+
+
+def gpu_name() -> str:
+    """Of the GPU that fits run on."""
+    import torch  # the jobs that need it have it already
+
+    return str(torch.cuda.get_device_name())
+
+
+def device(settings: Mapping[str, Any]) -> str:
+    """What did the work."""
+    if settings.get("fit", {}).get("device") == "cuda":
+        return gpu_name()
+    by_gpu = settings.get("views", {}).get("mapper") == "gpu"
+    return "OpenGL" if by_gpu else f"{platform.machine()} CPU"
+
+
+def seed(settings: Mapping[str, Any]) -> int | None:
+    """The seed of the stage's random numbers, where it has one."""
+    parts = [settings.get(name, {}) for name in ("fit", "volume")]
+    return next((part["seed"] for part in parts if "seed" in part), None)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python, texgs and what results depend on most."""
+    found = {"python": platform.python_version(), "texgs": __version__}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def user() -> str:
+    """Who runs this; a number where the system has no name for it."""
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return str(os.getuid())
+
+
+def git_revision() -> str:
+    """Commit of the source tree, with "+" where files differ from it; "unknown" outside a clone."""
+    folder = Path(__file__).parent
+    command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)
+    except (OSError, subprocess.SubprocessError):
+        return "unknown"
+    return done.stdout.strip()
