@@ -157,5 +157,7 @@ def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
     assert "31.25" in text
     assert "a &lt;b&gt; edit" in text
     assert "not measured" in text, "the second edit was not compared"
+    assert text.count('<a href="#job-1">1</a>') == 2, "rows lead to the job that they are from"
+    assert text.count('<tr id="job-1">') == 1
     assert text.count("data:image/png;base64,") == 1
     assert "http" not in text.replace("http-equiv", ""), "the report needs no other file"

@@ -10,14 +10,19 @@ def metrics(folder, stage, numbers, *, dataset="engine", tf="TF01", **more):
 
 
 def rows(table):
-    return [dict(zip([c.title for c in table.columns], row, strict=True)) for row in table.rows]
+    return [dict(zip([c.title for c in table.columns], row.cells, strict=True)) for row in table.rows]
 
 
 def test_data_sets_by_size_of_their_views(tmp_path):
     metrics(tmp_path, "volume", {"dims": [4, 5, 6], "volume_mib": 2.5})
     for tf, size, ms in (("TF01", 64, 10.0), ("TF02", 64, 30.0), ("TF01", 800, 500.0)):
         metrics(tmp_path, "views", {"width": size, "height": size, "frame_ms": ms}, tf=tf)
-    small, large = rows(datasets(tmp_path.iterdir()))
+    table = datasets(tmp_path.iterdir())
+    assert [[path.stem for path in row.sources] for row in table.rows] == [
+        ["000", "001", "002"],
+        ["000", "003"],
+    ]
+    small, large = rows(table)
     assert (small["views px"], small["basic scenes"], small["ms / frame"]) == ("64x64", 2, 20.0)
     assert (large["views px"], large["basic scenes"], large["ms / frame"]) == ("800x800", 1, 500.0)
     assert (small["samples"], small["volume MiB"]) == ("4x5x6", 2.5)
@@ -29,7 +34,9 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
     for tf in ("TF01", "TF02"):
         for seed in (0, 1):
             metrics(tmp_path, "texture", sizes, tf=tf, dataset="wood", seed=seed)
-    found = rows(model_size(tmp_path.iterdir()))
+    table = model_size(tmp_path.iterdir())
+    assert [[path.stem for path in row.sources] for row in table.rows] == [["000", "002"], ["001", "003"]]
+    found = rows(table)
     assert [row["recipe"] for row in found] == ["quick", "quick-s1"]
     assert (found[0]["basic scenes"], found[0]["primitives"], found[0]["texture MiB"]) == (2, 2000, 16.0)
     assert found[0]["texture MiB (paper)"] == 114.5

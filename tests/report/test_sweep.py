@@ -33,7 +33,7 @@ def run(
 
 
 def column(table: Table, title):
-    return [row[[c.title for c in table.columns].index(title)] for row in table.rows]
+    return [row.cells[[c.title for c in table.columns].index(title)] for row in table.rows]
 
 
 def test_means_and_spread_over_seeds(tmp_path):
@@ -69,7 +69,7 @@ def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):
 def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
     table = sweep(run(tmp_path, "a", phases=("shading",)), "mine")
     assert column(table, "seeds") == [0]
-    assert set(table.rows[0][5:]) == {None}
+    assert set(table.rows[0].cells[5:]) == {None}
 
 
 def test_fits_of_another_sweep_do_not_count_and_other_files_are_named(tmp_path):

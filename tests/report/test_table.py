@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+from pathlib import Path
 
 import pytest
 
@@ -8,18 +9,20 @@ from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.report.fitting import COLUMNS, fitting
 from texgs.report.metrics_files import paper
-from texgs.report.table import Column, Table
+from texgs.report.table import Column, Row, Table
 
 TABLE = Table(
-    "A caption.", (Column("name"), Column("dB", 2)), (("five_jets", 36.834), ("wood & stone", None))
+    "A caption.",
+    (Column("name"), Column("dB", 2)),
+    (Row(("five_jets", 36.834), (Path("a/metrics.json"),)), Row(("wood & stone", None), ())),
 )
 
 
 def test_csv_keeps_all_digits_and_leaves_gaps():
     assert list(csv.reader(io.StringIO(TABLE.csv()))) == [
-        ["name", "dB"],
-        ["five_jets", "36.834"],
-        ["wood & stone", ""],
+        ["name", "dB", "metrics files"],
+        ["five_jets", "36.834", "a/metrics.json"],
+        ["wood & stone", "", ""],
     ]
 
 
@@ -44,17 +47,17 @@ def test_fitting_stands_beside_the_paper(tmp_path):
     paths.append(metrics(tmp_path, "engine", "default", "surfels"))
     paths.append(metrics(tmp_path, "sphere", "quick", "shading", psnr=30.0, ssim=0.9))
     table = fitting(paths)
-    assert [row[:4] for row in table.rows] == [
+    assert [row.cells[:4] for row in table.rows] == [
         ["engine", "TF01", "default", "surfels"],
         ["engine", "TF01", "default", "texture"],
         ["sphere", "TF01", "quick", "shading"],
     ]
-    last = dict(zip([column.title for column in COLUMNS], table.rows[1], strict=True))
+    last = dict(zip([column.title for column in COLUMNS], table.rows[1].cells, strict=True))
     assert last["minutes"] == 1.5
     assert last["memory GiB"] == 0.5
     assert (last["PSNR (paper)"], last["minutes (paper)"]) == (33.29, 0.76)
-    assert table.rows[0][4] is None, "no test views were compared"
-    assert table.rows[2][-3:] == [None, None, None], "the paper does not have it"
+    assert table.rows[0].cells[4] is None, "no test views were compared"
+    assert table.rows[2].cells[-3:] == [None, None, None], "the paper does not have it"
 
 
 def test_the_papers_numbers_are_all_there():

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.report.metrics_files import PHASES, fits, paper
-from texgs.report.table import UNPUBLISHED, Cell, Column, Table
+from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 COLUMNS = (
     Column("data set"),
@@ -33,11 +33,14 @@ def fitting(paths: Iterable[str | Path]) -> Table:
         ArgumentError: if a file is no metrics file.
     """
     published = paper("fitting", keys=2)
-    rows = [row(metrics, path.parts[-3], published) for path, metrics in fits(paths)]
-    return Table(CAPTION, COLUMNS, sorted(rows, key=lambda cells: (cells[:3], PHASES.index(str(cells[3])))))
+    rows = [Row(cells(metrics, path.parts[-3], published), [path]) for path, metrics in fits(paths)]
+    rows.sort(key=lambda row: (row.cells[:3], PHASES.index(str(row.cells[3]))))
+    return Table(CAPTION, COLUMNS, rows)
 
 
-def row(metrics: dict[str, Any], recipe: str, published: dict[tuple[str, ...], dict[str, str]]) -> list[Cell]:
+def cells(
+    metrics: dict[str, Any], recipe: str, published: dict[tuple[str, ...], dict[str, str]]
+) -> list[Cell]:
     """The cells of one job."""
     numbers, phase = metrics["numbers"], metrics["stage"]
     beside = published.get((metrics["dataset"], phase), {})

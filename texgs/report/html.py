@@ -57,6 +57,7 @@ def write_report(path: str | Path, metrics_files: Iterable[str | Path]) -> Path:
         tables={name: table for name, table in tables.items() if table.rows},
         curves=data_uri(curves(jobs)),
         jobs=[job(metrics) for _, metrics in jobs],
+        places={path: index for index, path in enumerate(paths, start=1)},
         versions=versions([metrics for _, metrics in jobs]),
         headings=(*JOB, *SOURCE),
         kinds=kinds,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.report.metrics_files import paper, read
-from texgs.report.table import UNPUBLISHED, Cell, Column, Table
+from texgs.report.table import UNPUBLISHED, Column, Row, Table
 
 
 def datasets(paths: Iterable[str | Path]) -> Table:
@@ -25,24 +25,25 @@ def datasets(paths: Iterable[str | Path]) -> Table:
         Column("ms / frame (paper)", 1, UNPUBLISHED),
     )
     published = paper("datasets")
-    volumes: dict[str, dict[str, Any]] = {}
-    views: dict[tuple[str, str, str], dict[str, float | None]] = defaultdict(dict)
-    for _, metrics in read(paths):
+    volumes: dict[str, tuple[Path, dict[str, Any]]] = {}
+    views: dict[tuple[str, str, str], dict[str, tuple[Path, float | None]]] = defaultdict(dict)
+    for path, metrics in read(paths):
         n = metrics["numbers"]
         if metrics["stage"] == "volume":
-            volumes[metrics["dataset"]] = n
+            volumes[metrics["dataset"]] = (path, n)
         if metrics["stage"] == "views":
             size = f"{n['width']}x{n['height']}"
-            views[metrics["dataset"], size, metrics["device"]][metrics["tf"]] = n.get("frame_ms")
-    rows: list[list[Cell]] = []
+            views[metrics["dataset"], size, metrics["device"]][metrics["tf"]] = (path, n.get("frame_ms"))
+    rows = []
     for (name, size, device), by_tf in sorted(views.items()):
-        volume, theirs = volumes.get(name), published.get((name,), {})
-        times = [ms for ms in by_tf.values() if ms is not None]
+        of, volume = volumes.get(name, (None, None))
+        theirs = published.get((name,), {})
+        sources = [path for path in (of, *(path for path, _ in by_tf.values())) if path]
+        times = [ms for _, ms in by_tf.values() if ms is not None]
         of_volume = ["x".join(map(str, volume["dims"])), volume["volume_mib"]] if volume else [None, None]
         mean = sum(times) / len(times) if times else None
-        rows.append(
-            [name, *of_volume, size, len(by_tf), device, mean, *numbers(theirs, "volume_mib", "dvr_ms")]
-        )
+        cells = [name, *of_volume, size, len(by_tf), device, mean, *numbers(theirs, "volume_mib", "dvr_ms")]
+        rows.append(Row(cells, sources))
     return Table("Volume rendering of single basic TFs. The paper: on an RTX 4090.", columns, rows)
 
 
@@ -60,14 +61,14 @@ def rendering(paths: Iterable[str | Path]) -> Table:
         Column("volume, mean ms", 1),
         Column("volume / scene", 1),
     )
-    rows: list[list[Cell]] = []
-    for _, metrics in read(paths):
+    rows = []
+    for path, metrics in read(paths):
         if metrics["stage"] == "timing":
             n, volume = metrics["numbers"], metrics["numbers"].get("volume_mean_ms")
             ratio = None if volume is None else volume / n["frame_mean_ms"]
             where = [n["surfels"], f"{n['width']}x{n['height']}", metrics["device"], n["threads"]]
             times = [n["frame_mean_ms"], n["frame_max_ms"], volume, ratio]
-            rows.append([metrics["dataset"], label(metrics), *where, *times])
+            rows.append(Row([metrics["dataset"], label(metrics), *where, *times], [path]))
     caption = (
         "Test path. The paper, means over scenes on an RTX 4090: 11.82 ms at 800x800, 7.21 ms at 512x512."
     )
@@ -87,15 +88,15 @@ def model_size(paths: Iterable[str | Path]) -> Table:
         *(Column(f"{title} (paper)", 1, UNPUBLISHED) for title in titles),
     )
     published = paper("model_size")
-    found: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
-    for _, metrics in read(paths):
+    found: dict[tuple[str, str], list[tuple[Path, dict[str, Any]]]] = defaultdict(list)
+    for path, metrics in read(paths):
         if metrics["stage"] == "texture":
-            found[metrics["dataset"], label(metrics)].append(metrics["numbers"])
-    rows: list[list[Cell]] = []
+            found[metrics["dataset"], label(metrics)].append((path, metrics["numbers"]))
+    rows = []
     for (name, recipe), parts in sorted(found.items()):
-        sums = [sum(each[key] for each in parts) for key in ("surfels", *groups)]
+        sums = [sum(each[key] for _, each in parts) for key in ("surfels", *groups)]
         theirs = numbers(published.get((name,), {}), *groups)
-        rows.append([name, recipe, len(parts), *sums, *theirs])
+        rows.append(Row([name, recipe, len(parts), *sums, *theirs], [path for path, _ in parts]))
     return Table("Sums over the basic scenes, 32 bits a value.", columns, rows)
 
 
@@ -109,12 +110,12 @@ def edits(paths: Iterable[str | Path]) -> Table:
         Column("PSNR", 2),
         Column("SSIM", 4),
     )
-    rows: list[list[Cell]] = []
-    for _, metrics in read(paths):
+    rows = []
+    for path, metrics in read(paths):
         if metrics["stage"] == "pse":
             for step in (*metrics["numbers"]["pse"], *metrics["numbers"]["relight"]):
                 quality = [metrics["numbers"]["views"], step.get("psnr"), step.get("ssim")]
-                rows.append([metrics["dataset"], label(metrics), step["title"], *quality])
+                rows.append(Row([metrics["dataset"], label(metrics), step["title"], *quality], [path]))
     return Table("Views around the object; nothing is trained for an edit.", columns, rows)
 
 

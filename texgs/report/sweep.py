@@ -10,7 +10,7 @@ from typing import Any
 
 from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import fits, paper
-from texgs.report.table import UNPUBLISHED, Cell, Column, Table
+from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 MATERIAL = ("ambient_median", "diffuse_median", "specular_median", "shininess_median")
 PUBLISHED = {  # columns of the paper's numbers, by their headings in its files
@@ -54,9 +54,11 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
     groups: dict[tuple[str, ...], dict[int, dict[str, dict[str, Any]]]] = defaultdict(
         lambda: defaultdict(dict)
     )
-    for _, metrics in fits(paths):
+    sources: dict[tuple[str, ...], list[Path]] = defaultdict(list)
+    for path, metrics in fits(paths):
         if metrics.get("variant") and metrics["sweep"] == name:
             key = tuple(metrics[part] for part in ("dataset", "tf", "recipe", "variant"))
+            sources[key].append(path)
             groups[key][metrics["seed"]][metrics["stage"]] = metrics
     if not groups:
         raise ArgumentError(f"sweep {name}: no fit of it among the metrics files; run it first")
@@ -69,7 +71,7 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
     for key, by_seed in sorted(groups.items(), key=lambda item: (*item[0][:3], natural(item[0][3]))):
         line = published.get((key[0], key[3]), {})
         theirs = [float(line[k]) if line.get(k) else None for k, c in PUBLISHED.items() if c in beside]
-        rows.append([*key, *cells(list(by_seed.values())), *theirs])
+        rows.append(Row([*key, *cells(list(by_seed.values())), *theirs], sources[key]))
     return Table(CAPTION, (*COLUMNS, *beside), rows)
 
 

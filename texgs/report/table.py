@@ -1,4 +1,4 @@
-"""One table in three formats: CSV, Markdown and LaTeX."""
+"""One table in three formats: CSV, Markdown and LaTeX; each row knows the jobs that its numbers are from."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from texgs.core.io import write_bytes
 
 Cell = str | float | int | None
 MISSING = "not measured"
+SOURCES = "metrics files"  # heading in CSV
 UNPUBLISHED = "-"  # in columns of the paper's numbers
 
 
@@ -33,25 +34,36 @@ class Column:
 
 
 @dataclass(frozen=True)
+class Row:
+    """One row: its cells, and the metrics files that they were read from."""
+
+    cells: Sequence[Cell]
+    sources: Sequence[Path]
+
+
+@dataclass(frozen=True)
 class Table:
     """Rows of cells; what was not measured says so."""
 
     caption: str
     columns: Sequence[Column]
-    rows: Sequence[Sequence[Cell]]
+    rows: Sequence[Row]
 
     def texts(self) -> list[list[str]]:
         """All cells as people read them."""
         return [
-            [column.text(cell) for column, cell in zip(self.columns, row, strict=True)] for row in self.rows
+            [column.text(cell) for column, cell in zip(self.columns, row.cells, strict=True)]
+            for row in self.rows
         ]
 
     def csv(self) -> str:
-        """Comma separated, numbers in full; an empty cell is not measured."""
+        """Comma separated, numbers in full, sources last; an empty cell is not measured."""
         file = io.StringIO()
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow([column.title for column in self.columns])
-        writer.writerows([["" if cell is None else cell for cell in row] for row in self.rows])
+        writer.writerow([*(column.title for column in self.columns), SOURCES])
+        for row in self.rows:
+            sources = " ".join(path.as_posix() for path in row.sources)
+            writer.writerow(["" if cell is None else cell for cell in (*row.cells, sources)])
         return file.getvalue()
 
     def markdown(self) -> str:
