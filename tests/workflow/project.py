@@ -15,27 +15,28 @@ TINY = (
     "views.test.count=3 views.turntable=2 views.step=0.5"
 )
 
-# An editable installation finds texgs in the original sources, whatever the path: leave that out.
+# Runs a module's main with the copied sources. An editable installation finds texgs in the original sources,
+# whatever the path: leave that out.
 LAUNCHER = """
+import importlib
 import sys
 sys.meta_path[:] = [finder for finder in sys.meta_path if "ScikitBuild" not in type(finder).__name__]
 sys.path.insert(0, sys.argv.pop(1))
-from snakemake.cli import main
-main()
+sys.exit(importlib.import_module(sys.argv.pop(1)).main())
 """
 
 
 class Project:
     """The copied sources and a working directory for results."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, *, native: bool = False):
         self.sources, self.work = folder / "sources", folder / "work"
         self.work.mkdir(parents=True)
         for name in ("conf", "workflow", "texgs"):
             shutil.copytree(
                 ROOT / name,
                 self.sources / name,
-                ignore=shutil.ignore_patterns("csrc", "_native", "__pycache__"),
+                ignore=shutil.ignore_patterns("csrc", "__pycache__", *([] if native else ["_native"])),
             )
         shutil.copy(ROOT / "Snakefile", self.sources)
 
@@ -47,7 +48,15 @@ class Project:
         config: tuple[str, ...] = ("tracking=none",),
     ) -> subprocess.Popen[str]:
         """Snakemake in a process group of its own; `targets` are rules, by default those before the fits."""
-        command = [sys.executable, "-c", LAUNCHER, str(self.sources), "-s", str(self.sources / "Snakefile")]
+        command = [
+            sys.executable,
+            "-c",
+            LAUNCHER,
+            str(self.sources),
+            "snakemake.cli",
+            "-s",
+            str(self.sources / "Snakefile"),
+        ]
         command += ["-d", str(self.work), "--cores", "2", "--rerun-incomplete", *targets, *words]
         command += ["--config", *config, f"overrides={TINY} {overrides}"]
         environment = {**os.environ, "PYTHONPATH": str(ROOT)}
