@@ -14,8 +14,8 @@ from benchmarks.timing import Case, measure
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
 from texgs.core.memory import keep_freed_memory
-from texgs.fit.images import Images
 from texgs.fit.loop import Fit
+from texgs.scene.images import Images
 from texgs.scene.model import Model, Optics, raw_material
 from texgs.scene.render import render
 from texgs.volume.view_set import Light

@@ -6,9 +6,9 @@ import torch
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
-from texgs.fit.images import Images
 from texgs.fit.loop import Fit
 from texgs.fit.seeds import surfels_at
+from texgs.scene.images import Images
 from texgs.scene.model import Optics, raw_material
 from texgs.volume.view_set import Light
 
@@ -56,6 +56,17 @@ def ball_seeds(count=80, seed=0, opacity=0.1):
     points = (torch.rand(count, 3, generator=generator) - 0.5) * 2 * RADIUS
     parameters = surfels_at(points, opacity, generator)
     return {**parameters, "colors": torch.full((count, 3), 0.5), **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
+
+
+def random_surfels(seed, count, spread, size):
+    """Surfels of any size and tilt around a point off the middle."""
+    generator = torch.Generator().manual_seed(seed)
+    p = ball_seeds(count, seed, opacity=0.9)
+    middle = torch.randn(3, generator=generator) * 0.3
+    p["means"] = torch.randn(count, 3, generator=generator) * spread + middle
+    p["quats"] = torch.randn(count, 4, generator=generator)
+    p["scales"] = torch.log(size * torch.rand(count, 2, generator=generator).clamp_min(1e-3))
+    return p
 
 
 def phase(iterations=60, densify=None, losses=None, rates=None, **options):

@@ -7,10 +7,10 @@ from texgs.core.errors import FitError
 from texgs.core.image import write_png
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import split, zeroth
-from texgs.fit.images import load
 from texgs.fit.loop import CHECKED_EVERY, extent
 from texgs.fit.seeds import seed_surfels
 from texgs.metrics.quality import evaluate, mean
+from texgs.scene.images import load
 from texgs.scene.model import MATERIAL, Model, raw_material
 from texgs.volume.view_set import View, ViewSet, read_views, write_transforms
 

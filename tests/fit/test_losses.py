@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import pytest
 import torch
+from torch.testing import assert_close
 
-from tests.fit.scenes import ball_images, ball_seeds
+from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
 from texgs.config.fit import Losses
 from texgs.fit.losses import view_loss
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
@@ -9,6 +12,7 @@ from texgs.scene.model import Model, Optics, material
 from texgs.scene.render import render
 
 OPTICS = Optics()
+ALL = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 
 
 @pytest.fixture
@@ -105,3 +109,32 @@ def test_shading_turns_normals_unless_told_not_to(target):
     assert torch.allclose(
         unlit["quats"], gradients(turned, target, turns_normals=False)["quats"], rtol=1e-3, atol=1e-9
     ), "without light that depends on normals there is nothing to leave out"
+
+
+def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
+    """An independent surfel far to the left, and content far to the right: both count."""
+    camera = cameras(1, size=96, distance=4)[0]
+    p = random_surfels(7, 30, 0.05, 0.05)
+    generator = torch.Generator().manual_seed(1)
+    p |= {
+        name: p[name] + torch.randn(30, generator=generator)
+        for name in ("ambient", "diffuse", "specular", "shininess")
+    }
+    planes = torch.ones(4, 96, 96)
+    planes[3] = 0
+    planes[:, 40:52, 70:80] = 0.5
+    images = images_of([planes], [camera])
+    part, whole = images.visible(0, p, Optics()), images.target(0)
+    assert part.share < 0.6
+    found = []
+    for target in (part, whole):
+        leaves = {name: x.clone().requires_grad_() for name, x in p.items()}
+        view_loss(leaves, Optics(), target, ALL, None, iteration=1).backward()
+        without_normals = view_loss(p, Optics(), target, replace(ALL, normal=0.0), None, iteration=1)
+        found.append((without_normals, {name: x.grad for name, x in leaves.items()}))
+    assert_close(found[0][0], found[1][0], rtol=1e-5, atol=0)
+    for name, gradient in found[0][1].items():
+        scale = float(found[1][1][name].abs().max())
+        assert_close(
+            gradient, found[1][1][name], rtol=1e-3, atol=1e-4 * scale, msg=lambda m, n=name: f"{n}: {m}"
+        )

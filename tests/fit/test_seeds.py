@@ -8,9 +8,9 @@ from scipy.spatial.distance import cdist
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
 from texgs.fit.hull import hull_points, mean_colors, project
-from texgs.fit.images import load
 from texgs.fit.seeds import box_of, read_points, seed_surfels, surfels_at
 from texgs.fit.visible import shrunk
+from texgs.scene.images import load
 from texgs.volume.grid import Grid
 from texgs.volume.view_set import ViewSet, read_views
 

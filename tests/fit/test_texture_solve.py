@@ -9,11 +9,11 @@ from torch.testing import assert_close
 from tests.fit.scenes import HEADLIGHT, ball_images, ball_planes, ball_seeds, cameras, images_of, new_fit, run
 from texgs.config.fit import Densify
 from texgs.core.errors import FitError
-from texgs.fit.images import Images
 from texgs.fit.texels import textured
 from texgs.fit.texture_adam import refine, without_texture
 from texgs.fit.texture_layout import look, sizes_for_budget
 from texgs.fit.texture_solve import curvature, sampled_error, solve
+from texgs.scene.images import Images
 from texgs.scene.model import Model, Optics, raw_material
 from texgs.scene.render import render, shaded
 

@@ -13,9 +13,9 @@ from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fit.densify import DensityControl
 from texgs.fit.harmonics import join
-from texgs.fit.images import Images
 from texgs.fit.losses import view_loss
 from texgs.fit.optimizer import Optimizer, Rate
+from texgs.scene.images import Images
 from texgs.scene.model import MATERIAL, Optics
 
 USUAL_DISTANCE = 4.0  # of cameras, in radii of the object

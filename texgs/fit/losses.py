@@ -9,11 +9,11 @@ import torch
 from torch import Tensor
 
 from texgs.config.fit import Losses
-from texgs.fit.images import Target
 from texgs.raster import Render, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.ssim import l1_dssim, ssim
+from texgs.scene.images import Target
 from texgs.scene.model import MATERIAL, Optics, geometry, material
 from texgs.scene.render import shaded
 

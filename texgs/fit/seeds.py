@@ -10,8 +10,8 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
-from texgs.fit.images import Images
 from texgs.fit.visible import CANDIDATES, most_seen
+from texgs.scene.images import Images
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet

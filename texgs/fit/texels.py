@@ -6,10 +6,10 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.fit.images import Images
 from texgs.fit.texture_adam import refine
 from texgs.fit.texture_layout import look, offsets_of, sizes_for_budget, sizes_where_seen
 from texgs.fit.texture_solve import solve
+from texgs.scene.images import Images
 from texgs.scene.model import Model
 
 

@@ -6,8 +6,8 @@ import torch
 
 from texgs.core.errors import FitError
 from texgs.core.progress import progress
-from texgs.fit.images import Images
 from texgs.raster.ssim import l1_dssim
+from texgs.scene.images import Images
 from texgs.scene.model import TEXTURE, Model
 from texgs.scene.render import render
 

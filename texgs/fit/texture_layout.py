@@ -9,9 +9,9 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
-from texgs.fit.images import Images
 from texgs.raster import Texture, rasterize
 from texgs.raster.atlas import MOST_TEXELS
+from texgs.scene.images import Images
 from texgs.scene.model import Model, geometry
 from texgs.scene.render import shaded
 

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 from texgs.core.progress import progress
-from texgs.fit.images import Images, Target
 from texgs.fit.texture_layout import EXTENT, Sight
 from texgs.raster.ssim import l1_dssim
+from texgs.scene.images import Images, Target
 from texgs.scene.model import Model
 from texgs.scene.render import render
 

@@ -9,8 +9,8 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
-from texgs.fit.images import Images
 from texgs.fit.loop import Fit
+from texgs.scene.images import Images
 from texgs.scene.model import Model, Optics, raw_material
 from texgs.scene.render import render
 from texgs.volume.reduced import smaller

@@ -11,9 +11,9 @@ from torch import Tensor
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.progress import progress
 from texgs.fit import checkpoint
-from texgs.fit.images import Images
 from texgs.fit.loop import Fit
 from texgs.metrics.quality import evaluate, mean
+from texgs.scene.images import Images
 from texgs.scene.model import Model, Optics
 from texgs.volume.view_set import ViewSet
 

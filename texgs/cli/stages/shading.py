@@ -8,7 +8,7 @@ from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, 
 from texgs.core.device import torch_device
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import base_color
-from texgs.fit.images import load
+from texgs.scene.images import load
 from texgs.scene.model import Model, material, raw_material
 from texgs.scene.model_file import read_model, write_model
 from texgs.volume.view_set import read_views

@@ -10,8 +10,8 @@ from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, 
 from texgs.core.device import torch_device
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import join, split, zeroth
-from texgs.fit.images import load
 from texgs.fit.seeds import seed_surfels
+from texgs.scene.images import load
 from texgs.scene.model import Model, Optics
 from texgs.scene.model_file import write_model
 from texgs.volume.nrrd_file import open_grid

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.fit.crop import Box, content_box, surfel_box
+from texgs.scene.crop import Box, content_box, surfel_box
 from texgs.scene.model import Optics
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import Light, View

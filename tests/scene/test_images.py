@@ -4,13 +4,12 @@ import pytest
 import torch
 from PIL import Image
 
+from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
-from texgs.fit.images import load
+from texgs.scene.images import load
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View, read_views, write_transforms
-
-from .scenes import HEADLIGHT, cameras
 
 
 def random_view(folder, camera, seed=0, channels=4):

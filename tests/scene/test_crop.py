@@ -6,15 +6,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.testing import assert_close
 
-from tests.fit.scenes import ball_seeds, cameras, images_of
-from texgs.config.fit import Losses
+from tests.fit.scenes import cameras, images_of, random_surfels
 from texgs.core.camera import orbit
-from texgs.fit.crop import MARGIN, Box, content_box, surfel_box
-from texgs.fit.losses import view_loss
+from texgs.scene.crop import MARGIN, Box, content_box, surfel_box
 from texgs.scene.model import Model, Optics
 from texgs.scene.render import render
-
-ALL = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 
 
 def box_of(seen):
@@ -25,17 +21,6 @@ def box_of(seen):
 
 def is_inside(box, other):
     return box.union(other) == other
-
-
-def random_surfels(seed, count, spread, size):
-    """Surfels of any size and tilt around a point off the middle."""
-    generator = torch.Generator().manual_seed(seed)
-    p = ball_seeds(count, seed, opacity=0.9)
-    middle = torch.randn(3, generator=generator) * 0.3
-    p["means"] = torch.randn(count, 3, generator=generator) * spread + middle
-    p["quats"] = torch.randn(count, 4, generator=generator)
-    p["scales"] = torch.log(size * torch.rand(count, 2, generator=generator).clamp_min(1e-3))
-    return p
 
 
 @settings(max_examples=40, deadline=None)
@@ -100,35 +85,6 @@ def test_the_camera_of_a_part_sees_that_part():
     whole = render(Model(p), camera).color
     part = render(Model(p), camera.crop(7, 3, 40, 31)).color
     assert_close(part, whole[3:31, 7:40], atol=2e-5, rtol=0)
-
-
-def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
-    """An independent surfel far to the left, and content far to the right: both count."""
-    camera = cameras(1, size=96, distance=4)[0]
-    p = random_surfels(7, 30, 0.05, 0.05)
-    generator = torch.Generator().manual_seed(1)
-    p |= {
-        name: p[name] + torch.randn(30, generator=generator)
-        for name in ("ambient", "diffuse", "specular", "shininess")
-    }
-    planes = torch.ones(4, 96, 96)
-    planes[3] = 0
-    planes[:, 40:52, 70:80] = 0.5
-    images = images_of([planes], [camera])
-    part, whole = images.visible(0, p, Optics()), images.target(0)
-    assert part.share < 0.6
-    found = []
-    for target in (part, whole):
-        leaves = {name: x.clone().requires_grad_() for name, x in p.items()}
-        view_loss(leaves, Optics(), target, ALL, None, iteration=1).backward()
-        without_normals = view_loss(p, Optics(), target, replace(ALL, normal=0.0), None, iteration=1)
-        found.append((without_normals, {name: x.grad for name, x in leaves.items()}))
-    assert_close(found[0][0], found[1][0], rtol=1e-5, atol=0)
-    for name, gradient in found[0][1].items():
-        scale = float(found[1][1][name].abs().max())
-        assert_close(
-            gradient, found[1][1][name], rtol=1e-3, atol=1e-4 * scale, msg=lambda m, n=name: f"{n}: {m}"
-        )
 
 
 def test_the_part_keeps_the_light_and_moves_the_principal_point():
