@@ -1,0 +1,158 @@
+import hashlib
+from pathlib import Path
+
+import pytest
+import torch
+from safetensors.torch import save_file
+
+from tests.real_data import real_data
+from texgs.core.errors import ArgumentError, MissingDataError
+from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
+from texgs.models.tensors import read_tensors
+from texgs.models.weights import available, locate
+
+CONTENT = b"weights of a model"
+CHECKSUM = hashlib.sha256(CONTENT).hexdigest()
+UNREACHABLE = "http://127.0.0.1:9/tiny.bin"  # the port of a service that discards, closed everywhere
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A weights folder of its own, caches that are empty, and two entries in the catalogue."""
+    for name, path in (("TEXGS_WEIGHTS", "weights"), ("TEXGS_CACHE", "cache"), ("TORCH_HOME", "torch")):
+        monkeypatch.setenv(name, str(tmp_path / path))
+    monkeypatch.setenv("HF_HUB_CACHE", str(tmp_path / "hub"))
+    monkeypatch.setattr("huggingface_hub.constants.HF_HUB_OFFLINE", True, raising=False)
+    files = (File("tiny.bin", 0.1, CHECKSUM, UNREACHABLE), File("other.bin", 0.1, CHECKSUM))
+    monkeypatch.setitem(CATALOGUE, "tiny", Single(files, "a shelf"))
+    needs = (("config.json",), ("model.safetensors", "pytorch_model.bin"))
+    monkeypatch.setitem(CATALOGUE, "hub", Snapshot("texgs/none", "0" * 40, 1, needs, ("*.json",)))
+    return tmp_path
+
+
+def put(path, content=CONTENT):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("place", ["weights", "cache/weights", "torch/hub/checkpoints"])
+@pytest.mark.parametrize("name", ["tiny.bin", "other.bin"])
+def test_a_file_is_found_where_it_may_lie_under_either_name(folder, place, name):
+    assert not available("tiny")
+    path = put(folder / place / name)
+    assert locate("tiny") == path
+    assert available("tiny")
+
+
+def test_the_weights_folder_comes_first(folder):
+    put(folder / "torch/hub/checkpoints/tiny.bin")
+    path = put(folder / "weights" / "tiny.bin")
+    assert locate("tiny") == path
+
+
+def test_another_file_of_that_name_is_refused_also_after_it_was_whole(folder):
+    path = put(folder / "weights" / "tiny.bin")
+    assert available("tiny")
+    put(path, b"half of")
+    for look in (locate, available):
+        with pytest.raises(
+            ArgumentError, match=f"tiny.bin: expected the weights of tiny with checksum {CHECKSUM[:12]}"
+        ):
+            look("tiny")
+
+
+def test_missing_weights_are_one_sentence_with_size_source_and_place(folder):
+    with pytest.raises(MissingDataError) as caught:
+        locate("tiny")
+    message = str(caught.value)
+    for part in (
+        "tiny:",
+        "0.1 MB",
+        "a download failed",
+        "a shelf",
+        "tiny.bin or other.bin",
+        str(folder / "weights"),
+    ):
+        assert part in message
+    assert "\n" not in message
+    assert not list(folder.rglob("tiny.bin*")), "nothing half downloaded is left"
+
+
+def test_a_file_that_nothing_is_known_to_download_is_only_looked_for(folder, monkeypatch):
+    monkeypatch.setitem(CATALOGUE, "tiny", Single((File("other.bin", 2, CHECKSUM),), "a shelf"))
+    with pytest.raises(MissingDataError, match=r"\(2 MB\) are not on this machine; get them from a shelf"):
+        locate("tiny")
+
+
+@pytest.mark.parametrize("place", ["weights/hub", f"hub/models--texgs--none/snapshots/{'0' * 40}"])
+def test_a_folder_is_found_once_it_is_complete(folder, place):
+    put(folder / place / "config.json")
+    assert not available("hub")
+    put(folder / place / "pytorch_model.bin")
+    assert locate("hub") == folder / place
+
+
+def test_a_folder_that_is_missing_names_its_repository(folder):
+    with pytest.raises(MissingDataError, match=r"hub: .*huggingface.co/texgs/none and put the folder hub"):
+        locate("hub")
+
+
+def test_a_name_that_is_unknown_is_answered_with_those_known():
+    with pytest.raises(ArgumentError, match=r"expected one of vgg16, .*, got 'vgg19'"):
+        locate("vgg19")
+
+
+def test_the_catalogue_says_what_each_file_is():
+    for entry in CATALOGUE.values():
+        if isinstance(entry, Single):
+            assert all(len(bytes.fromhex(file.sha256)) == 32 and file.megabytes > 0 for file in entry.files)
+        else:
+            assert len(bytes.fromhex(entry.revision)) == 20
+            assert entry.source.endswith(entry.repository)
+
+
+@pytest.mark.parametrize("name", ["vgg16", "lpips_vgg", "mobile_sam"])
+def test_real_weights_are_whole(name, monkeypatch):
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(real_data("weights")))
+    assert len(read_tensors(locate(name))) > 4
+
+
+def test_only_the_tensors_asked_for_come_back(tmp_path):
+    tensors = {"a": torch.arange(3.0), "b": torch.ones(2, 2)}
+    save_file(tensors, tmp_path / "x.safetensors")
+    torch.save(tensors, tmp_path / "x.pth")
+    torch.save(tensors, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
+    for name in ("x.safetensors", "x.pth", "old.pth"):
+        assert read_tensors(tmp_path / name).keys() == tensors.keys()
+        (found,) = read_tensors(tmp_path / name, ["b"]).items()
+        assert found[0] == "b"
+        assert torch.equal(found[1], tensors["b"])
+        with pytest.raises(ArgumentError, match=f"{name}: expected tensor c, got a, b"):
+            read_tensors(tmp_path / name, ["b", "c"])
+
+
+class Harmful:
+    def __reduce__(self):
+        return (Path.touch, (Path("harm"),))
+
+
+def test_a_damaged_file_and_one_that_holds_code_are_refused(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    torch.save({"a": torch.ones(1000), "b": Harmful()}, tmp_path / "code.pth")
+    torch.save({"a": torch.ones(1000)}, tmp_path / "x.pth")
+    save_file({"a": torch.ones(1000)}, tmp_path / "x.safetensors")
+    for name in ("x.pth", "x.safetensors"):
+        whole = (tmp_path / name).read_bytes()
+        (tmp_path / f"cut_{name}").write_bytes(whole[: len(whole) // 2])
+        (tmp_path / f"text_{name}").write_bytes(b"<html>not found</html>")
+        (tmp_path / f"empty_{name}").touch()
+    bad = [path for path in tmp_path.iterdir() if path.name not in ("x.pth", "x.safetensors")]
+    assert len(bad) == 7
+    for path in bad:
+        with pytest.raises(ArgumentError, match="expected a file of weights, got one") as caught:
+            read_tensors(path)
+        assert "\n" not in str(caught.value)
+    assert not Path("harm").exists()
+    with pytest.raises(ArgumentError, match=r"gone\.pth: no such file"):
+        read_tensors(tmp_path / "gone.pth")

@@ -1,0 +1,115 @@
+"""The pretrained weights that texgs knows: names of their files, sizes, sources and checksums."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class File:
+    """A file of weights."""
+
+    name: str
+    megabytes: float
+    sha256: str
+    url: str | None = None  # None: it can only be put into the weights folder
+
+
+@dataclass(frozen=True)
+class Single:
+    """A model whose weights are one file; the first that is found of several that hold the same ones."""
+
+    files: tuple[File, ...]
+    source: str  # where a person gets it
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """A model that is a folder of the Hugging Face hub, at one revision."""
+
+    repository: str
+    revision: str
+    megabytes: float
+    needs: tuple[tuple[str, ...], ...]  # files of the folder, each with the names it may have
+    patterns: tuple[str, ...]  # of the files that are downloaded
+
+    @property
+    def source(self) -> str:
+        """Where a person gets it."""
+        return f"https://huggingface.co/{self.repository}"
+
+
+TEXT_FILES = ("*.json", "*.txt")
+
+CATALOGUE: dict[str, Single | Snapshot] = {
+    "vgg16": Single(
+        (
+            File(
+                "vgg16_features_fp16.safetensors",
+                29.4,
+                "4226839ba20eb3835e9fa6fe2d50a2e2c3b0db26fc00a3fc21b2c892c1703b9e",
+            ),
+            File(
+                "vgg16-397923af.pth",
+                553.4,
+                "397923af8e79cdbb6a7127f12361acd7a2f83e06b05044ddf496e83de57a5bf0",
+                "https://download.pytorch.org/models/vgg16-397923af.pth",
+            ),
+        ),
+        "https://download.pytorch.org/models/vgg16-397923af.pth",
+    ),
+    "lpips_vgg": Single(
+        (
+            File(
+                "lpips_lin_v0.1_vgg.pth",
+                0.007,
+                "a78928a0af1e5f0fcb1f3b9e8f8c3a2a5a3de244d830ad5c1feddc79b8432868",
+                "https://raw.githubusercontent.com/richzhang/PerceptualSimilarity/"
+                "082bb24f84c091ea94de2867d34c4544f68e0963/lpips/weights/v0.1/vgg.pth",
+            ),
+        ),
+        "https://github.com/richzhang/PerceptualSimilarity, lpips/weights/v0.1/vgg.pth",
+    ),
+    "mobile_sam": Single(
+        (
+            File(
+                "mobile_sam.pt",
+                40.7,
+                "6dbb90523a35330fedd7f1d3dfc66f995213d81b29a5ca8108dbcdd4e37d6c2f",
+                "https://raw.githubusercontent.com/ChaoningZhang/MobileSAM/master/weights/mobile_sam.pt",
+            ),
+        ),
+        "https://github.com/ChaoningZhang/MobileSAM, weights/mobile_sam.pt",
+    ),
+    "clip-vit-base-patch32": Snapshot(
+        "openai/clip-vit-base-patch32",
+        "3d74acf9a28c67741b2f4f2ea7635f0aaf6f0268",
+        605,
+        (("config.json",), ("model.safetensors", "pytorch_model.bin")),
+        (*TEXT_FILES, "pytorch_model.bin"),
+    ),
+    "clip-vit-large-patch14": Snapshot(
+        "openai/clip-vit-large-patch14",
+        "32bd64288804d66eefd0ccbe215aa642df71cc41",
+        1710,
+        (("config.json",), ("model.safetensors", "pytorch_model.bin")),
+        (*TEXT_FILES, "model.safetensors"),
+    ),
+    "instruct-pix2pix": Snapshot(
+        "timbrooks/instruct-pix2pix",
+        "31519b5cb02a7fd89b906d88731cd4d6a7bbf88d",
+        4270,
+        (
+            ("model_index.json",),
+            ("unet/diffusion_pytorch_model.safetensors",),
+            ("vae/diffusion_pytorch_model.safetensors",),
+            ("text_encoder/model.safetensors",),
+        ),
+        (
+            *TEXT_FILES,
+            "unet/diffusion_pytorch_model.safetensors",
+            "vae/diffusion_pytorch_model.safetensors",
+            "text_encoder/model.safetensors",
+        ),
+    ),
+}

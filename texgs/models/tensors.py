@@ -1,0 +1,63 @@
+"""Tensors from files of weights, without running anything that such a file may hold."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from pickle import UnpicklingError
+from zipfile import BadZipFile, is_zipfile
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+
+DAMAGE = (OSError, EOFError, BadZipFile, RuntimeError, UnpicklingError, TypeError, ValueError)
+
+
+def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[str, Tensor]:
+    """Tensors of a file of weights by name, nothing else of it: safetensors, or torch's own format.
+
+    Args:
+        path: with the ending .safetensors, or any other for torch's; nothing in it is executed.
+        names: of the tensors wanted; by default all. Others are not read.
+
+    Raises:
+        ArgumentError: if the file is missing, damaged, of another format, or lacks a name.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    path = Path(path)
+    try:
+        if path.suffix == ".safetensors":
+            with safe_open(path, framework="pt") as file:
+                found = _chosen(path, file.keys(), names)
+                return {name: file.get_tensor(name) for name in found}
+        stored = torch.load(path, map_location="cpu", weights_only=True, mmap=is_zipfile(path))
+        return {name: stored[name] for name in _chosen(path, stored, names)}
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file; see texgs.models.weights.locate") from error
+    except ArgumentError:
+        raise
+    except (*DAMAGE, SafetensorError) as error:
+        raise ArgumentError(
+            f"{path}: expected a file of weights, got one that is damaged or of another format "
+            f"({first_line(error)}); copy or download it again"
+        ) from error
+
+
+def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> list[str]:
+    there = list(stored)
+    wanted = there if names is None else list(names)
+    if missing := [name for name in wanted if name not in set(there)]:
+        raise ArgumentError(
+            f"{path}: expected tensor {missing[0]}, got {', '.join(there[:4])} ...; use weights of this model"
+        )
+    return wanted
+
+
+def first_line(error: Exception) -> str:
+    """Enough of an error to recognise it, on one line."""
+    lines = str(error).strip().splitlines()
+    text = lines[0] if lines else type(error).__name__
+    return text if len(text) <= 120 else f"{text[:120]}..."

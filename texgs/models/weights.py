@@ -1,0 +1,142 @@
+"""Where the weights of a pretrained model are: a local folder, the hubs' caches, or else a download."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from texgs.core.errors import ArgumentError, MissingDataError
+from texgs.core.folders import cache_folder, weights_folder
+from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
+from texgs.models.tensors import first_line
+
+
+def locate(name: str) -> Path:
+    """Path of the weights of a model: of a file, or of a folder in the layout of the Hugging Face hub.
+
+    Looked for in the weights folder (TEXGS_WEIGHTS), in the caches of the hubs, and then downloaded with
+    a progress bar, at a pinned revision or with a known checksum, into the cache.
+
+    Args:
+        name: of the catalogue, such as "vgg16" or "clip-vit-base-patch32".
+
+    Raises:
+        ArgumentError: if the name is unknown, or a file is not what its checksum says.
+        MissingDataError: if the weights are nowhere and cannot be downloaded.
+    """
+    entry = _entry(name)
+    found = _local(name, entry)
+    if found is not None:
+        return found
+    return _download_file(name, entry) if isinstance(entry, Single) else _download_snapshot(name, entry)
+
+
+def available(name: str) -> bool:
+    """Whether the weights of a model are on this machine, so that nothing would be downloaded.
+
+    Raises:
+        ArgumentError: if the name is unknown, or a file is not what its checksum says.
+    """
+    return _local(name, _entry(name)) is not None
+
+
+def _entry(name: str) -> Single | Snapshot:
+    if name not in CATALOGUE:
+        raise ArgumentError(f"weights: expected one of {', '.join(CATALOGUE)}, got {name!r}")
+    return CATALOGUE[name]
+
+
+def _local(name: str, entry: Single | Snapshot) -> Path | None:
+    if isinstance(entry, Snapshot):
+        folders = (weights_folder() / name, _hub_folder(entry))
+        return next((folder for folder in folders if _is_complete(folder, entry)), None)
+    for file in entry.files:
+        for folder in _file_folders():
+            if (path := folder / file.name).is_file():
+                _verify(name, file, path)
+                return path
+    return None
+
+
+def _file_folders() -> Iterator[Path]:
+    """Folders that files of weights may be in."""
+    yield weights_folder()
+    yield cache_folder() / "weights"
+    home = os.environ.get("TORCH_HOME")
+    yield (Path(home).expanduser() if home else Path.home() / ".cache" / "torch") / "hub" / "checkpoints"
+
+
+def _hub_folder(entry: Snapshot) -> Path:
+    """The folder of a snapshot in the cache of the Hugging Face hub, whether it is there or not."""
+    home = Path(os.environ.get("HF_HOME") or Path.home() / ".cache" / "huggingface").expanduser()
+    cache = Path(os.environ.get("HF_HUB_CACHE") or home / "hub").expanduser()
+    return cache / f"models--{entry.repository.replace('/', '--')}" / "snapshots" / entry.revision
+
+
+def _is_complete(folder: Path, entry: Snapshot) -> bool:
+    return all(any((folder / name).is_file() for name in names) for names in entry.needs)
+
+
+def _verify(name: str, file: File, path: Path) -> None:
+    status = path.stat()
+    found = _sha256(path, status.st_size, status.st_mtime_ns)
+    if found != file.sha256:
+        raise ArgumentError(
+            f"{path}: expected the weights of {name} with checksum {file.sha256[:12]}, got {found[:12]}; "
+            "the file is damaged or another one: remove it, and copy or download it again"
+        )
+
+
+@lru_cache
+def _sha256(path: Path, size: int, time: int) -> str:
+    """Checksum of a file, computed once for each size and time of it."""
+    del size, time
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _download_file(name: str, entry: Single) -> Path:
+    file = next((file for file in entry.files if file.url is not None), None)
+    if file is None:
+        raise _missing(name, entry, [file.name for file in entry.files], entry.files[0].megabytes)
+    import pooch
+
+    pooch.get_logger().setLevel("WARNING")
+    folder = cache_folder() / "weights"
+    try:
+        found = pooch.retrieve(file.url, f"sha256:{file.sha256}", file.name, folder, progressbar=True)
+        return Path(found)
+    except (OSError, ValueError) as error:  # ValueError: of another checksum; nothing is kept then
+        names = [file.name for file in entry.files]
+        raise _missing(name, entry, names, file.megabytes, error) from error
+
+
+def _download_snapshot(name: str, entry: Snapshot) -> Path:
+    try:
+        from huggingface_hub import snapshot_download
+    except ImportError as error:
+        raise _missing(name, entry, [name], entry.megabytes, error) from error
+    try:
+        return Path(
+            snapshot_download(entry.repository, revision=entry.revision, allow_patterns=list(entry.patterns))
+        )
+    except (OSError, ValueError, RuntimeError) as error:  # the hub's own errors are of these kinds
+        raise _missing(name, entry, [name], entry.megabytes, error) from error
+
+
+def _missing(
+    name: str,
+    entry: Single | Snapshot,
+    targets: Sequence[str],
+    megabytes: float,
+    error: Exception | None = None,
+) -> MissingDataError:
+    reason = "" if error is None else f", and a download failed ({first_line(error)})"
+    kind = "folder" if isinstance(entry, Snapshot) else "file"
+    return MissingDataError(
+        f"{name}: its weights ({megabytes:g} MB) are not on this machine{reason}; get them from "
+        f"{entry.source} and put the {kind} {' or '.join(targets)} into {weights_folder()}, or set TEXGS_WEIGHTS"
+    )
