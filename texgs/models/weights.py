@@ -138,5 +138,6 @@ def _missing(
     kind = "folder" if isinstance(entry, Snapshot) else "file"
     return MissingDataError(
         f"{name}: its weights ({megabytes:g} MB) are not on this machine{reason}; get them from "
-        f"{entry.source} and put the {kind} {' or '.join(targets)} into {weights_folder()}, or set TEXGS_WEIGHTS"
+        f"{entry.source} and put the {kind} "
+        f"{' or '.join(targets)} into {weights_folder()}, or set TEXGS_WEIGHTS"
     )

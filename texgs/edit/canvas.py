@@ -1,0 +1,107 @@
+"""What the losses of a style see of a view: the part that shows the model, with something behind it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.raster import Render, Texture, rasterize
+from texgs.scene.crop import surfel_box
+from texgs.scene.model import Model, geometry
+from texgs.scene.render import shaded
+from texgs.volume.view_set import Light
+
+SEEN = 0.02  # of alpha: less is not looked at
+MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """A view, or the part of it that shows the model."""
+
+    color: Tensor  # [3, h, w] premultiplied, over black
+    alpha: Tensor  # [h, w]
+    share: Tensor | None  # [h, w] of alpha that is of the surfels to be changed; None: all of it
+
+
+def paint(
+    model: Model,
+    texels: Tensor,
+    camera: Camera,
+    light: Light,
+    *,
+    opacity: float = 1.0,
+    is_lit: bool = True,
+    cropped: bool = True,
+    chosen: Tensor | None = None,
+) -> Canvas:
+    """Render a view, or the part of it that may show the model; differentiable in the texels.
+
+    Args:
+        model: textured.
+        texels: [T, 3] in place of its own.
+        camera: on the model's device.
+        light: of the view.
+        opacity: factor on opacities, which stay at most 1.
+        is_lit: or colours without light.
+        cropped: whether what cannot show the model is left out.
+        chosen: [N] bool, surfels whose share in alpha is wanted.
+    """
+    p = {**model.parameters, "texels": texels}
+    part = around(model, camera) if cropped else camera
+    if is_lit:
+        texture = shaded(p, model.optics, part, light)
+    else:
+        gain = torch.ones_like(p["opacities"])
+        texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
+    found = splatted(model, part, opacity, texture=texture)
+    share = None
+    if chosen is not None:
+        share = splatted(model, part, opacity, features=chosen.to(texels)[:, None]).color[..., 0]
+    return Canvas(found.color.permute(2, 0, 1), found.alpha, share)
+
+
+def around(model: Model, camera: Camera) -> Camera:
+    """The camera of the part of a view that surfels can be seen in; one pixel of it at least."""
+    box = surfel_box(model.parameters, model.optics, camera)
+    left, top = min(max(box.left, 0), camera.width - 1), min(max(box.top, 0), camera.height - 1)
+    right, bottom = min(box.right, camera.width), min(box.bottom, camera.height)
+    return camera.crop(left, top, max(right, left + 1), max(bottom, top + 1))
+
+
+def splatted(model: Model, camera: Camera, opacity: float, **colored: object) -> Render:
+    """Rasterize a model with a factor on its opacities."""
+    means, quats, scales, opacities = geometry(model.parameters)
+    opacities = (opacity * opacities).clamp_max(1)
+    return rasterize(
+        means,
+        quats,
+        scales,
+        opacities,
+        camera.viewmat,
+        camera.K,
+        camera.width,
+        camera.height,
+        options=model.optics.options,
+        **colored,  # type: ignore[arg-type]
+    )
+
+
+def visible_part(alpha: Tensor) -> tuple[slice, slice]:
+    """Rows and columns of the smallest part of alpha [h, w] that holds all that is seen, and a margin."""
+    seen = alpha > SEEN
+    return extent(seen.any(dim=1)), extent(seen.any(dim=0))
+
+
+def extent(seen: Tensor) -> slice:
+    """Where a row [n] has anything, widened to a multiple of pixels as far as there are any."""
+    found = seen.nonzero()[:, 0]
+    if not len(found):
+        return slice(0, min(MULTIPLE, len(seen)))
+    start = max(0, int(found[0]) - MARGIN)
+    size = int(found[-1]) + 1 + MARGIN - start
+    stop = min(len(seen), start + -(-size // MULTIPLE) * MULTIPLE)
+    return slice(start, stop)

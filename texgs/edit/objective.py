@@ -1,0 +1,103 @@
+"""How far a view is from a style: NNFM of VGG features, a CLIP term, sliced Wasserstein distance of patches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core.errors import ArgumentError
+from texgs.edit.recipe import Recipe
+from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
+from texgs.edit.style_picture import StylePicture
+from texgs.models.nnfm import StyleFeatures, nnfm
+from texgs.models.vgg import Vgg
+
+FeatureTerm = Callable[[Tensor], Tensor]  # image [H, W, 3] in [0, 1] to a loss []
+STRIDE = 4  # pixels between the positions of VGG's features
+ON_OBJECT = 0.5  # of alpha, from which a feature or a patch counts
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """The loss of a recipe for one style, and its terms."""
+
+    recipe: Recipe
+    reduce: int
+    vgg: Vgg | None
+    style: StyleFeatures | None
+    patches: PatchStatistics | None
+    clip: FeatureTerm | None
+
+    @classmethod
+    def of(
+        cls, recipe: Recipe, style: StylePicture, reduce: int, vgg: Vgg | None, clip: FeatureTerm | None
+    ) -> Objective:
+        """Compute once what the losses need to know about a style.
+
+        Args:
+            recipe: weights of the losses.
+            style: at the size at which it is to show.
+            reduce: pixels each way that features see as one.
+            vgg: needed by NNFM.
+            clip: a differentiable loss of an image [H, W, 3], needed where lambda_s is below 1.
+
+        Raises:
+            ArgumentError: if a model is needed and not given.
+        """
+        if recipe.needs_vgg and vgg is None:
+            raise ArgumentError(
+                "vgg: expected a VGG for this recipe, got none; load it, or choose recipe patches"
+            )
+        if recipe.needs_clip and clip is None:
+            raise ArgumentError(
+                f"clip: expected a CLIP term for lambda_s = {recipe.lambda_s:g}, got none; choose lambda_s = 1"
+            )
+        features = patches = None
+        if recipe.needs_vgg and vgg is not None:
+            small = style.scaled(max(style.region.shape) / reduce)
+            with torch.no_grad():
+                found = vgg.features(small.image)
+            region = F.adaptive_avg_pool2d(small.region[None].float(), found.shape[1:])[0] > ON_OBJECT
+            features = StyleFeatures.of(
+                found,
+                region if bool(region.any()) else None,
+                recipe.positions,
+                recipe.dimensions,
+                recipe.seed,
+            )
+        if recipe.patches > 0 and recipe.iterations > 0:
+            patches = PatchStatistics.of(style.image, style.region, recipe.seed)
+        return cls(recipe, reduce, vgg, features, patches, clip)
+
+    def terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
+        """Weighted losses [] by name, differentiable in the image.
+
+        Args:
+            image: [3, h, w] in [0, 1].
+            share: [h, w] how much of each pixel is to look like the style.
+            iteration: chooses the directions and the draw of patches.
+        """
+        recipe, found = self.recipe, {}
+        if self.style is not None and self.vgg is not None:
+            small = F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
+            features = self.vgg.features(small)
+            where = pooled(share, self.reduce * STRIDE, features.shape[1:]) if recipe.foreground else None
+            found["nnfm"] = recipe.features * recipe.lambda_s * nnfm(features, self.style, where)
+        if recipe.needs_clip and self.clip is not None:
+            found["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
+        if self.patches is not None:
+            where = (share > ON_OBJECT) if recipe.foreground else None
+            found["patches"] = recipe.patches * sliced_wasserstein(
+                image, self.patches, where, iteration, iteration
+            )
+        return found
+
+
+def pooled(share: Tensor, side: int, size: torch.Size) -> Tensor:
+    """Whether each of [h / side, w / side] features is on the object, bool, cut to the features' size."""
+    mean = F.avg_pool2d(share[None], side)[0] > ON_OBJECT
+    return mean[: size[0], : size[1]]

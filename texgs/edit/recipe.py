@@ -1,0 +1,114 @@
+"""How to stylise: the numbers of one image-driven edit, and the sets of them that have names."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal, get_args
+
+from texgs.core.errors import ArgumentError
+
+Start = Literal["projected", "mean", "random", "transfer"]
+FULL_RESOLUTION = 500  # pixels of the longer side up to which features see every pixel
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Numbers of an image-driven edit; the defaults are those of `default`.
+
+    The loss is features * (lambda_s * NNFM + (1 - lambda_s) * CLIP) + patches * sliced Wasserstein distance.
+
+    Raises:
+        ArgumentError: naming the value that is out of range.
+    """
+
+    iterations: int = 100  # one view each
+    start: Start = "projected"  # colours at the start: the picture laid onto the surface, its mean, random
+    # pixels of it, or the model's own colours moved to those of the style
+    rate: float = 0.05  # of Adam at the start
+    last_rate: float = 0.1  # at the end, relative to that
+    features: float = 1.0  # weight of NNFM and CLIP together; at 0 no weights of VGG are needed
+    lambda_s: float = 1.0  # share of NNFM in them; below 1 a CLIP term is needed
+    patches: float = 1.0  # weight of the sliced Wasserstein distance
+    pattern: float = 1.0  # size of the style's pattern: its longer side, in longer sides of a view
+    behind: Literal["style", "white"] = (
+        "style"  # what is behind the object: another part of the style, or white
+    )
+    cropped: bool = True  # whether losses see only the part of a view that shows the object
+    foreground: bool = True  # whether only features on the object have to match
+    positions: int | None = 8192  # features of the style that are searched, drawn at random; None: all
+    dimensions: int | None = 64  # of that search, by principal components; None: all, the search is exact
+    reduce: int | None = None  # features see averages of so many pixels each way; None: by the views' size
+    opacity: float = 1.0  # factor on opacities while stylising, so that what is in front counts more
+    is_lit: bool = True  # whether the losses see the light of the views, or colours without any
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for name in ("iterations", "rate", "features", "patches"):
+            if not getattr(self, name) >= 0:
+                raise ArgumentError(f"{name}: expected 0 or more, got {getattr(self, name)}")
+        for name in ("last_rate", "pattern", "opacity", "positions", "dimensions", "reduce"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise ArgumentError(f"{name}: expected more than 0, got {value}")
+        if not 0 <= self.lambda_s <= 1:
+            raise ArgumentError(f"lambda_s: expected a share from 0 to 1, got {self.lambda_s}")
+        for name, known in (("start", get_args(Start)), ("behind", ("style", "white"))):
+            if getattr(self, name) not in known:
+                raise ArgumentError(
+                    f"{name}: expected one of {', '.join(known)}, got {getattr(self, name)!r}"
+                )
+
+    @property
+    def needs_vgg(self) -> bool:
+        """Whether VGG is used at all."""
+        return self.iterations > 0 and self.features > 0 and self.lambda_s > 0
+
+    @property
+    def needs_clip(self) -> bool:
+        """Whether a CLIP term is used."""
+        return self.iterations > 0 and self.features > 0 and self.lambda_s < 1
+
+    def reduction(self, width: int, height: int) -> int:
+        """Pixels each way that features see as one, for views of this size."""
+        return self.reduce or max(1, round(max(width, height) / FULL_RESOLUTION))
+
+
+DEFAULT = Recipe()
+PRESETS = {
+    "default": DEFAULT,
+    "patches": replace(DEFAULT, features=0.0, iterations=150, rate=0.025),
+    "preview": replace(DEFAULT, iterations=0),
+    "paper": Recipe(
+        iterations=3000,
+        start="random",
+        rate=0.025,
+        last_rate=1.0,
+        lambda_s=0.9,
+        patches=0.0,
+        behind="white",
+        cropped=False,
+        foreground=False,
+        positions=None,
+        dimensions=None,
+        reduce=1,
+    ),
+}
+
+
+def preset(name: str, **changes: Any) -> Recipe:
+    """A recipe by name, with some of its numbers changed.
+
+    Args:
+        name: of PRESETS.
+        changes: fields of `Recipe`.
+
+    Raises:
+        ArgumentError: if there is none of that name, or no such field.
+    """
+    if name not in PRESETS:
+        raise ArgumentError(f"recipe: expected one of {', '.join(PRESETS)}, got {name!r}")
+    if unknown := [key for key in changes if key not in Recipe.__dataclass_fields__]:
+        raise ArgumentError(
+            f"recipe: expected one of {', '.join(Recipe.__dataclass_fields__)}, got {unknown[0]!r}"
+        )
+    return replace(PRESETS[name], **changes)

@@ -1,0 +1,141 @@
+"""The picture that a style is taken from: read at a useful size, with the part of it that counts."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError
+
+SMALLEST = 32  # pixels of the shorter side: less holds no pattern
+LARGEST = 2048  # pixels of the longer side that are kept
+
+
+@dataclass(frozen=True, eq=False)
+class StylePicture:
+    """A style and the part of its picture that counts.
+
+    Raises:
+        ShapeError, ArgumentError: if shapes do not fit, or the part is empty.
+    """
+
+    image: Tensor  # [3, h, w] in [0, 1]; beyond the region its nearest colours
+    region: Tensor  # [h, w] bool
+
+    def __post_init__(self) -> None:
+        size = check.shape("image", self.image, "3 h w")
+        check.shape("region", self.region, "h w", h=size["h"], w=size["w"])
+        if not bool(self.region.any()):
+            raise ArgumentError(
+                "region: expected a part of the style picture, got none of it; choose another"
+            )
+
+    @classmethod
+    def of(cls, image: Tensor, region: Tensor | None = None) -> StylePicture:
+        """A style from an image [3, h, w], cut to the box around the region [h, w]; by default all of it."""
+        size = check.shape("image", image, "3 h w")
+        if min(size["h"], size["w"]) < SMALLEST:
+            raise ArgumentError(
+                f"style: expected a picture of at least {SMALLEST} x {SMALLEST} pixels, got {size['w']} x "
+                f"{size['h']}; it holds no pattern to carry over"
+            )
+        if region is None:
+            return cls(image, torch.ones_like(image[0], dtype=torch.bool))
+        check.shape("region", region, "h w", h=size["h"], w=size["w"])
+        cls(image, region)
+        rows, columns = (region.any(dim=d).nonzero()[:, 0] for d in (1, 0))
+        box = (slice(int(rows[0]), int(rows[-1]) + 1), slice(int(columns[0]), int(columns[-1]) + 1))
+        return cls(filled(image[:, *box], region[box]), region[box])
+
+    @property
+    def mean(self) -> Tensor:
+        """Mean colour [3] of the region."""
+        return self.pixels.mean(0)
+
+    @property
+    def pixels(self) -> Tensor:
+        """Colours [n, 3] of the region."""
+        return self.image.permute(1, 2, 0)[self.region]
+
+    def scaled(self, long_side: float) -> StylePicture:
+        """The style with its longer side at so many pixels, its aspect kept; smaller ones by averaging."""
+        height, width = self.region.shape
+        factor = long_side / max(height, width)
+        size = [max(SMALLEST // 2, round(factor * x)) for x in (height, width)]
+        if size == [height, width]:
+            return self
+        image = F.interpolate(self.image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
+        region = F.interpolate(self.region[None, None].float(), size, mode="area")[0, 0] > 0.5
+        return StylePicture(image, region if bool(region.any()) else torch.ones_like(region))
+
+    def to(self, device: torch.device | str) -> StylePicture:
+        """The same on another device."""
+        return StylePicture(self.image.to(device), self.region.to(device))
+
+
+def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
+    """Read a style picture of any format that Pillow knows, grey or coloured; what is transparent does not count.
+
+    Args:
+        path: of the file. A picture of more than 2,048 pixels along its longer side is reduced to that.
+        region: [h, w] bool in the file's own pixels, such as the mask of an object in it; by default all.
+
+    Raises:
+        ArgumentError: if the file is missing, no picture, too large or too small, or the region does not fit.
+    """
+    try:
+        with warnings.catch_warnings(), Image.open(path) as picture:
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
+            width, height = picture.size
+            picture.draft("RGB", (LARGEST, LARGEST))  # JPEG files are decoded at a lower resolution
+            scale = min(1.0, LARGEST / max(width, height))
+            small = (max(1, round(scale * width)), max(1, round(scale * height)))
+            reduced = picture.convert("RGBA").resize(small, Image.Resampling.LANCZOS, reducing_gap=2.0)
+            pixels = torch.from_numpy(np.asarray(reduced, dtype=np.float32) / 255).permute(2, 0, 1)
+    except Image.DecompressionBombError as error:
+        raise ArgumentError(
+            f"{path}: expected a picture of at most 178 million pixels; scale it down"
+        ) from error
+    except (OSError, SyntaxError, ValueError) as error:
+        raise ArgumentError(f"{path}: expected a picture, got {error}") from error
+    visible = pixels[3] > 0.5
+    if region is not None:
+        check.shape("region", region, "h w", h=height, w=width)
+        inside = F.interpolate(region[None, None].float(), visible.shape, mode="area")[0, 0] > 0.5
+        visible = visible & inside
+    try:
+        return StylePicture.of(pixels[:3].contiguous(), None if bool(visible.all()) else visible)
+    except ArgumentError as error:
+        raise ArgumentError(f"{path}: {error}") from error
+
+
+def filled(image: Tensor, region: Tensor) -> Tensor:
+    """The image [3, h, w] with every pixel outside the region [h, w] in the colour of the nearest one in it."""
+    from scipy.ndimage import distance_transform_edt
+
+    nearest = distance_transform_edt(~region.cpu().numpy(), return_distances=False, return_indices=True)
+    rows, columns = (torch.from_numpy(x).long().to(image.device) for x in nearest)
+    return image[:, rows, columns]
+
+
+def mirrored_crop(image: Tensor, top: int, left: int, height: int, width: int) -> Tensor:
+    """[3, height, width] of the plane that an image, mirrored at its edges again and again, covers."""
+    rows, columns = (
+        mirrored(start, count, size, image.device)
+        for start, count, size in ((top, height, image.shape[1]), (left, width, image.shape[2]))
+    )
+    return image[:, rows][:, :, columns]
+
+
+def mirrored(start: int, count: int, size: int, device: torch.device) -> Tensor:
+    """Indices [count] into a side of `size` pixels."""
+    at = (start + torch.arange(count, device=device)) % (2 * size)
+    return torch.where(at < size, at, 2 * size - 1 - at)

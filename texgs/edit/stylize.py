@@ -1,0 +1,239 @@
+"""Image-driven editing: the texels of a basic model take on the style of a picture; nothing else changes."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError, FitError
+from texgs.core.progress import progress
+from texgs.edit.canvas import paint, visible_part
+from texgs.edit.objective import FeatureTerm, Objective
+from texgs.edit.recipe import DEFAULT, Recipe
+from texgs.edit.style_picture import StylePicture, mirrored_crop
+from texgs.edit.style_start import base_colors, pixel_side, start_colors
+from texgs.models.vgg import Vgg
+from texgs.scene.model import Model
+from texgs.scene.texels import owners
+from texgs.volume.view_set import Light
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """How an edit went."""
+
+    losses: dict[str, list[float]]  # weighted terms by name, a value for each iteration
+    seconds: dict[str, float]  # by part
+
+
+@dataclass(frozen=True, eq=False)
+class Stylized:
+    """A model in a style, and how it came to be."""
+
+    model: Model
+    history: History
+
+
+def stylize(
+    model: Model,
+    cameras: Sequence[Camera],
+    lights: Sequence[Light],
+    style: StylePicture,
+    recipe: Recipe = DEFAULT,
+    *,
+    vgg: Vgg | None = None,
+    clip: FeatureTerm | None = None,
+    surfels: Tensor | None = None,
+    title: str = "style",
+) -> Stylized:
+    """Give a model the style of a picture (the paper's section Image-Driven NPSE).
+
+    Only texels change: palette + offset + texel is the stylised colour without light, in [0, 1], so that the
+    palette, lights and opacities can be edited as before. What no view shows keeps the colour of the start.
+
+    Args:
+        model: of stage texture.
+        cameras: to learn from, such as those of the training views; of one size.
+        lights: one for each camera.
+        style: the picture.
+        recipe: how.
+        vgg: for NNFM; needed unless the recipe's `features` or `lambda_s` is 0.
+        clip: a differentiable loss [] of an image [H, W, 3] in [0, 1], for a `lambda_s` below 1.
+        surfels: [N] bool, the ones to change; by default all. The texels of others stay, bit for bit.
+        title: of the progress bar.
+
+    Raises:
+        ArgumentError, ShapeError: if the model has no texture, there is no view, or a term is missing.
+        FitError: if the loss is no longer finite; nothing is returned then.
+    """
+    _check(model, cameras, lights, surfels)
+    watch = Stopwatch(model.parameters["means"].device)
+    with watch.part("start"):
+        edit = Edit.prepare(model, cameras, style, recipe, vgg, clip, surfels)
+    losses: dict[str, list[float]] = defaultdict(list)
+    order = _order(len(cameras), recipe)
+    for iteration, index in enumerate(progress(order, title=title, unit="iteration")):
+        camera = cameras[index].to(watch.device)
+        terms = edit.step(camera, lights[index], iteration, watch)
+        for name, value in terms.items():
+            losses[name].append(value)
+    return Stylized(edit.result(), History(dict(losses), dict(watch.seconds)))
+
+
+@dataclass(eq=False)
+class Stopwatch:
+    """Seconds by part."""
+
+    device: torch.device
+    seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Add the time that the block takes, on a GPU until its work is done there."""
+        begin = time.perf_counter()
+        yield
+        if self.device.type == "cuda":
+            torch.cuda.synchronize(self.device)
+        self.seconds[name] += time.perf_counter() - begin
+
+
+@dataclass(eq=False)
+class Edit:
+    """An edit on its way."""
+
+    model: Model
+    recipe: Recipe
+    style: StylePicture  # at the size at which it is behind the object
+    objective: Objective
+    base: Tensor  # [T, 3] what texels are added to
+    texels: Tensor  # [T, 3] that learn
+    adam: torch.optim.Optimizer
+    generator: torch.Generator
+    surfels: Tensor | None  # [N] bool
+    fixed: Tensor | None  # [T] bool, texels that stay
+
+    @classmethod
+    def prepare(
+        cls,
+        model: Model,
+        cameras: Sequence[Camera],
+        style: StylePicture,
+        recipe: Recipe,
+        vgg: Vgg | None,
+        clip: FeatureTerm | None,
+        surfels: Tensor | None,
+    ) -> Edit:
+        """Lay the style onto the surface and compute its features."""
+        device = model.parameters["means"].device
+        width, height = cameras[0].width, cameras[0].height
+        scaled = style.to(device).scaled(recipe.pattern * max(width, height))
+        objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
+        base = base_colors(model)
+        pixel = pixel_side(model, cameras)
+        colors = start_colors(recipe.start, model, base, scaled, pixel, recipe.seed)
+        texels, fixed = colors - base, None
+        if surfels is not None:
+            fixed = _texels_of(model, ~surfels)
+            texels[fixed] = model.parameters["texels"][fixed]
+        texels.requires_grad_()
+        adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
+        generator = torch.Generator().manual_seed(recipe.seed)
+        return cls(model, recipe, scaled, objective, base, texels, adam, generator, surfels, fixed)
+
+    def step(self, camera: Camera, light: Light, iteration: int, watch: Stopwatch) -> dict[str, float]:
+        """Learn from one view; the terms of its loss."""
+        with watch.part("render"):
+            canvas = paint(
+                self.model,
+                self.texels,
+                camera,
+                light,
+                opacity=self.recipe.opacity,
+                is_lit=self.recipe.is_lit,
+                cropped=self.recipe.cropped,
+                chosen=self.surfels,
+            )
+            whole = slice(None), slice(None)
+            part = visible_part(canvas.alpha) if self.recipe.cropped else whole
+            color = canvas.color[:, *part]
+            alpha = canvas.alpha[part]
+            image = (color.detach() + (1 - alpha) * self.behind(alpha)).clamp(0, 1).requires_grad_()
+        with watch.part("losses"):
+            share = alpha if canvas.share is None else canvas.share[part]
+            terms = self.objective.terms(image, share, iteration)
+            values = {name: float(term.detach()) for name, term in terms.items()}
+            if not all(torch.isfinite(torch.tensor(list(values.values())))):
+                raise FitError(
+                    f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower the rate, and "
+                    "look for values that are not finite in the model"
+                )
+        with watch.part("losses, backward"):
+            (gradient,) = torch.autograd.grad(torch.stack(list(terms.values())).sum(), image)
+        with watch.part("render, backward"):
+            color.backward(gradient)
+        with watch.part("update"):
+            self.update(iteration)
+        return values
+
+    def behind(self, alpha: Tensor) -> Tensor:
+        """What is behind the object [3, h, w]: white, or somewhere in the mirrored style."""
+        if self.recipe.behind == "white":
+            return alpha.new_ones(3, *alpha.shape)
+        top, left = torch.randint(1 << 20, (2,), generator=self.generator).tolist()
+        return mirrored_crop(self.style.image, top, left, *alpha.shape)
+
+    @torch.no_grad()
+    def update(self, iteration: int) -> None:
+        """A step of Adam, after which colours are in [0, 1] again."""
+        recipe, gradient = self.recipe, self.texels.grad
+        if self.fixed is not None and gradient is not None:
+            gradient[self.fixed] = 0
+        self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
+        self.adam.step()
+        self.adam.zero_grad(set_to_none=True)
+        self.texels.add_(self.base).clamp_(0, 1).sub_(self.base)
+
+    def result(self) -> Model:
+        """The model with the texels as they are now."""
+        texels = self.texels.detach()
+        if self.fixed is not None:
+            texels[self.fixed] = self.model.parameters["texels"][self.fixed]
+        return Model({**self.model.parameters, "texels": texels}, self.model.optics, self.model.metadata)
+
+
+def _texels_of(model: Model, surfels: Tensor) -> Tensor:
+    """Which texels [T] belong to surfels [N], bool; also those that nobody owns."""
+    places, owner = owners(model.parameters)
+    found = torch.ones(len(model.parameters["texels"]), dtype=torch.bool, device=places.device)
+    found[places] = surfels[owner]
+    return found
+
+
+def _order(views: int, recipe: Recipe) -> list[int]:
+    """Views in random order, all of them once before any again."""
+    generator = torch.Generator().manual_seed(recipe.seed)
+    found: list[int] = []
+    while len(found) < recipe.iterations:
+        found += torch.randperm(views, generator=generator).tolist()
+    return found[: recipe.iterations]
+
+
+def _check(model: Model, cameras: Sequence[Camera], lights: Sequence[Light], surfels: Tensor | None) -> None:
+    if model.stage != "texture":
+        raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
+    if not cameras or len(lights) != len(cameras):
+        raise ArgumentError(
+            f"lights: expected one for each camera, and a camera at least, got {len(lights)} for {len(cameras)}"
+        )
+    if surfels is not None:
+        check.shape("surfels", surfels, "N", N=len(model))
+        if surfels.dtype != torch.bool or not bool(surfels.any()):
+            raise ArgumentError("surfels: expected a bool mask that chooses some, got none chosen")

@@ -1,0 +1,119 @@
+"""Nearest neighbour feature matching: every feature of an image is pulled to the one of the style most like it.
+
+The loss of ARF (Zhang et al. 2022, eq. 3), which the paper takes over: the mean over positions of the cosine
+distance to the nearest feature of the style.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError
+
+SCORES = 1 << 23  # numbers at a time of all queries by all positions: 32 MB
+
+
+@dataclass(frozen=True, eq=False)
+class StyleFeatures:
+    """Features of a style picture, ready to be searched."""
+
+    unit: Tensor  # [S, C] of length 1
+    searched: Tensor  # [S, D] float32: the same, or what is left of them in D principal directions
+    basis: Tensor | None  # [C, D] those directions; None: the search is exact
+
+    @classmethod
+    def of(
+        cls,
+        features: Tensor,
+        region: Tensor | None = None,
+        positions: int | None = None,
+        dimensions: int | None = None,
+        seed: int = 0,
+    ) -> StyleFeatures:
+        """Gather the features of a picture.
+
+        Args:
+            features: [C, h, w].
+            region: [h, w] bool, what of the picture counts; by default all.
+            positions: that are kept, drawn at random where there are more; by default all.
+            dimensions: of the search, by principal components; by default all, which is exact.
+            seed: of the draw.
+
+        Raises:
+            ShapeError: if the shapes do not fit.
+            ArgumentError: if the region is empty.
+        """
+        size = check.shape("features", features, "C h w")
+        found = features.detach().flatten(1).T  # [h w, C]
+        if region is not None:
+            check.shape("region", region, "h w", h=size["h"], w=size["w"])
+            found = found[region.flatten()]
+        if not len(found):
+            raise ArgumentError("region: expected a part of the style picture, got none of its features")
+        if positions is not None and len(found) > positions:
+            order = torch.randperm(len(found), generator=torch.Generator().manual_seed(seed))
+            found = found[order[:positions].to(found.device)]
+        exact = F.normalize(found.float(), dim=1)
+        unit = exact.to(features.dtype).contiguous()
+        if dimensions is None or dimensions >= size["C"]:
+            return cls(unit, exact, None)
+        basis = principal(exact, dimensions)
+        return cls(unit, (exact - exact.mean(0)) @ basis, basis)
+
+    @torch.no_grad()
+    def nearest(self, queries: Tensor) -> Tensor:
+        """Index [Q] of the style feature with the largest cosine to each query.
+
+        Args:
+            queries: [Q, C], of any length but zero.
+        """
+        queries = queries.float()
+        if self.basis is not None:
+            queries = queries @ self.basis
+        step = max(1, SCORES // len(self.searched))
+        return torch.cat([best(part @ self.searched.T) for part in queries.split(step)])
+
+
+def principal(rows: Tensor, dimensions: int) -> Tensor:
+    """Directions [C, D] in which rows [S, C] differ most. The mean does not count: it adds the same to all
+    products with a query.
+    """
+    centred = rows - rows.mean(0)
+    return torch.linalg.eigh(centred.T @ centred)[1][:, -dimensions:]
+
+
+def best(scores: Tensor) -> Tensor:
+    """Index [Q] of the largest of each row. On a CPU by NumPy, which is several times as fast as torch."""
+    if scores.is_cuda:
+        return scores.argmax(1)
+    return torch.from_numpy(scores.numpy().argmax(1))
+
+
+def nnfm(features: Tensor, style: StyleFeatures, where: Tensor | None = None) -> Tensor:
+    """Mean cosine distance [] in [0, 2] of features to their nearest neighbours in the style.
+
+    Differentiable in the features; which neighbour is nearest is constant for the gradient. 0 where no position
+    counts.
+
+    Args:
+        features: [C, h, w] of an image.
+        style: of the style picture, from the same layers.
+        where: [h, w] bool, positions that count; by default all.
+
+    Raises:
+        ShapeError: if the shapes do not fit.
+    """
+    size = check.shape("features", features, "C h w", C=style.unit.shape[1])
+    queries = features.flatten(1).T  # [h w, C]
+    if where is not None:
+        check.shape("where", where, "h w", h=size["h"], w=size["w"])
+        queries = queries[where.flatten().nonzero()[:, 0]]
+    if not len(queries):
+        return features.sum().float() * 0
+    neighbours = style.unit[style.nearest(queries.detach())]
+    return (1 - F.cosine_similarity(queries.float(), neighbours.float(), dim=1, eps=1e-8)).mean()

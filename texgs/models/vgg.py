@@ -1,0 +1,123 @@
+"""VGG-16 as far as its features are wanted, in the number format that the machine is fastest with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core import check
+from texgs.models.tensors import read_tensors
+from texgs.models.weights import locate
+
+MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of ImageNet, per channel
+BLOCKS = (2, 2, 3, 3, 3)  # convolutions between poolings
+CHANNELS = (64, 128, 256, 512, 512)  # of the blocks
+STYLE_LAYERS = ("relu3_1", "relu3_2", "relu3_3")  # 3 x 256 channels, a quarter of the resolution
+CPUINFO = Path("/proc/cpuinfo")
+BFLOAT16_FLAGS = {"avx512_bf16", "amx_bf16", "bf16"}  # what Linux calls instructions for it, x86 and Arm
+
+
+@dataclass(frozen=True, eq=False)
+class Vgg:
+    """Convolutions up to the last layer wanted, frozen."""
+
+    weights: tuple[Tensor, ...]  # [out, in, 3, 3] each, channels last
+    biases: tuple[Tensor, ...]
+    names: tuple[str, ...]  # of the layers, such as relu3_1
+    wanted: tuple[str, ...]
+
+    @classmethod
+    def load(
+        cls,
+        path: str | Path | None = None,
+        device: torch.device | str = "cpu",
+        layers: Sequence[str] = STYLE_LAYERS,
+        dtype: torch.dtype | None = None,
+    ) -> Vgg:
+        """Read the weights; only those that the layers need.
+
+        Args:
+            path: of a file with torchvision's names, `features.N.weight`; by default where it is found.
+            device: that computes.
+            layers: whose output is wanted, `relu1_1` to `relu5_3`, in order.
+            dtype: that it computes in; by default `fast_dtype`.
+
+        Raises:
+            ArgumentError, MissingDataError: if there is no such file, or it holds something else.
+        """
+        path = locate("vgg16") if path is None else path
+        names = [f"relu{b + 1}_{c + 1}" for b, count in enumerate(BLOCKS) for c in range(count)]
+        names = names[: names.index(layers[-1]) + 1]
+        keys = [f"features.{place(name)}" for name in names]
+        stored = read_tensors(path, [f"{key}.{kind}" for key in keys for kind in ("weight", "bias")])
+        dtype = fast_dtype(torch.device(device)) if dtype is None else dtype
+        for key, name, before in zip(keys, names, [None, *names], strict=False):
+            inputs = 3 if before is None else CHANNELS[int(before[4]) - 1]
+            check.shape(
+                f"{path}: {key}.weight", stored[f"{key}.weight"], f"{CHANNELS[int(name[4]) - 1]} {inputs} 3 3"
+            )
+        weights = [
+            stored[f"{key}.weight"].to(device, dtype, memory_format=torch.channels_last) for key in keys
+        ]
+        biases = [stored[f"{key}.bias"].to(device, dtype) for key in keys]
+        return cls(tuple(weights), tuple(biases), tuple(names), tuple(layers))
+
+    @property
+    def dtype(self) -> torch.dtype:
+        """That features are computed in."""
+        return self.weights[0].dtype
+
+    def layers(self, image: Tensor) -> list[Tensor]:
+        """Outputs [1, C, H/s, W/s] of the wanted layers, s = 1, 2, 4 ... by block; differentiable in the image.
+
+        Args:
+            image: [3, H, W], red, green and blue in [0, 1].
+        """
+        check.shape("image", image, "3 H W")
+        mean, deviation = (image.new_tensor(x)[:, None, None] for x in (MEAN, DEVIATION))
+        x = ((image - mean) / deviation)[None].to(self.dtype, memory_format=torch.channels_last)
+        found = []
+        for name, weight, bias in zip(self.names, self.weights, self.biases, strict=True):
+            if name.endswith("_1") and name != "relu1_1":
+                x = F.max_pool2d(x, 2)
+            x = F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
+            if name in self.wanted:
+                found.append(x)
+        return found
+
+    def features(self, image: Tensor) -> Tensor:
+        """The wanted layers of one block as one [C, H/s, W/s], without copying their channels' order.
+
+        Args:
+            image: [3, H, W] in [0, 1].
+        """
+        return torch.cat(self.layers(image), dim=1)[0]
+
+
+def place(name: str) -> int:
+    """Index of a layer's convolution in torchvision's list of features: each has a ReLU, each block a pooling."""
+    block, conv = int(name[4]) - 1, int(name[6]) - 1
+    return sum(2 * count + 1 for count in BLOCKS[:block]) + 2 * conv
+
+
+def fast_dtype(device: torch.device) -> torch.dtype:
+    """float16 on a GPU, bfloat16 on a CPU with instructions for it, else float32."""
+    if device.type == "cuda":
+        return torch.float16
+    return torch.bfloat16 if has_bfloat16() else torch.float32
+
+
+@cache
+def has_bfloat16() -> bool:
+    """Whether the processor multiplies bfloat16 itself; where nothing tells, no."""
+    if not CPUINFO.exists():
+        return False
+    lines = CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines()
+    flags = next((line for line in lines if line.lower().startswith(("flags", "features"))), "")
+    return bool(BFLOAT16_FLAGS & set(flags.split()))
