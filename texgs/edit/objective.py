@@ -1,4 +1,4 @@
-"""How far a view is from a style: NNFM of VGG features, a CLIP term, sliced Wasserstein distance of patches."""
+"""How far a view is from a style: NNFM of VGG features, a CLIP term, sliced distance of patches."""
 
 from __future__ import annotations
 
@@ -54,14 +54,17 @@ class Objective:
             )
         if recipe.needs_clip and clip is None:
             raise ArgumentError(
-                f"clip: expected a CLIP term for lambda_s = {recipe.lambda_s:g}, got none; choose lambda_s = 1"
+                f"clip: expected a CLIP term for lambda_s = {recipe.lambda_s:g}, got none; set it to 1"
             )
         features = patches = None
         if recipe.needs_vgg and vgg is not None:
             small = style.scaled(max(style.region.shape) / reduce)
             with torch.no_grad():
                 found = vgg.features(small.image)
-            region = F.adaptive_avg_pool2d(small.region[None].float(), found.shape[1:])[0] > ON_OBJECT
+            region = (
+                F.interpolate(small.region[None, None].float(), found.shape[1:], mode="area")[0, 0]
+                > ON_OBJECT
+            )
             features = StyleFeatures.of(
                 found,
                 region if bool(region.any()) else None,

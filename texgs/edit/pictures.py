@@ -1,4 +1,4 @@
-"""Style pictures that are made by code, so that nobody else has a right in them: for demonstrations and tests."""
+"""Style pictures made by code, so that nobody else has a right in them: for demonstrations and tests."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def strokes(size: int) -> np.ndarray:
     return np.asarray(canvas.resize((size, size), Image.Resampling.LANCZOS), dtype=np.float64) / 255
 
 
-def stroke(draw, rng, point, centres, width, color, full) -> None:  # type: ignore[no-untyped-def]
+def stroke(draw, rng, point, centres, width, color, full) -> None:
     """One stroke of a few bristles that follow the flow."""
     path = [point]
     for _ in range(9):

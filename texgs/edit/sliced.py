@@ -59,7 +59,7 @@ class PatchStatistics:
 
 
 def pyramid(image: Tensor, where: Tensor) -> list[tuple[Tensor, Tensor]]:
-    """The image [3, h, w] and what counts of its patches' centres [h - 6, w - 6], at full and lower resolution."""
+    """The image [3, h, w] and what counts of its patches' centres [h - 6, w - 6], at each level."""
     found, margin = [], SIDE // 2
     for level in range(LEVELS):
         if level:

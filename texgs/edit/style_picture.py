@@ -82,7 +82,7 @@ class StylePicture:
 
 
 def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
-    """Read a style picture of any format that Pillow knows, grey or coloured; what is transparent does not count.
+    """Read a style picture of any format that Pillow knows; what is transparent in it does not count.
 
     Args:
         path: of the file. A picture of more than 2,048 pixels along its longer side is reduced to that.
@@ -118,7 +118,7 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
 
 
 def filled(image: Tensor, region: Tensor) -> Tensor:
-    """The image [3, h, w] with every pixel outside the region [h, w] in the colour of the nearest one in it."""
+    """The image [3, h, w] with pixels outside the region [h, w] in the colour of the nearest one in it."""
     from scipy.ndimage import distance_transform_edt
 
     nearest = distance_transform_edt(~region.cpu().numpy(), return_distances=False, return_indices=True)

@@ -16,24 +16,12 @@ from texgs.scene.model import Model
 from texgs.scene.texels import owners
 
 
-def base_colors(model: Model) -> Tensor:
-    """What texels are added to [T, 3]: palette and offset of the surfel that owns them; 0 where none does."""
-    p = model.parameters
-    places, surfels = owners(p)
-    found = torch.zeros_like(p["texels"])
-    found[places] = p["colors"][surfels] + p["palette"]
-    return found
-
-
-def start_colors(
-    kind: Start, model: Model, base: Tensor, style: StylePicture, pixel: float, seed: int
-) -> Tensor:
+def start_colors(kind: Start, model: Model, style: StylePicture, pixel: float, seed: int) -> Tensor:
     """Colours of all texels [T, 3] in [0, 1], without light.
 
     Args:
         kind: see `Recipe`.
         model: textured.
-        base: what its texels are added to, [T, 3].
         style: at the size at which it is laid onto the surface.
         pixel: side of one of its pixels there, world units.
         seed: of random pixels.
@@ -42,13 +30,16 @@ def start_colors(
     if kind == "projected":
         return project(p, style.image, pixel)
     if kind == "mean":
-        return style.mean.expand_as(base).contiguous()
+        return style.mean.expand_as(p["texels"]).contiguous()
     if kind == "random":
         pixels = style.pixels
         generator = torch.Generator().manual_seed(seed)
-        chosen = torch.randint(len(pixels), (len(base),), generator=generator)
-        return pixels[chosen.to(base.device)]
-    own = (base + p["texels"]).clamp(0, 1)
+        chosen = torch.randint(len(pixels), (len(p["texels"]),), generator=generator)
+        return pixels[chosen.to(pixels.device)]
+    places, surfels = owners(p)
+    own = p["texels"].clone()
+    own[places] += p["colors"][surfels] + p["palette"]
+    own = own.clamp(0, 1)
     matrix, shift = color_map(own, style.pixels)
     return (own @ matrix.T.to(own) + shift.to(own)).clamp(0, 1)
 

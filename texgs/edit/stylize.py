@@ -19,7 +19,7 @@ from texgs.edit.canvas import paint, visible_part
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.style_picture import StylePicture, mirrored_crop
-from texgs.edit.style_start import base_colors, pixel_side, start_colors
+from texgs.edit.style_start import pixel_side, start_colors
 from texgs.models.vgg import Vgg
 from texgs.scene.model import Model
 from texgs.scene.texels import owners
@@ -56,8 +56,9 @@ def stylize(
 ) -> Stylized:
     """Give a model the style of a picture (the paper's section Image-Driven NPSE).
 
-    Only texels change: palette + offset + texel is the stylised colour without light, in [0, 1], so that the
-    palette, lights and opacities can be edited as before. What no view shows keeps the colour of the start.
+    Only texels and the surfels' colours (offsets from the palette) change: palette + offset is 0 and the
+    texel is the stylised colour without light, in [0, 1], so that the palette, lights and opacities can be
+    edited as before and highlights stay what they were. What no view shows keeps the colour of the start.
 
     Args:
         model: of stage texture.
@@ -67,7 +68,7 @@ def stylize(
         recipe: how.
         vgg: for NNFM; needed unless the recipe's `features` or `lambda_s` is 0.
         clip: a differentiable loss [] of an image [H, W, 3] in [0, 1], for a `lambda_s` below 1.
-        surfels: [N] bool, the ones to change; by default all. The texels of others stay, bit for bit.
+        surfels: [N] bool, the ones to change; by default all. Texels and colours of others stay, bit for bit.
         title: of the progress bar.
 
     Raises:
@@ -109,16 +110,15 @@ class Stopwatch:
 class Edit:
     """An edit on its way."""
 
-    model: Model
+    model: Model  # with the colours of its surfels taken out where they change
     recipe: Recipe
     style: StylePicture  # at the size at which it is behind the object
     objective: Objective
-    base: Tensor  # [T, 3] what texels are added to
     texels: Tensor  # [T, 3] that learn
     adam: torch.optim.Optimizer
     generator: torch.Generator
-    surfels: Tensor | None  # [N] bool
-    fixed: Tensor | None  # [T] bool, texels that stay
+    surfels: Tensor | None  # [N] bool, those that change
+    fixed: Tensor | None  # [F] indices of texels that stay
 
     @classmethod
     def prepare(
@@ -132,21 +132,22 @@ class Edit:
         surfels: Tensor | None,
     ) -> Edit:
         """Lay the style onto the surface and compute its features."""
-        device = model.parameters["means"].device
+        p = model.parameters
         width, height = cameras[0].width, cameras[0].height
-        scaled = style.to(device).scaled(recipe.pattern * max(width, height))
+        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
         objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
-        base = base_colors(model)
-        pixel = pixel_side(model, cameras)
-        colors = start_colors(recipe.start, model, base, scaled, pixel, recipe.seed)
-        texels, fixed = colors - base, None
+        texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed)
+        colors, fixed = -p["palette"].expand_as(p["colors"]), None
         if surfels is not None:
-            fixed = _texels_of(model, ~surfels)
-            texels[fixed] = model.parameters["texels"][fixed]
+            colors = torch.where(surfels[:, None], colors, p["colors"])
+            places, owner = owners(p)
+            fixed = places[~surfels[owner]]
+            texels[fixed] = p["texels"][fixed]
+        bare = Model({**p, "colors": colors.contiguous()}, model.optics, model.metadata)
         texels.requires_grad_()
         adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
         generator = torch.Generator().manual_seed(recipe.seed)
-        return cls(model, recipe, scaled, objective, base, texels, adam, generator, surfels, fixed)
+        return cls(bare, recipe, scaled, objective, texels, adam, generator, surfels, fixed)
 
     def step(self, camera: Camera, light: Light, iteration: int, watch: Stopwatch) -> dict[str, float]:
         """Learn from one view; the terms of its loss."""
@@ -172,8 +173,8 @@ class Edit:
             values = {name: float(term.detach()) for name, term in terms.items()}
             if not all(torch.isfinite(torch.tensor(list(values.values())))):
                 raise FitError(
-                    f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower the rate, and "
-                    "look for values that are not finite in the model"
+                    f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower "
+                    "the rate, and look for values that are not finite in the model"
                 )
         with watch.part("losses, backward"):
             (gradient,) = torch.autograd.grad(torch.stack(list(terms.values())).sum(), image)
@@ -193,28 +194,18 @@ class Edit:
     @torch.no_grad()
     def update(self, iteration: int) -> None:
         """A step of Adam, after which colours are in [0, 1] again."""
-        recipe, gradient = self.recipe, self.texels.grad
-        if self.fixed is not None and gradient is not None:
-            gradient[self.fixed] = 0
+        recipe = self.recipe
         self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
         self.adam.step()
         self.adam.zero_grad(set_to_none=True)
-        self.texels.add_(self.base).clamp_(0, 1).sub_(self.base)
+        self.texels.clamp_(0, 1)
+        if self.fixed is not None:
+            self.texels[self.fixed] = self.model.parameters["texels"][self.fixed]
 
     def result(self) -> Model:
         """The model with the texels as they are now."""
-        texels = self.texels.detach()
-        if self.fixed is not None:
-            texels[self.fixed] = self.model.parameters["texels"][self.fixed]
-        return Model({**self.model.parameters, "texels": texels}, self.model.optics, self.model.metadata)
-
-
-def _texels_of(model: Model, surfels: Tensor) -> Tensor:
-    """Which texels [T] belong to surfels [N], bool; also those that nobody owns."""
-    places, owner = owners(model.parameters)
-    found = torch.ones(len(model.parameters["texels"]), dtype=torch.bool, device=places.device)
-    found[places] = surfels[owner]
-    return found
+        parameters = {**self.model.parameters, "texels": self.texels.detach()}
+        return Model(parameters, self.model.optics, self.model.metadata)
 
 
 def _order(views: int, recipe: Recipe) -> list[int]:
@@ -231,7 +222,7 @@ def _check(model: Model, cameras: Sequence[Camera], lights: Sequence[Light], sur
         raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
     if not cameras or len(lights) != len(cameras):
         raise ArgumentError(
-            f"lights: expected one for each camera, and a camera at least, got {len(lights)} for {len(cameras)}"
+            f"lights: expected one for each of some cameras, got {len(lights)} for {len(cameras)}"
         )
     if surfels is not None:
         check.shape("surfels", surfels, "N", N=len(model))

@@ -1,4 +1,4 @@
-"""Nearest neighbour feature matching: every feature of an image is pulled to the one of the style most like it.
+"""Nearest neighbour feature matching: each feature of an image is pulled to the most similar one of a style.
 
 The loss of ARF (Zhang et al. 2022, eq. 3), which the paper takes over: the mean over positions of the cosine
 distance to the nearest feature of the style.
@@ -80,8 +80,9 @@ class StyleFeatures:
 
 
 def principal(rows: Tensor, dimensions: int) -> Tensor:
-    """Directions [C, D] in which rows [S, C] differ most. The mean does not count: it adds the same to all
-    products with a query.
+    """Directions [C, D] in which rows [S, C] differ most.
+
+    What they have in common does not count: it adds the same to all products with a query.
     """
     centred = rows - rows.mean(0)
     return torch.linalg.eigh(centred.T @ centred)[1][:, -dimensions:]
@@ -97,8 +98,8 @@ def best(scores: Tensor) -> Tensor:
 def nnfm(features: Tensor, style: StyleFeatures, where: Tensor | None = None) -> Tensor:
     """Mean cosine distance [] in [0, 2] of features to their nearest neighbours in the style.
 
-    Differentiable in the features; which neighbour is nearest is constant for the gradient. 0 where no position
-    counts.
+    Differentiable in the features; which neighbour is nearest is constant for the gradient. 0 where no
+    position counts.
 
     Args:
         features: [C, h, w] of an image.

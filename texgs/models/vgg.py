@@ -74,7 +74,7 @@ class Vgg:
         return self.weights[0].dtype
 
     def layers(self, image: Tensor) -> list[Tensor]:
-        """Outputs [1, C, H/s, W/s] of the wanted layers, s = 1, 2, 4 ... by block; differentiable in the image.
+        """Outputs [1, C, H/s, W/s] of the wanted layers, s = 1, 2, 4 ... by block; differentiable.
 
         Args:
             image: [3, H, W], red, green and blue in [0, 1].
@@ -101,7 +101,7 @@ class Vgg:
 
 
 def place(name: str) -> int:
-    """Index of a layer's convolution in torchvision's list of features: each has a ReLU, each block a pooling."""
+    """Index of a convolution in torchvision's list of features: each has a ReLU, each block a pooling."""
     block, conv = int(name[4]) - 1, int(name[6]) - 1
     return sum(2 * count + 1 for count in BLOCKS[:block]) + 2 * conv
 

@@ -1,4 +1,4 @@
-"""Files of texture variants: other texels for a basic model, such as a style; its geometry stays."""
+"""Files of texture variants: other texels and colours for a basic model, such as a style."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ VERSION = 1
 
 
 def write_texture(path: str | Path, model: Model, metadata: Mapping[str, Any] | None = None) -> Path:
-    """Write the texels of a model, with the sizes of its textures to know it by, in one step.
+    """Write texels and colours of a model, with the sizes of its textures to know it by, in one step.
 
     Args:
         path: target.
@@ -36,12 +36,14 @@ def write_texture(path: str | Path, model: Model, metadata: Mapping[str, Any] | 
     if model.stage != "texture":
         raise ArgumentError(f"{path}: expected a model of stage texture, got {model.stage}")
     header = {FORMAT: json.dumps({"version": VERSION, "metadata": dict(metadata or {})}, allow_nan=False)}
-    tensors = {name: model.parameters[name].detach().cpu().contiguous() for name in ("texels", "sizes")}
+    tensors = {
+        name: model.parameters[name].detach().cpu().contiguous() for name in ("texels", "colors", "sizes")
+    }
     return write_bytes(path, save(tensors, header))
 
 
 def with_texture(model: Model, path: str | Path) -> Model:
-    """The model with the texels of a variant.
+    """The model with the texels and colours of a variant; a file without colours keeps those of the model.
 
     Raises:
         ArgumentError: if the file is missing, of another kind, or of another model.
@@ -54,11 +56,13 @@ def with_texture(model: Model, path: str | Path) -> Model:
             f"and {len(found['texels'])} texels; make it again from the model"
         )
     try:
-        check.finite(texels=found["texels"])
+        check.finite(texels=found["texels"], colors=found.get("colors"))
+        if "colors" in found:
+            check.shape("colors", found["colors"], "N 3", N=len(model))
     except TexgsError as error:
         raise ArgumentError(f"{path}: {error}") from error
-    texels = found["texels"].to(p["texels"].device)
-    return replace(model, parameters={**p, "texels": texels})
+    changed = {name: x.to(p[name].device) for name, x in found.items() if name in ("texels", "colors")}
+    return replace(model, parameters={**p, **changed})
 
 
 def _read(path: Path) -> dict[str, Tensor]:

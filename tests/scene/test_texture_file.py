@@ -1,0 +1,55 @@
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from tests.scene.samples import same, sample
+from texgs.core.errors import ArgumentError
+from texgs.scene.model import Model
+from texgs.scene.texture_file import with_texture, write_texture
+
+
+def restyled(model):
+    """The model with other texels and colours."""
+    p = model.parameters
+    return Model({**p, "texels": p["texels"] + 0.5, "colors": -p["colors"]}, model.optics, model.metadata)
+
+
+def test_a_variant_brings_texels_and_colours_and_nothing_else(tmp_path):
+    model = sample()
+    path = write_texture(tmp_path / "style.safetensors", restyled(model), {"style": "half"})
+    assert same(with_texture(model, path), restyled(model))
+    assert set(load_file(path)) == {"texels", "colors", "sizes"}
+
+
+def rewritten(path, **tensors):
+    """The file with other tensors; None takes one away."""
+    from safetensors import safe_open
+
+    with safe_open(path, framework="pt") as file:
+        header = file.metadata()
+    found = {name: x for name, x in {**load_file(path), **tensors}.items() if x is not None}
+    save_file(found, path, header)
+    return path
+
+
+def test_a_file_without_colours_keeps_those_of_the_model(tmp_path):
+    model = sample()
+    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), colors=None)
+    found = with_texture(model, path).parameters
+    assert torch.equal(found["colors"], model.parameters["colors"])
+    assert torch.equal(found["texels"], model.parameters["texels"] + 0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("colors", torch.zeros(3, 3), "colors: expected"),
+        ("colors", torch.full((7, 3), torch.nan), "colors: expected finite values"),
+        ("sizes", torch.ones(4, 2, dtype=torch.int32), "expected texels and sizes that fit"),
+    ],
+)
+def test_tensors_of_another_model_are_refused(tmp_path, name, value, message):
+    model = sample()
+    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), **{name: value})
+    with pytest.raises(ArgumentError, match=f"style.safetensors: {message}"):
+        with_texture(model, path)
