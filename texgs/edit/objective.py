@@ -89,7 +89,8 @@ class Objective:
             small = F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
             features = self.vgg.features(small)
             where = pooled(share, self.reduce * STRIDE, features.shape[1:]) if recipe.foreground else None
-            found["nnfm"] = recipe.features * recipe.lambda_s * nnfm(features, self.style, where)
+            distance = nnfm(features, self.style, where, recipe.queries, iteration)
+            found["nnfm"] = recipe.features * recipe.lambda_s * distance
         if recipe.needs_clip and self.clip is not None:
             found["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
         if self.patches is not None:

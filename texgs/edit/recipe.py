@@ -28,13 +28,14 @@ class Recipe:
     last_rate: float = 0.1  # at the end, relative to that
     features: float = 1.0  # weight of NNFM and CLIP together; at 0 no weights of VGG are needed
     lambda_s: float = 1.0  # share of NNFM in them; below 1 a CLIP term is needed
-    patches: float = 1.0  # weight of the sliced Wasserstein distance
+    patches: float = 50.0  # weight of the sliced Wasserstein distance
     pattern: float = 1.0  # size of the style's pattern: its longer side, in longer sides of a view
     behind: Literal["style", "white"] = (
         "style"  # what is behind the object: another part of the style, or white
     )
     cropped: bool = True  # whether losses see only the part of a view that shows the object
     foreground: bool = True  # whether only features on the object have to match
+    queries: int | None = 2048  # features of a view that have to match, drawn at random; None: all
     positions: int | None = 8192  # features of the style that are searched, drawn at random; None: all
     dimensions: int | None = 64  # of that search, by principal components; None: all, the search is exact
     reduce: int | None = None  # features see averages of so many pixels each way; None: by the views' size
@@ -46,7 +47,7 @@ class Recipe:
         for name in ("iterations", "rate", "features", "patches"):
             if not getattr(self, name) >= 0:
                 raise ArgumentError(f"{name}: expected 0 or more, got {getattr(self, name)}")
-        for name in ("last_rate", "pattern", "opacity", "positions", "dimensions", "reduce"):
+        for name in ("last_rate", "pattern", "opacity", "queries", "positions", "dimensions", "reduce"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise ArgumentError(f"{name}: expected more than 0, got {value}")
@@ -88,6 +89,7 @@ PRESETS = {
         behind="white",
         cropped=False,
         foreground=False,
+        queries=None,
         positions=None,
         dimensions=None,
         reduce=1,

@@ -95,7 +95,13 @@ def best(scores: Tensor) -> Tensor:
     return torch.from_numpy(scores.numpy().argmax(1))
 
 
-def nnfm(features: Tensor, style: StyleFeatures, where: Tensor | None = None) -> Tensor:
+def nnfm(
+    features: Tensor,
+    style: StyleFeatures,
+    where: Tensor | None = None,
+    most: int | None = None,
+    seed: int = 0,
+) -> Tensor:
     """Mean cosine distance [] in [0, 2] of features to their nearest neighbours in the style.
 
     Differentiable in the features; which neighbour is nearest is constant for the gradient. 0 where no
@@ -105,6 +111,8 @@ def nnfm(features: Tensor, style: StyleFeatures, where: Tensor | None = None) ->
         features: [C, h, w] of an image.
         style: of the style picture, from the same layers.
         where: [h, w] bool, positions that count; by default all.
+        most: positions of them that are looked at, drawn at random where there are more; by default all.
+        seed: of the draw.
 
     Raises:
         ShapeError: if the shapes do not fit.
@@ -114,6 +122,9 @@ def nnfm(features: Tensor, style: StyleFeatures, where: Tensor | None = None) ->
     if where is not None:
         check.shape("where", where, "h w", h=size["h"], w=size["w"])
         queries = queries[where.flatten().nonzero()[:, 0]]
+    if most is not None and len(queries) > most:
+        order = torch.randperm(len(queries), generator=torch.Generator().manual_seed(seed))
+        queries = queries[order[:most].to(queries.device)]
     if not len(queries):
         return features.sum().float() * 0
     neighbours = style.unit[style.nearest(queries.detach())]

@@ -1,0 +1,30 @@
+"""Random weights in the format of torchvision's VGG-16, and that network built of modules."""
+
+import torch
+from torch import nn
+
+LAYOUT = (64, 64, "M", 128, 128, "M", 256, 256, 256, "M", 512, 512, 512, "M", 512, 512, 512)
+
+
+def features():
+    """The list of modules that torchvision calls `features`."""
+    modules, inputs = [], 3
+    for width in LAYOUT:
+        if width == "M":
+            modules.append(nn.MaxPool2d(2))
+        else:
+            modules += [nn.Conv2d(inputs, width, 3, padding=1), nn.ReLU()]
+            inputs = width
+    return nn.Sequential(*modules)
+
+
+def random_weights(seed=0, last=None):
+    """Tensors by name, with activations that neither vanish nor explode; up to module `last`."""
+    generator = torch.Generator().manual_seed(seed)
+    found = {}
+    for name, shape in ((name, x.shape) for name, x in features().state_dict().items()):
+        if last is None or int(name.split(".")[0]) <= last:
+            fan = shape[1] * 9 if len(shape) == 4 else 1
+            scale = (2 / fan) ** 0.5 if len(shape) == 4 else 0.1
+            found[f"features.{name}"] = scale * torch.randn(shape, generator=generator)
+    return found

@@ -1,0 +1,72 @@
+import pytest
+import torch
+from torch.nn.functional import conv2d
+
+from tests.models.networks import features, random_weights
+from tests.real_data import real_data
+from texgs.core.errors import ShapeError
+from texgs.models.lpips import Lpips
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lpips")
+    torch.save(random_weights(), folder / "vgg.pth")
+    generator = torch.Generator().manual_seed(5)
+    widths = (64, 128, 256, 512, 512)
+    heads = {
+        f"lin{i}.model.1.weight": torch.rand(1, n, 1, 1, generator=generator) for i, n in enumerate(widths)
+    }
+    torch.save(heads, folder / "heads.pth")
+    return folder, heads
+
+
+def defined(image, other, heads):
+    """The published formula in float64: inputs in [-1, 1] with its own shift and scale, 1 x 1 convolutions."""
+    shift, scale = torch.tensor([-0.030, -0.088, -0.188]), torch.tensor([0.458, 0.448, 0.450])
+    modules, total = features().double(), 0.0
+    modules.load_state_dict(
+        {name.removeprefix("features."): x.double() for name, x in random_weights().items()}
+    )
+    x, y = (
+        ((2 * z.permute(2, 0, 1) - 1 - shift[:, None, None]) / scale[:, None, None]).double()[None]
+        for z in (image, other)
+    )
+    taps = iter(heads.values())
+    for index, module in enumerate(modules):
+        x, y = module(x), module(y)
+        if index in (3, 8, 15, 22, 29):
+            a, b = (z / (z.square().sum(1, keepdim=True).sqrt() + 1e-10) for z in (x, y))
+            total += float(conv2d((a - b).square(), next(taps).double()).mean().detach())
+    return total
+
+
+def test_the_distance_is_the_published_one(files):
+    folder, heads = files
+    image, other = torch.rand(2, 32, 40, 3, generator=torch.Generator().manual_seed(1))
+    lpips = Lpips.load(folder / "vgg.pth", folder / "heads.pth")
+    assert float(lpips.distance(image, other)) == pytest.approx(defined(image, other, heads), rel=1e-4)
+    assert float(lpips.distance(image, image)) == 0
+    with pytest.raises(ShapeError, match=r"other: expected \[32, 40, 3\]"):
+        lpips.distance(image, other[:20])
+
+
+def test_heads_of_another_backbone_are_refused(files, tmp_path):
+    folder, heads = files
+    torch.save({**heads, "lin1.model.1.weight": torch.ones(1, 192, 1, 1)}, tmp_path / "alex.pth")
+    with pytest.raises(ShapeError, match=r"alex\.pth: lin1\.model\.1\.weight: expected \[128\]"):
+        Lpips.load(folder / "vgg.pth", tmp_path / "alex.pth")
+
+
+def test_real_weights_find_a_blur_worse_than_a_shade(monkeypatch):
+    """What LPIPS is for: a blur and a faint change of brightness that the mean squared error calls equal."""
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(real_data("weights")))
+    lpips = Lpips.load()
+    generator = torch.Generator().manual_seed(0)
+    image = torch.rand(16, 16, 3, generator=generator).repeat_interleave(4, 0).repeat_interleave(4, 1)
+    image = 0.25 + 0.5 * image
+    blurred = torch.nn.functional.avg_pool2d(
+        torch.nn.functional.pad(image.permute(2, 0, 1)[None], (2, 2, 2, 2), mode="reflect"), 5, 1
+    )[0].permute(1, 2, 0)
+    shade = (blurred - image).square().mean().sqrt()
+    assert float(lpips.distance(image, blurred)) > 2 * float(lpips.distance(image, image + shade))

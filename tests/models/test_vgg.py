@@ -1,0 +1,109 @@
+import pytest
+import torch
+from safetensors.torch import save_file
+from torch.testing import assert_close
+
+from tests.models.networks import features, random_weights
+from tests.real_data import real_data
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.models import vgg
+from texgs.models.vgg import Vgg, fast_dtype
+
+STYLE = {11: "relu3_1", 13: "relu3_2", 15: "relu3_3"}  # by index of the module in torchvision's list
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """The same weights in both formats; as far as the style needs them."""
+    folder = tmp_path_factory.mktemp("vgg")
+    weights = random_weights(last=14)
+    save_file({name: x.contiguous() for name, x in weights.items()}, folder / "vgg.safetensors")
+    torch.save(weights, folder / "vgg.pth")
+    return folder
+
+
+def expected(image, weights, wanted):
+    """Outputs of torchvision's modules in float64."""
+    modules = features().double()
+    modules.load_state_dict(
+        {name.removeprefix("features."): x.double() for name, x in weights.items()}, strict=False
+    )
+    mean, deviation = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
+    x, found = ((image - mean[:, None, None]) / deviation[:, None, None]).double()[None], []
+    for index, module in enumerate(modules[: max(wanted) + 1]):
+        x = module(x)
+        if index in wanted:
+            found.append(x)
+    return found
+
+
+@pytest.mark.parametrize("name", ["vgg.safetensors", "vgg.pth"])
+def test_features_are_those_of_torchvisions_modules(files, name):
+    image = torch.rand(3, 41, 30)
+    network = Vgg.load(files / name, dtype=torch.float32)
+    truth = torch.cat(expected(image, random_weights(), STYLE), dim=1)[0]
+    found = network.features(image)
+    assert found.shape == (768, 10, 7)
+    assert_close(found.double(), truth, rtol=1e-4, atol=1e-4)
+
+
+def test_bfloat16_is_close_and_has_gradients(files):
+    image = torch.rand(3, 32, 32, requires_grad=True)
+    truth = torch.cat(expected(image.detach(), random_weights(), STYLE), dim=1)[0]
+    found = Vgg.load(files / "vgg.pth", dtype=torch.bfloat16).features(image)
+    assert found.dtype == torch.bfloat16
+    assert torch.cosine_similarity(found.double(), truth, dim=0).min() > 0.999
+    (gradient,) = torch.autograd.grad(found.float().square().mean(), image)
+    exact = image.detach().clone().requires_grad_()
+    network = Vgg.load(files / "vgg.pth", dtype=torch.float32)
+    (other,) = torch.autograd.grad(network.features(exact).square().mean(), exact)
+    assert torch.cosine_similarity(gradient.flatten(), other.flatten(), dim=0) > 0.99
+
+
+def test_layers_of_several_blocks_come_one_by_one(files):
+    network = Vgg.load(files / "vgg.pth", layers=("relu1_2", "relu2_2"), dtype=torch.float32)
+    assert len(network.weights) == 4, "no more is read than needed"
+    image = torch.rand(3, 16, 24)
+    for found, truth in zip(network.layers(image), expected(image, random_weights(), (3, 8)), strict=True):
+        assert_close(found.double(), truth, rtol=1e-4, atol=1e-4)
+
+
+def test_weights_of_something_else_are_refused(tmp_path):
+    weights = random_weights(last=14)
+    torch.save({name: x for name, x in weights.items() if "14" not in name}, tmp_path / "short.pth")
+    with pytest.raises(ArgumentError, match=r"short\.pth: expected tensor features\.14\.weight"):
+        Vgg.load(tmp_path / "short.pth")
+    torch.save({**weights, "features.5.weight": torch.ones(128, 32, 3, 3)}, tmp_path / "other.pth")
+    with pytest.raises(ShapeError, match=r"other\.pth: features\.5\.weight: expected \[128, 64, 3, 3\]"):
+        Vgg.load(tmp_path / "other.pth")
+
+
+@pytest.mark.parametrize(
+    ("text", "native"),
+    [
+        ("processor : 0\nflags\t\t: fpu avx512f avx512_bf16 amx\n", True),
+        ("processor : 0\nflags\t\t: fpu avx2\n", False),
+        ("Features\t: fp asimd bf16 i8mm\n", True),
+        ("", False),
+    ],
+)
+def test_bfloat16_is_used_where_the_processor_has_it(tmp_path, monkeypatch, text, native):
+    (tmp_path / "cpuinfo").write_text(text)
+    monkeypatch.setattr(vgg, "CPUINFO", tmp_path / "cpuinfo")
+    vgg.has_bfloat16.cache_clear()
+    assert fast_dtype(torch.device("cpu")) == (torch.bfloat16 if native else torch.float32)
+    monkeypatch.setattr(vgg, "CPUINFO", tmp_path / "none")
+    vgg.has_bfloat16.cache_clear()
+    assert fast_dtype(torch.device("cpu")) == torch.float32
+    assert fast_dtype(torch.device("cuda")) == torch.float16
+    vgg.has_bfloat16.cache_clear()
+
+
+def test_real_weights_tell_an_edge_from_noise():
+    """Features of two noises are more alike than those of a noise and of stripes: those of random weights too,
+    but a channel that only stripes excite is learned."""
+    network = Vgg.load(real_data("weights") / "vgg16_features_fp16.safetensors", dtype=torch.float32)
+    stripes = torch.arange(64).div(4, rounding_mode="floor").remainder(2).float().expand(3, 64, 64)
+    noise = torch.rand(2, 3, 64, 64)
+    a, b, c = (network.features(x).mean(dim=(1, 2)) for x in (*noise, stripes))
+    assert torch.cosine_similarity(a, b, dim=0) > torch.cosine_similarity(a, c, dim=0) + 0.2

@@ -1,0 +1,88 @@
+"""How much of a style a model shows in views that it did not learn from: NNFM, Gram matrices, colours."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core.camera import Camera
+from texgs.core.progress import progress
+from texgs.models.nnfm import StyleFeatures, nnfm
+from texgs.models.vgg import Vgg
+from texgs.scene.model import Model
+from texgs.scene.render import render
+from texgs.volume.view_set import Light
+
+STRIDE = 4  # pixels between the positions of VGG's features
+ON_OBJECT = 0.5  # of alpha, from which a feature counts
+OPAQUE = 0.9  # of alpha, from which a pixel's colour counts
+
+
+@dataclass(frozen=True, eq=False)
+class Likeness:
+    """Measures of a view, mean over views; NaN where no view shows enough of the model."""
+
+    nnfm: float  # mean cosine distance of features on the object to the nearest of the style; exact search
+    gram: float  # distance of the Gram matrices, relative to the norm of the style's
+    color: tuple[float, float, float]  # mean colour of opaque pixels of all views less the style's mean
+
+
+@torch.no_grad()
+def likeness(
+    model: Model,
+    cameras: Sequence[Camera],
+    lights: Sequence[Light],
+    style: Tensor,
+    vgg: Vgg,
+    region: Tensor | None = None,
+    title: str = "likeness",
+) -> Likeness:
+    """Compare views over white with a style.
+
+    Args:
+        model: any stage.
+        cameras: of views not trained on.
+        lights: one for each camera.
+        style: [3, h, w] in [0, 1], its longer side that of the views.
+        vgg: whose features are compared.
+        region: [h, w] bool, what of the style counts; by default all.
+        title: of the progress bar.
+    """
+    device = model.parameters["means"].device
+    style = style.to(device)
+    found = vgg.features(style)
+    part = None
+    if region is not None:
+        part = F.interpolate(region[None, None].float(), found.shape[1:], mode="area")[0, 0].to(device) > 0.5
+    features = StyleFeatures.of(found, part)
+    target = gram(found if part is None else found[:, part])
+    distances, grams, colors = [], [], []
+    for camera, light in progress(
+        list(zip(cameras, lights, strict=True)), len(cameras), title=title, unit="view"
+    ):
+        shown = render(model, camera.to(device), light)
+        image = shown.color.clamp(0, 1)
+        colors.append(image[shown.alpha > OPAQUE])
+        seen = vgg.features(image.permute(2, 0, 1))
+        where = F.avg_pool2d(shown.alpha[None], STRIDE)[0] > ON_OBJECT
+        if bool(where.any()):
+            distances.append(float(nnfm(seen, features, where)))
+            grams.append(float((gram(seen[:, where]) - target).norm() / target.norm()))
+    mean_style = (style.flatten(1) if region is None else style[:, region]).mean(1)
+    red, green, blue = (torch.cat(colors).mean(0) - mean_style).tolist()
+    return Likeness(mean(distances), mean(grams), (red, green, blue))
+
+
+def gram(features: Tensor) -> Tensor:
+    """Mean products [C, C] of all channels of features [C, ...], float32: which of them occur together."""
+    rows = features.flatten(1).float()
+    return rows @ rows.T / rows.shape[1]
+
+
+def mean(values: Sequence[float]) -> float:
+    """Of numbers; NaN of none."""
+    return sum(values) / len(values) if values else float("nan")
