@@ -22,7 +22,7 @@ def files(tmp_path_factory):
 
 
 def defined(image, other, heads):
-    """The published formula in float64: inputs in [-1, 1] with its own shift and scale, 1 x 1 convolutions."""
+    """The published formula in float64: inputs in [-1, 1] with its own shift and scale."""
     shift, scale = torch.tensor([-0.030, -0.088, -0.188]), torch.tensor([0.458, 0.448, 0.450])
     modules, total = features().double(), 0.0
     modules.load_state_dict(

@@ -100,8 +100,6 @@ def test_bfloat16_is_used_where_the_processor_has_it(tmp_path, monkeypatch, text
 
 
 def test_real_weights_tell_an_edge_from_noise():
-    """Features of two noises are more alike than those of a noise and of stripes: those of random weights too,
-    but a channel that only stripes excite is learned."""
     network = Vgg.load(real_data("weights") / "vgg16_features_fp16.safetensors", dtype=torch.float32)
     stripes = torch.arange(64).div(4, rounding_mode="floor").remainder(2).float().expand(3, 64, 64)
     noise = torch.rand(2, 3, 64, 64)

@@ -44,40 +44,47 @@ def strokes(size: int) -> np.ndarray:
     tone = fractal(full, 3, seed=5)
     night = ["#0d1b4c", "#1b3f8b", "#2f6fb5", "#5fa3c9", "#a9cfd0"]
     fire = ["#d98e1f", "#f2b632", "#f7d76b", "#fbf0c4"]
-    for width, count in ((0.022, 2600), (0.014, 4200), (0.009, 5200)):
-        for _ in range(count):
-            point = rng.random(2)
-            glow = np.exp(-(((point - centres) ** 2).sum(1)) / 0.012).max()
-            shade = tone[int(point[1] * full), int(point[0] * full)] + 0.35 * rng.standard_normal()
-            colors = palette(fire if glow > 0.25 + 0.5 * rng.random() else night, np.array([shade]))
-            stroke(draw, rng, point, centres, width * (0.6 + 0.8 * rng.random()), colors[0], full)
+    for width, count in ((0.022, 1600), (0.014, 2200), (0.009, 2600)):
+        points = rng.random((count, 2))
+        glow = np.exp(-((points[:, None] - centres) ** 2).sum(2) / 0.012).max(1)
+        columns, rows = (points * full).astype(int).T
+        shades = tone[rows, columns] + 0.35 * rng.standard_normal(count)
+        is_fire = glow > 0.25 + 0.5 * rng.random(count)
+        colors = np.where(is_fire[:, None], palette(fire, shades), palette(night, shades))
+        widths = width * (0.6 + 0.8 * rng.random(count))
+        for path, color, wide in zip(paths(points, centres), colors, widths, strict=True):
+            stroke(draw, rng, path * full, color, wide * full)
     return np.asarray(canvas.resize((size, size), Image.Resampling.LANCZOS), dtype=np.float64) / 255
 
 
-def stroke(draw, rng, point, centres, width, color, full) -> None:
-    """One stroke of a few bristles that follow the flow."""
-    path = [point]
-    for _ in range(9):
-        path.append(path[-1] + 0.011 * flow(path[-1], centres))
-    line = np.array(path)
-    across = np.stack([-(line[-1] - line[0])[1], (line[-1] - line[0])[0]])
-    across = across / (np.linalg.norm(across) + 1e-9)
+def stroke(
+    draw: ImageDraw.ImageDraw, rng: np.random.Generator, path: np.ndarray, color: np.ndarray, width: float
+) -> None:
+    """One stroke of a few bristles, each of a shade of its own, along a path [P, 2] in pixels."""
+    along = path[-1] - path[0]
+    across = np.array([-along[1], along[0]]) / (np.linalg.norm(along) + 1e-9)
     for bristle in np.linspace(-0.5, 0.5, 5):
         shade = np.clip(color * (1 + 0.22 * rng.standard_normal()), 0, 1)
-        points = [tuple(p) for p in (line + bristle * width * across) * full]
-        draw.line(points, tuple(int(255 * x) for x in shade), max(1, int(0.34 * width * full)), "curve")
+        points = [tuple(p) for p in path + bristle * width * across]
+        draw.line(points, tuple((255 * shade).astype(int).tolist()), max(1, int(0.34 * width)))
 
 
-def flow(point: np.ndarray, centres: np.ndarray) -> np.ndarray:
-    """Unit direction of the strokes at a place: waves from left to right that turn around the centres."""
-    away = point - centres
-    near = np.exp(-(away**2).sum(1) / 0.02)[:, None]
-    turn = (
-        near * np.stack([-away[:, 1], away[:, 0]], 1) / (np.linalg.norm(away, axis=1)[:, None] + 1e-6)
-    ).sum(0)
-    wave = np.array([1.0, 0.55 * np.cos(7 * point[0] + 4 * point[1])])
+def paths(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Ways [S, 10, 2] that follow the flow from points [S, 2]."""
+    found = [points]
+    for _ in range(9):
+        found.append(found[-1] + 0.011 * flow(found[-1], centres))
+    return np.stack(found, axis=1)
+
+
+def flow(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
+    """Unit directions [S, 2] of the strokes: waves from left to right that turn around the centres."""
+    away = points[:, None] - centres  # [S, 3, 2]
+    near = np.exp(-(away**2).sum(2) / 0.02) / (np.linalg.norm(away, axis=2) + 1e-6)
+    turn = (near[..., None] * np.stack([-away[..., 1], away[..., 0]], axis=2)).sum(1)
+    wave = np.stack([np.ones(len(points)), 0.55 * np.cos(7 * points[:, 0] + 4 * points[:, 1])], axis=1)
     direction = 0.45 * wave + 2.2 * turn
-    return direction / (np.linalg.norm(direction) + 1e-9)
+    return direction / (np.linalg.norm(direction, axis=1, keepdims=True) + 1e-9)
 
 
 def glass(size: int) -> np.ndarray:
@@ -86,7 +93,7 @@ def glass(size: int) -> np.ndarray:
     jewels = ["#b3122b", "#e2572b", "#f3b61f", "#1f8a5b", "#0f6fb0", "#28318f", "#6d2a8a", "#e7e0c0"]
     rng = np.random.default_rng(4)
     colors = palette(jewels, rng.random(90))[cell]
-    streaks = 0.72 + 0.5 * fractal(size, 4, seed=8)[..., None]
+    streaks = 1.0 + 0.3 * fractal(size, 4, seed=8)[..., None]
     light = (1.12 - 0.5 * smoothstep(0.0, 0.09, nearest))[..., None]
     edge = second - nearest
     lead = smoothstep(0.006, 0.011, edge)[..., None]
@@ -95,18 +102,19 @@ def glass(size: int) -> np.ndarray:
 
 
 def marble(size: int) -> np.ndarray:
-    """Polished marble: cream and grey-green clouds with dark veins and threads of gold."""
+    """Polished marble: cream and green clouds drawn into bands, with dark veins and threads of gold."""
     x, y = grid(size)
-    warp = 0.35 * fractal(size, 5, seed=1), 0.35 * fractal(size, 5, seed=2)
-    bands = np.sin(9 * (x + warp[0] * 2) + 5 * (y + warp[1] * 2))
-    stone = palette(["#f4efe4", "#dcd8cb", "#b9c2b4", "#7f938a", "#41564f"], 0.5 + 0.5 * bands * 0.9)
-    vein = np.abs(fractal(size, 6, seed=9) + 0.25 * bands)
-    dark = (1 - smoothstep(0.0, 0.05, vein))[..., None]
-    thread = np.abs(fractal(size, 6, seed=21) - 0.12 + 0.2 * np.sin(6 * (x - y)))
-    gold = (1 - smoothstep(0.0, 0.022, thread))[..., None]
-    stone = stone * (0.93 + 0.07 * fractal(size, 3, seed=30)[..., None])
-    stone = stone * (1 - 0.8 * dark) + 0.8 * dark * np.array([0.10, 0.17, 0.16])
-    return stone * (1 - gold) + gold * (np.array([0.80, 0.60, 0.22]) * (0.85 + 0.3 * bands[..., None] ** 2))
+    bent = [0.13 * fractal(size, 4, seed) for seed in (1, 2)]
+    bands = np.sin(11 * (0.8 * (x + bent[0]) + 0.6 * (y + bent[1])) + 2.2 * fractal(size, 3, seed=3))
+    clouds = 0.5 + 0.38 * bands + 0.12 * fractal(size, 6, seed=4)
+    stone = palette(["#f6f1e6", "#e6e1d2", "#c3ccbb", "#83a092", "#3f6157"], clouds)
+    vein = np.abs(np.sin(5 * (x - y) + 9 * bent[1] + 1.6 * fractal(size, 5, seed=9)))
+    dark = 0.85 * (1 - smoothstep(0.0, 0.07, vein))[..., None]
+    thread = np.abs(np.sin(4 * (x + 0.5 * y) + 8 * bent[0] + 1.4 * fractal(size, 5, seed=21)))
+    gold = (1 - smoothstep(0.012, 0.045, thread))[..., None]
+    stone = stone * (1 - dark) + dark * np.array([0.08, 0.15, 0.14])
+    metal = np.array([0.82, 0.62, 0.24]) * (0.8 + 0.35 * bands[..., None] ** 2)
+    return stone * (1 - gold) + gold * metal
 
 
 def weave(size: int) -> np.ndarray:

@@ -78,6 +78,9 @@ DEFAULT = Recipe()
 PRESETS = {
     "default": DEFAULT,
     "patches": replace(DEFAULT, features=0.0, iterations=150, rate=0.025),
+    # Layers are averaged in a pixel: each learns as if it were opaque, and colours are held less tightly,
+    # because an average that has to show all of a style's contrast drives its layers to pure colours.
+    "translucent": replace(DEFAULT, opacity=8.0, patches=10.0),
     "preview": replace(DEFAULT, iterations=0),
     "paper": Recipe(
         iterations=3000,

@@ -92,20 +92,18 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
         ArgumentError: if the file is missing, no picture, too large or too small, or the region does not fit.
     """
     try:
-        with warnings.catch_warnings(), Image.open(path) as picture:
+        with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            width, height = picture.size
-            picture.draft("RGB", (LARGEST, LARGEST))  # JPEG files are decoded at a lower resolution
-            scale = min(1.0, LARGEST / max(width, height))
-            small = (max(1, round(scale * width)), max(1, round(scale * height)))
-            reduced = picture.convert("RGBA").resize(small, Image.Resampling.LANCZOS, reducing_gap=2.0)
-            pixels = torch.from_numpy(np.asarray(reduced, dtype=np.float32) / 255).permute(2, 0, 1)
+            with Image.open(path) as picture:
+                width, height = picture.size
+                small = reduced(picture)
     except Image.DecompressionBombError as error:
         raise ArgumentError(
             f"{path}: expected a picture of at most 178 million pixels; scale it down"
         ) from error
     except (OSError, SyntaxError, ValueError) as error:
         raise ArgumentError(f"{path}: expected a picture, got {error}") from error
+    pixels = torch.from_numpy(np.asarray(small, dtype=np.float32) / 255).permute(2, 0, 1)
     visible = pixels[3] > 0.5
     if region is not None:
         check.shape("region", region, "h w", h=height, w=width)
@@ -115,6 +113,20 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
         return StylePicture.of(pixels[:3].contiguous(), None if bool(visible.all()) else visible)
     except ArgumentError as error:
         raise ArgumentError(f"{path}: {error}") from error
+
+
+def reduced(picture: Image.Image) -> Image.Image:
+    """A picture as red, green, blue and alpha with 2,048 pixels along its longer side at most."""
+    scale = min(1.0, LARGEST / max(picture.size))
+    width, height = (max(1, round(scale * side)) for side in picture.size)
+    picture.draft("RGB", (2 * width, 2 * height))  # JPEG files are decoded at a lower resolution
+    if picture.mode.startswith("I"):  # grey values of 16 bits
+        picture = Image.fromarray((np.asarray(picture) / 257).round().clip(0, 255).astype(np.uint8))
+    if picture.mode in ("P", "1", "PA"):
+        picture = picture.convert("RGBA")
+    factor = max(1, min(picture.width // (2 * width), picture.height // (2 * height)))
+    coarse = picture.reduce(factor) if factor > 1 else picture  # before it is converted, to save memory
+    return coarse.convert("RGBA").resize((width, height), Image.Resampling.LANCZOS)
 
 
 def filled(image: Tensor, region: Tensor) -> Tensor:

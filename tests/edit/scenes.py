@@ -1,0 +1,47 @@
+"""A textured ball in memory, seen from around."""
+
+import torch
+
+from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
+from texgs.core.rotation import matrices_to_quats
+from texgs.scene.model import Model, Optics, raw_material
+
+
+def sphere_points(count):
+    """Evenly spread unit vectors [count, 3]: a Fibonacci spiral."""
+    index = torch.arange(count) + 0.5
+    height = 1 - 2 * index / count
+    angle = index * 2.399963
+    flat = (1 - height**2).sqrt()
+    return torch.stack([flat * angle.cos(), height, flat * angle.sin()], dim=1)
+
+
+def ball(count=400, side=5, opacity=4.0):
+    """Surfels on a sphere that face outwards, with textures of one colour in an order of their own."""
+    normals = sphere_points(count)
+    helper = torch.eye(3)[normals.abs().argmin(dim=1)]
+    first = torch.nn.functional.normalize(torch.linalg.cross(helper, normals), dim=1)
+    axes = torch.stack([first, torch.linalg.cross(normals, first), normals], dim=2)
+    sigma = 1.6 * RADIUS / count**0.5
+    order = torch.randperm(count, generator=torch.Generator().manual_seed(1))
+    colors = torch.tensor([0.3, -0.2, 0.4]).expand(count, 3) + 0.05 * normals
+    return Model(
+        {
+            "means": RADIUS * normals,
+            "quats": matrices_to_quats(axes),
+            "scales": torch.full((count, 2), sigma).log(),
+            "opacities": torch.full((count,), opacity),
+            "colors": colors,
+            **raw_material(0.4, 0.5, 0.2, 20.0, "bounded"),
+            "palette": torch.tensor([0.6, 0.5, 0.1]),
+            "texels": torch.zeros(count * side**2, 3),
+            "sizes": torch.full((count, 2), side, dtype=torch.int32),
+            "offsets": order * side**2,
+        },
+        Optics(),
+    )
+
+
+def views(count=6, size=64):
+    """Cameras around the ball and their lights."""
+    return cameras(count, size), [HEADLIGHT] * count

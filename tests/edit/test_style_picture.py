@@ -1,0 +1,97 @@
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.edit.style_picture import filled, mirrored_crop, read_style
+
+
+def pixels(height, width, channels=3, seed=0):
+    return np.random.default_rng(seed).integers(0, 256, (height, width, channels), dtype=np.uint8)
+
+
+@pytest.mark.parametrize("ending", ["png", "jpg", "tif", "webp"])
+def test_a_picture_keeps_its_size_and_aspect(tmp_path, ending):
+    values = np.full((60, 90, 3), (200, 100, 50), np.uint8)
+    Image.fromarray(values).save(tmp_path / f"x.{ending}")
+    style = read_style(tmp_path / f"x.{ending}")
+    assert style.image.shape == (3, 60, 90)
+    assert style.region.all()
+    torch.testing.assert_close(style.mean, torch.tensor([200, 100, 50]) / 255, atol=0.02, rtol=0)
+    assert style.scaled(30).image.shape == (3, 20, 30)
+    assert style.scaled(180).image.shape == (3, 120, 180)
+
+
+@pytest.mark.parametrize("mode", ["L", "LA", "P", "RGBA", "I;16", "1", "CMYK"])
+def test_any_kind_of_pixels_becomes_red_green_and_blue(tmp_path, mode):
+    picture = Image.fromarray(pixels(40, 50)).convert("L" if mode == "I;16" else mode)
+    if mode == "I;16":
+        picture = Image.fromarray(np.asarray(picture).astype(np.uint16) * 257)
+    name = "x.tif" if mode in ("I;16", "CMYK") else "x.png"
+    picture.save(tmp_path / name)
+    style = read_style(tmp_path / name)
+    assert style.image.shape == (3, 40, 50)
+    assert 0 <= style.image.min() < 0.2 < 0.8 < style.image.max() <= 1
+
+
+def test_what_is_transparent_does_not_count(tmp_path):
+    values = pixels(64, 64, 4)
+    values[..., 3] = 0
+    values[10:50, 20:60] = (10, 200, 30, 255)
+    Image.fromarray(values).save(tmp_path / "x.png")
+    style = read_style(tmp_path / "x.png")
+    assert style.image.shape == (3, 40, 40)
+    torch.testing.assert_close(
+        style.image, (torch.tensor([10, 200, 30]) / 255)[:, None, None].expand(3, 40, 40)
+    )
+
+
+def test_a_region_is_cut_out_and_what_is_around_it_filled(tmp_path):
+    values = np.full((80, 80, 3), 255, np.uint8)
+    y, x = np.mgrid[:80, :80]
+    disc = (x - 40) ** 2 + (y - 40) ** 2 < 24**2
+    values[disc] = (0, 0, 128)
+    Image.fromarray(values).save(tmp_path / "x.png")
+    style = read_style(tmp_path / "x.png", torch.from_numpy(disc))
+    assert style.image.shape == (3, 47, 47)
+    assert not style.region.all()
+    assert style.image.max() <= 128 / 255 + 1e-6, "white around it has gone"
+    with pytest.raises(ShapeError, match=r"region: expected \[80, 80\]"):
+        read_style(tmp_path / "x.png", torch.from_numpy(disc[:70]))
+    with pytest.raises(ArgumentError, match=r"x\.png: region: expected a part of the style"):
+        read_style(tmp_path / "x.png", torch.zeros(80, 80, dtype=torch.bool))
+
+
+def test_filling_takes_the_nearest_colour():
+    image = torch.zeros(3, 3, 4)
+    image[:, :, 0], image[:, :, 3] = 0.2, 0.8
+    region = torch.zeros(3, 4, dtype=torch.bool)
+    region[:, 0] = region[:, 3] = True
+    expected = torch.tensor([0.2, 0.2, 0.8, 0.8]).expand(3, 3, 4)
+    assert torch.equal(filled(image, region), expected)
+
+
+def test_a_large_picture_is_reduced_and_a_tiny_one_refused(tmp_path):
+    Image.new("L", (10000, 10000), 90).save(tmp_path / "large.png")
+    style = read_style(tmp_path / "large.png")
+    assert style.image.shape == (3, 2048, 2048)
+    Image.new("RGB", (10, 10)).save(tmp_path / "tiny.png")
+    with pytest.raises(ArgumentError, match=r"tiny\.png: .*at least 32 x 32 pixels, got 10 x 10;"):
+        read_style(tmp_path / "tiny.png")
+
+
+def test_what_is_no_picture_is_one_sentence(tmp_path):
+    (tmp_path / "text.png").write_text("no picture")
+    Image.fromarray(pixels(64, 64)).save(tmp_path / "whole.png")
+    (tmp_path / "cut.png").write_bytes((tmp_path / "whole.png").read_bytes()[:4000])
+    for name in ("text.png", "cut.png", "gone.png"):
+        with pytest.raises(ArgumentError, match=f"{name}: expected a picture, got") as caught:
+            read_style(tmp_path / name)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_crop_is_one_of_the_mirrored_plane():
+    image = torch.rand(3, 5, 4)
+    plane = torch.from_numpy(np.pad(image.numpy(), ((0, 0), (0, 30), (0, 30)), mode="symmetric"))
+    assert torch.equal(mirrored_crop(image, 7, 3, 12, 20), plane[:, 7:19, 3:23])

@@ -1,0 +1,240 @@
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.edit.scenes import ball, views
+from tests.models.networks import random_weights
+from texgs.core.errors import ArgumentError, FitError, ShapeError
+from texgs.edit.pictures import picture
+from texgs.edit.recipe import PRESETS, preset
+from texgs.edit.style_picture import StylePicture
+from texgs.edit.style_start import pixel_side
+from texgs.edit.stylize import stylize
+from texgs.models.vgg import Vgg
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.model import GEOMETRY, MATERIAL, Model
+from texgs.scene.render import render
+from texgs.scene.texels import owners
+
+CHANGED = {"texels", "colors"}
+
+
+@pytest.fixture(scope="module")
+def vgg(tmp_path_factory):
+    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
+    torch.save(random_weights(last=14), path)
+    return Vgg.load(path, dtype=torch.float32)
+
+
+@pytest.fixture(scope="module")
+def style():
+    return StylePicture.of(picture("dots", 96))
+
+
+def short(name="default", **changes):
+    return preset(name, **{"iterations": 6, **changes})
+
+
+def base_color(model):
+    """c_ind of every texel: palette + offset + texel."""
+    p = model.parameters
+    places, surfel = owners(p)
+    found = p["texels"].clone()
+    found[places] += p["palette"] + p["colors"][surfel]
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name in PRESETS if name != "paper"])
+def test_only_texels_and_offsets_change_and_base_colours_are_colours(name, vgg, style):
+    model = ball()
+    before = {key: x.clone() for key, x in model.parameters.items()}
+    iterations = 0 if name == "preview" else 4
+    done = stylize(model, *views(), style, preset(name, iterations=iterations), vgg=vgg)
+    assert all(torch.equal(before[key], x) for key, x in model.parameters.items()), (
+        "the model given is left alone"
+    )
+    for key, x in done.model.parameters.items():
+        assert torch.equal(x, before[key]) == (key not in CHANGED), key
+    assert {*GEOMETRY, *MATERIAL, "sizes", "offsets", "palette"} <= before.keys()
+    color = base_color(done.model)
+    assert color.min() > -1e-6
+    assert color.max() < 1 + 1e-6
+    assert {len(values) for values in done.history.losses.values()} <= {iterations}
+
+
+def test_a_plain_style_becomes_the_colour_of_the_surface():
+    """Its projection is that colour, whatever light: c_ind * gain + highlight is what Blinn-Phong says."""
+    color = torch.tensor([0.2, 0.6, 0.3])
+    style = StylePicture.of(color[:, None, None].expand(3, 40, 40).contiguous())
+    model = ball()
+    plain = {**model.parameters, "palette": color, "colors": torch.zeros_like(model.parameters["colors"])}
+    cameras, lights = views()
+    done = stylize(model, cameras, lights, style, preset("preview"))
+    for look in ("shaded", "unshaded"):
+        found, expected = (
+            Composition([x]).render(cameras[0], look=look).color for x in (done.model, Model(plain))
+        )
+        torch.testing.assert_close(found, expected, atol=1e-5, rtol=0)
+
+
+def test_iterations_lower_the_loss_on_views_not_trained_on(vgg, style):
+    cameras, lights = views(8)
+    recipe = short(iterations=40, start="random", patches=20.0)
+    done = stylize(ball(), cameras[:6], lights[:6], style, recipe, vgg=vgg)
+    for name in ("nnfm", "patches"):
+        values = done.history.losses[name]
+        assert sum(values[-6:]) < 0.9 * sum(values[:6]), name
+    assert done.history.seconds.keys() == {
+        "start", "render", "losses", "losses, backward", "render, backward", "update"
+    }  # fmt: skip
+
+
+def test_without_weights_patches_alone_bring_the_colours_of_the_style(style):
+    cameras, lights = views()
+    done = stylize(
+        ball(), cameras, lights, style, short("patches", iterations=60, start="random", is_lit=False)
+    )
+    found = render_unlit(done.model, cameras[1])
+    assert (found - style.mean).abs().max() < 0.06
+    assert (render_unlit(ball(), cameras[1]) - style.mean).abs().max() > 0.2
+
+
+def render_unlit(model, camera):
+    """Mean colour of what is opaque."""
+    shown = Composition([model]).render(camera, look="unshaded")
+    return shown.color[shown.alpha > 0.9].mean(0)
+
+
+def test_an_edit_is_the_same_with_the_same_seed_and_another_with_another(vgg, style):
+    runs = [
+        stylize(ball(), *views(), style, short(seed=seed), vgg=vgg).model.parameters["texels"]
+        for seed in (1, 1, 2)
+    ]
+    assert torch.equal(runs[0], runs[1])
+    assert not torch.equal(runs[0], runs[2])
+
+
+def test_surfels_that_are_not_chosen_stay_as_they_are(vgg, style):
+    model = ball()
+    chosen = model.parameters["means"][:, 0] > 0
+    done = stylize(model, *views(), style, short(), vgg=vgg, surfels=chosen).model.parameters
+    before = model.parameters
+    places, surfel = owners(before)
+    kept = places[~chosen[surfel]]
+    assert torch.equal(done["texels"][kept], before["texels"][kept])
+    assert torch.equal(done["colors"][~chosen], before["colors"][~chosen])
+    changed = (done["texels"] != before["texels"]).any(dim=1)
+    assert changed[places[chosen[surfel]]].float().mean() > 0.9
+
+
+def test_the_palette_of_a_styled_model_can_still_be_changed(style):
+    cameras, lights = views()
+    model = stylize(ball(), cameras, lights, style, preset("preview")).model
+    palette = model.parameters["palette"]
+    moved = Edit(palette=tuple((palette + torch.tensor([0.1, 0.0, 0.2])).tolist()))
+    scene = Composition([model])
+    plain = scene.render(cameras[0], look="unshaded")
+    edited = scene.render(cameras[0], edits=[moved], look="unshaded")
+    expected = plain.color + plain.alpha[..., None] * torch.tensor([0.1, 0.0, 0.2])
+    torch.testing.assert_close(edited.color, expected, atol=1e-5, rtol=0)
+
+
+def test_a_clip_term_is_any_loss_of_an_image(vgg, style):
+    """A term that wants red: with lambda_s 0 nothing else speaks, and VGG is not needed."""
+    seen = []
+
+    def redness(image):
+        seen.append(image.shape)
+        return (image - torch.tensor([1.0, 0.0, 0.0])).square().mean()
+
+    cameras, lights = views()
+    recipe = short(iterations=30, lambda_s=0.0, patches=0.0, start="mean", rate=0.1)
+    done = stylize(ball(), cameras, lights, style, recipe, clip=redness)
+    assert all(len(shape) == 3 and shape[2] == 3 for shape in seen)
+    red, green, blue = render_unlit(done.model, cameras[0])
+    assert red > 0.7 > 0.3 > max(green, blue)
+    both = stylize(ball(), cameras, lights, style, short(lambda_s=0.9), vgg=vgg, clip=redness)
+    assert both.history.losses.keys() == {"nnfm", "clip", "patches"}
+
+
+def test_the_paper_looks_at_the_whole_view_over_white(vgg, style):
+    seen = []
+
+    def look(image):
+        seen.append(image.detach())
+        return image.mean()
+
+    cameras, lights = views()
+    stylize(ball(), cameras, lights, style, preset("paper", iterations=2), vgg=vgg, clip=look)
+    assert {tuple(image.shape) for image in seen} == {(64, 64, 3)}
+    assert all(torch.equal(image[0, 0], torch.ones(3)) for image in seen)
+
+
+def test_starts(style):
+    model, (cameras, lights) = ball(), views()
+    colors = {
+        name: base_color(stylize(model, cameras, lights, style, preset("preview", start=name)).model)
+        for name in ("projected", "mean", "random", "transfer")
+    }
+    style = style.scaled(64)  # as it is laid onto views of that size
+    pixels = style.pixels
+    assert torch.allclose(colors["mean"], style.mean, atol=1e-5)
+    assert all((pixels - color).abs().sum(1).min() < 1e-5 for color in colors["random"][:5])
+    assert (colors["random"].mean(0) - pixels.mean(0)).abs().max() < 0.02
+    assert (colors["transfer"].mean(0) - style.mean).abs().max() < 0.1
+    assert colors["projected"].std(dim=0).min() > 0.05
+
+
+def test_a_pixel_is_as_large_as_the_camera_shows_it():
+    """At distance 1.5 a field of view of 50 degrees is 2 * 1.5 * tan(25 degrees) high."""
+    cameras, _ = views(size=64)
+    assert pixel_side(ball(), cameras) == pytest.approx(2 * 1.5 * 0.4663 / 64, rel=1e-3)
+
+
+def test_views_that_do_not_show_the_model_change_nothing(vgg, style):
+    cameras, lights = views()
+    away = [replace(camera, viewmat=torch.diag(torch.tensor([-1.0, 1, -1, 1])) @ camera.viewmat)
+            for camera in cameras]  # fmt: skip
+    start = stylize(ball(), cameras, lights, style, preset("preview")).model
+    done = stylize(ball(), away, lights, style, short(), vgg=vgg)
+    assert torch.equal(done.model.parameters["texels"], start.parameters["texels"])
+    assert render(ball(), away[0]).alpha.max() == 0
+
+
+def test_mistakes_are_named_before_any_work(vgg, style):
+    cameras, lights = views()
+    shading = {
+        k: x for k, x in ball().parameters.items() if k not in ("texels", "sizes", "offsets", "palette")
+    }
+    cases = [
+        ({"model": Model(shading)}, ArgumentError, "model: expected stage texture, got shading"),
+        ({"lights": lights[:2]}, ArgumentError, "expected one for each of some cameras, got 2 for 6"),
+        ({"cameras": [], "lights": []}, ArgumentError, "got 0 for 0"),
+        (
+            {"vgg": None},
+            ArgumentError,
+            "vgg: expected a VGG for this recipe, got none",
+        ),
+        ({"recipe": short(lambda_s=0.5)}, ArgumentError, "clip: expected a CLIP term for lambda_s = 0.5"),
+        ({"surfels": torch.ones(3, dtype=torch.bool)}, ShapeError, r"surfels: expected \[400\]"),
+        ({"surfels": torch.zeros(400, dtype=torch.bool)}, ArgumentError, "surfels: expected a bool mask"),
+    ]
+    given = {
+        "model": ball(),
+        "cameras": cameras,
+        "lights": lights,
+        "style": style,
+        "recipe": short(),
+        "vgg": vgg,
+    }
+    for changes, error, message in cases:
+        with pytest.raises(error, match=message):
+            stylize(**{**given, **changes})
+
+
+def test_a_loss_that_is_not_finite_stops_the_edit(style):
+    recipe = short(lambda_s=0.0, patches=0.0)
+    with pytest.raises(FitError, match="style: the loss is not finite in iteration 1"):
+        stylize(ball(), *views(), style, recipe, clip=lambda image: image.mean() / 0)

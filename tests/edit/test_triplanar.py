@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+import torch
+
+from tests.edit.scenes import ball
+from texgs.core.errors import ShapeError
+from texgs.edit.triplanar import project
+from texgs.scene.texels import owners
+
+
+def wall(normal_quat, sizes=((4, 3), (2, 5)), offsets=(10, 0)):
+    """Two parallel surfels with textures of different shapes, the second first in the list."""
+    return {
+        "means": torch.tensor([[0.1, 0.2, 0.3], [-0.2, 0.1, -0.1]]),
+        "quats": torch.tensor(normal_quat).expand(2, 4),
+        "scales": torch.tensor([[0.02, 0.03], [0.01, 0.05]]).log(),
+        "sizes": torch.tensor(sizes, dtype=torch.int32),
+        "offsets": torch.tensor(offsets),
+        "texels": torch.zeros(22, 3),
+    }
+
+
+def place(p, n, i, j):
+    """World position of a texel of an unrotated surfel, from the definition."""
+    (s_u, s_v), (across, along) = p["scales"][n].exp(), p["sizes"][n]
+    u, v = 6 * ((i + 0.5) / across - 0.5) * s_u, 6 * ((j + 0.5) / along - 0.5) * s_v
+    return p["means"][n] + torch.stack([u, v, torch.zeros(())])
+
+
+def test_a_wall_that_faces_z_shows_the_picture_upright():
+    """On a picture whose colours are its coordinates a texel reads its own place, up being up."""
+    size, pixel = 200, 0.01
+    x, y = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="xy")
+    picture = torch.stack([x / size, y / size, torch.zeros_like(x)])
+    p = wall([1.0, 0, 0, 0])
+    found = project(p, picture, pixel)
+    for n, (across, along) in enumerate(p["sizes"].tolist()):
+        for i, j in ((0, 0), (across - 1, along - 1), (1, 2)):
+            at = place(p, n, i, j) / pixel
+            expected = torch.stack([at[0] / size + 0.5, 0.5 - at[1] / size, torch.zeros(())])
+            texel = found[int(p["offsets"][n]) + j * across + i]
+            torch.testing.assert_close(texel, expected, atol=1e-5, rtol=0)
+
+
+def test_a_picture_of_one_colour_is_that_colour_everywhere():
+    p = ball().parameters
+    color = torch.tensor([0.2, 0.7, 0.4])
+    found = project(p, color[:, None, None].expand(3, 40, 30), 0.01)
+    torch.testing.assert_close(found, color.expand_as(found))
+
+
+def test_contrast_is_kept_where_projections_meet():
+    p = ball(2000).parameters
+    noise = torch.rand(1, 300, 300, generator=torch.Generator().manual_seed(0))
+    picture = (0.3 * noise + 0.35).expand(3, -1, -1)
+    found = project(p, picture, 0.01)[:, 0]
+    _, surfel = owners(p)
+    steepest = (p["means"].abs() / p["means"].norm(dim=1, keepdim=True)).max(dim=1).values
+    values = torch.zeros(len(steepest)).index_add_(0, surfel, found[owners(p)[0]] - 0.5)
+    slanted, straight = values[steepest < 0.65].std(), values[steepest > 0.95].std()
+    assert slanted == pytest.approx(float(straight), rel=0.25)
+
+
+def test_beyond_its_edges_the_picture_is_mirrored():
+    p = wall([1.0, 0, 0, 0])
+    picture = torch.rand(3, 6, 6, generator=torch.Generator().manual_seed(1))
+    tiled = torch.from_numpy(np.pad(picture.numpy(), ((0, 0), (24, 24), (24, 24)), mode="symmetric"))
+    torch.testing.assert_close(project(p, picture, 0.01), project(p, tiled, 0.01), atol=1e-4, rtol=0)
+
+
+def test_a_picture_has_three_channels():
+    with pytest.raises(ShapeError, match=r"picture: expected \[3, h, w\]"):
+        project(ball().parameters, torch.rand(20, 20, 3), 0.01)

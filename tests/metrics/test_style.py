@@ -1,0 +1,67 @@
+import math
+
+import pytest
+import torch
+
+from tests.edit.scenes import ball, views
+from tests.models.networks import random_weights
+from texgs.metrics.style import gram, likeness
+from texgs.models.vgg import Vgg
+from texgs.scene.composition import Composition
+from texgs.scene.model import Model
+
+
+@pytest.fixture(scope="module")
+def vgg(tmp_path_factory):
+    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
+    torch.save(random_weights(last=14), path)
+    return Vgg.load(path, dtype=torch.float32)
+
+
+def test_gram_matrices_are_mean_products():
+    features = torch.randn(5, 3, 4, generator=torch.Generator().manual_seed(0))
+    expected = torch.zeros(5, 5, dtype=torch.float64)
+    for column in features.double().flatten(1).T:
+        expected += column[:, None] * column / 12
+    torch.testing.assert_close(gram(features).double(), expected, rtol=1e-5, atol=1e-6)
+
+
+def test_a_view_is_like_itself_and_less_like_noise(vgg):
+    cameras, lights = views(1)
+    shown = Composition([ball()]).render(cameras[0], lights[0]).color.permute(2, 0, 1)
+    itself = likeness(ball(), cameras, lights, shown, vgg)
+    assert itself.nnfm < 1e-5
+    noise = torch.rand(3, 64, 64, generator=torch.Generator().manual_seed(1))
+    other = likeness(ball(), cameras, lights, noise, vgg)
+    assert other.nnfm > itself.nnfm + 0.01
+    assert other.gram > itself.gram
+
+
+def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):
+    cameras, lights = views(1)
+    shown = Composition([ball()]).render(cameras[0], lights[0])
+    found = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
+    around = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha < 0.1)
+    assert found.gram < 0.3 < around.gram
+    assert max(abs(x) for x in found.color) < 1e-5
+
+
+def test_colours_are_those_of_opaque_pixels(vgg):
+    cameras, lights = views(2)
+    color = torch.tensor([0.1, 0.5, 0.9])
+    p = ball().parameters
+    plain = Model({**p, "palette": color, "colors": torch.zeros_like(p["colors"])})
+    found = likeness(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
+    pixels = []
+    for camera, light in zip(cameras, lights, strict=True):
+        shown = Composition([plain]).render(camera, light)
+        pixels.append(shown.color.clamp(0, 1)[shown.alpha > 0.9])
+    expected = (torch.cat(pixels).mean(0) - 0.5).tolist()
+    assert list(found.color) == pytest.approx(expected, abs=1e-5)
+
+
+def test_nothing_to_see_is_no_number(vgg):
+    cameras, lights = views(1)
+    faint = ball(opacity=-9.0)
+    found = likeness(faint, cameras, lights, torch.rand(3, 64, 64), vgg)
+    assert all(math.isnan(x) for x in (found.nnfm, found.gram, *found.color))
