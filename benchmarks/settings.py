@@ -11,7 +11,7 @@ import torch
 from benchmarks.scenes import KINDS
 from texgs.core.errors import ArgumentError
 
-SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory", "views", "fit", "scene")
+SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory", "views", "fit", "scene", "style")
 ROUNDS = 5  # visits to each case, see timing.py
 
 
@@ -57,7 +57,7 @@ def parse(arguments: list[str] | None = None) -> Settings:
     """
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks",
-        description="Measure rasterizer, losses, volume rendering, training steps and scenes; write JSON.",
+        description="Measure rasterizer, losses, volume rendering, training, scenes and edits; write JSON.",
     )
     parser.add_argument(
         "--quick", action="store_true", help="few cases, each timed once: seconds, not minutes"

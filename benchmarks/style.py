@@ -1,0 +1,72 @@
+"""An image-driven edit of a textured model: seconds of its start, milliseconds of an iteration, by part."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import torch
+
+from benchmarks.fit import DISTANCE, VIEWS
+from benchmarks.report import Measurement, Section
+from benchmarks.scene import model
+from benchmarks.settings import Settings
+from texgs.core.camera import Camera, orbit
+from texgs.core.memory import keep_freed_memory
+from texgs.edit.pictures import picture
+from texgs.edit.recipe import Recipe, preset
+from texgs.edit.style_picture import StylePicture
+from texgs.edit.stylize import History, stylize
+from texgs.models.vgg import CHANNELS, STYLE_LAYERS, Vgg, fast_dtype
+from texgs.scene.model import Model
+from texgs.volume.view_set import Light
+
+ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick
+LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)
+RECIPES = ("default", "patches", "translucent")
+
+
+def run(settings: Settings) -> Section:
+    """Time edits with each recipe; the weights of VGG are random, which takes as long."""
+    keep_freed_memory()  # as the command line does
+    section = Section()
+    scene, vgg = model(0, settings.device), random_vgg(settings.device)
+    style = StylePicture.of(picture("dots", 256))
+    for size in settings.sizes:
+        cameras = [orbit(-60.0 + 360 / VIEWS * i, 25.0, DISTANCE, 30.0, size, size) for i in range(VIEWS)]
+        preview = [edited(scene, cameras, style, preset("preview"), None) for _ in range(1 + settings.rounds)]
+        times = [1e3 * history.seconds["start"] for history in preview[1:]]  # the first one warms up
+        section.measurements.append(Measurement.of("preview", {"size": size}, "ms", times))
+        for name in RECIPES:
+            recipe = preset(name, iterations=FEW if settings.is_quick else ITERATIONS)
+            runs = [edited(scene, cameras, style, recipe, vgg) for _ in range(1 + settings.rounds)]
+            section.measurements += iterations(runs[1:], {"size": size, "recipe": name}, recipe.iterations)
+    return section
+
+
+def edited(
+    scene: Model, cameras: list[Camera], style: StylePicture, recipe: Recipe, vgg: Vgg | None
+) -> History:
+    """How an edit went."""
+    lights = [Light("headlight")] * len(cameras)
+    return stylize(scene, cameras, lights, style, recipe, vgg=vgg, title="benchmark").history
+
+
+def iterations(runs: list[History], where: dict[str, object], count: int) -> list[Measurement]:
+    """Milliseconds of an iteration, as a whole and by part; and of the start, once."""
+    parts = [name for name in runs[0].seconds if name != "start"]
+    found = {f"part {name}": [1e3 * run.seconds[name] / count for run in runs] for name in parts}
+    found["iteration"] = [sum(times) for times in zip(*found.values(), strict=True)]
+    found["start"] = [1e3 * run.seconds["start"] for run in runs]
+    return [Measurement.of(name, where, "ms", values) for name, values in found.items()]
+
+
+def random_vgg(device: torch.device) -> Vgg:
+    """A network of the right size whose activations keep theirs."""
+    generator, dtype = torch.Generator().manual_seed(0), fast_dtype(device)
+    widths = [3, *(CHANNELS[int(name[4]) - 1] for name in LAYERS)]
+    weights, biases = [], []
+    for inputs, outputs in pairwise(widths):
+        weight = (2 / (9 * inputs)) ** 0.5 * torch.randn(outputs, inputs, 3, 3, generator=generator)
+        weights.append(weight.to(device, dtype, memory_format=torch.channels_last))
+        biases.append(torch.zeros(outputs, device=device, dtype=dtype))
+    return Vgg(tuple(weights), tuple(biases), LAYERS, STYLE_LAYERS)
