@@ -238,3 +238,18 @@ def test_a_loss_that_is_not_finite_stops_the_edit(style):
     recipe = short(lambda_s=0.0, patches=0.0)
     with pytest.raises(FitError, match="style: the loss is not finite in iteration 1"):
         stylize(ball(), *views(), style, recipe, clip=lambda image: image.mean() / 0)
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
+def test_half_precision_learns_what_single_precision_does(tmp_path, style, dtype):
+    """Texels after a few steps: a gradient that underflowed would leave them where they were."""
+    torch.save(random_weights(last=14), tmp_path / "vgg.pth")
+    recipe = short(iterations=2, patches=0.0)
+    start = stylize(ball(), *views(), style, preset("preview")).model.parameters["texels"]
+    moves = []
+    for kind in (torch.float32, dtype):
+        vgg = Vgg.load(tmp_path / "vgg.pth", dtype=kind)
+        moves.append(stylize(ball(), *views(), style, recipe, vgg=vgg).model.parameters["texels"] - start)
+    assert (
+        torch.cosine_similarity(moves[0].flatten(), moves[1].flatten(), dim=0) > 0.8
+    )  # Adam turns noise near 0 into whole steps

@@ -25,6 +25,8 @@ from texgs.scene.model import Model
 from texgs.scene.texels import owners
 from texgs.volume.view_set import Light
 
+LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
+
 
 @dataclass(frozen=True, eq=False)
 class History:
@@ -177,7 +179,8 @@ class Edit:
                     "the rate, and look for values that are not finite in the model"
                 )
         with watch.part("losses, backward"):
-            (gradient,) = torch.autograd.grad(torch.stack(list(terms.values())).sum(), image)
+            total = LOSS_SCALE * torch.stack(list(terms.values())).sum()
+            gradient = torch.autograd.grad(total, image)[0] / LOSS_SCALE
         with watch.part("render, backward"):
             color.backward(gradient)
         with watch.part("update"):
