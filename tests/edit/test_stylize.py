@@ -250,6 +250,5 @@ def test_half_precision_learns_what_single_precision_does(tmp_path, style, dtype
     for kind in (torch.float32, dtype):
         vgg = Vgg.load(tmp_path / "vgg.pth", dtype=kind)
         moves.append(stylize(ball(), *views(), style, recipe, vgg=vgg).model.parameters["texels"] - start)
-    assert (
-        torch.cosine_similarity(moves[0].flatten(), moves[1].flatten(), dim=0) > 0.8
-    )  # Adam turns noise near 0 into whole steps
+    # Adam turns noise of gradients near 0 into whole steps: not all of them agree.
+    assert torch.cosine_similarity(moves[0].flatten(), moves[1].flatten(), dim=0) > 0.8

@@ -1,0 +1,40 @@
+"""What an edit is for, with real weights, on a picture that no number of a recipe was chosen with."""
+
+import pytest
+
+from tests.edit.scenes import ball, views
+from tests.real_data import real_data
+from texgs.edit.pictures import picture
+from texgs.edit.recipe import preset
+from texgs.edit.style_picture import StylePicture
+from texgs.edit.stylize import stylize
+from texgs.metrics.style import likeness
+from texgs.models.vgg import Vgg
+
+SIZE = 96
+
+
+@pytest.fixture(scope="module")
+def found():
+    """Likeness of views not trained on: of the style laid onto the surface, and of the edit."""
+    vgg = Vgg.load(real_data("weights") / "vgg16_features_fp16.safetensors")
+    style = StylePicture.of(picture("waves", 256))
+    scene, (cameras, lights) = ball(800, 7), views(15, SIZE)
+    held, learned = slice(0, None, 5), [i for i in range(15) if i % 5]
+    recipe = preset("default", iterations=40, rate=0.1, pattern=2.0)
+    done = {}
+    for name, chosen in (("start", preset("preview", pattern=2.0)), ("edit", recipe)):
+        edited = stylize(
+            scene, [cameras[i] for i in learned], [lights[i] for i in learned], style, chosen, vgg=vgg
+        )
+        scaled = style.scaled(2 * SIZE)
+        done[name] = likeness(edited.model, cameras[held], lights[held], scaled.image, vgg)
+    return done
+
+
+def test_features_come_closer_to_the_style_than_its_projection_is(found):
+    assert found["edit"].nnfm < found["start"].nnfm - 0.02
+
+
+def test_colours_are_those_of_the_style(found):
+    assert max(abs(x) for x in found["edit"].color) < 0.05
