@@ -1,0 +1,224 @@
+"""Edit views by a guidance and make the texels follow: all text-driven methods, as presets of one loop."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.edit.back_projection import back_project, fill_unseen
+from texgs.edit.exposures import Exposure, expose
+from texgs.edit.target_adam import Reconstruction
+from texgs.edit.target_solve import solve
+from texgs.edit.target_views import bare_colors, render_views, require_texture
+from texgs.models.guidance import Guidance, Views, require_edited, require_instruction
+from texgs.scene.model import Model
+from texgs.scene.texels import mean_texels, owners
+from texgs.volume.view_set import Light
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Which views are edited when, and how texels follow.
+
+    Raises:
+        ArgumentError: naming the value that is out of range.
+    """
+
+    rounds: int = 1  # how often views are edited and texels follow
+    group: int | None = None  # views edited in a round, the next ones in turn; all by default
+    opacities: tuple[float, ...] = (2.0, 1.0, 0.5)  # factors on the scene's opacity while texels are found
+    sweeps: int = 3  # of the solver in a round, where there are no iterations
+    iterations: int = 0  # of Adam in a round, over which opacities follow each other; 0: solve
+    rate: float = 0.025  # of Adam at the start
+
+    def __post_init__(self) -> None:
+        for name in ("rounds", "group", "sweeps"):
+            value = getattr(self, name)
+            if value is not None and value < 1:
+                raise ArgumentError(f"{name}: expected at least 1, got {value}")
+        if self.iterations < 0 or not self.rate > 0:
+            raise ArgumentError(
+                f"iterations, rate: expected 0 or more and above 0, got {self.iterations} and {self.rate}"
+            )
+        if not self.opacities or not all(0 < factor < float("inf") for factor in self.opacities):
+            raise ArgumentError(f"opacities: expected factors above 0, at least one, got {self.opacities}")
+
+
+@dataclass(frozen=True, eq=False)
+class Edited:
+    """What an edit gives."""
+
+    model: Model
+    """With new texels and offsets of surfels; the rest is that of the model edited, bit for bit."""
+    views: Views
+    """As the guidance saw them, the last time each."""
+    images: Tensor
+    """[V, H, W, 3] as the guidance edited them, the last time each."""
+    seen: float
+    """Share of the texels that may change that edited views show at some opacity; others are made up."""
+
+
+def update(
+    model: Model,
+    cameras: Sequence[Camera],
+    guidance: Guidance,
+    instruction: str,
+    policy: Policy = Policy(),  # noqa: B008, it is frozen
+    *,
+    light: Light = Light("headlight"),  # noqa: B008, it is frozen
+    lit: bool | None = None,
+    surfels: Tensor | None = None,
+    seed: int = 0,
+    title: str = "edit",
+) -> Edited:
+    """Edit a model by editing views of it (the paper's section Text-Driven NPSE; IN2N, IG2G and DGE alike).
+
+    Geometry, material, lighting and palette stay as they are: views of any angle agree, however the
+    edits differ. The model may be the result of an edit: its views show that (text prompt refinement). The
+    opacity factors of the policy are those of the search only; the model keeps its own.
+
+    Args:
+        model: textured.
+        cameras: of the views to edit, of one size, on the model's device.
+        guidance: edits them.
+        instruction: to the guidance.
+        policy: which views when, and how texels follow.
+        light: that shines on the scene while it is edited.
+        lit: whether the guidance sees the scene with light, and texels make up for it, or bare colours,
+            which light falls on afterwards; by default as the guidance wants it.
+        surfels: [N] bool, which may change; all by default. Others keep their colours bit for bit.
+        seed: of all random numbers; with the same one, machine and versions, results are the same.
+        title: of progress bars.
+
+    Raises:
+        ArgumentError, ShapeError: if the model has no texture, no surfel may change, the instruction is
+            empty, or what the guidance returned is not finite or of another size.
+    """
+    require_texture(model)
+    instruction = require_instruction(instruction)
+    changing = _changing(model, surfels)
+    shine = light if (guidance.lit if lit is None else lit) else None
+    generator = torch.Generator().manual_seed(seed)
+    colors = bare_colors(model).clamp(0, 1)
+    originals = render_views(model, bare_colors(model), cameras, shine)
+    targets = _Targets(len(policy.opacities))
+    adam = Reconstruction(colors, policy.rate, policy.rounds * policy.iterations) if policy.iterations else None
+    seen = colors.new_zeros(len(colors))
+    for round_ in range(policy.rounds):
+        ids = _group(round_, policy.group, len(cameras))
+        current = bare_colors(model) if round_ == 0 else colors
+        views = render_views(model, current, [cameras[i] for i in ids], shine, originals.conditions[ids])
+        edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
+        targets.put(ids, views, edited, expose(model, views, edited, shine, policy.opacities, changing))
+        name = title if policy.rounds == 1 else f"{title}, round {round_ + 1} of {policy.rounds}"
+        if adam is None:
+            flat = [exposure for row in targets.rows for exposure in row]
+            sums = back_project(flat, model)
+            start = fill_unseen(sums.colors, sums.weights, model)
+            colors = solve(
+                flat, model, sums, start, sweeps=policy.sweeps, generator=generator, title=name
+            )
+            seen = sums.weights
+        else:
+            adam.run(targets.rows, model, policy.iterations, generator, name)
+            colors = adam.colors
+    if adam is not None:
+        seen = back_project([x for row in targets.rows for x in row], model).weights
+        colors = fill_unseen(colors, seen, model)
+    share = _share(seen, model, changing)
+    return Edited(recolored(model, colors, changing), targets.views, targets.images, share)
+
+
+def recolored(model: Model, colors: Tensor, surfels: Tensor | None = None) -> Model:
+    """The model with other bare colours: offsets of surfels become their means, texels what is left.
+
+    Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in
+    that colour, or highlights would take on the hue that the surfel had before.
+
+    Args:
+        model: textured.
+        colors: [T, 3] bare colours of all texels, in their places in the list.
+        surfels: [N] bool, which change; all by default.
+    """
+    p = model.parameters
+    place, surfel = owners(p)
+    changing = torch.ones_like(p["opacities"], dtype=torch.bool) if surfels is None else surfels
+    mean = mean_texels({**p, "texels": colors}).to(colors)  # [N, 3]
+    offsets = torch.where(changing[:, None], mean - p["palette"], p["colors"])
+    texels = p["texels"].clone()
+    moved = changing[surfel]
+    texels[place[moved]] = colors[place[moved]] - mean[surfel[moved]]
+    return replace(model, parameters={**p, "colors": offsets, "texels": texels})
+
+
+class _Targets:
+    """The latest edit of each view that has one."""
+
+    def __init__(self, opacities: int) -> None:
+        self.opacities = opacities
+        self.latest: dict[int, tuple[Views, int, Tensor]] = {}
+        self.exposures: dict[int, list[Exposure]] = {}
+
+    def put(self, ids: Sequence[int], views: Views, edited: Tensor, exposures: list[list[Exposure]]) -> None:
+        """Replace those of some views."""
+        for place, index in enumerate(ids):
+            self.latest[index] = (views, place, edited[place])
+            self.exposures[index] = [row[place] for row in exposures]
+
+    @property
+    def images(self) -> Tensor:
+        """[V, H, W, 3] as edited, in the order of views."""
+        return torch.stack([self.latest[index][2] for index in sorted(self.latest)])
+
+    @property
+    def views(self) -> Views:
+        """What was edited, in the order of views."""
+        found = [self.latest[index][:2] for index in sorted(self.latest)]
+        tensors = {
+            name: torch.stack([getattr(views, name)[place] for views, place in found])
+            for name in ("images", "conditions", "alphas", "points", "normals")
+        }
+        return Views(**tensors, cameras=[views.cameras[place] for views, place in found])
+
+    @property
+    def rows(self) -> list[list[Exposure]]:
+        """For each opacity the exposures of all views with an edit."""
+        return [[found[k] for found in self.exposures.values()] for k in range(self.opacities)]
+
+
+def _group(round_: int, size: int | None, count: int) -> list[int]:
+    """Views of a round: the next ones in turn."""
+    if size is None or size >= count:
+        return list(range(count))
+    return [(round_ * size + k) % count for k in range(size)]
+
+
+def _changing(model: Model, surfels: Tensor | None) -> Tensor:
+    """Which surfels may change [N], bool.
+
+    Raises:
+        ArgumentError, ShapeError: if none may, or the mask is of another model.
+    """
+    n = len(model)
+    if surfels is None:
+        return torch.ones(n, dtype=torch.bool, device=model.parameters["means"].device)
+    check.shape("surfels", surfels, "N", N=n)
+    if surfels.dtype != torch.bool or not bool(surfels.any()):
+        raise ArgumentError(
+            f"surfels: expected at least one that may change as bool, got {int(surfels.sum())} "
+            f"of {surfels.dtype}; choose a segment that is not empty"
+        )
+    return surfels.to(model.parameters["means"].device)
+
+
+def _share(weights: Tensor, model: Model, changing: Tensor) -> float:
+    """Share of the texels that may change with a weight above 0."""
+    place, surfel = owners(model.parameters)
+    mine = weights[place[changing[surfel]]]
+    return float((mine > 0).double().mean())

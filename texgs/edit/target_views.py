@@ -1,0 +1,129 @@
+"""A model as a guidance sees it: images, alpha, and where in the world each pixel lies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.models.guidance import Views
+from texgs.raster import Texture, rasterize
+from texgs.raster.shading import blinn_phong_texture
+from texgs.scene.model import Model, geometry, material
+from texgs.scene.render import light_direction, viewer
+from texgs.scene.texels import owners
+from texgs.volume.view_set import Light
+
+
+def require_texture(model: Model) -> None:
+    """Require a textured model.
+
+    Raises:
+        ArgumentError: naming the stage found.
+    """
+    if model.stage != "texture":
+        raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
+
+
+def bare_colors(model: Model) -> Tensor:
+    """c_ind of all texels [T, 3], each in its place in the list: palette + offset of its surfel + texel."""
+    p = model.parameters
+    place, surfel = owners(p)
+    offsets = torch.zeros_like(p["texels"])
+    offsets[place] = p["colors"][surfel]
+    return p["palette"] + offsets + p["texels"]
+
+
+def light_on(model: Model, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:
+    """Highlight [N, 3] and gain [N]: a fragment of bare colour c looks like highlight + gain * c.
+
+    Args:
+        model: relightable.
+        camera: of the view.
+        light: that shines on the surfels; without one, colours look as they are.
+    """
+    p, optics = model.parameters, model.optics
+    black = torch.zeros_like(p["means"])
+    if light is None:
+        return black, torch.ones_like(p["opacities"])
+    a, d, s, b = material(p, optics.material).values()
+    return blinn_phong_texture(
+        black,
+        a,
+        d,
+        s,
+        b,
+        p["means"],
+        p["quats"],
+        viewer(camera, optics),
+        light_direction(light, camera),
+        facing=optics.facing,
+    )
+
+
+@torch.no_grad()
+def render_views(
+    model: Model,
+    colors: Tensor,
+    cameras: Sequence[Camera],
+    light: Light | None,
+    conditions: Tensor | None = None,
+) -> Views:
+    """Render a model with other colours of its texels for a guidance.
+
+    Args:
+        model: textured.
+        colors: [T, 3] bare colours.
+        cameras: of one size, on the model's device.
+        light: or None for bare colours.
+        conditions: [V, H, W, 3] of the views returned; what is rendered now, by default.
+
+    Raises:
+        ArgumentError: if there is no camera or they differ in size.
+    """
+    sizes = {(camera.width, camera.height) for camera in cameras}
+    if len(sizes) != 1:
+        raise ArgumentError(f"cameras: expected at least one, all of one size, got sizes {sorted(sizes)}")
+    p = model.parameters
+    images, alphas, points, normals = [], [], [], []
+    for camera in cameras:
+        highlight, gain = light_on(model, camera, light)
+        seen = rasterize(
+            *geometry(p),
+            camera.viewmat,
+            camera.K,
+            camera.width,
+            camera.height,
+            texture=Texture(highlight, gain, colors, p["sizes"], p["offsets"]),
+            background=torch.ones_like(colors[0]),
+            outputs=("depth", "normal"),
+            options=model.optics.options,
+        )
+        images.append(seen.color.clamp(0, 1))
+        alphas.append(seen.alpha)
+        points.append(unproject(seen.depth, camera))  # type: ignore[arg-type]
+        normals.append(seen.normal)
+    shown = torch.stack(images)
+    return Views(
+        shown,
+        shown if conditions is None else conditions,
+        torch.stack(alphas),
+        torch.stack(points),
+        torch.stack(normals),  # type: ignore[arg-type]
+        list(cameras),
+    )
+
+
+def unproject(depth: Tensor, camera: Camera) -> Tensor:
+    """Places in the world [H, W, 3] of pixels at a camera z [H, W], world units."""
+    height, width = depth.shape
+    x = torch.arange(width, dtype=depth.dtype, device=depth.device) + 0.5
+    y = torch.arange(height, dtype=depth.dtype, device=depth.device) + 0.5
+    K, R_cw, t_cw = camera.K, camera.viewmat[:3, :3], camera.viewmat[:3, 3]
+    columns = ((x - K[0, 2]) / K[0, 0]).expand(height, width)
+    rows = ((y - K[1, 2]) / K[1, 1])[:, None].expand(height, width)
+    local = torch.stack([columns, rows, torch.ones_like(depth)], dim=-1) * depth[..., None]
+    return (local - t_cw) @ R_cw

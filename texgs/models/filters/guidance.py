@@ -1,0 +1,49 @@
+"""The offline counterpart of a diffusion model: a guidance made of procedural filters."""
+
+from __future__ import annotations
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.models.filters.surface import surface_of
+from texgs.models.filters.vocabulary import understand
+from texgs.models.guidance import Views
+
+
+class ProceduralFilters:
+    """Edits views by filters that are anchored to the surface: no weights, milliseconds to seconds.
+
+    Every filter is a solid texture, a function of the place in the world that a pixel shows and of light
+    that is fixed there, so that all views agree and a texture lifted from them is crisp. It answers the
+    entries of `vocabulary` only. It wants to see bare colours: what it paints is what light falls on.
+
+    Args:
+        scale: factor on the size of patterns; 1 gives about 26 of them along the scene.
+
+    Raises:
+        ArgumentError: if the scale is not positive.
+    """
+
+    name = "procedural filters"
+    lit = False
+
+    def __init__(self, scale: float = 1.0) -> None:
+        if not scale > 0:
+            raise ArgumentError(f"scale: expected a factor above 0, got {scale}")
+        self.scale = scale
+
+    @torch.no_grad()
+    def __call__(self, views: Views, instruction: str, generator: torch.Generator) -> Tensor:
+        """Edit the views; see `Guidance`.
+
+        Raises:
+            ArgumentError: if the instruction is empty or not in the vocabulary.
+        """
+        _, function = understand(instruction)
+        seed = int(torch.randint(2**16, (), generator=generator))
+        surface, where = surface_of(views, self.scale, seed)
+        edited = views.images.clone()
+        alpha = views.alphas[where][:, None]
+        edited[where] = function(surface) * alpha + 1 - alpha
+        return edited

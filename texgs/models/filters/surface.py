@@ -1,0 +1,64 @@
+"""What a filter paints on: the pixels that show the scene, as points on surfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from texgs.models.guidance import Views
+
+CELLS = 26.0  # patterns along the longest side of the scene, for scale 1
+KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light that a drawing's tone is made by, fixed in the world
+LUMA = (0.299, 0.587, 0.114)
+SOLID = 0.02  # alpha from which a pixel shows enough of the scene to be painted
+LOUD = 0.95  # quantile of luminance that counts as white
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """P points. All is fixed to the world, so that views agree on what is painted where."""
+
+    color: Tensor  # [P, 3] straight colours in [0, 1]
+    tone: Tensor  # [P] in [0, 1], how light a drawing should be here
+    shade: Tensor  # [P] in [0, 1], light of the key light alone
+    points: Tensor  # [P, 3] in units of the pattern
+    normals: Tensor  # [P, 3] unit length
+    pixel: float  # side of a pixel in units of the pattern: edges are as soft as that
+    seed: int  # of all that is random
+
+    def ramp(self, distance: Tensor) -> Tensor:
+        """1 inside, where a signed distance in units of the pattern is negative, 0 outside, softly."""
+        return (0.5 - distance / max(self.pixel, 1e-6)).clamp(0, 1)
+
+
+def surface_of(views: Views, scale: float, seed: int) -> tuple[Surface, Tensor]:
+    """The points that views show, and where they are [V, H, W].
+
+    Args:
+        views: of the scene.
+        scale: factor on the size of patterns.
+        seed: of patterns.
+    """
+    where = views.alphas > SOLID
+    alpha = views.alphas[where][:, None]
+    color = ((views.images[where] - (1 - alpha)) / alpha).clamp(0, 1)
+    points, normals = views.points[where], views.normals[where]
+    normals = normals / normals.norm(dim=1, keepdim=True).clamp_min(1e-6)
+    side = (points.amax(dim=0) - points.amin(dim=0)).max().clamp_min(1e-6) if len(points) else points.new_ones(())
+    unit = scale * float(side) / CELLS
+    shade = 0.5 + 0.5 * (normals @ normals.new_tensor(KEY_LIGHT))
+    luma = color @ color.new_tensor(LUMA)
+    white = luma.quantile(LOUD).clamp_min(1e-3) if 0 < len(luma) < 2**24 else luma.new_ones(())
+    tone = shade * (luma / white).clamp(0, 1)
+    pixel = _pixel(views, points) / unit
+    return Surface(color, tone, shade.clamp(0, 1), points / unit, normals, pixel, seed), where
+
+
+def _pixel(views: Views, points: Tensor) -> float:
+    """Side of a pixel at the middle of the scene, world units."""
+    if not len(points):
+        return 1.0
+    middle = points.mean(dim=0)
+    return sum(float((c.position - middle).norm() / c.K[0, 0]) for c in views.cameras) / len(views)

@@ -1,0 +1,92 @@
+"""What every editor of views takes and gives, whether a diffusion model or a procedural filter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """Views of one scene to be edited together; all of one size, on one device, over white."""
+
+    images: Tensor
+    """[V, H, W, 3] the scene as it looks now, in [0, 1]."""
+    conditions: Tensor
+    """[V, H, W, 3] the scene before any edit of this run: what an edit should stay close to."""
+    alphas: Tensor
+    """[V, H, W] in [0, 1]."""
+    points: Tensor
+    """[V, H, W, 3] place in the world of what a pixel shows; of no meaning where alpha is 0."""
+    normals: Tensor
+    """[V, H, W, 3] world axes, facing the camera; 0 where alpha is 0."""
+    cameras: Sequence[Camera]
+    """One for each view."""
+
+    def __post_init__(self) -> None:
+        size = check.shape("images", self.images, "V H W 3")
+        if len(self.cameras) != size["V"]:
+            raise ArgumentError(f"cameras: expected {size['V']} as images, got {len(self.cameras)}")
+        check.shape("alphas", self.alphas, "V H W", **size)
+        for name in ("conditions", "points", "normals"):
+            check.shape(name, getattr(self, name), "V H W 3", **size)
+
+    def __len__(self) -> int:
+        return len(self.images)
+
+
+class Guidance(Protocol):
+    """Edits views as an instruction says."""
+
+    name: str
+    """For reports and metadata."""
+    lit: bool
+    """Whether it wants to see the scene with light, or the bare colours that light falls on."""
+
+    def __call__(self, views: Views, instruction: str, generator: torch.Generator) -> Tensor:
+        """Edit the views.
+
+        Args:
+            views: to edit.
+            instruction: what to do, in words.
+            generator: of all random numbers, on the CPU; the same one gives the same images.
+
+        Returns:
+            [V, H, W, 3] edited images over white.
+
+        Raises:
+            ArgumentError: if the instruction is empty or not understood.
+        """
+
+
+def require_instruction(instruction: str) -> str:
+    """The instruction without blanks around it.
+
+    Raises:
+        ArgumentError: if nothing is left.
+    """
+    if not isinstance(instruction, str) or not instruction.strip():
+        raise ArgumentError(
+            f"instruction: expected what to do in words, such as 'make it gold', got {instruction!r}"
+        )
+    return instruction.strip()
+
+
+def require_edited(edited: Tensor, views: Views, name: str) -> Tensor:
+    """Edited images, clamped to [0, 1] on the views' device.
+
+    Raises:
+        ArgumentError, ShapeError: naming the guidance, if they are of another size or not finite.
+    """
+    count, height, width, _ = views.images.shape
+    check.shape(f"images edited by {name}", edited, "V H W 3", V=count, H=height, W=width)
+    check.finite(**{f"images edited by {name}": edited})
+    return edited.to(views.images).clamp(0, 1)
