@@ -12,7 +12,7 @@ from texgs.edit.back_projection import BackProjection
 from texgs.edit.exposures import Exposure
 from texgs.scene.model import Model
 
-STEP = 1.0  # of a Newton step in a typical exposure: 2 is the limit of stability
+STEP = 1.5  # of a Newton step in a typical exposure: 2 is the limit of stability
 LAST_STEP = 0.1  # what single exposures disagree about averages out as steps fall
 RIDGE = 0.02  # added to curvatures, relative to their median: texels that are hardly seen stay
 

@@ -20,6 +20,8 @@ class ProceduralFilters:
 
     Args:
         scale: factor on the size of patterns; 1 gives about 26 of them along the scene.
+        seed: of patterns. They do not depend on the generator of a call, so that one call goes on with what
+            another has begun.
 
     Raises:
         ArgumentError: if the scale is not positive.
@@ -28,10 +30,10 @@ class ProceduralFilters:
     name = "procedural filters"
     lit = False
 
-    def __init__(self, scale: float = 1.0) -> None:
+    def __init__(self, scale: float = 1.0, seed: int = 0) -> None:
         if not scale > 0:
             raise ArgumentError(f"scale: expected a factor above 0, got {scale}")
-        self.scale = scale
+        self.scale, self.seed = scale, seed
 
     @torch.no_grad()
     def __call__(self, views: Views, instruction: str, generator: torch.Generator) -> Tensor:
@@ -41,8 +43,7 @@ class ProceduralFilters:
             ArgumentError: if the instruction is empty or not in the vocabulary.
         """
         _, function = understand(instruction)
-        seed = int(torch.randint(2**16, (), generator=generator))
-        surface, where = surface_of(views, self.scale, seed)
+        surface, where = surface_of(views, self.scale, self.seed)
         edited = views.images.clone()
         alpha = views.alphas[where][:, None]
         edited[where] = function(surface) * alpha + 1 - alpha

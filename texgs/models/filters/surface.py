@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import log2
 
 import torch
 from torch import Tensor
@@ -46,14 +47,19 @@ def surface_of(views: Views, scale: float, seed: int) -> tuple[Surface, Tensor]:
     color = ((views.images[where] - (1 - alpha)) / alpha).clamp(0, 1)
     points, normals = views.points[where], views.normals[where]
     normals = normals / normals.norm(dim=1, keepdim=True).clamp_min(1e-6)
-    side = (points.amax(dim=0) - points.amin(dim=0)).max().clamp_min(1e-6) if len(points) else points.new_ones(())
-    unit = scale * float(side) / CELLS
+    unit = scale * _side(points) / CELLS
     shade = 0.5 + 0.5 * (normals @ normals.new_tensor(KEY_LIGHT))
     luma = color @ color.new_tensor(LUMA)
     white = luma.quantile(LOUD).clamp_min(1e-3) if 0 < len(luma) < 2**24 else luma.new_ones(())
     tone = shade * (luma / white).clamp(0, 1)
     pixel = _pixel(views, points) / unit
     return Surface(color, tone, shade.clamp(0, 1), points / unit, normals, pixel, seed), where
+
+
+def _side(points: Tensor) -> float:
+    """About the longest side of what is seen, world units: a power of sqrt 2, the same for other views."""
+    side = float((points.amax(dim=0) - points.amin(dim=0)).max()) if len(points) else 1.0
+    return float(2 ** (round(2 * log2(max(side, 1e-6))) / 2))
 
 
 def _pixel(views: Views, points: Tensor) -> float:

@@ -1,0 +1,85 @@
+"""Guidances without networks or filters."""
+
+import torch
+
+
+class Identity:
+    """Changes nothing."""
+
+    name, lit = "identity", True
+
+    def __init__(self, lit=True):
+        self.lit = lit
+
+    def __call__(self, views, instruction, generator):
+        return views.images.clone()
+
+
+class Tint(Identity):
+    """Every view in one colour, where it shows anything."""
+
+    name = "tint"
+
+    def __init__(self, color, lit=False):
+        super().__init__(lit)
+        self.color = torch.tensor(color)
+
+    def __call__(self, views, instruction, generator):
+        alpha = views.alphas[..., None]
+        return self.color * alpha + 1 - alpha
+
+
+class NoisyTint(Tint):
+    """As `Tint`, but every view of every call goes half way to a colour that is off by chance."""
+
+    name = "noisy tint"
+
+    def __init__(self, color, sigma):
+        super().__init__(color)
+        self.sigma = sigma
+
+    def __call__(self, views, instruction, generator):
+        alpha = views.alphas[..., None]
+        color = self.color + self.sigma * torch.randn(len(views), 1, 1, 3, generator=generator)
+        return 0.5 * views.images + 0.5 * (color.clamp(0, 1) * alpha + 1 - alpha)
+
+
+class NoisyStripes(Tint):
+    """Stripes on the surface that lie elsewhere in every view of every call: crisp, and never the same."""
+
+    name = "noisy stripes"
+
+    def __init__(self, jitter):
+        super().__init__((0.9, 0.9, 0.9))
+        self.jitter = jitter
+
+    def __call__(self, views, instruction, generator):
+        shift = self.jitter * torch.randn(len(views), 1, 1, generator=generator)
+        is_dark = ((views.points[..., 1] * 8 + shift) % 1 < 0.5)[..., None]
+        alpha = views.alphas[..., None]
+        return torch.where(is_dark, 0.1, self.color) * alpha + 1 - alpha
+
+
+class Returns(Identity):
+    """Whatever it was given."""
+
+    name = "broken"
+
+    def __init__(self, images):
+        super().__init__()
+        self.found = images
+
+    def __call__(self, views, instruction, generator):
+        return self.found(views) if callable(self.found) else self.found
+
+
+class Watching(Tint):
+    """As `Tint`; keeps the views it was given."""
+
+    def __init__(self, color, lit=False):
+        super().__init__(color, lit)
+        self.seen = []
+
+    def __call__(self, views, instruction, generator):
+        self.seen.append(views)
+        return super().__call__(views, instruction, generator)

@@ -1,0 +1,179 @@
+"""Epipolar lines against projected points, and attention across views against plain attention."""
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.models.tiny_diffusion import save_tiny
+from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError
+from texgs.models.epipolar import Consistency, attend, epipolar_mask, fundamental, match, token_camera
+
+PAIRS = [((0, 0), (40, 10)), ((0, 0), (180, 0)), ((-90, 0), (0, 90)), ((30, -60), (200, 45))]
+
+
+def project(points, camera):
+    """Pixels [P, 2] of points [P, 3], float64."""
+    local = points @ camera.viewmat[:3, :3].double().T + camera.viewmat[:3, 3].double()
+    pixels = local @ camera.K.double().T
+    return pixels[:, :2] / pixels[:, 2:]
+
+
+def points(count=300, seed=0):
+    return (torch.rand(count, 3, generator=torch.Generator().manual_seed(seed)).double() - 0.5) * 0.9
+
+
+def pair(angles, width=48, height=32):
+    return (orbit(*each, 3.0, 35, width, height) for each in angles)
+
+
+@pytest.mark.parametrize("angles", PAIRS)
+def test_points_lie_on_their_lines(angles):
+    view, key = pair(angles)
+    x = torch.nn.functional.pad(project(points(), view), (0, 1), value=1)
+    y = torch.nn.functional.pad(project(points(), key), (0, 1), value=1)
+    lines = x @ fundamental(view, key)
+    distance = (lines * y).sum(dim=1).abs() / lines[:, :2].norm(dim=1)
+    assert float(distance.max()) < 1e-3  # cameras are float32
+
+
+@pytest.mark.parametrize("angles", PAIRS)
+def test_mask_allows_the_tokens_of_what_both_views_show(angles):
+    view, key = pair(angles, 24, 16)
+    places = [project(points(2000), camera).floor().long() for camera in (view, key)]
+    inside = [((p >= 0) & (p < torch.tensor([24, 16]))).all(dim=1) for p in places]
+    seen = inside[0] & inside[1]
+    tokens = [p[:, 1] * 24 + p[:, 0] for p in places]
+    allowed = epipolar_mask(view, key)
+    share = allowed[tokens[0][seen], tokens[1][seen]].double().mean()
+    assert share > 0.97  # half a token on either side of a line through a token's centre may be too far
+    assert allowed.double().mean() < 0.35
+
+
+def test_mask_of_a_camera_with_itself_forbids_nothing():
+    camera = orbit(20, 10, 3.0, 35, 8, 8)
+    assert bool(epipolar_mask(camera, camera).all())
+
+
+def test_tokens_without_a_line_in_the_key_may_match_any():
+    view, key = orbit(0, 0, 3.0, 60, 12, 12), orbit(0, 0, 3.0, 60, 12, 12)
+    viewmat = key.viewmat.clone()
+    viewmat[0, 3] += 1.0  # a step aside: lines are rows of the image
+    K = key.K.clone()
+    K[1, 2] -= 6.25  # the lower half of the key, about
+    allowed = epipolar_mask(view, Camera(viewmat, K, 12, 6))
+    assert allowed.any(dim=1).all()
+    assert allowed[:12].all()  # the first row is far above the key
+    rows = allowed[8 * 12 + 3].reshape(6, 12)
+    assert rows.any(dim=1).tolist() == [False, True, True, False, False, False]
+
+
+def test_token_camera_keeps_pixels_in_their_tokens():
+    camera = orbit(10, 20, 3.0, 40, 400, 300)
+    tokens = token_camera(camera, (384, 512), 48, 64)  # scaled to 512 x 384: a token is 8 pixels
+    x = project(points(), camera) * (512 / 400) / 8
+    assert_close(project(points(), tokens), x)
+
+
+def test_match_is_brute_force():
+    generator = torch.Generator().manual_seed(1)
+    view, key = torch.randn(20, 6, generator=generator), torch.randn(15, 6, generator=generator)
+    allowed = torch.rand(20, 15, generator=generator) < 0.3
+    allowed[:, 4] |= ~allowed.any(dim=1)
+    found = match(view, key, allowed)
+    for i in range(20):
+        cosines = {
+            j: float(view[i].double() @ key[j].double() / view[i].double().norm() / key[j].double().norm())
+            for j in range(15)
+            if allowed[i, j]
+        }
+        assert int(found[i]) == max(cosines, key=cosines.__getitem__)
+
+
+def test_match_prefers_an_allowed_unlike_token_to_a_forbidden_one():
+    view, key = torch.tensor([[1.0, 0.0]]), torch.tensor([[-1.0, 0.0], [1.0, 0.0]])
+    assert int(match(view, key, torch.tensor([[True, False]]))) == 0
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    pytest.importorskip("diffusers")
+    return save_tiny(tmp_path_factory.mktemp("tiny") / "model")
+
+
+@pytest.fixture
+def unet(folder):
+    from diffusers import UNet2DConditionModel
+
+    return UNet2DConditionModel.from_pretrained(folder / "unet").eval().requires_grad_(False)
+
+
+def inputs(count, same=False, seed=0):
+    generator = torch.Generator().manual_seed(seed)
+    latents = torch.randn(3, count, 8, 8, 8, generator=generator)
+    if same:
+        latents = latents[:, :1].expand(-1, count, -1, -1, -1).contiguous()
+    return latents, torch.randn(3, 12, 16, generator=generator)
+
+
+def branches_of(unet, latents, texts):
+    def branches(ids):
+        words = texts[:, None].expand(-1, len(ids), -1, -1).flatten(0, 1)
+        return unet(latents[:, ids].flatten(0, 1), 500, words).sample.unflatten(0, (3, len(ids)))
+
+    return branches
+
+
+def test_attention_is_that_of_diffusers(unet):
+    latents, texts = inputs(1)
+    plain = branches_of(unet, latents, texts)([0])
+    Consistency(unet)
+    assert_close(branches_of(unet, latents, texts)([0]), plain, atol=1e-5, rtol=1e-5)
+
+
+def test_with_itself_as_the_key_attention_is_plain(unet):
+    """Two views of the same camera and the same latents: the second takes over what it would have had."""
+    latents, texts = inputs(2, same=True)
+    plain = branches_of(unet, latents, texts)([0])[:, 0]
+    consistency = Consistency(unet)
+    consistency.aim([orbit(0, 0, 3.0, 35, 64, 64)] * 2, (64, 64))
+    found = consistency.run(branches_of(unet, latents, texts), 2, 500, torch.Generator().manual_seed(0))
+    for view in range(2):
+        assert_close(found[:, view], plain, atol=1e-5, rtol=1e-5)
+
+
+def test_other_views_take_over_from_the_key(unet):
+    latents, texts = inputs(2)
+    branches = branches_of(unet, latents, texts)
+    consistency = Consistency(unet)
+    consistency.aim(list(pair(((0, 0), (40, 10)), 64, 64)), (64, 64))
+    alone = [branches([view])[:, 0] for view in range(2)]
+    found = consistency.run(branches, 2, 500, torch.Generator().manual_seed(0))
+    (key,) = consistency.key_ids
+    assert_close(found[:, key], alone[key], atol=1e-5, rtol=1e-5)
+    assert not torch.allclose(found[:, 1 - key], alone[1 - key], atol=1e-3)
+    late = consistency.run(branches, 2, 50, torch.Generator().manual_seed(0))
+    assert_close(late, torch.stack(alone, dim=1), atol=1e-5, rtol=1e-5)
+
+
+def test_keys_attend_to_the_tokens_of_all_keys(unet):
+    name = "down_blocks.0.attentions.0.transformer_blocks.0.attn1"
+    attention = unet.get_submodule(name)
+    consistency = Consistency(unet, keys=2)
+    consistency.role, consistency.key_ids = "key", [0, 1]
+    hidden = torch.randn(6, 16, 32, generator=torch.Generator().manual_seed(2))
+    output = attention(hidden).unflatten(0, (3, 2))
+    views = hidden.unflatten(0, (3, 2))
+    for branch in range(3):
+        both = views[branch].flatten(0, 1)[None]
+        exact = attend(attention, both, both)[0].unflatten(0, (2, 16))
+        assert_close(output[branch], exact, atol=1e-5, rtol=1e-5)
+
+
+def test_a_network_without_self_attention_is_refused():
+    with pytest.raises(ArgumentError, match="UNet with self-attention"):
+        Consistency(torch.nn.Module.__new__(NoAttention))
+
+
+class NoAttention(torch.nn.Module):
+    attn_processors = {"mid.attn2.processor": None}  # noqa: RUF012

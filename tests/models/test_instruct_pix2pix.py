@@ -1,0 +1,158 @@
+"""InstructPix2Pix in its own file format with random weights: the loop around the network, not the network."""
+
+import math
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.models.tiny_diffusion import save_tiny
+from tests.models.views_of import random_views
+from texgs.core.errors import ArgumentError, MissingDataError
+from texgs.models import instruct_pix2pix
+from texgs.models.instruct_pix2pix import InstructPix2Pix, fit, unfit
+
+pytest.importorskip("diffusers")
+pytest.importorskip("transformers")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return save_tiny(tmp_path_factory.mktemp("weights") / "instruct-pix2pix")
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """Work at 64 pixels instead of 512."""
+    monkeypatch.setattr(instruct_pix2pix, "LONGEST", 64)
+
+
+def seeded(seed=0):
+    return torch.Generator().manual_seed(seed)
+
+
+def test_guidance_is_that_of_three_separate_calls(folder):
+    model = InstructPix2Pix.open(folder, text_scale=12.5, image_scale=1.25)
+    model.unet.double()
+    generator = seeded()
+    latents, kept = (torch.randn(2, 4, 8, 8, generator=generator).double() for _ in range(2))
+    texts = torch.randn(3, 12, 16, generator=generator).double()
+    texts[2] = texts[1]
+    guided = model.predict(latents, kept, texts, 700, generator)
+    for view in range(2):
+
+        def e(condition, text, view=view):
+            return model.unet(torch.cat([latents[view], condition])[None], 700, text[None]).sample[0]
+
+        nothing, image = torch.zeros_like(kept[view]), kept[view]
+        uncond = e(nothing, texts[1])
+        exact = uncond + 1.25 * (e(image, texts[1]) - uncond)
+        exact = exact + 12.5 * (e(image, texts[0]) - e(image, texts[1]))
+        assert_close(guided[view], exact, atol=1e-9, rtol=1e-9)
+
+
+def test_denoising_undoes_noise_that_is_predicted_exactly(folder):
+    """With the true noise as the prediction, DDIM goes back along a straight line to the clean latents."""
+    model = InstructPix2Pix.open(folder, steps=7)
+    clean = torch.randn(1, 4, 8, 8, generator=seeded(1))
+    noise = torch.randn(clean.shape, generator=seeded(2))  # what the loop will draw
+    model.predict = lambda *_: noise
+    found = model.denoise(clean, clean, torch.zeros(3, 1, 1), seeded(2))
+    last = float(model.alphas[0])
+    assert_close(found, math.sqrt(last) * clean + math.sqrt(1 - last) * noise, atol=1e-5, rtol=1e-4)
+
+
+def test_steps_start_at_the_level_of_the_noise_and_end_at_none(folder):
+    model = InstructPix2Pix.open(folder)
+    assert model.times[0] == 998
+    assert model.times[-1] == 0
+    assert len(model.times) == 21
+    assert all(a > b for a, b in zip(model.times, model.times[1:], strict=False))
+
+
+def test_noise_levels_are_those_of_stable_diffusion(folder):
+    betas = torch.linspace(0.00085**0.5, 0.012**0.5, 1000, dtype=torch.float64) ** 2
+    assert_close(InstructPix2Pix.open(folder).alphas, (1 - betas).cumprod(0), atol=1e-6, rtol=1e-5)
+
+
+@pytest.mark.parametrize("epipolar", [False, True])
+def test_same_generator_same_images_of_any_size(folder, epipolar):
+    model = InstructPix2Pix.open(folder, steps=2, epipolar=epipolar)
+    views = random_views(3, height=20, width=33)
+    first = model(views, "make it gold", seeded(4))
+    assert first.shape == (3, 20, 33, 3)
+    assert bool(((first >= 0) & (first <= 1)).all())
+    assert torch.equal(first, model(views, "make it gold", seeded(4)))
+    assert not torch.equal(first, model(views, "make it gold", seeded(5)))
+    assert not torch.equal(first, model(views, "light", seeded(4)))
+
+
+def test_negative_prompt_counts(folder):
+    views = random_views(1)
+    edits = [
+        InstructPix2Pix.open(folder, steps=1, negative=text)(views, "make it gold", seeded())
+        for text in ("", "shadow")
+    ]
+    assert not torch.equal(*edits)
+
+
+def test_images_to_edit_are_scaled_latents_and_conditions_plain_ones(folder):
+    model = InstructPix2Pix.open(folder)
+    images = torch.rand(1, 3, 64, 64, generator=seeded())
+    found = model.vae.encode(2 * images - 1).latent_dist
+    assert_close(model.encode(images, None), found.mode())
+    noise = torch.randn(found.mean.shape, generator=seeded(3))
+    assert_close(model.encode(images, seeded(3)), 0.18215 * (found.mean + found.std * noise))
+
+
+@pytest.mark.parametrize("size", [(48, 64), (64, 40), (30, 30), (100, 160), (7, 64)])
+def test_resizing_there_and_back(size):
+    y, x = torch.meshgrid(torch.linspace(0, 1, size[0]), torch.linspace(0, 1, size[1]), indexing="ij")
+    images = torch.stack([x, y, 0.5 * x * y])[None]
+    there = fit(images)
+    assert there.shape[2] % 64 == 0
+    assert there.shape[3] % 64 == 0
+    assert max(there.shape[2:]) == 64
+    back = unfit(there, size)
+    assert back.shape == images.shape
+    assert float((back - images).abs().mean()) < 0.01
+
+
+def test_aspect_is_kept():
+    """A square stays a square; the rest of the model's image is padding."""
+    images = torch.ones(1, 3, 64, 128)
+    images[:, :, 16:48, 32:64] = 0
+    black = (fit(images)[0, 0] < 0.5).nonzero()
+    extent = (black.amax(dim=0) - black.amin(dim=0) + 1).tolist()
+    assert extent == [16, 16]
+
+
+def test_missing_parts_are_named(folder, tmp_path):
+    with pytest.raises(MissingDataError, match=r"none named unet, vae, text_encoder.*copy timbrooks"):
+        InstructPix2Pix.open(tmp_path)
+
+
+def test_damaged_weights_are_one_sentence(tmp_path):
+    folder = save_tiny(tmp_path / "damaged")
+    path = folder / "vae" / "diffusion_pytorch_model.safetensors"
+    path.write_bytes(path.read_bytes()[:1000])
+    with pytest.raises(ArgumentError, match=r"expected the files of InstructPix2Pix, got .*copy them again"):
+        InstructPix2Pix.open(folder)
+
+
+def test_another_model_is_refused(tmp_path):
+    with pytest.raises(ArgumentError, match=r"UNet of 8 and 4 channels .* got 4 and 4"):
+        InstructPix2Pix.open(save_tiny(tmp_path / "plain", channels=4))
+    with pytest.raises(ArgumentError, match="predicts v_prediction"):
+        InstructPix2Pix.open(save_tiny(tmp_path / "v", prediction="v_prediction"))
+
+
+@pytest.mark.parametrize("options", [{"steps": 0}, {"level": 1000}, {"steps": 30, "level": 20}])
+def test_numbers_out_of_range(folder, options):
+    with pytest.raises(ArgumentError, match="1 <= steps <= level < 1000"):
+        InstructPix2Pix.open(folder, **options)
+
+
+def test_empty_instruction(folder):
+    with pytest.raises(ArgumentError, match="expected what to do in words"):
+        InstructPix2Pix.open(folder)(random_views(1), "  ", seeded())

@@ -1,0 +1,193 @@
+"""Attention across views: what a view shows is taken from a key view, along epipolar lines (DGE)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize, scaled_dot_product_attention
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+
+LAST = 100  # timestep below which views get their own details
+BAND = 1.0  # tokens: largest distance of a match from its epipolar line
+BRANCH = 1  # of the three, whose features are compared: with the image, without the instruction
+
+
+def fundamental(view: Camera, key: Camera) -> Tensor:
+    """F [3, 3], float64: a pixel x of the view is seen in the key on the line x^T F, homogeneous."""
+    K_view, K_key = view.K.double().cpu(), key.K.double().cpu()
+    relative = key.viewmat.double().cpu() @ torch.linalg.inv(view.viewmat.double().cpu())  # view to key
+    x, y, z = relative[:3, 3].tolist()
+    cross = torch.tensor([[0, -z, y], [z, 0, -x], [-y, x, 0]], dtype=torch.float64)
+    return (torch.linalg.inv(K_key).T @ cross @ relative[:3, :3] @ torch.linalg.inv(K_view)).T
+
+
+def token_camera(camera: Camera, image: Sequence[int], rows: int, columns: int) -> Camera:
+    """A camera whose pixels are the tokens of an image that was scaled and padded to height and width `image`.
+
+    Args:
+        camera: of the view.
+        image: height and width that the model works on; the view fills its longer side.
+        rows: of tokens.
+        columns: of tokens.
+    """
+    scale = max(image) / max(camera.width, camera.height)
+    K = camera.K.double().clone()
+    K[0] *= scale * columns / image[1]
+    K[1] *= scale * rows / image[0]
+    return Camera(camera.viewmat.double(), K, columns, rows)
+
+
+def epipolar_mask(view: Camera, key: Camera) -> Tensor:
+    """Which tokens of the key may match each token of the view [S, S'], bool.
+
+    Those no farther than `BAND` from the epipolar line of the token's centre. Where none is, all may; so may
+    all where both cameras are at one place, and there are no lines.
+
+    Args:
+        view: camera with one pixel for each token, see `token_camera`.
+        key: likewise.
+    """
+    lines = _centers(view) @ fundamental(view, key)  # [S, 3]
+    length = lines[:, :2].norm(dim=1, keepdim=True)
+    distance = (lines @ _centers(key).T).abs() / length.clamp_min(1e-12)
+    allowed = (distance <= BAND) | (length <= 1e-9)
+    return allowed | ~allowed.any(dim=1, keepdim=True)
+
+
+def _centers(camera: Camera) -> Tensor:
+    """Homogeneous pixel centres [S, 3], float64, row after row."""
+    y, x = torch.meshgrid(
+        torch.arange(camera.height, dtype=torch.float64) + 0.5,
+        torch.arange(camera.width, dtype=torch.float64) + 0.5,
+        indexing="ij",
+    )
+    return torch.stack([x, y, torch.ones_like(x)], dim=-1).reshape(-1, 3)
+
+
+class Consistency:
+    """Puts attention across views into a UNet of diffusers; plain attention until views are run together.
+
+    In each denoising step a key view is drawn. Keys attend to the tokens of all keys; every other view takes
+    over the attention output of the token of the nearest key that looks most alike and lies on the epipolar
+    line (Chen et al. 2024, section 4). Similarities are not masked by 0 but excluded.
+
+    Args:
+        unet: whose self-attention, of the modules named attn1, is replaced.
+        keys: how many views are keys in each step.
+
+    Raises:
+        ArgumentError: if the UNet has no self-attention.
+    """
+
+    def __init__(self, unet: Any, keys: int = 1) -> None:
+        processors = dict(unet.attn_processors)
+        mine = {name: _SelfAttention(self) for name in processors if ".attn1." in name}
+        if not mine or keys < 1:
+            raise ArgumentError(
+                f"epipolar: expected a UNet with self-attention and at least 1 key, got {len(mine)} and {keys}"
+            )
+        unet.set_attn_processor({**processors, **mine})
+        self.keys = keys
+        self.cameras: Sequence[Camera] = ()
+        self.image: tuple[int, int] = (0, 0)
+        self.role, self.view, self.nearest = "alone", 0, 0
+        self.key_ids: list[int] = []
+        self.masks: dict[tuple[int, int, int], Tensor] = {}
+        self.stored: dict[int, tuple[Tensor, Tensor]] = {}
+
+    def aim(self, cameras: Sequence[Camera], image: Sequence[int]) -> None:
+        """Say what cameras the views have, and the height and width in pixels that the model works on."""
+        self.cameras, self.image = list(cameras), (image[0], image[1])
+        self.masks = {}
+
+    def run(
+        self, branches: Callable[[list[int]], Tensor], count: int, time: int, generator: torch.Generator
+    ) -> Tensor:
+        """Noise [3, V, ...] of all views in one denoising step.
+
+        Args:
+            branches: runs the UNet on some views: [3, K, ...].
+            count: of views.
+            time: of the step.
+            generator: draws the keys.
+        """
+        try:
+            if time < LAST:
+                self.role = "alone"
+                return torch.cat([branches([index]) for index in range(count)], dim=1)
+            self.key_ids = sorted(torch.randperm(count, generator=generator)[: self.keys].tolist())
+            self.role, self.stored = "key", {}
+            found = dict(zip(self.key_ids, branches(self.key_ids).unbind(dim=1), strict=True))
+            self.role = "view"
+            for index in range(count):
+                if index not in found:
+                    self.view, self.nearest = index, self._nearest_key(index)
+                    found[index] = branches([index])[:, 0]
+            return torch.stack([found[index] for index in range(count)], dim=1)
+        finally:
+            self.role, self.stored = "alone", {}
+
+    def mask(self, view: int, key: int, tokens: int) -> Tensor:
+        """Which of so many tokens of a key may match those of a view."""
+        if (view, key, tokens) not in self.masks:
+            shrink = round((self.image[0] * self.image[1] / tokens) ** 0.5)
+            rows, columns = self.image[0] // shrink, self.image[1] // shrink
+            pair = (token_camera(self.cameras[i], self.image, rows, columns) for i in (view, key))
+            self.masks[view, key, tokens] = epipolar_mask(*pair)
+        return self.masks[view, key, tokens]
+
+    def _nearest_key(self, view: int) -> int:
+        """Place among the keys of the one whose camera is nearest."""
+        position = self.cameras[view].position
+        distances = [float((self.cameras[key].position - position).norm()) for key in self.key_ids]
+        return distances.index(min(distances))
+
+
+class _SelfAttention:
+    """Processor of one self-attention module, of what its block has normalised."""
+
+    def __init__(self, consistency: Consistency) -> None:
+        self.consistency = consistency
+
+    def __call__(self, attn: Any, hidden_states: Tensor, *_: Any, **__: Any) -> Tensor:
+        """Attention output of [B, S, C] features; B is 3 branches times views."""
+        shared = self.consistency
+        if shared.role == "alone":
+            return attend(attn, hidden_states, hidden_states)
+        if shared.role == "key":
+            branches = hidden_states.unflatten(0, (3, len(shared.key_ids)))  # [3, K, S, C]
+            everything = branches.flatten(1, 2).repeat_interleave(len(shared.key_ids), dim=0)
+            output = attend(attn, hidden_states, everything)
+            shared.stored[id(self)] = (branches[BRANCH], output.unflatten(0, (3, len(shared.key_ids))))
+            return output
+        features, outputs = shared.stored[id(self)]
+        key = shared.nearest
+        allowed = shared.mask(shared.view, shared.key_ids[key], hidden_states.shape[1])
+        return outputs[:, key][:, match(hidden_states[BRANCH], features[key], allowed)]
+
+
+def match(view: Tensor, key: Tensor, allowed: Tensor) -> Tensor:
+    """Index [S] of the token of the key most like each token of the view, by the cosine, of those allowed.
+
+    Args:
+        view: [S, C] features.
+        key: [S', C] features.
+        allowed: [S, S'] bool, at least one in each row.
+    """
+    alike = normalize(view.float(), dim=1) @ normalize(key.float(), dim=1).T
+    return alike.masked_fill(~allowed.to(alike.device), -torch.inf).argmax(dim=1)
+
+
+def attend(attn: Any, queries: Tensor, keys: Tensor) -> Tensor:
+    """What an attention module of diffusers makes of queries [B, S, C] and keys [B, S', C]."""
+    q, k, v = (
+        layer(x).unflatten(2, (attn.heads, -1)).transpose(1, 2)
+        for layer, x in ((attn.to_q, queries), (attn.to_k, keys), (attn.to_v, keys))
+    )
+    mixed = scaled_dot_product_attention(q, k, v, scale=attn.scale).transpose(1, 2).flatten(2)
+    return attn.to_out[1](attn.to_out[0](mixed)) / attn.rescale_output_factor
