@@ -36,5 +36,5 @@ def shell(count=160, texels=5, opacity=3.0, seed=0):
 def around(count=12, size=48):
     """Cameras from all sides, above and below."""
     turns = [360 * 0.618 * i for i in range(count)]
-    heights = [-75 + 150 * i / (count - 1) for i in range(count)]
+    heights = [-75 + 150 * i / max(count - 1, 1) for i in range(count)]
     return [orbit(a, h, 2.5, 26, size, size) for a, h in zip(turns, heights, strict=True)]

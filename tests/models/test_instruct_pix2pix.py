@@ -1,4 +1,4 @@
-"""InstructPix2Pix in its own file format with random weights: the loop around the network, not the network."""
+"""InstructPix2Pix of random weights in the files of the real one: the loop around the network."""
 
 import math
 

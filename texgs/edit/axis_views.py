@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from math import acos, atan, cos, degrees, radians
 
+import torch
 from torch import Tensor
 
 from texgs.core import check
@@ -45,10 +46,9 @@ def choose_axis_views(cameras: Sequence[Camera], center: Tensor | None = None) -
         ArgumentError: if an axis has no camera within 45 degrees that is not taken by another.
     """
     found: dict[str, int] = {}
-    if cameras:
-        center = cameras[0].viewmat.new_zeros(3) if center is None else center
-        check.shape("center", center, "3")
-    toward = [(camera.position - center).double().cpu() for camera in cameras]
+    middle = torch.zeros(3) if center is None else center
+    check.shape("center", middle, "3")
+    toward = [camera.position.double().cpu() - middle.double().cpu() for camera in cameras]
     for name, axis in AXES.items():
         cosines = {
             index: float(x @ x.new_tensor(axis) / x.norm().clamp_min(1e-12))
@@ -57,16 +57,18 @@ def choose_axis_views(cameras: Sequence[Camera], center: Tensor | None = None) -
         }
         best = max(cosines, key=cosines.__getitem__, default=None)
         if best is None or cosines[best] < cos(radians(FARTHEST)):
-            nearest = "none" if best is None else f"{degrees(acos(max(-1.0, min(1.0, cosines[best])))):.0f}"
+            nearest = "none" if best is None else f"one at {degrees(acos(max(-1.0, cosines[best]))):.0f}"
             raise ArgumentError(
-                f"cameras: expected one within {FARTHEST:g} degrees of the {name} view, got one at {nearest}; "
+                f"cameras: expected one within {FARTHEST:g} degrees of the {name} view, got {nearest}; "
                 "make views with axis_cameras"
             )
         found[name] = best
     return found
 
 
-def axis_cameras(like: Camera, points: Tensor, width: int | None = None, height: int | None = None) -> dict[str, Camera]:
+def axis_cameras(
+    like: Camera, points: Tensor, width: int | None = None, height: int | None = None
+) -> dict[str, Camera]:
     """Six new cameras exactly along the axes of a scene, which it fills.
 
     They look at the middle of the scene from as far as another camera does, with the narrowest field of view
@@ -109,8 +111,10 @@ def _widest(points: Tensor, radius: float, aspect: float) -> float:
         x, y, z = (points @ R_cw.T).unbind(dim=1)
         if float(z.min()) + radius < NEAREST * radius:
             raise ArgumentError(
-                f"like: expected a camera well outside of the scene, got one at {radius:.3g} from its middle, "
+                f"like: expected a camera well outside of the scene, got one {radius:.3g} from its middle, "
                 "which is too near; pass one farther away"
             )
-        widest = max(widest, float((y.abs() / (z + radius)).max()), float((x.abs() / (z + radius)).max()) / aspect)
+        widest = max(
+            widest, float((y.abs() / (z + radius)).max()), float((x.abs() / (z + radius)).max()) / aspect
+        )
     return widest

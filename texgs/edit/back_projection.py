@@ -13,6 +13,7 @@ from texgs.scene.model import Model
 from texgs.scene.texels import owners
 
 FAINT = 1e-4  # gain times alpha below which a pixel says nothing
+HARDLY = 0.01  # of the mean weight: what is seen less than that is hardly seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,34 +57,47 @@ def back_project(exposures: Sequence[Exposure], model: Model) -> BackProjection:
     return BackProjection(mean.clamp(0, 1), weights, squares / total.clamp_min(torch.finfo(total.dtype).tiny))
 
 
-def fill_unseen(colors: Tensor, weights: Tensor, model: Model) -> Tensor:
-    """Colours [T, 3] with those of texels that no view shows made up from what is seen nearest to them.
+def seen_texels(weights: Tensor) -> Tensor:
+    """Which texels [T] views really show: not those glimpsed through what is in front of them."""
+    return weights > HARDLY * weights.mean()
 
-    Such a texel gets the mean of the seen texels of its surfel, weighted by how much they are seen; where
-    none is, that of the nearest surfel (by its mean) that has any. So a view that nobody edited shows what is
-    around, and neither the old colours nor black.
+
+def fill_unseen(sums: BackProjection, model: Model) -> Tensor:
+    """Mean colours [T, 3] of texels, with those that views hardly show drawn to what is seen nearest to them.
+
+    That is the mean of the texels of the same surfel, weighted by how much they are seen; where the whole
+    surfel hardly is, that of the nearest one (by its mean) that is seen. So a side that nobody edited shows
+    what is around: neither the old colours, nor black, nor what shines through from the other side.
 
     Args:
-        colors: [T, 3]; only those with a weight count.
-        weights: [T], 0 where a texel is not seen.
+        sums: of all exposures.
         model: textured.
     """
+    place, surfel = owners(model.parameters)
+    weight = sums.weights[place]
+    of_surfel = weight.new_zeros(len(model)).index_add_(0, surfel, weight)
+    if not bool((of_surfel > 0).any()):
+        return sums.colors
+    totals = sums.colors.new_zeros(len(model), 3).index_add_(0, surfel, sums.colors[place] * weight[:, None])
+    tiny = torch.finfo(weight.dtype).tiny
+    mean = totals / of_surfel.clamp_min(tiny)[:, None]
+    few = HARDLY * of_surfel.mean()
+    around = mean[_nearest(model.parameters["means"], of_surfel > few)]
+    mean = (totals + few * around) / (of_surfel + few)[:, None]
+    few = HARDLY * weight.mean()
+    filled = sums.colors.clone()
+    filled[place] = (sums.colors[place] * weight[:, None] + few * mean[surfel]) / (weight + few)[:, None]
+    return filled
+
+
+def _nearest(means: Tensor, known: Tensor) -> Tensor:
+    """Index [N] of the nearest of the known surfels, of which there is one; of these themselves their own."""
     from scipy.spatial import cKDTree
 
-    place, surfel = owners(model.parameters)
-    n = len(model)
-    weight = weights.new_zeros(n).index_add_(0, surfel, weights[place])
-    sums = colors.new_zeros(n, 3).index_add_(0, surfel, colors[place] * weights[place][:, None])
-    seen = weight > 0
-    if not bool(seen.any()):
-        return colors
-    mean = sums / weight.clamp_min(torch.finfo(weight.dtype).tiny)[:, None]
-    if not bool(seen.all()):
-        means = model.parameters["means"].cpu()
-        known = seen.nonzero()[:, 0]
-        _, nearest = cKDTree(means[known.cpu()].numpy()).query(means[~seen.cpu()].numpy())
-        mean[~seen] = mean[known[torch.as_tensor(nearest, device=known.device)]]
-    filled = colors.clone()
-    is_unseen = weights[place] == 0
-    filled[place[is_unseen]] = mean[surfel[is_unseen]]
-    return filled
+    index = torch.arange(len(means), device=means.device)
+    if bool(known.all()):
+        return index
+    ids, points = known.nonzero()[:, 0], means.detach().cpu().numpy()
+    _, nearest = cKDTree(points[ids.cpu()]).query(points[(~known).cpu()])
+    index[~known] = ids[torch.as_tensor(nearest, device=ids.device)]
+    return index

@@ -19,6 +19,7 @@ from texgs.volume.view_set import Light
 MARGIN = 11  # pixels around content: a window of SSIM
 SOFT = 0.05  # alpha below which colours are rather those of the neighbourhood
 NEAR, FAR = 9, 65  # pixels, windows of that neighbourhood
+FEW = 0.02  # mean alpha of a window below which it rather has the colour of the larger one
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +149,7 @@ def straight_colors(image: Tensor, alpha: Tensor) -> Tensor:
         image: [H, W, 3] over white.
         alpha: [H, W].
     """
-    own = (image - (1 - alpha[..., None])) * (alpha[..., None] > 0)
+    own = (image - (1 - alpha[..., None])).clamp_min(0).minimum(alpha[..., None])  # premultiplied
     around = _mean(own, alpha, FAR, _overall(own, alpha))
     around = _mean(own, alpha, NEAR, around)
     return ((own + SOFT * around) / (alpha[..., None] + SOFT)).clamp(0, 1)
@@ -165,5 +166,4 @@ def _mean(own: Tensor, alpha: Tensor, window: int, beyond: Tensor) -> Tensor:
     for size in ((window, 1), (1, window)):  # separable, and zeros beyond the border count as transparent
         planes = avg_pool2d(planes, size, stride=1, padding=(size[0] // 2, size[1] // 2))
     *color, cover = planes[0]
-    few = 1e-3
-    return (torch.stack(color, dim=-1) + few * beyond) / (cover[..., None] + few)
+    return (torch.stack(color, dim=-1) + FEW * beyond) / (cover[..., None] + FEW)

@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.edit.back_projection import back_project, fill_unseen
+from texgs.edit.back_projection import back_project, fill_unseen, seen_texels
 from texgs.edit.exposures import Exposure, expose
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
@@ -69,7 +69,7 @@ def update(
     cameras: Sequence[Camera],
     guidance: Guidance,
     instruction: str,
-    policy: Policy = Policy(),  # noqa: B008, it is frozen
+    policy: Policy = Policy(),
     *,
     light: Light = Light("headlight"),  # noqa: B008, it is frozen
     lit: bool | None = None,
@@ -108,7 +108,9 @@ def update(
     colors = bare_colors(model).clamp(0, 1)
     originals = render_views(model, bare_colors(model), cameras, shine)
     targets = _Targets(len(policy.opacities))
-    adam = Reconstruction(colors, policy.rate, policy.rounds * policy.iterations) if policy.iterations else None
+    adam = (
+        Reconstruction(colors, policy.rate, policy.rounds * policy.iterations) if policy.iterations else None
+    )
     seen = colors.new_zeros(len(colors))
     for round_ in range(policy.rounds):
         ids = _group(round_, policy.group, len(cameras))
@@ -120,17 +122,16 @@ def update(
         if adam is None:
             flat = [exposure for row in targets.rows for exposure in row]
             sums = back_project(flat, model)
-            start = fill_unseen(sums.colors, sums.weights, model)
-            colors = solve(
-                flat, model, sums, start, sweeps=policy.sweeps, generator=generator, title=name
-            )
+            start = fill_unseen(sums, model)
+            colors = solve(flat, model, sums, start, sweeps=policy.sweeps, generator=generator, title=name)
             seen = sums.weights
         else:
             adam.run(targets.rows, model, policy.iterations, generator, name)
             colors = adam.colors
     if adam is not None:
-        seen = back_project([x for row in targets.rows for x in row], model).weights
-        colors = fill_unseen(colors, seen, model)
+        sums = back_project([x for row in targets.rows for x in row], model)
+        colors = fill_unseen(replace(sums, colors=colors), model)
+        seen = sums.weights
     share = _share(seen, model, changing)
     return Edited(recolored(model, colors, changing), targets.views, targets.images, share)
 
@@ -218,7 +219,6 @@ def _changing(model: Model, surfels: Tensor | None) -> Tensor:
 
 
 def _share(weights: Tensor, model: Model, changing: Tensor) -> float:
-    """Share of the texels that may change with a weight above 0."""
+    """Share of the texels that may change that are seen."""
     place, surfel = owners(model.parameters)
-    mine = weights[place[changing[surfel]]]
-    return float((mine > 0).double().mean())
+    return float(seen_texels(weights)[place[changing[surfel]]].double().mean())

@@ -27,7 +27,7 @@ def fundamental(view: Camera, key: Camera) -> Tensor:
 
 
 def token_camera(camera: Camera, image: Sequence[int], rows: int, columns: int) -> Camera:
-    """A camera whose pixels are the tokens of an image that was scaled and padded to height and width `image`.
+    """A camera whose pixels are the tokens of an image scaled and padded to height and width `image`.
 
     Args:
         camera: of the view.
@@ -89,7 +89,7 @@ class Consistency:
         mine = {name: _SelfAttention(self) for name in processors if ".attn1." in name}
         if not mine or keys < 1:
             raise ArgumentError(
-                f"epipolar: expected a UNet with self-attention and at least 1 key, got {len(mine)} and {keys}"
+                f"epipolar: expected a UNet with self-attention and 1 key or more, got {len(mine)} and {keys}"
             )
         unet.set_attn_processor({**processors, **mine})
         self.keys = keys

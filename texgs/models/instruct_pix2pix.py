@@ -71,7 +71,7 @@ class InstructPix2Pix:
 
     @classmethod
     def open(cls, folder: str | Path, device: torch.device | str = "cpu", **options: Any) -> InstructPix2Pix:
-        """Read the model from a folder in its published format: unet, vae, text_encoder, tokenizer, scheduler.
+        """Read the model from a folder in its published format, with a folder for each of its parts.
 
         Half precision on a GPU, single on a CPU. Nothing is downloaded, nothing in the files is executed.
 
@@ -148,7 +148,7 @@ class InstructPix2Pix:
         return (self.vae.decode(latents / self.vae.config.scaling_factor).sample / 2 + 0.5).clamp(0, 1)
 
     def denoise(self, clean: Tensor, kept: Tensor, texts: Tensor, generator: torch.Generator) -> Tensor:
-        """Noise latents [V, 4, h, w] to the first level and denoise them step by step (DDIM, Song et al. 2021)."""
+        """Noise latents [V, 4, h, w] to the first level and denoise them step by step (DDIM)."""
         first = float(self.alphas[self.times[0]])
         noise = torch.randn(clean.shape, generator=generator).to(clean)
         latents = first**0.5 * clean + (1 - first) ** 0.5 * noise
@@ -190,7 +190,7 @@ def _read(folder: Path, device: torch.device) -> tuple[dict[str, Any], Any]:
     from transformers import CLIPTextModel, CLIPTokenizer
 
     dtype = torch.float16 if device.type == "cuda" else torch.float32
-    local = {"local_files_only": True}
+    local: dict[str, Any] = {"local_files_only": True}
     weights = {**local, "torch_dtype": dtype, "use_safetensors": True}
     modules = {
         "unet": UNet2DConditionModel.from_pretrained(folder / "unet", **weights),
@@ -211,7 +211,7 @@ def fitted(height: int, width: int) -> tuple[int, int]:
 
 
 def fit(images: Tensor) -> Tensor:
-    """Images [V, 3, H, W] scaled to `LONGEST` and padded at the right and the bottom, by what is at the edge."""
+    """Images [V, 3, H, W] scaled to `LONGEST` and padded at the right and the bottom with their edges."""
     height, width = fitted(*images.shape[2:])
     scaled = images
     if (height, width) != tuple(images.shape[2:]):

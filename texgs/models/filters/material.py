@@ -23,11 +23,15 @@ def marble(surface: Surface) -> Tensor:
     for k, (direction, frequency, sharpness, weight) in enumerate(
         (((0.6, 0.7, 0.4), 1.0, 9.0, 0.85), ((-0.7, 0.3, 0.65), 2.3, 14.0, 0.6))
     ):
-        bent = points @ points.new_tensor(direction) * frequency + 2.4 * fractal_noise(points * 1.3, seed + 11 * k)
+        bent = points @ points.new_tensor(direction) * frequency + 2.4 * fractal_noise(
+            points * 1.3, seed + 11 * k
+        )
         line = 1 - torch.sin(math.pi * bent).abs()
         veins = torch.maximum(veins, weight * line.pow(sharpness))
     cloud = fractal_noise(points * 2, seed + 29)
-    stone = torch.lerp(_color(surface, (0.80, 0.81, 0.83)), _color(surface, (0.98, 0.97, 0.95)), cloud[:, None])
+    stone = torch.lerp(
+        _color(surface, (0.80, 0.81, 0.83)), _color(surface, (0.98, 0.97, 0.95)), cloud[:, None]
+    )
     return torch.lerp(stone, _color(surface, (0.16, 0.18, 0.22)), veins[:, None])
 
 

@@ -10,7 +10,7 @@ from texgs.models.filters.surface import LUMA, Surface
 
 
 def oil(surface: Surface) -> Tensor:
-    """Overlapping dabs [P, 3] of a flat brush, each with its direction, its mix of pigments and its bristles."""
+    """Overlapping dabs [P, 3] of a flat brush, each with a direction, a mix of pigments and bristles."""
     points, seed = surface.points * 0.8, surface.seed
     top = torch.full_like(surface.tone, -1.0)
     value, warm, relief = (torch.zeros_like(surface.tone) for _ in range(3))

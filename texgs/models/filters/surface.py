@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import log2
 
-import torch
 from torch import Tensor
 
 from texgs.models.guidance import Views

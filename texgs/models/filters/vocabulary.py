@@ -22,7 +22,7 @@ FILTERS: dict[str, tuple[Filter, tuple[str, ...]]] = {  # by name: the filter an
         ("hatching", "hatched", "crosshatching", "crosshatched", "cross hatching", "cross hatched", "pencil"),
     ),
     "woodcut": (ink.woodcut, ("woodcut", "wood cut", "linocut", "engraving", "engraved")),
-    "watercolour": (paint.watercolour, ("watercolour", "watercolor", "water colour", "aquarelle")),
+    "watercolour": (paint.watercolour, ("watercolour", "watercolor", "water", "aquarelle")),
     "oil painting": (paint.oil, ("oil", "oils", "brush strokes", "brushstrokes")),
     "cartoon": (paint.cartoon, ("cartoon", "comic", "cel shading", "cel shaded", "toon")),
     "marble": (material.marble, ("marble", "stone")),
@@ -33,12 +33,12 @@ FILTERS: dict[str, tuple[Filter, tuple[str, ...]]] = {  # by name: the filter an
     "copper": (partial(material.metal, tones=material.COPPER), ("copper", "bronze")),
 }
 # Words that say nothing about the look.
-FILLERS = frozenset(
-    "a an and appear as by change color coloured colored colour convert draw drawing drawn effect give have "
-    "in into it like look made make making of out paint painted painting picture please render rendered "
-    "sculpture sketch style styled surface texture textured that the them this to transform turn was were "
-    "with scene volume object".split()
-)
+FILLERS = """
+    a an and appear as by change color coloured colored colour convert draw drawing drawn effect give have in
+    into it like look made make making object of out paint painted painting picture please render rendered
+    scene sculpture sketch style styled surface texture textured that the them this to transform turn volume
+    was were with
+"""
 
 
 def vocabulary() -> list[str]:
@@ -53,7 +53,7 @@ def understand(instruction: str) -> tuple[str, Filter]:
         ArgumentError: if it is empty, or says anything that is not in the vocabulary, which is listed.
     """
     text = require_instruction(instruction)
-    words = [word for word in re.findall(r"[#\w]+", text.lower()) if word not in FILLERS]
+    words = [word for word in re.findall(r"[#\w]+", text.lower()) if word not in FILLERS.split()]
     asked = " ".join(words)
     for name, (function, synonyms) in FILTERS.items():
         if any(asked in (word, f"{word} pencil", f"pencil {word}") for word in synonyms):

@@ -1,0 +1,191 @@
+"""Colours found from exposures: against dense least squares, and Adam against the same problem."""
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.edit.textured import around, shell
+from texgs.edit.back_projection import BackProjection, back_project, fill_unseen, seen_texels
+from texgs.edit.exposures import expose
+from texgs.edit.target_adam import Reconstruction
+from texgs.edit.target_solve import solve
+from texgs.edit.target_views import bare_colors, render_views
+from texgs.raster.ssim import l1_dssim
+from texgs.scene.model import Model
+from texgs.scene.texels import owners
+from texgs.volume.view_set import Light
+
+STRIPES = 9.0  # for each world unit
+
+
+@pytest.fixture(scope="module")
+def model():
+    return shell(count=80, texels=4)
+
+
+@pytest.fixture(scope="module")
+def problem(model):
+    return striped(model, None)
+
+
+def striped(model, light):
+    """Rows of exposures of stripes on the surface."""
+    views = render_views(model, bare_colors(model), around(6, 32), light)
+    is_dark = (views.points[..., 1:2] * STRIPES) % 1 < 0.5
+    alpha = views.alphas[..., None]
+    edited = torch.where(is_dark, 0.2, 0.6) * alpha.expand(-1, -1, -1, 3) + 1 - alpha
+    return expose(model, views, edited, light, (2.0, 1.0, 0.5))
+
+
+def flat(rows):
+    return [exposure for row in rows for exposure in row]
+
+
+def error(exposures, model, colors):
+    p = model.parameters
+    return sum(
+        float((e.image(colors, p["sizes"], p["offsets"]) - e.wanted).square().sum()) for e in exposures
+    )
+
+
+def dense(exposures, model):
+    """Matrix [pixels, T] of one channel and its right-hand side [pixels, 3], float64."""
+    p = model.parameters
+    columns, count = [], len(p["texels"])
+    for texel in range(count):
+        unit = torch.zeros(count, 3)
+        unit[texel] = 1
+        images = [e.image(unit, p["sizes"], p["offsets"], plain=True)[..., 0] for e in exposures]
+        columns.append(torch.cat([image.flatten() for image in images]))
+    black = torch.zeros(count, 3)
+    rest = [(e.wanted - e.image(black, p["sizes"], p["offsets"])).reshape(-1, 3) for e in exposures]
+    return torch.stack(columns, dim=1).double(), torch.cat(rest).double()
+
+
+@pytest.fixture(scope="module")
+def few():
+    """A problem small enough to write down: one opacity, coarse textures, colours that can be had."""
+    model = shell(count=24, texels=3, opacity=2.0)
+    views = render_views(model, bare_colors(model), around(4, 24), None)
+    known = torch.rand(len(model.parameters["texels"]), 3, generator=torch.Generator().manual_seed(5))
+    edited = render_views(model, known, around(4, 24), None).images
+    exposures = flat(expose(model, views, edited, None, (1.0,)))
+    return model, exposures, known
+
+
+def test_sums_are_those_of_the_dense_matrix(few):
+    model, exposures, _ = few
+    A, wanted = dense(exposures, model)
+    sums = back_project(exposures, model)
+    pixels = [e.cover.numel() for e in exposures]
+    shows = torch.cat([e.cover.flatten() for e in exposures]).double() > 1e-4
+    assert_close(sums.weights.double(), A[shows].sum(dim=0), atol=1e-3, rtol=1e-4)
+    gains = A.sum(dim=1, keepdim=True)
+    means = (A.T @ (wanted / gains.clamp_min(1e-4)).clamp(0, 1)) / A.sum(dim=0)[:, None]
+    solid = A.sum(dim=0) > 0.5
+    assert_close(sums.colors[solid].double(), means[solid], atol=2e-3, rtol=0)
+    rows = torch.stack([a.T @ a.sum(dim=1) for a in A.split(pixels)])  # [V, T] of A'A 1
+    assert_close(sums.curvature.double(), rows.square().sum(0) / rows.sum(0), atol=1e-4, rtol=1e-3)
+
+
+def test_solve_agrees_with_dense_least_squares(few):
+    model, exposures, known = few
+    A, wanted = dense(exposures, model)
+    sums = back_project(exposures, model)
+    start = fill_unseen(sums, model)
+    found = solve(
+        exposures, model, sums, start, sweeps=150, generator=torch.Generator().manual_seed(0), title=""
+    )
+    exact = torch.linalg.lstsq(A, wanted).solution
+    left = (A @ exact - wanted).square().sum()
+    zero = (A @ start.double() - wanted).square().sum()
+    assert (A @ found.double() - wanted).square().sum() < left + 0.01 * (zero - left)
+    clear = A.square().sum(dim=0) > 3.0
+    assert int(clear.sum()) > 10
+    assert (found[clear] - known[clear]).abs().mean() < 0.25 * (start[clear] - known[clear]).abs().mean()
+
+
+def test_three_sweeps_are_as_good_as_the_papers_iterations(problem, model):
+    """1,500 of Adam at falling opacity against 54 steps: the squared error of the views, to 0.1 dB."""
+    exposures = flat(problem)
+    sums = back_project(exposures, model)
+    start = fill_unseen(sums, model)
+    solved = solve(exposures, model, sums, start, sweeps=3, generator=torch.Generator(), title="")
+    adam = Reconstruction(bare_colors(model), 0.025, 1500)
+    adam.run(problem, model, 1500, torch.Generator().manual_seed(0), "")
+    assert error(problem[1], model, start) > 1.1 * error(problem[1], model, solved)
+    assert error(problem[1], model, solved) < 1.023 * error(problem[1], model, adam.colors)  # 0.1 dB
+    assert 0 <= float(solved.min()) <= float(solved.max()) <= 1
+
+
+def test_light_is_made_up_for(model):
+    """Stripes as bright under light as they are wanted: bare colours are brighter than the stripes."""
+    rows = striped(model, Light("headlight"))
+    solved = solved_in(rows, model)
+    assert error(rows[1], model, solved) < 0.4 * error(rows[1], model, bare_colors(model))
+    dark = striped(model, None)
+    assert error(rows[1], model, solved) < 0.9 * error(rows[1], model, solved_in(dark, model))
+
+
+def solved_in(rows, model):
+    sums = back_project(flat(rows), model)
+    return solve(flat(rows), model, sums, sums.colors, sweeps=3, generator=torch.Generator(), title="")
+
+
+def test_adam_lowers_its_loss_and_follows_the_opacities(problem, model):
+    adam = Reconstruction(bare_colors(model), 0.025, 90)
+    first = loss(problem[-1], model, adam.colors)
+    adam.run(problem, model, 60, torch.Generator().manual_seed(0), "")
+    middle = adam.colors.clone()
+    assert adam.adam.param_groups[0]["lr"] == pytest.approx(0.025 * 0.1 ** (59 / 90))
+    adam.run(problem, model, 30, torch.Generator().manual_seed(1), "")
+    assert loss(problem[-1], model, adam.colors) < loss(problem[-1], model, middle) < 0.8 * first
+
+
+def loss(row, model, colors):
+    p = model.parameters
+    with torch.no_grad():
+        images = [e.image(colors, p["sizes"], p["offsets"]) for e in row]
+        return sum(float(l1_dssim(x, e.wanted, 0.2)) for x, e in zip(images, row, strict=True))
+
+
+def sums_of(colors, weights):
+    return BackProjection(colors, weights, weights)
+
+
+def test_unseen_texels_take_the_mean_of_their_surfel():
+    model = shell(count=10, texels=2)
+    place, surfel = owners(model.parameters)
+    colors = torch.rand(40, 3, generator=torch.Generator().manual_seed(0))
+    weights = torch.full((40,), 2.0)
+    mine = place[surfel == 3]
+    weights[mine[0]], weights[mine[1]], weights[mine[2:]] = 1.0, 3.0, 0.0
+    filled = fill_unseen(sums_of(colors, weights), model)
+    expected = (colors[mine[0]] + 3 * colors[mine[1]]) / 4
+    assert_close(filled[mine[2:]], expected.expand(2, 3), atol=0.01, rtol=0)
+    kept = weights > 0
+    assert_close(filled[kept], colors[kept], atol=0.02, rtol=0)
+    assert torch.equal(seen_texels(weights), kept)
+
+
+@pytest.mark.parametrize("glimpse", [0.0, 1e-4])
+def test_hidden_surfels_take_the_colour_of_the_nearest_seen_one(glimpse):
+    """Even if they are glimpsed through what hides them, and would be the colour of that."""
+    model = shell(count=10, texels=2)
+    means = torch.zeros(10, 3)
+    means[:, 0] = torch.arange(10.0) ** 1.1
+    model = Model({**model.parameters, "means": means}, model.optics)
+    place, surfel = owners(model.parameters)
+    colors = torch.ones(40, 3)
+    weights = torch.full((40,), glimpse)
+    is_seen = (surfel == 2) | (surfel == 7)
+    weights[place[is_seen]] = 1.0
+    colors[place[is_seen]] = (surfel[is_seen] / 10)[:, None].expand(-1, 3)
+    filled = fill_unseen(sums_of(colors, weights), model)[place, 0].reshape(10, 4)[:, 0]
+    assert_close(filled, torch.tensor([0.2] * 5 + [0.7] * 5), atol=0.08, rtol=0)
+
+
+def test_nothing_seen_nothing_changes():
+    model = shell(count=4, texels=2)
+    sums = sums_of(torch.rand(16, 3), torch.zeros(16))
+    assert fill_unseen(sums, model) is sums.colors

@@ -1,0 +1,70 @@
+"""Text-driven editing from end to end, offline."""
+
+import pytest
+import torch
+
+from tests.edit.guidances import Tint, Watching
+from tests.edit.textured import around, shell
+from texgs.core.errors import ArgumentError
+from texgs.edit.target_views import bare_colors, render_views
+from texgs.edit.text import RECIPES, edit_by_text
+from texgs.models.filters import ProceduralFilters
+
+
+@pytest.fixture(scope="module")
+def model():
+    return shell()
+
+
+def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
+    guidance = Watching((0.1, 0.2, 0.3))
+    wide = [type(c)(c.viewmat, c.K, 48, 24) for c in around(2)]
+    edit_by_text(model, wide, guidance, "x", size=40)
+    (views,) = guidance.seen
+    assert views.images.shape == (6, 20, 40, 3)
+    directions = torch.stack([camera.position / camera.position.norm() for camera in views.cameras])
+    assert (directions.abs().amax(dim=1) > 0.999).all()
+    filled = (views.alphas > 0).any(dim=2).float().mean(dim=1)
+    assert (filled > 0.8).all()
+
+
+def test_iterative_edits_the_views_given(model, monkeypatch):
+    from texgs.edit.target_update import Policy
+
+    monkeypatch.setitem(RECIPES, "iterative", Policy(rounds=2, opacities=(1.0,), iterations=5))
+    guidance = Watching((0.1, 0.2, 0.3))
+    edit_by_text(model, around(7), guidance, "x", "iterative")
+    assert [views.images.shape for views in guidance.seen] == [(7, 48, 48, 3)] * 2
+
+
+def test_recipes_are_those_of_the_paper_and_its_rivals():
+    assert RECIPES["paper"].iterations == 1500
+    assert RECIPES["paper"].opacities[0] == 2.0
+    assert RECIPES["paper"].opacities[-1] == 0.5
+    assert RECIPES["iterative"].rounds * RECIPES["iterative"].iterations == 7500
+
+
+def test_refinement_keeps_some_of_the_first_style(model):
+    """Dots, then blue: the dots are blue."""
+    cameras = around(4)
+    dots = edit_by_text(model, cameras, ProceduralFilters(2.0), "as a stipple drawing", size=96).model
+    both = edit_by_text(dots, cameras, ProceduralFilters(2.0), "make it blue", size=96).model
+    plain = edit_by_text(model, cameras, ProceduralFilters(2.0), "make it blue", size=96).model
+    shown = [render_views(m, bare_colors(m), cameras, None) for m in (dots, both, plain)]
+    solid = shown[0].alphas > 0.95
+    ink, blue, alone = (views.images[solid] for views in shown)
+    assert (blue[:, 2] - blue[:, 0]).mean() > 0.2
+    pattern = torch.corrcoef(torch.stack([ink.mean(dim=1), blue.mean(dim=1)]))[0, 1]
+    assert pattern > 0.6
+    assert blue.std(dim=0).mean() > 2 * alone.std(dim=0).mean()
+
+
+def test_bad_arguments(model):
+    with pytest.raises(ArgumentError, match="recipe: expected one of default, paper, iterative, got 'fast'"):
+        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", "fast")
+    with pytest.raises(ArgumentError, match="cameras: expected those of the training views, got none"):
+        edit_by_text(model, [], Tint((0, 0, 0)), "x")
+    with pytest.raises(ArgumentError, match="size: expected at least 1 pixel"):
+        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", size=0)
+    with pytest.raises(ArgumentError, match="expected one of stipple drawing"):
+        edit_by_text(model, around(2), ProceduralFilters(), "in the style of van Gogh")
