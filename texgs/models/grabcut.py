@@ -1,0 +1,95 @@
+"""Masks from clicks by GrabCut (Rother et al. 2004): colours and edges alone, no weights needed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core.errors import ArgumentError
+from texgs.models.masks import check_clicks
+
+SIZE = 320  # pixels of the longer side that is segmented; larger images are reduced, and masks enlarged
+SEED = 0.01  # radius of what a click marks for certain, of the longer side
+ALIKE = 16  # largest difference per channel of 255 of what is probably the same object as a click
+PLAIN = 2  # largest difference within an empty background
+ROUNDS = 5
+
+
+class GrabCut:
+    """A mask model without learned weights: the offline counterpart of SAM.
+
+    It separates objects by colour and contrast. What is connected to a positive click and of its colour is
+    taken for the object at first, a plain border of the image for background; Gaussian mixtures of the
+    colours of both and a minimal cut then move the outline. Parts that no positive click is on are left out.
+    """
+
+    name = "GrabCut"
+
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+        """The object [H, W] bool in an image, on the image's device; see `MaskModel`.
+
+        Raises:
+            ArgumentError, ShapeError: if OpenCV is missing, no point is positive, or one is outside.
+        """
+        try:
+            import cv2
+        except ImportError as error:
+            raise ArgumentError(
+                "grabcut: expected OpenCV, which is not installed; pip install opencv-python-headless"
+            ) from error
+        check_clicks(image, points, positive)
+        shape = (image.shape[0], image.shape[1])
+        scale = min(SIZE / max(shape), 1.0)
+        height, width = (max(round(side * scale), 1) for side in shape)
+        planes = image.detach().cpu().float().permute(2, 0, 1)[None]
+        planes = F.interpolate(planes, (height, width), mode="bilinear", antialias=True)
+        pixels = planes[0].clamp(0, 1).mul(255).round().to(torch.uint8).permute(1, 2, 0).contiguous().numpy()
+        shrink = points.new_tensor([width / shape[1], height / shape[0]])
+        places = np.floor((points * shrink).cpu().numpy()).astype(int).clip(0, (width - 1, height - 1))
+        found = cut(cv2, pixels, places, positive.cpu().numpy())
+        mask = torch.from_numpy(found).float()[None, None]
+        return (F.interpolate(mask, shape, mode="bilinear")[0, 0] > 0.5).to(image.device)
+
+
+def cut(cv2: Any, pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
+    """The object [H, W] bool in an 8-bit image with clicks at pixels [P, 2]."""
+    labels = first_guess(cv2, pixels, places, positive)
+    is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    if is_object.any() and not is_object.all():
+        cv2.setRNGSeed(0)
+        models = np.zeros((2, 1, 65))
+        cv2.grabCut(pixels, labels, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
+        is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
+    _, parts = cv2.connectedComponents(is_object.astype(np.uint8))
+    clicked = {parts[y, x] for x, y in places[positive]} - {0}
+    return np.isin(parts, list(clicked))
+
+
+def first_guess(cv2: Any, pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
+    """Labels [H, W] that GrabCut starts from: certain around clicks and in a plain border, else probable."""
+    height, width = pixels.shape[:2]
+    labels = np.full((height, width), cv2.GC_PR_BGD, dtype=np.uint8)
+    smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
+    for place in places[positive]:
+        labels[flooded(cv2, smooth, place, ALIKE)] = cv2.GC_PR_FGD
+    for corner in ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)):
+        labels[flooded(cv2, pixels, corner, PLAIN)] = cv2.GC_BGD
+    radius = max(round(SEED * max(height, width)), 1)
+    for place, is_positive in zip(places, positive, strict=True):
+        certain = cv2.GC_FGD if is_positive else cv2.GC_BGD
+        cv2.circle(labels, tuple(map(int, place)), radius, int(certain), -1)
+    return labels
+
+
+def flooded(cv2: Any, pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
+    """Pixels [H, W] bool connected to a place whose channels differ from it by at most so much."""
+    height, width = pixels.shape[:2]
+    found = np.zeros((height + 2, width + 2), dtype=np.uint8)
+    flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | (1 << 8)
+    x, y = (int(value) for value in place)
+    cv2.floodFill(pixels.copy(), found, (x, y), 0, (most,) * 3, (most,) * 3, flags)
+    return found[1:-1, 1:-1] > 0

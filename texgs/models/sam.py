@@ -1,0 +1,174 @@
+"""Masks from clicks by Segment Anything (Kirillov et al. 2023): MobileSAM, or a folder of transformers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
+from texgs.models.masks import Remembered, check_clicks
+from texgs.models.tensors import first_line, read_tensors
+from texgs.models.weights import locate
+
+MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # that images are normalised with, per channel
+DEVIATION = (58.395 / 255, 57.12 / 255, 57.375 / 255)
+
+Encode = Callable[[Tensor], Tensor]  # [1, 3, S, S] to features of the image
+Decode = Callable[[Tensor, Tensor, Tensor, bool], tuple[Tensor, Tensor]]
+"""Features, points [1, P, 2], labels [1, P] and whether there may be several masks, to logits [K, L, L] and
+the quality [K] that the model expects of each."""
+
+
+class Sam:
+    """A mask model; the features of an image are computed once for all clicks on it.
+
+    One click is ambiguous (a wheel, or the car): of the three masks that the model offers for it, the one
+    that it thinks best is taken. For several clicks it gives one mask.
+
+    Args:
+        name: of the model.
+        encode: features of an image.
+        decode: masks from features and points.
+        size: of the square image that the encoder takes, pixels.
+        device: that computes.
+    """
+
+    def __init__(
+        self, name: str, encode: Encode, decode: Decode, size: int, device: torch.device | str = "cpu"
+    ) -> None:
+        self.name, self.size, self.device = name, size, torch.device(device)
+        self._decode = decode
+        self._features = Remembered(lambda image: encode(self.prepared(image)))
+
+    def prepared(self, image: Tensor) -> Tensor:
+        """An image [H, W, 3] as the encoder takes it [1, 3, S, S]: the longer side fills it, the rest is 0."""
+        planes = image.to(self.device).float().permute(2, 0, 1)[None]
+        height, width = self.fitted(image.shape[0], image.shape[1])
+        planes = F.interpolate(planes, (height, width), mode="bilinear", antialias=True)
+        mean, deviation = (planes.new_tensor(x)[:, None, None] for x in (MEAN, DEVIATION))
+        return F.pad((planes - mean) / deviation, (0, self.size - width, 0, self.size - height))
+
+    def fitted(self, height: int, width: int) -> tuple[int, int]:
+        """Size of an image whose longer side fills the encoder's square."""
+        scale = self.size / max(height, width)
+        return max(int(height * scale + 0.5), 1), max(int(width * scale + 0.5), 1)
+
+    @torch.no_grad()
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+        """The object [H, W] bool in an image, on the image's device; see `MaskModel`.
+
+        Raises:
+            ArgumentError, ShapeError: if no point is positive, or one is outside of the image.
+        """
+        check_clicks(image, points, positive)
+        shape = (image.shape[0], image.shape[1])
+        height, width = self.fitted(*shape)
+        scale = points.new_tensor([width / shape[1], height / shape[0]])
+        places = (points * scale - 0.5).to(self.device)[None]  # the models count from centres of pixels
+        labels = positive.to(self.device).long()[None]
+        logits, quality = self._decode(self._features(image), places, labels, len(points) == 1)
+        best = logits[quality.argmax()][None, None].float()
+        square = F.interpolate(best, (self.size, self.size), mode="bilinear")[..., :height, :width]
+        return (F.interpolate(square, shape, mode="bilinear")[0, 0] > 0).to(image.device)
+
+
+def mobile_sam(
+    path: str | Path | None = None,
+    device: torch.device | str = "cpu",
+    dtype: torch.dtype = torch.float32,
+) -> Sam:
+    """MobileSAM (Zhang et al. 2023) from its official file.
+
+    Args:
+        path: mobile_sam.pt; by default where it is found.
+        device: that computes.
+        dtype: of the encoder, which takes nearly all of the time.
+
+    Raises:
+        ArgumentError, MissingDataError: if kornia is missing, or there is no such file, or it is another one.
+    """
+    try:
+        from kornia.models.sam import Sam as Network
+        from kornia.models.sam import SamConfig
+    except ImportError as error:
+        raise ArgumentError("mobile_sam: expected kornia, which is not installed; pip install kornia") from error
+    path = locate("mobile_sam") if path is None else path
+    network = Network.from_config(SamConfig("mobile_sam")).eval().requires_grad_(False)
+    try:
+        network.load_state_dict(read_tensors(path))
+    except RuntimeError as error:
+        raise ArgumentError(f"{path}: expected the weights of MobileSAM, got others") from error
+    network.to(device)
+    network.image_encoder.to(dtype)
+    return Sam("MobileSAM", *_kornia(network, dtype), network.image_encoder.img_size, device)
+
+
+def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
+    def encode(pixels: Tensor) -> Tensor:
+        features: Tensor = network.image_encoder(pixels.to(dtype)).float()
+        return features
+
+    def decode(features: Tensor, points: Tensor, labels: Tensor, several: bool) -> tuple[Tensor, Tensor]:
+        sparse, dense = network.prompt_encoder((points, labels), None, None)
+        places = network.prompt_encoder.get_dense_pe()
+        logits, quality = network.mask_decoder(features, places, sparse, dense, several)
+        return logits[0], quality[0]
+
+    return encode, decode
+
+
+def sam_folder(
+    folder: str | Path, device: torch.device | str = "cpu", dtype: torch.dtype = torch.float32
+) -> Sam:
+    """A SAM of any size from a folder of transformers, such as a copy of facebook/sam-vit-base.
+
+    Args:
+        folder: with config.json and model.safetensors.
+        device: that computes.
+        dtype: of the encoder.
+
+    Raises:
+        ArgumentError: if transformers is missing, or the folder holds no SAM or a damaged one.
+    """
+    try:
+        from transformers import SamModel
+    except ImportError as error:
+        raise ArgumentError(
+            f"{folder}: expected transformers, which is not installed; pip install transformers"
+        ) from error
+    folder = Path(folder)
+    kind = read_json(folder / "config.json").get("model_type")
+    if kind != "sam":
+        raise ArgumentError(f"{folder}: expected a model of type sam, got {kind}")
+    try:
+        model = SamModel.from_pretrained(folder, local_files_only=True).eval().requires_grad_(False)
+    except (OSError, RuntimeError, ValueError) as error:
+        raise ArgumentError(
+            f"{folder}: expected a SAM of transformers, got one that cannot be read ({first_line(error)})"
+        ) from error
+    model.to(device)
+    model.vision_encoder.to(dtype)
+    return Sam(folder.name, *_transformers(model, dtype), model.config.vision_config.image_size, device)
+
+
+def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
+    def encode(pixels: Tensor) -> Tensor:
+        features: Tensor = model.get_image_embeddings(pixels.to(dtype)).float()
+        return features
+
+    def decode(features: Tensor, points: Tensor, labels: Tensor, several: bool) -> tuple[Tensor, Tensor]:
+        found = model(
+            image_embeddings=features,
+            input_points=points[:, None],
+            input_labels=labels[:, None],
+            multimask_output=several,
+        )
+        return found.pred_masks[0, 0], found.iou_scores[0, 0]
+
+    return encode, decode
