@@ -15,16 +15,17 @@ from texgs.models.masks import check_clicks
 SIZE = 320  # pixels of the longer side that is segmented; larger images are reduced, and masks enlarged
 SEED = 0.01  # radius of what a click marks for certain, of the longer side
 ALIKE = 16  # largest difference per channel of 255 of what is probably the same object as a click
-PLAIN = 2  # largest difference within an empty background
+PLAIN = 20  # largest difference per channel within an empty background; less parts objects that nearly touch
 ROUNDS = 5
 
 
 class GrabCut:
     """A mask model without learned weights: the offline counterpart of SAM.
 
-    It separates objects by colour and contrast. What is connected to a positive click and of its colour is
-    taken for the object at first, a plain border of the image for background; Gaussian mixtures of the
-    colours of both and a minimal cut then move the outline. Parts that no positive click is on are left out.
+    It separates objects by colour and contrast. A plain border of the image is background, and so is what
+    this separates from all positive clicks. Of the rest, what is connected to a click and of its colour is
+    taken for the object at first, or not, as the click says; Gaussian mixtures of the colours of both and a
+    minimal cut then move the outline.
     """
 
     name = "GrabCut"
@@ -57,32 +58,52 @@ class GrabCut:
 
 def cut(cv2: Any, pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
     """The object [H, W] bool in an 8-bit image with clicks at pixels [P, 2]."""
-    labels = first_guess(cv2, pixels, places, positive)
+    plain = plain_border(cv2, pixels)
+    clicked = connected(cv2, ~plain, places[positive])
+    # Other objects would teach the mixture of the background their colours, which may be those of this one.
+    emptied = np.where(clicked[..., None], pixels, np.median(pixels[plain], axis=0) if plain.any() else 0)
+    emptied = emptied.astype(np.uint8)
+    labels = first_guess(cv2, emptied, clicked, places, positive)
     is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     if is_object.any() and not is_object.all():
         cv2.setRNGSeed(0)
         models = np.zeros((2, 1, 65))
-        cv2.grabCut(pixels, labels, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
+        cv2.grabCut(emptied, labels, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
         is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    _, parts = cv2.connectedComponents(is_object.astype(np.uint8))
-    clicked = {parts[y, x] for x, y in places[positive]} - {0}
-    return np.isin(parts, list(clicked))
+    return connected(cv2, is_object, places[positive])
 
 
-def first_guess(cv2: Any, pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
-    """Labels [H, W] that GrabCut starts from: certain around clicks and in a plain border, else probable."""
-    height, width = pixels.shape[:2]
-    labels = np.full((height, width), cv2.GC_PR_BGD, dtype=np.uint8)
+def first_guess(
+    cv2: Any, pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray
+) -> np.ndarray:
+    """Labels [H, W] that GrabCut starts from: certain at clicks and beyond what is clicked, else probable."""
+    edge = np.concatenate([clicked[0], clicked[-1], clicked[:, 0], clicked[:, -1]])
+    rest = cv2.GC_PR_BGD if edge.any() or not positive.all() else cv2.GC_PR_FGD
+    labels = np.where(clicked, rest, cv2.GC_BGD).astype(np.uint8)
     smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
-    for place in places[positive]:
-        labels[flooded(cv2, smooth, place, ALIKE)] = cv2.GC_PR_FGD
-    for corner in ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)):
-        labels[flooded(cv2, pixels, corner, PLAIN)] = cv2.GC_BGD
-    radius = max(round(SEED * max(height, width)), 1)
-    for place, is_positive in zip(places, positive, strict=True):
+    order = np.argsort(~positive, kind="stable")  # negative clicks last: they take from positive ones
+    clicks = list(zip(places[order], positive[order], strict=True))
+    for place, is_positive in clicks:
+        alike = flooded(cv2, smooth, place, ALIKE) & clicked
+        labels[alike] = cv2.GC_PR_FGD if is_positive else cv2.GC_PR_BGD
+    radius = max(round(SEED * max(labels.shape)), 1)
+    for place, is_positive in clicks:
         certain = cv2.GC_FGD if is_positive else cv2.GC_BGD
         cv2.circle(labels, tuple(map(int, place)), radius, int(certain), -1)
     return labels
+
+
+def plain_border(cv2: Any, pixels: np.ndarray) -> np.ndarray:
+    """Pixels [H, W] bool of one colour that are connected to a corner."""
+    height, width = pixels.shape[:2]
+    corners = ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1))
+    return np.any([flooded(cv2, pixels, corner, PLAIN) for corner in corners], axis=0)
+
+
+def connected(cv2: Any, mask: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The connected parts of a mask that places lie on."""
+    _, parts = cv2.connectedComponents(mask.astype(np.uint8))
+    return np.isin(parts, list({parts[y, x] for x, y in places} - {0}))
 
 
 def flooded(cv2: Any, pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:

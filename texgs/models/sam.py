@@ -97,7 +97,9 @@ def mobile_sam(
         from kornia.models.sam import Sam as Network
         from kornia.models.sam import SamConfig
     except ImportError as error:
-        raise ArgumentError("mobile_sam: expected kornia, which is not installed; pip install kornia") from error
+        raise ArgumentError(
+            "mobile_sam: expected kornia, which is not installed; pip install kornia"
+        ) from error
     path = locate("mobile_sam") if path is None else path
     network = Network.from_config(SamConfig("mobile_sam")).eval().requires_grad_(False)
     try:

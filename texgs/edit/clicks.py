@@ -1,0 +1,112 @@
+"""Clicks on a view as points in space, and where other views see these points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.rotation import quats_to_matrices
+from texgs.raster import rasterize
+from texgs.scene.crop import REACH
+from texgs.scene.model import Model, geometry
+
+FAINT = 0.05  # alpha below which a click is on the background
+TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what hides it: surfaces are thick
+
+
+@dataclass(frozen=True, eq=False)
+class Prompts:
+    """Places that belong to what is looked for, and places that do not."""
+
+    places: Tensor  # [P, 3] world units
+    positive: Tensor  # [P] bool
+
+
+@torch.no_grad()
+def prompts_at(model: Model, camera: Camera, points: Tensor, positive: Tensor) -> Prompts:
+    """Lift clicks to the surfels that they are on: those that make up most of the pixel.
+
+    Behind a layer that lets through more than it shows, a click is on what shows through.
+
+    Args:
+        model: of any stage.
+        camera: that the view was rendered with, on the model's device.
+        points: [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5).
+        positive: [P] bool, at least one true.
+
+    Raises:
+        ArgumentError, ShapeError: if a point is outside of the view or on the background, or none is positive.
+    """
+    count = check.shape("points", points, "P 2")["P"]
+    check.shape("positive", positive, "P", P=count)
+    if not bool(positive.any()):
+        raise ArgumentError("points: expected a positive one at least, got none; click on the object")
+    places = [_place(model, camera, x, y) for x, y in points.tolist()]
+    return Prompts(torch.stack(places), positive.to(places[0].device))
+
+
+def _place(model: Model, camera: Camera, x: float, y: float) -> Tensor:
+    """Where the ray of a pixel meets the surfel that makes up most of it, [3]."""
+    if not (0 <= x < camera.width and 0 <= y < camera.height):
+        raise ArgumentError(
+            f"point ({x:g}, {y:g}): expected a place in the view of {camera.width} x {camera.height} pixels"
+        )
+    pixel = camera.crop(int(x), int(y), int(x) + 1, int(y) + 1)
+    means, quats, scales, opacities = geometry(model.parameters)
+    weights = rasterize(
+        *(means, quats, scales, opacities),
+        *(pixel.viewmat, pixel.K, 1, 1),
+        features=torch.zeros_like(opacities)[:, None],
+        outputs=("statistics",),
+        options=model.optics.options,
+    ).statistics.weight_sum  # type: ignore[union-attr]
+    alpha = float(weights.sum())
+    if alpha < FAINT:
+        raise ArgumentError(
+            f"point ({x:g}, {y:g}): expected a place on the model, got background (alpha {alpha:.2f}); "
+            "click on what is to be segmented"
+        )
+    index = int(weights.argmax())
+    mean, normal = means[index], quats_to_matrices(quats[index])[:, 2]
+    inside = torch.stack([mean.new_tensor(x), mean.new_tensor(y), mean.new_tensor(1.0)])
+    ray = camera.viewmat[:3, :3].T @ torch.linalg.inv(camera.K) @ inside
+    along = normal @ (mean - camera.position) / (normal @ ray)
+    hit = camera.position + along * ray
+    # Seen edge on, a surfel is drawn by the filter beside its plane: then its middle is nearer than the plane.
+    is_on_it = bool((hit - mean).norm() <= REACH * scales[index].max())
+    return hit if is_on_it else mean
+
+
+def projected(places: Tensor, camera: Camera) -> tuple[Tensor, Tensor]:
+    """Pixels [P, 2] and camera z [P] of places [P, 3] in a view; behind the camera, pixels mean nothing."""
+    x, y, z = (places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]).unbind(1)
+    K = camera.K
+    return torch.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], dim=1), z
+
+
+def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float) -> Tensor:
+    """Whether more than half of the light reaches places in a view, [P] bool.
+
+    Args:
+        pixels: [P, 2] of the places.
+        depths: [P] their camera z.
+        median: [H, W] camera z of the last fragment that more than half of the light reaches, 0 where none
+            is: the rasterizer's median depth.
+        tolerance: world units, by which a place may be behind it.
+    """
+    height, width = median.shape
+    x, y = pixels.floor().unbind(1)
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height) & (depths > 0)
+    limit = median[y.clamp(0, height - 1).long(), x.clamp(0, width - 1).long()]
+    return inside & ((limit == 0) | (depths <= limit + tolerance))
+
+
+def extent(model: Model) -> float:
+    """Longest side of the box around the surfels' means, world units."""
+    means = model.parameters["means"]
+    return float((means.amax(0) - means.amin(0)).max()) if len(means) else 0.0

@@ -1,0 +1,153 @@
+"""Segments from clicks on one view: masks of many views, and surfels that their votes select."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.progress import progress
+from texgs.edit.clicks import TOLERANCE, Prompts, extent, is_visible, projected, prompts_at
+from texgs.edit.votes import ContributionVotes, Vote, votes_of
+from texgs.models.masks import MaskModel
+from texgs.scene.crop import surfel_box
+from texgs.scene.model import Model
+from texgs.scene.render import render
+from texgs.volume.view_set import Light
+
+CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
+AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
+HEADLIGHT = Light("headlight")
+
+
+@dataclass(frozen=True, eq=False)
+class Lifted:
+    """A segment, and how much it rests on."""
+
+    mask: Tensor  # [N] bool
+    reference: Tensor  # [H, W] bool, the mask of the view that was clicked on
+    used: int  # views whose masks have votes
+    left_out: int  # views that see nothing of the object, or whose masks disagree with the others
+
+
+@torch.no_grad()
+def lift(
+    model: Model,
+    camera: Camera,
+    points: Tensor,
+    positive: Tensor,
+    cameras: Sequence[Camera],
+    masks: MaskModel,
+    *,
+    light: Light = HEADLIGHT,
+    vote: Vote = "contribution",
+    threshold: float | None = None,
+    title: str = "segment",
+) -> Lifted:
+    """Segment a model by clicks on one view of it (the paper's 2D-lift-3D segmentation).
+
+    The views are visited from the one clicked on outwards. Clicks become places in space; a view gets those
+    that it sees (more than half of the light reaches them), and if it sees no positive one, a place of what
+    the views before it agree on, so that the far side of an object is found as well. A mask that contradicts
+    the views before it has no vote.
+
+    Args:
+        model: of any stage, as fitted: masks are found in its own colours.
+        camera: of the view that was clicked on; all cameras on the model's device.
+        points: [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5).
+        positive: [P] bool, whether a click is on the object or beside it.
+        cameras: of the other views.
+        masks: finds the object in a view.
+        light: in all views.
+        vote: how masks become surfels; "centre" is the paper's way.
+        threshold: of the votes; by default 0.5 of contributions, 0.7 of views.
+        title: of the progress bar.
+
+    Raises:
+        ArgumentError, ShapeError: if a click is outside of the view or on the background, or no surfel is
+            selected.
+    """
+    clicks = prompts_at(model, camera, points, positive)
+    views = View(model, light, masks)
+    reference = views.mask(camera, points, positive)
+    so_far = ContributionVotes(model, rounds=0)
+    so_far.add(camera, reference)
+    votes = votes_of(vote, model, threshold)
+    votes.add(camera, reference)
+    used = 1
+    for other in progress(by_angle(camera, cameras), title=title, unit="view"):
+        mask = _mask(views, so_far, clicks, other)
+        if mask is not None:
+            so_far.add(other, mask)
+            votes.add(other, mask)
+            used += 1
+    selected = votes.selected()
+    if not bool(selected.any()):
+        raise ArgumentError(
+            f"segment: expected surfels that most masks of {used} views hold, got none; click elsewhere on the "
+            "object, or lower the threshold"
+        )
+    return Lifted(selected, reference, used, 1 + len(cameras) - used)
+
+
+class View:
+    """Images of a model as the mask model sees them: cut out around what they show, which then is larger."""
+
+    def __init__(self, model: Model, light: Light, masks: MaskModel) -> None:
+        self.model, self.light, self.masks = model, light, masks
+
+    @torch.no_grad()
+    def mask(self, camera: Camera, points: Tensor, positive: Tensor) -> Tensor:
+        """The mask [H, W] bool of the whole view for points [P, 2] in it; what lies outside of it is dropped."""
+        box = surfel_box(self.model.parameters, self.model.optics, camera).within(camera.width, camera.height)
+        cut = camera.crop(*box)
+        image = render(self.model, cut, self.light).color.clamp(0, 1)
+        moved = points.to(image) - image.new_tensor(box[:2])
+        inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
+        found = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
+        if bool(positive.to(image.device)[inside].any()):
+            part = self.masks(image, moved[inside], positive.to(image.device)[inside])
+            found[box.top : box.bottom, box.left : box.right] = part
+        return found
+
+
+def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:
+    """Cameras by the angle between their directions of view and that of one, the smallest first."""
+    return sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
+
+
+def _mask(views: View, so_far: ContributionVotes, clicks: Prompts, camera: Camera) -> Tensor | None:
+    """The mask of a view, or None where it sees nothing of the object or contradicts the views before."""
+    model = views.model
+    median = render(model, camera, views.light, outputs=("median",)).median
+    pixels, depths = projected(clicks.places, camera)
+    seen = is_visible(pixels, depths, median, TOLERANCE * extent(model))  # type: ignore[arg-type]
+    points, positive = pixels[seen], clicks.positive[seen]
+    has_votes, alpha = so_far.shown(camera, so_far.seen.float())
+    is_object, _ = so_far.shown(camera, so_far.shares)
+    if not bool(positive.any()):
+        inner = middle_of((is_object > CERTAIN * alpha) & (alpha > 0.5))
+        if inner is None:
+            return None
+        points = torch.cat([points, points.new_tensor([inner])])
+        positive = torch.cat([positive, positive.new_ones(1)])
+    mask = views.mask(camera, points, positive)
+    known = has_votes > 0.5 * alpha.clamp_min(1e-6)
+    expected = (is_object > 0.5 * has_votes) & known
+    overlap = (mask & expected).sum() / (mask & known | expected).sum().clamp_min(1)
+    return mask if bool(mask.any()) and float(overlap) >= AGREEMENT else None
+
+
+def middle_of(mask: Tensor) -> tuple[float, float] | None:
+    """The place in a mask [H, W] that is farthest from its outline, in pixels; None in an empty one."""
+    from scipy.ndimage import distance_transform_edt
+
+    if not bool(mask.any()):
+        return None
+    distances = distance_transform_edt(mask.cpu().numpy())
+    row, column = divmod(int(distances.argmax()), mask.shape[1])
+    return column + 0.5, row + 0.5

@@ -1,0 +1,152 @@
+"""Which surfels belong to the objects that masks show: two ways of counting votes over views."""
+
+from __future__ import annotations
+
+from typing import Literal, Protocol
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.edit.clicks import projected
+from texgs.raster import rasterize, splat
+from texgs.scene.model import Model, geometry
+
+Vote = Literal["contribution", "centre"]
+SEEN = 0.01  # pixels in all views together that a surfel must make up to have a vote
+ROUNDS = 3
+NEIGHBOURS = 5  # seen surfels, whose mean share one that no view shows gets
+
+
+class Votes(Protocol):
+    """Counts what masks of views say about each surfel."""
+
+    def add(self, camera: Camera, mask: Tensor) -> None:
+        """Count the mask [H, W] of a view."""
+        ...
+
+    def selected(self) -> Tensor:
+        """Surfels [N] bool that belong to the object."""
+        ...
+
+
+class ContributionVotes:
+    """Each pixel votes for the surfels that it shows, by how much of it they make up.
+
+    A surfel's share is sum(weight * mask) / sum(weight) over all pixels of all views, weight being its blending
+    weight there: the adjoint of rendering. What is hidden in a view has no vote in it, and what shows little
+    has little. Where a surfel shares its pixels with others, the share is too much of a mean: then shares are
+    rendered, and what pixels lack of their masks, or have too much, is voted on in turn. These rounds are the
+    simultaneous iterative reconstruction of tomography (Gilbert 1972), of which plain votes are the first
+    step; they move towards the least-squares solution, and few of them do not yet fit the noise of masks.
+
+    A surfel that no view shows gets the mean share of its nearest neighbours.
+
+    Args:
+        model: of any stage.
+        threshold: least share of what belongs to the object.
+        rounds: of votes on what is left; 0 for plain votes.
+    """
+
+    def __init__(self, model: Model, threshold: float = 0.5, rounds: int = ROUNDS) -> None:
+        self.model, self.threshold, self.rounds = model, threshold, rounds
+        self.geometry, self.options = geometry(model.parameters), model.optics.options
+        self.sums, self.weights = model.parameters["means"].new_zeros(2, len(model))
+        self.views: list[tuple[Camera, Tensor]] = []
+
+    @torch.no_grad()
+    def add(self, camera: Camera, mask: Tensor) -> None:
+        """Count the mask [H, W], bool or in [0, 1], of a view."""
+        mask = mask.to(self.sums)
+        sums, weights = self._splat(camera, mask)
+        self.sums += sums
+        self.weights += weights
+        self.views.append((camera, mask))
+
+    @property
+    def seen(self) -> Tensor:
+        """Surfels [N] bool that have votes."""
+        return self.weights > SEEN
+
+    @property
+    def shares(self) -> Tensor:
+        """Share [N] of each surfel's plain votes that are for the object; 0 without votes."""
+        return torch.where(self.seen, self.sums / self.weights.clamp_min(SEEN), 0.0)
+
+    @torch.no_grad()
+    def refined(self) -> Tensor:
+        """Shares [N] after all rounds."""
+        shares = self.shares
+        for _ in range(self.rounds):
+            change = torch.zeros_like(shares)
+            for camera, mask in self.views:
+                shown, alpha = self.shown(camera, shares)
+                change += self._splat(camera, mask - shown / alpha.clamp_min(1e-6))[0]
+            shares = (shares + change / self.weights.clamp_min(SEEN)).clamp(0, 1)
+        return shares
+
+    def selected(self) -> Tensor:
+        """Surfels [N] bool that belong to the object."""
+        shares, seen = self.refined(), self.seen
+        if bool(seen.any()) and not bool(seen.all()):
+            from scipy.spatial import cKDTree
+
+            means = self.geometry[0].detach().cpu()
+            count = min(NEIGHBOURS, int(seen.count_nonzero()))
+            known, hidden = seen.cpu(), ~seen.cpu()
+            nearest = cKDTree(means[known].numpy()).query(means[hidden].numpy(), k=range(1, count + 1))[1]
+            shares[~seen] = shares[seen][torch.from_numpy(nearest).to(shares.device)].mean(1)
+        return shares > self.threshold
+
+    def shown(self, camera: Camera, values: Tensor) -> tuple[Tensor, Tensor]:
+        """Values [N] of surfels as a view shows them over 0 [H, W], and its alpha [H, W]."""
+        lens = (camera.viewmat, camera.K, camera.width, camera.height)
+        found = rasterize(*self.geometry, *lens, features=values[:, None], options=self.options)
+        return found.color[..., 0], found.alpha
+
+    def _splat(self, camera: Camera, image: Tensor) -> tuple[Tensor, Tensor]:
+        """Sums [N] of weight * image [H, W], and sums [N] of weights."""
+        sums, weights = splat(
+            image[..., None].contiguous(), *self.geometry, camera.viewmat, camera.K, options=self.options
+        )
+        return sums[:, 0], weights
+
+
+class CentreVotes:
+    """Each view votes once for each surfel, by the pixel that its mean projects to: the paper's way.
+
+    A surfel is 1 or 0 as the mask there, -1 outside of the view; neither size nor opacity nor what is in front
+    of it counts. It belongs to the object if 1 is the most frequent of all views, and frequent enough
+    (Hu et al. 2024, SAGD).
+
+    Args:
+        model: of any stage.
+        threshold: share of all views that must say 1, exceeded.
+    """
+
+    def __init__(self, model: Model, threshold: float = 0.7) -> None:
+        self.means, self.threshold, self.views = model.parameters["means"], threshold, 0
+        self.inside, self.outside = self.means.new_zeros(2, len(model))
+
+    def add(self, camera: Camera, mask: Tensor) -> None:
+        """Count the mask [H, W] of a view."""
+        pixels, depths = projected(self.means, camera)
+        x, y = pixels.floor().unbind(1)
+        is_there = (depths > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+        x, y = (torch.where(is_there, at, 0.0).long() for at in (x, y))
+        is_in = mask.to(self.means.device)[y, x] > 0.5
+        self.inside += is_there & is_in
+        self.outside += is_there & ~is_in
+        self.views += 1
+
+    def selected(self) -> Tensor:
+        """Surfels [N] bool that belong to the object."""
+        absent = self.views - self.inside - self.outside
+        is_mode = (self.inside > self.outside) & (self.inside > absent)
+        return is_mode & (self.inside > self.threshold * self.views)
+
+
+def votes_of(kind: Vote, model: Model, threshold: float | None = None) -> ContributionVotes | CentreVotes:
+    """Votes of a kind, with its own threshold unless one is given."""
+    make = ContributionVotes if kind == "contribution" else CentreVotes
+    return make(model) if threshold is None else make(model, threshold)
