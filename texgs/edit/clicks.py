@@ -20,6 +20,25 @@ TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what h
 
 
 @dataclass(frozen=True, eq=False)
+class Clicks:
+    """What a user clicked on in a rendered view; all tensors on the model's device.
+
+    Raises:
+        ArgumentError, ShapeError: if points and signs do not fit each other, or no point is positive.
+    """
+
+    camera: Camera  # of the view
+    points: Tensor  # [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5)
+    positive: Tensor  # [P] bool, whether a point is on the object or beside it
+
+    def __post_init__(self) -> None:
+        count = check.shape("points", self.points, "P 2")["P"]
+        check.shape("positive", self.positive, "P", P=count)
+        if not bool(self.positive.any()):
+            raise ArgumentError("points: expected a positive one at least, got none; click on the object")
+
+
+@dataclass(frozen=True, eq=False)
 class Prompts:
     """Places that belong to what is looked for, and places that do not."""
 
@@ -28,26 +47,20 @@ class Prompts:
 
 
 @torch.no_grad()
-def prompts_at(model: Model, camera: Camera, points: Tensor, positive: Tensor) -> Prompts:
+def prompts_at(model: Model, clicks: Clicks) -> Prompts:
     """Lift clicks to the surfels that they are on: those that make up most of the pixel.
 
     Behind a layer that lets through more than it shows, a click is on what shows through.
 
     Args:
         model: of any stage.
-        camera: that the view was rendered with, on the model's device.
-        points: [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5).
-        positive: [P] bool, at least one true.
+        clicks: on a view of it.
 
     Raises:
-        ArgumentError, ShapeError: if a point is outside of the view or on the background, or none is positive.
+        ArgumentError: if a point is outside of the view or on the background.
     """
-    count = check.shape("points", points, "P 2")["P"]
-    check.shape("positive", positive, "P", P=count)
-    if not bool(positive.any()):
-        raise ArgumentError("points: expected a positive one at least, got none; click on the object")
-    places = [_place(model, camera, x, y) for x, y in points.tolist()]
-    return Prompts(torch.stack(places), positive.to(places[0].device))
+    places = [_place(model, clicks.camera, x, y) for x, y in clicks.points.tolist()]
+    return Prompts(torch.stack(places), clicks.positive)
 
 
 def _place(model: Model, camera: Camera, x: float, y: float) -> Tensor:
@@ -77,7 +90,7 @@ def _place(model: Model, camera: Camera, x: float, y: float) -> Tensor:
     ray = camera.viewmat[:3, :3].T @ torch.linalg.inv(camera.K) @ inside
     along = normal @ (mean - camera.position) / (normal @ ray)
     hit = camera.position + along * ray
-    # Seen edge on, a surfel is drawn by the filter beside its plane: then its middle is nearer than the plane.
+    # Seen edge on, a surfel is drawn by the filter, beside where the ray meets its plane.
     is_on_it = bool((hit - mean).norm() <= REACH * scales[index].max())
     return hit if is_on_it else mean
 

@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
-from texgs.edit.clicks import TOLERANCE, Prompts, extent, is_visible, projected, prompts_at
+from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, projected, prompts_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
 from texgs.models.masks import MaskModel
 from texgs.scene.crop import surfel_box
@@ -37,9 +37,7 @@ class Lifted:
 @torch.no_grad()
 def lift(
     model: Model,
-    camera: Camera,
-    points: Tensor,
-    positive: Tensor,
+    clicks: Clicks,
     cameras: Sequence[Camera],
     masks: MaskModel,
     *,
@@ -57,10 +55,8 @@ def lift(
 
     Args:
         model: of any stage, as fitted: masks are found in its own colours.
-        camera: of the view that was clicked on; all cameras on the model's device.
-        points: [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5).
-        positive: [P] bool, whether a click is on the object or beside it.
-        cameras: of the other views.
+        clicks: on a view of it.
+        cameras: of the other views, on the model's device.
         masks: finds the object in a view.
         light: in all views.
         vote: how masks become surfels; "centre" is the paper's way.
@@ -68,19 +64,18 @@ def lift(
         title: of the progress bar.
 
     Raises:
-        ArgumentError, ShapeError: if a click is outside of the view or on the background, or no surfel is
-            selected.
+        ArgumentError: if a click is outside of the view or on the background, or no surfel is selected.
     """
-    clicks = prompts_at(model, camera, points, positive)
-    views = View(model, light, masks)
-    reference = views.mask(camera, points, positive)
+    prompts, camera = prompts_at(model, clicks), clicks.camera
+    views = Views(model, light, masks)
+    reference = views.mask(clicks)
     so_far = ContributionVotes(model, rounds=0)
     so_far.add(camera, reference)
     votes = votes_of(vote, model, threshold)
     votes.add(camera, reference)
     used = 1
     for other in progress(by_angle(camera, cameras), title=title, unit="view"):
-        mask = _mask(views, so_far, clicks, other)
+        mask = _mask(views, so_far, prompts, other)
         if mask is not None:
             so_far.add(other, mask)
             votes.add(other, mask)
@@ -88,29 +83,30 @@ def lift(
     selected = votes.selected()
     if not bool(selected.any()):
         raise ArgumentError(
-            f"segment: expected surfels that most masks of {used} views hold, got none; click elsewhere on the "
-            "object, or lower the threshold"
+            f"segment: expected surfels that most masks of {used} views hold, got none; click elsewhere on "
+            "the object, or lower the threshold"
         )
     return Lifted(selected, reference, used, 1 + len(cameras) - used)
 
 
-class View:
+class Views:
     """Images of a model as the mask model sees them: cut out around what they show, which then is larger."""
 
     def __init__(self, model: Model, light: Light, masks: MaskModel) -> None:
         self.model, self.light, self.masks = model, light, masks
 
     @torch.no_grad()
-    def mask(self, camera: Camera, points: Tensor, positive: Tensor) -> Tensor:
-        """The mask [H, W] bool of the whole view for points [P, 2] in it; what lies outside of it is dropped."""
+    def mask(self, clicks: Clicks) -> Tensor:
+        """The mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
+        camera = clicks.camera
         box = surfel_box(self.model.parameters, self.model.optics, camera).within(camera.width, camera.height)
         cut = camera.crop(*box)
         image = render(self.model, cut, self.light).color.clamp(0, 1)
-        moved = points.to(image) - image.new_tensor(box[:2])
+        moved = clicks.points.to(image) - image.new_tensor(box[:2])
         inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
         found = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
-        if bool(positive.to(image.device)[inside].any()):
-            part = self.masks(image, moved[inside], positive.to(image.device)[inside])
+        if bool(clicks.positive[inside].any()):
+            part = self.masks(image, moved[inside], clicks.positive[inside])
             found[box.top : box.bottom, box.left : box.right] = part
         return found
 
@@ -120,13 +116,13 @@ def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:
     return sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
 
 
-def _mask(views: View, so_far: ContributionVotes, clicks: Prompts, camera: Camera) -> Tensor | None:
+def _mask(views: Views, so_far: ContributionVotes, prompts: Prompts, camera: Camera) -> Tensor | None:
     """The mask of a view, or None where it sees nothing of the object or contradicts the views before."""
     model = views.model
     median = render(model, camera, views.light, outputs=("median",)).median
-    pixels, depths = projected(clicks.places, camera)
+    pixels, depths = projected(prompts.places, camera)
     seen = is_visible(pixels, depths, median, TOLERANCE * extent(model))  # type: ignore[arg-type]
-    points, positive = pixels[seen], clicks.positive[seen]
+    points, positive = pixels[seen], prompts.positive[seen]
     has_votes, alpha = so_far.shown(camera, so_far.seen.float())
     is_object, _ = so_far.shown(camera, so_far.shares)
     if not bool(positive.any()):
@@ -135,7 +131,7 @@ def _mask(views: View, so_far: ContributionVotes, clicks: Prompts, camera: Camer
             return None
         points = torch.cat([points, points.new_tensor([inner])])
         positive = torch.cat([positive, positive.new_ones(1)])
-    mask = views.mask(camera, points, positive)
+    mask = views.mask(Clicks(camera, points, positive))
     known = has_votes > 0.5 * alpha.clamp_min(1e-6)
     expected = (is_object > 0.5 * has_votes) & known
     overlap = (mask & expected).sum() / (mask & known | expected).sum().clamp_min(1)

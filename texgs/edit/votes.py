@@ -33,12 +33,13 @@ class Votes(Protocol):
 class ContributionVotes:
     """Each pixel votes for the surfels that it shows, by how much of it they make up.
 
-    A surfel's share is sum(weight * mask) / sum(weight) over all pixels of all views, weight being its blending
-    weight there: the adjoint of rendering. What is hidden in a view has no vote in it, and what shows little
-    has little. Where a surfel shares its pixels with others, the share is too much of a mean: then shares are
-    rendered, and what pixels lack of their masks, or have too much, is voted on in turn. These rounds are the
-    simultaneous iterative reconstruction of tomography (Gilbert 1972), of which plain votes are the first
-    step; they move towards the least-squares solution, and few of them do not yet fit the noise of masks.
+    A surfel's share is sum(weight * mask) / sum(weight) over all pixels of all views, weight being its
+    blending weight there: the adjoint of rendering. What is hidden in a view has no vote in it, and what
+    shows little has little. Where a surfel shares its pixels with others, the share is too much of a mean:
+    then shares are rendered, and what pixels lack of their masks, or have too much, is voted on. Such rounds
+    are the simultaneous iterative reconstruction of tomography (Gilbert 1972), of which plain votes are the
+    first step; they move towards the least-squares solution, and few of them do not yet fit the noise of
+    masks.
 
     A surfel that no view shows gets the mean share of its nearest neighbours.
 
@@ -115,8 +116,8 @@ class ContributionVotes:
 class CentreVotes:
     """Each view votes once for each surfel, by the pixel that its mean projects to: the paper's way.
 
-    A surfel is 1 or 0 as the mask there, -1 outside of the view; neither size nor opacity nor what is in front
-    of it counts. It belongs to the object if 1 is the most frequent of all views, and frequent enough
+    A surfel is 1 or 0 as the mask there, -1 outside of the view; neither size nor opacity nor what is in
+    front of it counts. It belongs to the object if 1 is the most frequent of all views, and frequent enough
     (Hu et al. 2024, SAGD).
 
     Args:

@@ -47,7 +47,7 @@ class Sam:
         self._features = Remembered(lambda image: encode(self.prepared(image)))
 
     def prepared(self, image: Tensor) -> Tensor:
-        """An image [H, W, 3] as the encoder takes it [1, 3, S, S]: the longer side fills it, the rest is 0."""
+        """An image [H, W, 3] as the encoder takes it [1, 3, S, S], with zeros below or at the right."""
         planes = image.to(self.device).float().permute(2, 0, 1)[None]
         height, width = self.fitted(image.shape[0], image.shape[1])
         planes = F.interpolate(planes, (height, width), mode="bilinear", antialias=True)

@@ -1,0 +1,121 @@
+"""Consistency of views of a plane, whose depth and colours are known in closed form."""
+
+from dataclasses import replace
+from math import sqrt
+
+import pytest
+import torch
+
+from tests.raster.scenes import random_scene
+from texgs.core.camera import Camera, intrinsics, look_at
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.metrics.consistency import Frame, consistency, warp
+
+SIZE = 64
+
+
+def camera(x, y=0.0, z=-2.0, target=None):
+    """Looks along +z with y down, unless at a target."""
+    place = torch.tensor([x, y, z])
+    towards = place + torch.tensor([0.0, 0.0, 1.0]) if target is None else torch.tensor(target)
+    return Camera(look_at(place, towards), intrinsics(40, SIZE, SIZE), SIZE, SIZE)
+
+
+def color(places):
+    """Smooth colours of the plane z = 0."""
+    x, y = places[..., 0], places[..., 1]
+    return torch.stack([0.5 + 0.3 * x, 0.5 - 0.2 * y, 0.5 + 0.2 * torch.sin(3 * x + 2 * y)], dim=-1)
+
+
+def plane(view, half=0.4):
+    """The square |x|, |y| < half of the plane z = 0 seen by a camera, by ray casting in float64."""
+    at = torch.arange(SIZE) + 0.5
+    y, x = torch.meshgrid(at, at, indexing="ij")
+    rays = torch.stack([x, y, torch.ones_like(x)], -1).double() @ torch.linalg.inv(view.K.double()).T
+    R = view.viewmat[:3, :3].double()
+    depth = -view.position.double()[2] / (rays @ R)[..., 2]
+    places = view.position.double() + depth[..., None] * (rays @ R)
+    alpha = (places[..., :2].abs() < half).all(-1)
+    image = torch.where(alpha[..., None], color(places), 1.0)
+    return Frame(image.float(), torch.where(alpha, depth, 0).float(), alpha.float(), view)
+
+
+def test_a_textured_plane_is_consistent():
+    frames = [plane(camera(0.3 * i - 0.6, 0.1 * i, target=(0.0, 0.0, 0.0))) for i in range(5)]
+    for apart in (1, 3):
+        found = consistency(frames, apart)
+        assert found.rmse < 2e-4, "but for what interpolation between pixels loses"
+        assert found.covered > 0.85
+        assert found.pairs == 5 - apart
+        assert found.perceptual is None
+
+
+def test_colours_that_change_with_the_view_are_measured():
+    """An offset of one view shows in both pairs that it is in: (0.1, 0.1, 0)."""
+    frames = [plane(camera(0.02 * i)) for i in range(4)]
+    frames[1] = replace(frames[1], image=frames[1].image + 0.1)
+    assert consistency(frames).rmse == pytest.approx(0.1 * sqrt(2 / 3), abs=1e-4)
+    assert consistency(frames, 2).rmse == pytest.approx(0.1 * sqrt(1 / 2), abs=1e-4)
+
+
+def test_noise_of_views_is_measured():
+    """Moved by whole pixels nothing is interpolated: the difference of two noises of deviation 0.05."""
+    step = 3 * 2.0 / float(intrinsics(40, SIZE, SIZE)[0, 0])
+    generator = torch.Generator().manual_seed(0)
+    frames = [plane(camera(step * i)) for i in range(4)]
+    noisy = [
+        replace(frame, image=frame.image + 0.05 * torch.randn(SIZE, SIZE, 3, generator=generator))
+        for frame in frames
+    ]
+    assert consistency(frames).rmse < 1e-5
+    assert consistency(noisy).rmse == pytest.approx(0.05 * sqrt(2), rel=0.02)
+
+
+def test_what_is_hidden_is_not_compared():
+    """A near square of another colour hides part of the plane in one view, another part in the other."""
+    frames = []
+    for x in (-0.2, 0.2):
+        back, front = plane(camera(x)), plane(camera(x, z=-1.0), half=0.1)  # 1 nearer, colours of its own
+        is_front = front.alpha > 0.5
+        image = torch.where(is_front[..., None], torch.tensor([0.0, 0.0, 1.0]), back.image)
+        frames.append(replace(back, image=image, depth=torch.where(is_front, front.depth, back.depth)))
+    warped, same = warp(frames[1], frames[0])
+    assert same.any()
+    assert (warped - frames[0].image)[same].abs().max() < 0.01
+    assert not same.all()
+
+
+def test_a_perceptual_distance_sees_only_what_is_compared():
+    seen = []
+
+    def distance(image, target):
+        seen.append((image, target))
+        return float((image - target).abs().max())
+
+    frames = [plane(camera(0.2 * i)) for i in range(2)]
+    found = consistency(frames, perceptual=distance)
+    same = warp(frames[1], frames[0])[1]
+    image, target = seen[0]
+    assert torch.equal(image[~same], target[~same])
+    assert found.perceptual == pytest.approx(float((image - target)[same].abs().max()))
+
+
+def test_rendered_views_of_surfels_are_consistent_with_themselves():
+    scene = random_scene(0, n=50)
+    view = Camera(scene.viewmat, scene.K, scene.width, scene.height)
+    depth = torch.full((scene.height, scene.width), 2.0)
+    frame = Frame(torch.rand(scene.height, scene.width, 3), depth, torch.ones_like(depth), view)
+    found = consistency([frame, frame])
+    assert found.rmse < 1e-5
+    assert found.covered > 0.9
+
+
+def test_frames_that_cannot_be_compared():
+    frames = [plane(camera(0.0)), plane(camera(0.02))]
+    with pytest.raises(ArgumentError, match="frames: expected more than 7 for pairs so far apart, got 2"):
+        consistency(frames, 7)
+    away = plane(camera(5.0, target=(5.0, 0.0, 0.0)))
+    with pytest.raises(ArgumentError, match="frames: expected pairs that see the same, got none"):
+        consistency([frames[0], away])
+    with pytest.raises(ShapeError, match=r"depth: expected \[64, 64\], got \[64, 63\]"):
+        consistency([frames[0], replace(frames[1], depth=frames[1].depth[:, 1:])])

@@ -1,0 +1,219 @@
+"""Segment a model of a scene by clicks on a view of it, so that the segment can be edited on its own."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import torch
+
+    from texgs.core.camera import Camera
+    from texgs.edit.clicks import Clicks
+    from texgs.models.masks import MaskModel
+    from texgs.scene.model import Model
+    from texgs.scene.scene_file import Scene
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What is clicked on, and how masks are found and lifted."""
+    parser.add_argument("scene", type=Path, help="scene.yaml")
+    parser.add_argument("--model", help="name of the model; may be left out where there is one")
+    parser.add_argument("--name", help="of the new segment")
+    parser.add_argument(
+        "--view",
+        type=numbers,
+        default=(30.0, 20.0),
+        metavar="AZIMUTH,POLAR",
+        help="degrees, of the view clicked on (30,20): what texgs render shows of the model alone",
+    )
+    parser.add_argument(
+        "--point",
+        action="append",
+        type=numbers,
+        default=[],
+        metavar="X,Y",
+        help="pixel on the object, counted from 0,0; repeat for several",
+    )
+    parser.add_argument(
+        "--not",
+        dest="other",
+        action="append",
+        type=numbers,
+        default=[],
+        metavar="X,Y",
+        help="pixel that is not of the object; repeat for several",
+    )
+    parser.add_argument("--output", type=Path, help="the new scene.yaml; the segment's file is put beside it")
+    parser.add_argument("--preview", type=Path, metavar="PNG", help="write the view with the mask, no scene")
+    parser.add_argument(
+        "--masks",
+        default="mobile_sam",
+        help="mobile_sam, a folder with a SAM of transformers, or grabcut, which needs no weights "
+        "(%(default)s)",
+    )
+    parser.add_argument(
+        "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
+    )
+    parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
+    parser.add_argument("--views", type=int, default=42, help="that vote, 10 f^2 + 2 (%(default)s)")
+    parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
+    parser.add_argument("--width", type=int, default=800, help="of the view clicked on (%(default)s)")
+    parser.add_argument("--height", type=int, help="default the width")
+    parser.add_argument("--radius", type=float, default=4.0311, help="distance, world units (%(default)s)")
+    parser.add_argument(
+        "--fov", type=float, default=30.0, help="vertical field of view, degrees (%(default)s)"
+    )
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+
+
+def numbers(text: str) -> tuple[float, float]:
+    """Two numbers with a comma between them."""
+    first, _, second = text.partition(",")
+    return float(first), float(second)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write the preview, or the segment and the scene that has it."""
+    from texgs.core.device import torch_device
+    from texgs.core.image import write_png
+    from texgs.edit.lift import lift
+    from texgs.edit.preview import preview
+    from texgs.scene.compact import open_model
+    from texgs.scene.scene_file import read_scene
+
+    scene = read_scene(arguments.scene)
+    name = chosen(arguments, scene)
+    device = torch_device(arguments.device)
+    clicks = clicks_of(arguments, device)
+    around = [camera.to(device) for camera in cameras(arguments)]
+    masks = mask_model(arguments.masks, device)
+    model = open_model(scene.models[name].file).to(device)
+    if arguments.preview:
+        print(write_png(arguments.preview, preview(model, clicks, masks, scene.light)[1]))
+        return 0
+    found = lift(
+        *(model, clicks, around, masks),
+        light=scene.light,
+        vote=arguments.vote,
+        threshold=arguments.threshold,
+        title=f"segment {arguments.name}",
+    )
+    print(*write(arguments, scene, name, model, found.mask), sep="\n")
+    return 0
+
+
+def clicks_of(arguments: argparse.Namespace, device: "torch.device") -> "Clicks":
+    """The clicks, each in the middle of its pixel.
+
+    Raises:
+        ArgumentError: if there is none on the object, or the view is out of range.
+    """
+    import torch
+
+    from texgs.core.camera import orbit
+    from texgs.core.errors import ArgumentError
+    from texgs.edit.clicks import Clicks
+
+    if not arguments.point:
+        raise ArgumentError("--point: expected one at least, got none; name a pixel on the object")
+    height = arguments.width if arguments.height is None else arguments.height
+    azimuth, polar = arguments.view
+    camera = orbit(azimuth, polar, arguments.radius, arguments.fov, arguments.width, height).to(device)
+    pixels = torch.tensor([*arguments.point, *arguments.other], device=device)
+    positive = torch.arange(len(pixels), device=device) < len(arguments.point)
+    return Clicks(camera, pixels + 0.5, positive)
+
+
+def cameras(arguments: argparse.Namespace) -> "list[Camera]":
+    """Of the views that vote.
+
+    Raises:
+        ArgumentError: if no icosphere has so many views.
+    """
+    from math import isqrt
+
+    from texgs.core.errors import ArgumentError
+    from texgs.volume.cameras import icosphere
+
+    frequency = isqrt(max(arguments.views - 2, 0) // 10)
+    if frequency < 1 or 10 * frequency**2 + 2 != arguments.views:
+        raise ArgumentError(f"--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {arguments.views}")
+    return icosphere(frequency, arguments.radius, arguments.fov, arguments.size, arguments.size)
+
+
+def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
+    """The model's name.
+
+    Raises:
+        ArgumentError: if there is no such model, the new name cannot be one, or nothing is to be written.
+    """
+    from texgs.core.errors import ArgumentError
+    from texgs.scene.scene_file import RESERVED
+
+    name = next(iter(scene.models)) if arguments.model is None and len(scene.models) == 1 else arguments.model
+    if name not in scene.models:
+        raise ArgumentError(f"--model: expected one of {', '.join(scene.models)}, got {name}")
+    if arguments.preview:
+        return str(name)
+    new = arguments.name
+    if not new or any(mark in new for mark in RESERVED):
+        raise ArgumentError(f"--name: expected a name without {' '.join(RESERVED)}, got {new}")
+    if new in scene.models[name].segments:
+        raise ArgumentError(
+            f"--name: expected a new name, got {new}, which {name} has; remove it by texgs edit {name}/{new}="
+        )
+    if not arguments.output:
+        raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
+    return str(name)
+
+
+def mask_model(name: str, device: "torch.device") -> "MaskModel":
+    """The mask model of a name, or in a folder."""
+    from texgs.models.grabcut import GrabCut
+    from texgs.models.sam import mobile_sam, sam_folder
+
+    if name == "grabcut":
+        return GrabCut()
+    return mobile_sam(device=device) if name == "mobile_sam" else sam_folder(name, device)
+
+
+def write(
+    arguments: argparse.Namespace, scene: "Scene", name: str, model: "Model", mask: "torch.Tensor"
+) -> tuple[Path, Path]:
+    """Write the segment beside the new scene, then the scene.
+
+    Raises:
+        ArgumentError: if earlier segments have all of its surfels.
+    """
+    import sys
+
+    from texgs.core.errors import ArgumentError
+    from texgs.scene.scene_file import SceneSegment, write_scene
+    from texgs.scene.segment_file import read_segment, write_segment
+
+    entry = scene.models[name]
+    free = mask.clone()
+    for other in entry.segments.values():
+        free &= ~read_segment(other.file, model)
+    if not bool(free.any()):
+        raise ArgumentError(
+            f"segment: expected surfels that no segment of {name} has, got none; remove one that has them "
+            f"({', '.join(entry.segments)})"
+        )
+    held, count = int((mask & ~free).sum()), int(mask.sum())
+    note = f", of which {held} stay with earlier segments" if held else ""
+    sys.stderr.write(f"{name}/{arguments.name}: {count} of {len(mask)} surfels{note}\n")
+    facts = {
+        "view": arguments.view,
+        "points": arguments.point,
+        "not": arguments.other,
+        "masks": arguments.masks,
+        "vote": arguments.vote,
+    }
+    file = arguments.output.with_name(f"{arguments.output.stem}-{name}-{arguments.name}.safetensors")
+    write_segment(file, model, mask, facts)
+    # It starts as the model is now, so that nothing changes until it is edited.
+    segment = SceneSegment(file, entry.edit, entry.texture)
+    changed = replace(entry, segments={**entry.segments, arguments.name: segment})
+    return write_scene(arguments.output, replace(scene, models={**scene.models, name: changed})), file

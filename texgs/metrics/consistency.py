@@ -1,0 +1,133 @@
+"""Multi-view consistency: views warped into each other by their depth, compared where both see the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from statistics import fmean
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core import check
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+
+SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
+OPAQUE = 0.5  # least alpha of a pixel that has a depth
+TOLERANCE = 0.01  # of the depth, by which two views of the same point may differ
+
+Perceptual = Callable[[Tensor, Tensor], float]  # of two images [H, W, 3], such as LPIPS
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One rendered view."""
+
+    image: Tensor  # [H, W, 3] in [0, 1]
+    depth: Tensor  # [H, W] camera z, world units: the rasterizer's median depth
+    alpha: Tensor  # [H, W]
+    camera: Camera
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """How much pairs of views differ where they see the same."""
+
+    rmse: float
+    """Root of the mean over pairs of the mean squared difference, in units of colour; 0 is best."""
+    perceptual: float | None
+    """Mean over pairs, or None where it was not measured."""
+    covered: float
+    """Mean share of the pixels of an object that a pair compares."""
+    pairs: int
+
+
+def consistency(
+    frames: Sequence[Frame],
+    apart: int = SHORT,
+    perceptual: Perceptual | None = None,
+    tolerance: float = TOLERANCE,
+) -> Consistency:
+    """Compare each view with the one `apart` views later, warped into it.
+
+    What depends on the place of the viewer counts as inconsistent, highlights and headlights too: render
+    without light to measure textures alone.
+
+    Args:
+        frames: along a path of cameras.
+        apart: 1 for short-range consistency, 7 for long-range.
+        perceptual: distance of two images; it sees the first view with the compared pixels exchanged.
+        tolerance: of depths, relative.
+
+    Raises:
+        ArgumentError, ShapeError: if there is no pair, no pair sees the same, or a frame does not fit itself.
+    """
+    if apart < 1 or len(frames) <= apart:
+        raise ArgumentError(f"frames: expected more than {apart} for pairs so far apart, got {len(frames)}")
+    squares, distances, shares = [], [], []
+    for first, second in zip(frames, frames[apart:], strict=False):
+        warped, same = warp(second, first, tolerance)
+        if not bool(same.any()):
+            continue
+        squares.append(float((warped - first.image)[same].double().square().mean()))
+        shares.append(float(same.sum() / (first.alpha >= OPAQUE).sum()))
+        if perceptual is not None:
+            exchanged = torch.where(same[..., None], warped, first.image)
+            distances.append(float(perceptual(exchanged, first.image)))
+    if not squares:
+        raise ArgumentError("frames: expected pairs that see the same, got none; use views closer together")
+    mean_distance = fmean(distances) if distances else None
+    return Consistency(sqrt(fmean(squares)), mean_distance, fmean(shares), len(squares))
+
+
+@torch.no_grad()
+def warp(source: Frame, target: Frame, tolerance: float = TOLERANCE) -> tuple[Tensor, Tensor]:
+    """Colours of one view at the pixels of another, and where both see the same point.
+
+    A pixel of the target is compared where it is opaque, its point is inside of the source, and the four
+    pixels there are opaque and as far away as the point is.
+
+    Args:
+        source: view that colours come from.
+        target: view that they are warped to.
+        tolerance: of depths, relative.
+
+    Returns:
+        Colours [H, W, 3], interpolated bilinearly, and [H, W] bool.
+
+    Raises:
+        ShapeError: if images, depths and cameras do not fit each other.
+    """
+    for frame in (source, target):
+        size = {"H": frame.camera.height, "W": frame.camera.width}
+        check.shape("image", frame.image, "H W 3", **size)
+        check.shape("depth", frame.depth, "H W", **size)
+        check.shape("alpha", frame.alpha, "H W", **size)
+    pixels, z = reprojected(target, source.camera)
+    height, width = source.depth.shape
+    grid = 2 * pixels / pixels.new_tensor([width, height]) - 1
+    found = F.grid_sample(source.image.permute(2, 0, 1)[None], grid[None], align_corners=False)
+    inside = ((pixels >= 0.5) & (pixels <= pixels.new_tensor([width - 0.5, height - 0.5]))).all(-1)
+    same = (target.alpha >= OPAQUE) & inside & (z > 0)
+    column, row = ((pixels[..., axis] - 0.5).nan_to_num(0, 0, 0).floor().long() for axis in (0, 1))
+    for y in (row, row + 1):
+        for x in (column, column + 1):
+            at = (y.clamp(0, height - 1), x.clamp(0, width - 1))
+            same &= (source.alpha[at] >= OPAQUE) & ((source.depth[at] - z).abs() <= tolerance * z)
+    return found[0].permute(1, 2, 0), same
+
+
+def reprojected(frame: Frame, camera: Camera) -> tuple[Tensor, Tensor]:
+    """Where another camera sees the points of a view's pixels: pixels [H, W, 2] and camera z [H, W]."""
+    here, depth = frame.camera, frame.depth
+    rows, columns = (torch.arange(size, device=depth.device) + 0.5 for size in depth.shape)
+    y, x = torch.meshgrid(rows, columns, indexing="ij")
+    rays = torch.stack([x, y, torch.ones_like(x)], dim=-1).to(depth) @ torch.linalg.inv(here.K).T
+    R_cw, t_cw = here.viewmat[:3, :3], here.viewmat[:3, 3]
+    places = (rays * depth[..., None] - t_cw) @ R_cw  # [H, W, 3] world
+    moved = places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
+    seen = moved @ camera.K.T
+    return seen[..., :2] / seen[..., 2:], moved[..., 2]

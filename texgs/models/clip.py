@@ -1,0 +1,122 @@
+"""Features of images and texts by CLIP (Radford et al. 2021), from a folder of transformers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
+from texgs.models.tensors import first_line
+from texgs.models.weights import locate
+
+MEAN = (0.48145466, 0.4578275, 0.40821073)  # that CLIP normalises images with, per channel
+DEVIATION = (0.26862954, 0.26130258, 0.27577711)
+DEFAULT = "clip-vit-large-patch14"  # what the metrics of InstructPix2Pix and its successors use
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """A frozen CLIP model; features are unit vectors in a space that images and texts share."""
+
+    name: str  # of the backbone, for the headers of tables
+    network: Any
+    tokenizer: Any
+
+    @classmethod
+    def load(cls, weights: str | Path = DEFAULT, device: torch.device | str = "cpu") -> Clip:
+        """Read a model in float32.
+
+        Args:
+            weights: name of the catalogue, or a folder with config.json, weights and tokenizer.
+            device: that computes.
+
+        Raises:
+            ArgumentError, MissingDataError: if transformers or the weights are missing, or the folder holds
+                no CLIP or a damaged one.
+        """
+        try:
+            from transformers import AutoTokenizer, CLIPModel
+        except ImportError as error:
+            raise ArgumentError(
+                f"{weights}: expected transformers, which is not installed; pip install transformers"
+            ) from error
+        folder = Path(weights) if Path(weights).is_dir() else locate(str(weights))
+        kind = read_json(folder / "config.json").get("model_type")
+        if kind != "clip":
+            raise ArgumentError(f"{folder}: expected a model of type clip, got {kind}")
+        try:
+            network = CLIPModel.from_pretrained(folder, local_files_only=True, dtype=torch.float32)
+            tokenizer = AutoTokenizer.from_pretrained(folder, local_files_only=True)
+        except (OSError, RuntimeError, ValueError, TypeError) as error:
+            raise ArgumentError(
+                f"{folder}: expected a CLIP of transformers, got one that cannot be read "
+                f"({first_line(error)})"
+            ) from error
+        name = folder.name if Path(weights).is_dir() else str(weights)
+        return cls(name, network.eval().requires_grad_(False).to(device), tokenizer)
+
+    @property
+    def size(self) -> int:
+        """Of the square image that the encoder takes, pixels."""
+        return int(self.network.config.vision_config.image_size)
+
+    def prepared(self, images: Tensor) -> Tensor:
+        """Images as the encoder takes them [B, 3, S, S]; differentiable.
+
+        The whole image is squeezed to a square by bicubic interpolation without antialiasing, nothing is cut
+        off: as the metrics of InstructPix2Pix and Instruct-NeRF2NeRF do, unlike CLIP's own preprocessing.
+
+        Args:
+            images: [B, H, W, 3] in [0, 1].
+        """
+        check.shape("images", images, "B H W 3")
+        planes = images.permute(0, 3, 1, 2)
+        planes = F.interpolate(planes, (self.size, self.size), mode="bicubic", align_corners=False)
+        mean, deviation = (planes.new_tensor(x)[:, None, None] for x in (MEAN, DEVIATION))
+        return (planes - mean) / deviation
+
+    def images(self, images: Tensor) -> Tensor:
+        """Features [B, D] of images [B, H, W, 3] in [0, 1]; differentiable in the images."""
+        return self.encoded(self.prepared(images))
+
+    def encoded(self, pixels: Tensor) -> Tensor:
+        """Features [B, D] of what the encoder takes, [B, 3, S, S] normalised; differentiable."""
+        device = next(self.network.parameters()).device
+        return _unit(self.network.get_image_features(pixel_values=pixels.to(device)))
+
+    @torch.no_grad()
+    def texts(self, texts: Sequence[str]) -> Tensor:
+        """Features [T, D] of texts, cut off where they are longer than the model can read.
+
+        Raises:
+            ArgumentError: if there is none, or one is empty.
+        """
+        if not texts or not all(text.strip() for text in texts):
+            raise ArgumentError("texts: expected words in each, got an empty one; describe the picture")
+        device = next(self.network.parameters()).device
+        tokens = self.tokenizer(
+            list(texts),
+            padding=True,
+            truncation=True,
+            max_length=self.network.config.text_config.max_position_embeddings,
+            return_tensors="pt",
+        ).to(device)
+        return _unit(
+            self.network.get_text_features(
+                input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
+            )
+        )
+
+
+def _unit(features: Any) -> Tensor:
+    """Features [B, D] of unit length; newer versions of transformers wrap them."""
+    found: Tensor = features if isinstance(features, Tensor) else features.pooler_output
+    return F.normalize(found, dim=-1)
