@@ -48,7 +48,7 @@ class Prompts:
 
 @torch.no_grad()
 def prompts_at(model: Model, clicks: Clicks) -> Prompts:
-    """Lift clicks to the surfels that they are on: those that make up most of the pixel.
+    """Lift clicks to the surface that they are on: the layer of surfels that makes up most of the pixel.
 
     Behind a layer that lets through more than it shows, a click is on what shows through.
 
@@ -59,40 +59,59 @@ def prompts_at(model: Model, clicks: Clicks) -> Prompts:
     Raises:
         ArgumentError: if a point is outside of the view or on the background.
     """
-    places = [_place(model, clicks.camera, x, y) for x, y in clicks.points.tolist()]
+    thickness = TOLERANCE * extent(model)
+    places = [_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()]
     return Prompts(torch.stack(places), clicks.positive)
 
 
-def _place(model: Model, camera: Camera, x: float, y: float) -> Tensor:
-    """Where the ray of a pixel meets the surfel that makes up most of it, [3]."""
+def _place(model: Model, camera: Camera, x: float, y: float, thickness: float) -> Tensor:
+    """Where the ray through a pixel meets the layer that makes up most of it, [3]."""
     if not (0 <= x < camera.width and 0 <= y < camera.height):
         raise ArgumentError(
             f"point ({x:g}, {y:g}): expected a place in the view of {camera.width} x {camera.height} pixels"
         )
-    pixel = camera.crop(int(x), int(y), int(x) + 1, int(y) + 1)
-    means, quats, scales, opacities = geometry(model.parameters)
-    weights = rasterize(
-        *(means, quats, scales, opacities),
-        *(pixel.viewmat, pixel.K, 1, 1),
-        features=torch.zeros_like(opacities)[:, None],
-        outputs=("statistics",),
-        options=model.optics.options,
-    ).statistics.weight_sum  # type: ignore[union-attr]
+    weights = weights_at(model, camera, int(x), int(y))
     alpha = float(weights.sum())
     if alpha < FAINT:
         raise ArgumentError(
             f"point ({x:g}, {y:g}): expected a place on the model, got background (alpha {alpha:.2f}); "
             "click on what is to be segmented"
         )
-    index = int(weights.argmax())
-    mean, normal = means[index], quats_to_matrices(quats[index])[:, 2]
-    inside = torch.stack([mean.new_tensor(x), mean.new_tensor(y), mean.new_tensor(1.0)])
-    ray = camera.viewmat[:3, :3].T @ torch.linalg.inv(camera.K) @ inside
-    along = normal @ (mean - camera.position) / (normal @ ray)
-    hit = camera.position + along * ray
-    # Seen edge on, a surfel is drawn by the filter, beside where the ray meets its plane.
-    is_on_it = bool((hit - mean).norm() <= REACH * scales[index].max())
-    return hit if is_on_it else mean
+    shown = weights.nonzero()[:, 0]
+    hits, depths = met(model, camera, x, y, shown)
+    behind = depths[None] - depths[:, None]  # [K, K]
+    layers = torch.where((behind >= 0) & (behind <= thickness), weights[shown], 0.0)  # from each one on
+    layer = layers[layers.sum(dim=1).argmax()]
+    return hits[layer.argmax()]
+
+
+def weights_at(model: Model, camera: Camera, column: int, row: int) -> Tensor:
+    """How much of a pixel each surfel makes up, [N]."""
+    pixel = camera.crop(column, row, column + 1, row + 1)
+    opacities = model.parameters["opacities"]
+    seen = rasterize(
+        *geometry(model.parameters),
+        *(pixel.viewmat, pixel.K, 1, 1),
+        features=torch.zeros_like(opacities)[:, None],
+        outputs=("statistics",),
+        options=model.optics.options,
+    ).statistics
+    return seen.weight_sum  # type: ignore[union-attr]
+
+
+def met(model: Model, camera: Camera, x: float, y: float, surfels: Tensor) -> tuple[Tensor, Tensor]:
+    """Where the ray through a place of the image meets surfels, [K, 3], and the camera z there [K].
+
+    Edge on, a surfel is drawn by the filter, beside where the ray meets its plane: then it is its middle.
+    """
+    means, quats, scales, _ = (tensor[surfels] for tensor in geometry(model.parameters))
+    normals = quats_to_matrices(quats)[:, :, 2]
+    ray = camera.viewmat[:3, :3].T @ torch.linalg.inv(camera.K) @ means.new_tensor([x, y, 1.0])
+    along = ((means - camera.position) * normals).sum(1) / (normals @ ray)
+    hits = camera.position + along[:, None] * ray
+    is_on_it = (hits - means).norm(dim=1) <= REACH * scales.amax(dim=1)
+    hits = torch.where(is_on_it[:, None], hits, means)
+    return hits, hits @ camera.viewmat[2, :3] + camera.viewmat[2, 3]
 
 
 def projected(places: Tensor, camera: Camera) -> tuple[Tensor, Tensor]:

@@ -14,7 +14,7 @@ from texgs.scene.model import Model, geometry
 
 Vote = Literal["contribution", "centre"]
 SEEN = 0.01  # pixels in all views together that a surfel must make up to have a vote
-ROUNDS = 3
+ROUNDS = 5
 NEIGHBOURS = 5  # seen surfels, whose mean share one that no view shows gets
 
 

@@ -13,8 +13,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json
-from texgs.models.tensors import first_line
+from texgs.models.folder import read_folder
 from texgs.models.weights import locate
 
 MEAN = (0.48145466, 0.4578275, 0.40821073)  # that CLIP normalises images with, per channel
@@ -42,26 +41,10 @@ class Clip:
             ArgumentError, MissingDataError: if transformers or the weights are missing, or the folder holds
                 no CLIP or a damaged one.
         """
-        try:
-            from transformers import AutoTokenizer, CLIPModel
-        except ImportError as error:
-            raise ArgumentError(
-                f"{weights}: expected transformers, which is not installed; pip install transformers"
-            ) from error
         folder = Path(weights) if Path(weights).is_dir() else locate(str(weights))
-        kind = read_json(folder / "config.json").get("model_type")
-        if kind != "clip":
-            raise ArgumentError(f"{folder}: expected a model of type clip, got {kind}")
-        try:
-            network = CLIPModel.from_pretrained(folder, local_files_only=True, dtype=torch.float32)
-            tokenizer = AutoTokenizer.from_pretrained(folder, local_files_only=True)
-        except (OSError, RuntimeError, ValueError, TypeError) as error:
-            raise ArgumentError(
-                f"{folder}: expected a CLIP of transformers, got one that cannot be read "
-                f"({first_line(error)})"
-            ) from error
+        network, tokenizer = read_folder(folder, "clip", ("CLIPModel", "AutoTokenizer"))
         name = folder.name if Path(weights).is_dir() else str(weights)
-        return cls(name, network.eval().requires_grad_(False).to(device), tokenizer)
+        return cls(name, network.to(device), tokenizer)
 
     @property
     def size(self) -> int:

@@ -77,10 +77,13 @@ def first_guess(
     cv2: Any, pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray
 ) -> np.ndarray:
     """Labels [H, W] that GrabCut starts from: certain at clicks and beyond what is clicked, else probable."""
-    edge = np.concatenate([clicked[0], clicked[-1], clicked[:, 0], clicked[:, -1]])
-    rest = cv2.GC_PR_BGD if edge.any() or not positive.all() else cv2.GC_PR_FGD
-    labels = np.where(clicked, rest, cv2.GC_BGD).astype(np.uint8)
     smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
+    labels = np.where(clicked, cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
+    edge = np.concatenate([clicked[0], clicked[-1], clicked[:, 0], clicked[:, -1]])
+    if not edge.any():  # what a plain border surrounds is the object, but for what looks like negative clicks
+        colors = smooth[places[:, 1], places[:, 0]].astype(int)  # [P, 3]
+        nearest = np.abs(smooth[..., None, :].astype(int) - colors).sum(axis=-1).argmin(axis=-1)  # [H, W]
+        labels[clicked & positive[nearest]] = cv2.GC_PR_FGD
     order = np.argsort(~positive, kind="stable")  # negative clicks last: they take from positive ones
     clicks = list(zip(places[order], positive[order], strict=True))
     for place, is_positive in clicks:

@@ -11,9 +11,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json
+from texgs.models.folder import read_folder
 from texgs.models.masks import Remembered, check_clicks
-from texgs.models.tensors import first_line, read_tensors
+from texgs.models.tensors import read_tensors
 from texgs.models.weights import locate
 
 MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # that images are normalised with, per channel
@@ -138,25 +138,10 @@ def sam_folder(
     Raises:
         ArgumentError: if transformers is missing, or the folder holds no SAM or a damaged one.
     """
-    try:
-        from transformers import SamModel
-    except ImportError as error:
-        raise ArgumentError(
-            f"{folder}: expected transformers, which is not installed; pip install transformers"
-        ) from error
-    folder = Path(folder)
-    kind = read_json(folder / "config.json").get("model_type")
-    if kind != "sam":
-        raise ArgumentError(f"{folder}: expected a model of type sam, got {kind}")
-    try:
-        model = SamModel.from_pretrained(folder, local_files_only=True).eval().requires_grad_(False)
-    except (OSError, RuntimeError, ValueError) as error:
-        raise ArgumentError(
-            f"{folder}: expected a SAM of transformers, got one that cannot be read ({first_line(error)})"
-        ) from error
+    (model,) = read_folder(folder, "sam", ("SamModel",))
     model.to(device)
     model.vision_encoder.to(dtype)
-    return Sam(folder.name, *_transformers(model, dtype), model.config.vision_config.image_size, device)
+    return Sam(Path(folder).name, *_transformers(model, dtype), model.config.vision_config.image_size, device)
 
 
 def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:

@@ -1,0 +1,125 @@
+"""`texgs segment`: clicks become a segment of the scene, which is edited and taken back."""
+
+import numpy as np
+import pytest
+import torch
+import yaml
+from PIL import Image
+
+from tests.edit.lift_scenes import two_balls
+from tests.edit.test_lift import pixel_of
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.scene.model_file import write_model
+from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.segment_file import write_segment
+
+SIZE = 120
+LENS = ("--radius", "4", "--fov", "22", "--width", str(SIZE))
+FAST = ("--masks", "grabcut", "--views", "12", "--size", "96")
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """A scene of one model with a red and a blue ball."""
+    path = write_model(tmp_path / "model.safetensors", two_balls()[0])
+    return write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(path)}))
+
+
+def pixel(place):
+    """What --point takes for a place, seen from the front."""
+    return ",".join(str(int(x)) for x in pixel_of(place, orbit(-90, 0, 4.0, 22.0, SIZE, SIZE)))
+
+
+LEFT, RIGHT = pixel((-0.3, 0.0, 0.25)), pixel((0.3, 0.1, 0.35))
+
+
+def segment(scene, *words, name="red", output="new.yaml"):
+    where = ["--name", name, "--output", str(scene.with_name(output))]
+    return main(["segment", str(scene), "--view=-90,0", *LENS, *FAST, *where, *words])
+
+
+def colors(scene, output):
+    """How red and how blue a picture is."""
+    words = ["--azimuth", "-90", "--polar", "0", *LENS, "--output", str(output)]
+    assert main(["render", str(scene), *words]) == 0
+    picture = np.asarray(Image.open(output)).astype(int)
+    hue = picture[..., 0] - picture[..., 2]
+    return int((hue > 60).sum()), int((hue < -60).sum()), picture
+
+
+def test_a_segment_is_made_edited_and_taken_back(scene, tmp_path, capsys):
+    red, blue, before = colors(scene, tmp_path / "0.png")
+    assert segment(scene, "--point", LEFT, "--not", RIGHT) == 0
+    printed = capsys.readouterr()
+    assert f"{tmp_path / 'new.yaml'}\n{tmp_path / 'new-balls-red.safetensors'}" in printed.out
+    assert "balls/red: " in printed.err
+    new = tmp_path / "new.yaml"
+    assert np.array_equal(colors(new, tmp_path / "1.png")[2], before), "nothing is edited yet"
+    edited = tmp_path / "edited.yaml"
+    assert main(["edit", str(new), "balls/red.visible=false", "--output", str(edited)]) == 0
+    red_left, blue_left, _ = colors(edited, tmp_path / "2.png")
+    assert red_left < 0.05 * red
+    assert blue_left > 0.95 * blue
+    back = tmp_path / "back.yaml"
+    assert main(["edit", str(edited), "balls/red=", "--output", str(back)]) == 0
+    assert yaml.safe_load(back.read_text()) == yaml.safe_load(scene.read_text())
+
+
+def test_a_second_segment_gets_what_the_first_left(scene, tmp_path, capsys):
+    assert segment(scene, "--point", LEFT, "--not", RIGHT) == 0
+    again = (tmp_path / "new.yaml", "--point", LEFT, "--not", RIGHT)
+    assert segment(*again, name="both", output="next.yaml") == 2
+    assert "expected surfels that no segment of balls has, got none; remove one that has them (red)" in (
+        capsys.readouterr().err
+    )
+    assert segment(tmp_path / "new.yaml", "--point", RIGHT, name="blue", output="next.yaml") == 0
+    model = read_scene(tmp_path / "next.yaml").models["balls"]
+    assert list(model.segments) == ["red", "blue"]
+
+
+def test_a_new_segment_starts_as_the_model_is(scene, tmp_path):
+    half = tmp_path / "half.yaml"
+    assert main(["edit", str(scene), "balls.opacity=0.8", "--output", str(half)]) == 0
+    before = colors(half, tmp_path / "0.png")[2]
+    assert segment(half, "--point", LEFT, "--not", RIGHT) == 0
+    new = read_scene(tmp_path / "new.yaml").models["balls"]
+    assert new.segments["red"].edit == new.edit
+    assert np.array_equal(colors(tmp_path / "new.yaml", tmp_path / "1.png")[2], before)
+
+
+def test_a_preview_writes_no_scene(scene, tmp_path):
+    picture = tmp_path / "preview.png"
+    assert segment(scene, "--point", LEFT, "--not", RIGHT, "--preview", str(picture)) == 0
+    assert Image.open(picture).size == (SIZE, SIZE)
+    assert not (tmp_path / "new.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([], "--point: expected one at least, got none"),
+        (["--point", "2,2"], "point (2.5, 2.5): expected a place on the model, got background (alpha 0.00)"),
+        (["--point", "500,2"], "point (500.5, 2.5): expected a place in the view of 120 x 120 pixels"),
+        (["--point", LEFT, "--model", "TF01"], "--model: expected one of balls, got TF01"),
+        (["--point", LEFT, "--name", "a.b"], "--name: expected a name without / . =, got a.b"),
+        (
+            ["--point", LEFT, "--views", "40"],
+            "--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got 40",
+        ),
+        (["--point", LEFT, "--masks", "none"], "none/config.json: no such file"),
+        (["--point", LEFT, "--threshold", "2"], "expected surfels that most masks"),
+    ],
+)
+def test_a_mistake_writes_nothing(scene, tmp_path, capsys, words, message):
+    assert segment(scene, *words) == 2
+    assert message in capsys.readouterr().err
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["model.safetensors", "scene.yaml"]
+
+
+def test_a_name_that_is_taken(scene, tmp_path, capsys):
+    mask = write_segment(tmp_path / "half", two_balls()[0], torch.arange(3000) < 9)
+    assert main(["edit", str(scene), f"balls/red={mask}", "--output", str(tmp_path / "half.yaml")]) == 0
+    assert segment(tmp_path / "half.yaml", "--point", LEFT) == 2
+    message = "--name: expected a new name, got red, which balls has; remove it by texgs edit balls/red="
+    assert message in capsys.readouterr().err

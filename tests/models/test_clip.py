@@ -1,0 +1,186 @@
+"""CLIP's features, scores and losses against transformers' own pipeline and formulas written out."""
+
+from math import asin
+
+import numpy as np
+import pytest
+import torch
+from torch.nn.functional import interpolate, normalize
+
+from tests.models.clips import write_clip
+from texgs.core.errors import ArgumentError, MissingDataError, ShapeError
+from texgs.edit.clip_loss import ClipLoss, middle
+from texgs.metrics.clip import clip_scores, direction, similarity
+from texgs.models.clip import DEVIATION, MEAN, Clip
+
+TEXTS = ["a beetle", "a beetle made of gold"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_clip(tmp_path_factory.mktemp("weights") / "tiny-clip")
+
+
+@pytest.fixture(scope="module")
+def clip(folder):
+    return Clip.load(folder)
+
+
+def image(seed, height=32, width=32):
+    """Smooth random colours, whole levels of 8 bits."""
+    generator = torch.Generator().manual_seed(seed)
+    coarse = torch.rand(1, 3, 4, 4, generator=generator)
+    smooth = interpolate(coarse, (height, width), mode="bilinear")[0].permute(1, 2, 0)
+    return (smooth * 255).round() / 255
+
+
+def test_features_agree_with_the_pipeline_of_transformers(folder, clip):
+    """Where nothing is resized, both preprocessings are the same."""
+    from transformers import CLIPModel, CLIPTokenizer
+    from transformers.models.clip.image_processing_pil_clip import CLIPImageProcessorPil
+
+    model = CLIPModel.from_pretrained(folder).eval()
+    processor = CLIPImageProcessorPil(size={"shortest_edge": 32}, crop_size={"height": 32, "width": 32})
+    tokens = CLIPTokenizer.from_pretrained(folder)(TEXTS, padding=True, return_tensors="pt")
+    pictures = [(image(seed).numpy() * 255).round().astype(np.uint8) for seed in (0, 1)]
+    pixels = processor(pictures, return_tensors="pt")["pixel_values"].float()
+    with torch.no_grad():
+        found = model(pixel_values=pixels, **tokens)
+    ours = clip.images(torch.stack([image(0), image(1)]))
+    torch.testing.assert_close(ours, normalize(found.image_embeds, dim=1), atol=1e-5, rtol=0)
+    texts = clip.texts(TEXTS)
+    torch.testing.assert_close(texts, normalize(found.text_embeds, dim=1), atol=1e-5, rtol=0)
+    logits = found.logits_per_image / model.logit_scale.exp()
+    for text in range(2):
+        torch.testing.assert_close(similarity(ours, texts[text]), logits[:, text], atol=1e-5, rtol=0)
+
+
+def test_images_are_squeezed_bicubically_without_antialias_and_not_cropped(clip):
+    """Weights of the cubic kernel with a = -0.75 at each output pixel's four neighbours, written out."""
+    wide = image(2, 20, 50)
+
+    def weights(size):
+        table = torch.zeros(32, size, dtype=torch.float64)
+        for out in range(32):
+            at = (out + 0.5) * size / 32 - 0.5
+            for near in range(int(np.floor(at)) - 1, int(np.floor(at)) + 3):
+                d = abs(at - near)
+                a = -0.75
+                w = (a + 2) * d**3 - (a + 3) * d**2 + 1 if d <= 1 else a * (d**3 - 5 * d**2 + 8 * d - 4)
+                table[out, min(max(near, 0), size - 1)] += w
+        return table
+
+    squeezed = torch.einsum("ah,hwc,bw->cab", weights(20), wide.double(), weights(50))
+    expected = (squeezed - torch.tensor(MEAN)[:, None, None]) / torch.tensor(DEVIATION)[:, None, None]
+    torch.testing.assert_close(clip.prepared(wide[None])[0].double(), expected, atol=1e-5, rtol=0)
+
+
+def test_features_are_differentiable_in_the_image(clip):
+    picture = image(3, 40, 24).double().float().requires_grad_()
+    loss = clip.images(picture[None])[0, 0]
+    (gradient,) = torch.autograd.grad(loss, picture)
+    step = 1e-2 * torch.randn(picture.shape, generator=torch.Generator().manual_seed(0))
+    with torch.no_grad():
+        change = (clip.images(picture[None] + step) - clip.images(picture[None] - step))[0, 0] / 2
+    assert float(change) == pytest.approx(float((gradient * step).sum()), rel=0.02)
+
+
+def test_scores_are_means_of_cosines_over_views(clip):
+    before, after = [image(0), image(1, 24, 40)], [image(5), image(6, 24, 40)]
+    found = clip_scores(clip, after, before, *TEXTS)
+    f = [clip.images(x[None])[0].double() for x in (*before, *after)]
+    g = clip.texts(TEXTS).double()
+
+    def cosine(a, b):
+        return float(a @ b / (a @ a).sqrt() / (b @ b).sqrt())
+
+    assert found.backbone == "tiny-clip"
+    assert found.similarity == pytest.approx(np.mean([cosine(f[2], g[1]), cosine(f[3], g[1])]), abs=1e-5)
+    expected = [cosine(f[2] - f[0], g[1] - g[0]), cosine(f[3] - f[1], g[1] - g[0])]
+    assert found.direction == pytest.approx(np.mean(expected), abs=1e-4)
+
+
+def test_directions_in_closed_form():
+    source, target = torch.tensor([1.0, 0.0, 0.0]), torch.tensor([0.0, 1.0, 0.0])
+    as_said, against = target[None], 2 * source[None] - target[None]
+    assert direction(source[None], as_said, source, target).item() == pytest.approx(1)
+    assert direction(source[None], against, source, target).item() == pytest.approx(-1)
+    assert direction(source[None], source[None], source, target).item() == 0, "nothing was edited"
+
+
+def test_scores_that_cannot_be_computed(clip):
+    with pytest.raises(ArgumentError, match="as many of the edited scene as of the original, got 1 and 2"):
+        clip_scores(clip, [image(0)], [image(0)] * 2, *TEXTS)
+    with pytest.raises(ArgumentError, match="got 0 and 0"):
+        clip_scores(clip, [], [], *TEXTS)
+    with pytest.raises(ArgumentError, match="texts: expected words in each, got an empty one"):
+        clip_scores(clip, [image(0)], [image(0)], " ", "a beetle")
+    with pytest.raises(ShapeError, match=r"text: expected \[24\], got \[12\]"):
+        similarity(torch.ones(2, 24), torch.ones(12))
+
+
+def test_long_texts_are_cut_off(clip):
+    long = "a beetle " * 30
+    assert torch.equal(clip.texts([long]), clip.texts([long + "made of stone"]))
+    assert not torch.allclose(clip.texts(["a beetle"]), clip.texts(["a beetle made of stone"]))
+
+
+def test_the_loss_of_whole_images_is_the_distance_of_features(clip):
+    style, picture = image(7, 40, 30), image(8)
+    loss = ClipLoss(clip, style)
+    assert loss(style) == pytest.approx(0, abs=1e-5)
+    expected = (clip.images(picture[None]) - clip.images(style[None])).norm()
+    assert float(loss(picture)) == pytest.approx(float(expected), rel=1e-5)
+
+
+def test_the_loss_of_cutouts_is_the_spherical_distance(clip):
+    """A picture no larger than the encoder's is its own cutout; then the formula is the release's."""
+    style, picture = image(7, 40, 30), image(8)
+    a, b = clip.images(picture[None])[0], clip.images(middle(style)[None])[0]
+    expected = 2 * asin(float((a - b).norm()) / 2) ** 2
+    assert float(ClipLoss(clip, style, "cutouts")(picture)) == pytest.approx(expected, rel=1e-4)
+    large = image(9, 80, 64)
+    first, again, other = (
+        ClipLoss(clip, style, "cutouts", torch.Generator().manual_seed(seed))(large) for seed in (1, 1, 2)
+    )
+    assert first == again
+    assert first != other
+
+
+@pytest.mark.parametrize("kind", ["whole", "cutouts"])
+def test_losses_fall_along_their_gradient(clip, kind):
+    style, picture = image(7), image(8, 48, 40).requires_grad_()
+    loss = ClipLoss(clip, style, kind, torch.Generator().manual_seed(0))
+    before = loss(picture)
+    (gradient,) = torch.autograd.grad(before, picture)
+    assert gradient.isfinite().all()
+    loss.generator.manual_seed(0)
+    assert loss(picture.detach() - 0.5 * gradient / gradient.norm()) < before
+    exact = ClipLoss(clip, style)(style.clone().requires_grad_())
+    assert exact.isfinite()
+
+
+def test_a_loss_of_an_unknown_kind(clip):
+    with pytest.raises(ArgumentError, match="kind: expected whole, or cutouts"):
+        ClipLoss(clip, image(0), "crops")
+
+
+def refused(*_, **__):
+    raise OSError("no way out")
+
+
+def test_weights_that_are_missing_or_of_another_model(folder, tmp_path, monkeypatch):
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path / "none"))
+    with pytest.raises(ArgumentError, match=r"weights: expected one of .*clip-vit-base-.*, got 'clip'"):
+        Clip.load("clip")
+    monkeypatch.setenv("HF_HOME", str(tmp_path / "hub"))
+    monkeypatch.setattr("huggingface_hub.snapshot_download", refused)
+    with pytest.raises(MissingDataError, match=r"clip-vit-large-patch14: its weights .* TEXGS_WEIGHTS"):
+        Clip.load()
+    (tmp_path / "config.json").write_text('{"model_type": "siglip"}')
+    with pytest.raises(ArgumentError, match="expected a model of type clip, got siglip"):
+        Clip.load(tmp_path)
+    (tmp_path / "config.json").write_text((folder / "config.json").read_text())
+    (tmp_path / "model.safetensors").write_bytes((folder / "model.safetensors").read_bytes()[:99])
+    with pytest.raises(ArgumentError, match="expected a clip model of transformers, got one that cannot be"):
+        Clip.load(tmp_path)

@@ -1,0 +1,228 @@
+"""Mask models on pictures whose objects are known, and weights in the formats that they come in."""
+
+import pytest
+import torch
+
+from tests.real_data import real_data
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.models.grabcut import GrabCut
+from texgs.models.masks import Remembered
+from texgs.models.sam import Sam, mobile_sam, sam_folder
+
+SIZE = 96
+
+
+def picture(*discs, size=SIZE, background=(1.0, 1.0, 1.0)):
+    """Shaded discs (x, y, radius, colour) on a plain background, and the mask of each."""
+    at = torch.arange(size) + 0.5
+    image, masks = torch.tensor(background).repeat(size, size, 1), []
+    for x, y, radius, color in discs:
+        distance = ((at[None] - x) ** 2 + (at[:, None] - y) ** 2).sqrt()
+        masks.append(distance < radius)
+        shade = (1.1 - 0.4 * distance / radius)[..., None]
+        image = torch.where(masks[-1][..., None], shade * torch.tensor(color), image)
+    return image.clamp(0, 1), masks
+
+
+def overlap(found, expected):
+    return float((found & expected).sum() / (found | expected).sum())
+
+
+def click(*points, negative=()):
+    places = torch.tensor([*points, *negative], dtype=torch.float32)
+    return places, torch.arange(len(places)) < len(points)
+
+
+YELLOW, BLUE, RED = (0.9, 0.8, 0.1), (0.1, 0.2, 0.8), (0.8, 0.1, 0.1)
+
+
+@pytest.mark.parametrize("size", [96, 700])
+def test_grabcut_finds_the_object_clicked_on_among_others_of_its_colour(size):
+    scale = size / 96
+    discs = [(x * scale, y * scale, 15 * scale, YELLOW) for x, y in ((25, 30), (65, 30), (50, 70))]
+    image, masks = picture(*discs, size=size)
+    for (x, y, _, _), mask in zip(discs, masks, strict=True):
+        assert overlap(GrabCut()(image, *click((x, y))), mask) > 0.93
+    both = GrabCut()(image, *click(discs[0][:2], discs[2][:2]))
+    assert overlap(both, masks[0] | masks[2]) > 0.93
+
+
+def test_grabcut_tells_touching_objects_apart_by_colour():
+    image, (yellow, blue) = picture((40, 48, 22, YELLOW), (62, 48, 18, BLUE))
+    found = GrabCut()(image, *click((30, 48), negative=[(64, 48)]))
+    assert overlap(found, yellow & ~blue) > 0.9
+    found = GrabCut()(image, *click((64, 48), negative=[(30, 48)]))
+    assert overlap(found, blue) > 0.9
+
+
+def test_grabcut_finds_an_object_that_fills_a_picture_without_a_plain_border():
+    generator = torch.Generator().manual_seed(0)
+    image, (mask,) = picture((48, 48, 25, RED), background=(0.2, 0.6, 0.3))
+    noisy = (image + 0.08 * torch.randn(image.shape, generator=generator)).clamp(0, 1)
+    assert overlap(GrabCut()(noisy, *click((48, 48), (40, 40))), mask) > 0.9
+
+
+def test_grabcut_gives_the_same_mask_again():
+    image, _ = picture((40, 48, 22, YELLOW), (62, 48, 18, BLUE))
+    first, second = (GrabCut()(image, *click((40, 48))) for _ in range(2))
+    assert torch.equal(first, second)
+
+
+@pytest.mark.parametrize(
+    ("points", "positive", "error", "message"),
+    [
+        ([[3.0, 3.0]], [False], ArgumentError, "points: expected a positive one at least, got none"),
+        ([[96.0, 3.0]], [True], ArgumentError, r"in the image of 96 x 96 pixels, got \(96, 3\)"),
+        ([[3.0, 3.0]], [True, True], ShapeError, r"positive: expected \[1\], got \[2\]"),
+        ([[float("nan"), 3.0]], [True], ArgumentError, "points: expected finite values"),
+    ],
+)
+def test_clicks_that_no_mask_model_takes(points, positive, error, message):
+    image, _ = picture((48, 48, 20, RED))
+    with pytest.raises(error, match=message):
+        GrabCut()(image, torch.tensor(points), torch.tensor(positive))
+
+
+def test_a_result_is_remembered_for_the_last_images():
+    asked = []
+    remembered = Remembered(lambda image: asked.append(float(image[0])) or image, most=2)
+    for value in (1.0, 1.0, 2.0, 1.0, 3.0, 2.0):
+        remembered(torch.tensor([value]))
+    assert asked == [1, 2, 3, 2], "of 1, 2 and 3 the one not asked for longest was dropped"
+
+
+def stub(best=1, size=32):
+    """A SAM whose masks are squares of sides 4, 8 and 16 of 32 around the first point; `best` is its best."""
+    asked = []
+
+    def encode(pixels):
+        asked.append(pixels)
+        return pixels
+
+    def decode(features, points, labels, several):
+        at = torch.arange(size) * 1.0
+        x, y = points[0, 0].tolist()
+        near = torch.maximum((at[None] - x).abs(), (at[:, None] - y).abs())
+        logits = torch.stack([side / 2 - near for side in (4.0, 8.0, 16.0)])
+        quality = torch.eye(3)[best]
+        return (logits, quality) if several else (logits[:1], quality[:1])
+
+    return Sam("stub", encode, decode, size), asked
+
+
+@pytest.mark.parametrize("shape", [(32, 32), (64, 32), (32, 64), (24, 16)])
+def test_masks_come_back_where_the_click_was(shape):
+    sam, asked = stub()
+    x, y = shape[1] * 0.4, shape[0] * 0.6
+    mask = sam(torch.rand(*shape, 3), *click((x, y)))
+    assert mask.shape == shape
+    rows, columns = mask.nonzero().double().add(0.5).unbind(1)
+    assert columns.mean() == pytest.approx(x, abs=0.06 * max(shape))
+    assert rows.mean() == pytest.approx(y, abs=0.06 * max(shape))
+    sides = 8 * max(shape) / 32
+    assert mask.sum() == pytest.approx(sides**2, rel=0.3)
+    assert asked[0].shape == (1, 3, 32, 32)
+
+
+def test_one_click_has_the_best_of_several_masks_and_more_clicks_have_one():
+    image = torch.rand(32, 32, 3)
+    sizes = [int(stub(best)[0](image, *click((16, 16))).sum()) for best in range(3)]
+    assert sizes == sorted(sizes)
+    assert sizes[0] < sizes[2]
+    assert int(stub(2)[0](image, *click((16, 16), (17, 17))).sum()) == sizes[0]
+
+
+def test_an_image_is_encoded_once_for_all_clicks():
+    sam, asked = stub()
+    image = torch.rand(32, 32, 3)
+    for x in (8, 16, 24):
+        sam(image, *click((x, 16)))
+        sam(image.clone(), *click((x, 16), (x, 17)))
+    assert len(asked) == 1
+    sam(torch.rand(32, 32, 3), *click((8, 16)))
+    assert len(asked) == 2
+
+
+@pytest.fixture(scope="module")
+def tiny_sam(tmp_path_factory):
+    """A folder with a random SAM of transformers, of images of 64x64."""
+    transformers = pytest.importorskip("transformers")
+    torch.manual_seed(0)
+    vision = {
+        "hidden_size": 16,
+        "num_hidden_layers": 2,
+        "num_attention_heads": 2,
+        "image_size": 64,
+        "patch_size": 16,
+        "output_channels": 32,
+        "window_size": 2,
+        "global_attn_indexes": [1],
+        "mlp_dim": 32,
+        "num_pos_feats": 16,
+    }
+    prompt = {"hidden_size": 32, "image_size": 64, "patch_size": 16, "mask_input_channels": 4}
+    decoder = {"hidden_size": 32, "mlp_dim": 32, "num_hidden_layers": 1, "num_attention_heads": 2}
+    decoder |= {"iou_head_hidden_dim": 16}
+    config = transformers.SamConfig(
+        vision_config=vision, prompt_encoder_config=prompt, mask_decoder_config=decoder
+    )
+    folder = tmp_path_factory.mktemp("weights") / "tiny-sam"
+    transformers.SamModel(config).save_pretrained(folder)
+    return folder
+
+
+def test_a_sam_folder_agrees_with_the_pipeline_of_transformers(tiny_sam):
+    from transformers import SamModel
+    from transformers.models.sam.image_processing_pil_sam import SamImageProcessorPil
+
+    image, _ = picture((20, 30, 12, RED), (44, 30, 12, BLUE), size=64)
+    image = (image * 255).round() / 255
+    points = torch.tensor([[20.0, 30.0], [30.0, 40.0]])
+    processor = SamImageProcessorPil(size={"longest_edge": 64}, pad_size={"height": 64, "width": 64})
+    pixels = processor((image * 255).byte().numpy(), return_tensors="pt")["pixel_values"]
+    sam = sam_folder(tiny_sam)
+    torch.testing.assert_close(sam.prepared(image), pixels.float(), atol=1e-5, rtol=1e-5)
+    model = SamModel.from_pretrained(tiny_sam).eval()
+    with torch.no_grad():
+        found = model(
+            pixel_values=pixels.float(),
+            input_points=points[None, None] - 0.5,
+            input_labels=torch.tensor([[[1, 0]]]),
+            multimask_output=False,
+        )
+    logits = torch.nn.functional.interpolate(found.pred_masks[0], (64, 64), mode="bilinear")[0, 0]
+    assert torch.equal(sam(image, points, torch.tensor([True, False])), logits > 0)
+
+
+def test_folders_that_hold_no_sam(tiny_sam, tmp_path):
+    with pytest.raises(ArgumentError, match=r"config\.json: no such file"):
+        sam_folder(tmp_path)
+    (tmp_path / "config.json").write_text('{"model_type": "clip"}')
+    with pytest.raises(ArgumentError, match="expected a model of type sam, got clip"):
+        sam_folder(tmp_path)
+    (tmp_path / "config.json").write_text((tiny_sam / "config.json").read_text())
+    with pytest.raises(
+        ArgumentError, match="expected a sam model of transformers, got one that cannot be read"
+    ):
+        sam_folder(tmp_path)
+    (tmp_path / "model.safetensors").write_bytes((tiny_sam / "model.safetensors").read_bytes()[:1000])
+    with pytest.raises(ArgumentError, match="got one that cannot be read"):
+        sam_folder(tmp_path)
+
+
+def test_mobile_sam_without_its_weights(tmp_path):
+    pytest.importorskip("kornia")
+    with pytest.raises(ArgumentError, match=r"none\.pt: no such file"):
+        mobile_sam(tmp_path / "none.pt")
+    torch.save({"weight": torch.zeros(2)}, tmp_path / "other.pt")
+    with pytest.raises(ArgumentError, match=r"other\.pt: expected the weights of MobileSAM, got others"):
+        mobile_sam(tmp_path / "other.pt")
+
+
+def test_mobile_sam_finds_the_disc_clicked_on():
+    pytest.importorskip("kornia")
+    path = real_data("weights/mobile_sam.pt")
+    image, masks = picture((30, 30, 16, YELLOW), (70, 40, 14, BLUE), (45, 74, 14, RED))
+    sam = mobile_sam(path)
+    for (x, y), mask in zip(((30, 30), (70, 40), (45, 74)), masks, strict=True):
+        assert overlap(sam(image, *click((x, y))), mask) > 0.9

@@ -1,0 +1,52 @@
+"""Models of transformers from folders in its format, with errors that say what is wrong with a folder."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
+from texgs.models.tensors import first_line
+
+DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
+
+
+def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[Any]:
+    """What classes of transformers read from a folder; networks come frozen, in float32 and ready to use.
+
+    Nothing is downloaded.
+
+    Args:
+        folder: with config.json, and weights as safetensors.
+        kind: the model_type of config.json, such as "clip".
+        names: of classes of transformers that can be read from a folder.
+
+    Raises:
+        ArgumentError: if transformers is missing, or the folder holds another model or a damaged one.
+    """
+    try:
+        import transformers
+    except ImportError as error:
+        raise ArgumentError(
+            f"{folder}: expected transformers, which is not installed; pip install transformers"
+        ) from error
+    from safetensors import SafetensorError
+
+    folder = Path(folder)
+    found = read_json(folder / "config.json").get("model_type")
+    if found != kind:
+        raise ArgumentError(f"{folder}: expected a model of type {kind}, got {found}")
+    try:
+        read = [getattr(transformers, name).from_pretrained(folder, local_files_only=True) for name in names]
+    except (*DAMAGE, SafetensorError) as error:
+        raise ArgumentError(
+            f"{folder}: expected a {kind} model of transformers, got one that cannot be read "
+            f"({first_line(error)}); copy or download it again"
+        ) from error
+    for part in read:
+        if isinstance(part, torch.nn.Module):
+            part.float().eval().requires_grad_(False)
+    return read
