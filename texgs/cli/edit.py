@@ -15,7 +15,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
         "diffuse, specular, shininess (factors) or texture (a file); light=headlight or light=AZIMUTH,POLAR; "
-        "background=#rrggbb; MODEL.KEY= takes an edit back",
+        "background=#rrggbb; MODEL.KEY= takes an edit back; MODEL/SEGMENT.KEY=VALUE edits a segment, "
+        "MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= removes it",
     )
     parser.add_argument("--output", type=Path, required=True, help="the new scene.yaml")
 
@@ -50,18 +51,45 @@ def apply(values: dict[str, Any], word: str, folder: Path) -> None:
     key, is_edit, text = word.partition("=")
     if not is_edit:
         raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
-    table = values
-    if "." in key:
-        name, _, key = key.rpartition(".")
-        if name not in values["models"]:
-            raise ArgumentError(f"expected a model of the scene ({', '.join(values['models'])}), got {name}")
-        table = values["models"][name]
+    table, key = place(values, key, is_new=text != "")
     if text == "":
         table.pop(key, None)
     elif key in ("file", "texture"):
         table[key] = file(text, folder)
     else:
         table[key] = light(text) if key == "light" else plain(text)
+
+
+def place(values: dict[str, Any], key: str, is_new: bool) -> tuple[dict[str, Any], str]:
+    """The table of a scene's plain values that a key is in, and the key there.
+
+    MODEL/SEGMENT is the file of a segment where one is given (`is_new`), else the segment itself.
+
+    Raises:
+        ArgumentError: if there is no such model or segment.
+    """
+    from texgs.core.errors import ArgumentError
+
+    models = values["models"]
+    name, dot, last = key.rpartition(".")
+    if name in models:
+        return models[name], last
+    if not dot and "/" not in key:
+        return values, key
+    name, slash, rest = key.rpartition("/")  # names of models may have both marks, those of segments none
+    if not slash or name not in models:
+        raise ArgumentError(
+            f"expected a model of the scene ({', '.join(models)}), got {name or key.rpartition('.')[0]}"
+        )
+    segments = {str(found): entry for found, entry in models[name].get("segments", {}).items()}
+    models[name]["segments"] = segments
+    segment, dot, last = rest.partition(".")
+    if is_new and not dot:
+        return segments.setdefault(segment, {}), "file"
+    if segment not in segments:
+        known = ", ".join(segments) or "it has none"
+        raise ArgumentError(f"expected a segment of {name} ({known}), got {segment}")
+    return (segments[segment], last) if dot else (segments, segment)
 
 
 def file(text: str, folder: Path) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Literal, get_args
 
 import torch
@@ -16,6 +17,7 @@ from texgs.raster.shading import blinn_phong_texture
 from texgs.scene.edits import Edit
 from texgs.scene.model import MATERIAL, Model, geometry, material
 from texgs.scene.render import light_direction, viewer
+from texgs.scene.segment import labels_of
 from texgs.volume.view_set import Light
 
 Look = Literal["shaded", "unshaded", "ambient", "diffuse", "specular", "shininess"]
@@ -23,20 +25,29 @@ Look = Literal["shaded", "unshaded", "ambient", "diffuse", "specular", "shinines
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """What edits and lights change of one model, ready for use."""
+    """What edits and lights change of one model, ready for use.
+
+    Its methods take the edit of what no segment holds, and one for each segment behind it.
+    """
 
     model: Model
     colors: Tensor  # [N, 3] offsets from the palette
     palette: Tensor | None  # [3]; None without texture
     material: Mapping[str, Tensor]  # factors, [N] or [1]
     opacities: Tensor  # [N]
+    segments: int = 0
+    labels: Tensor | None = None  # [N] number of the segment, 0 for none; None without segments
 
     @classmethod
-    def of(cls, model: Model) -> Part:
+    def of(cls, model: Model, masks: Sequence[Tensor] = ()) -> Part:
         """The part of a relightable model.
 
+        Args:
+            model: of stage shading or texture.
+            masks: [N] bool of its segments; of two that overlap, the first has the surfel.
+
         Raises:
-            ArgumentError: if the model has no shading yet.
+            ArgumentError, ShapeError: if the model has no shading yet, or a mask is not one of it.
         """
         if model.stage == "surfels":
             raise ArgumentError(
@@ -44,30 +55,45 @@ class Part:
             )
         p = model.parameters
         factors = material(p, model.optics.material)
-        return cls(model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid())
+        labels = labels_of(masks, len(model)) if masks else None
+        return cls(
+            model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid(), len(masks), labels
+        )
 
-    def colored(self, edit: Edit) -> Tensor:
+    def per_surfel(self, values: Sequence[float]) -> float | Tensor:
+        """The value of each surfel's edit [N]; a plain number where all are the same."""
+        if self.labels is None or all(value == values[0] for value in values):
+            return values[0]
+        return self.opacities.new_tensor(values)[self.labels]
+
+    def colored(self, edits: Sequence[Edit]) -> Tensor:
         """c_ind without texels [N, 3].
 
         Raises:
             ArgumentError: if a colour is given to a model without a palette.
         """
         if self.palette is None:
-            if edit.palette is not None:
+            if any(edit.palette is not None for edit in edits):
                 raise ArgumentError("palette: expected a model with a texture; fit its texture first")
             return self.colors
-        palette = self.palette if edit.palette is None else self.palette.new_tensor(edit.palette)
-        return self.colors + palette
+        fitted = self.palette
+        palettes = [fitted if edit.palette is None else fitted.new_tensor(edit.palette) for edit in edits]
+        if self.labels is None or all(edit.palette == edits[0].palette for edit in edits):
+            return self.colors + palettes[0]
+        return self.colors + torch.stack(palettes)[self.labels]
 
-    def factors(self, edit: Edit) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """k_a, k_d, k_s and beta with the edit's factors."""
-        a, d, s, b = (self.material[name] * getattr(edit, name) for name in MATERIAL)
+    def factors(self, edits: Sequence[Edit]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """k_a, k_d, k_s and beta with the edits' factors."""
+        a, d, s, b = (
+            self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
+            for name in MATERIAL
+        )
         return a, d, s, b
 
-    def look(self, edit: Edit, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
+    def look(self, edits: Sequence[Edit], camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Base [N, 3] and gain [N]: colour of a fragment is base + gain * texel."""
         p, optics, n = self.model.parameters, self.model.optics, len(self.model)
-        colors, (a, d, s, b) = self.colored(edit), self.factors(edit)
+        colors, (a, d, s, b) = self.colored(edits), self.factors(edits)
         if look == "unshaded":
             return colors, torch.ones_like(self.opacities)
         if look != "shaded":
@@ -79,9 +105,10 @@ class Part:
         )
         return base.clamp(0, 1), gain
 
-    def opacity(self, edit: Edit) -> Tensor:
-        """Opacities [N] with the edit's factor; 0 where the model is hidden, so that nothing is drawn."""
-        return (self.opacities * (edit.opacity if edit.visible else 0.0)).clamp_max(1)
+    def opacity(self, edits: Sequence[Edit]) -> Tensor:
+        """Opacities [N] with the edits' factors; 0 where surfels are hidden, so that nothing is drawn."""
+        factor = self.per_surfel([edit.opacity if edit.visible else 0.0 for edit in edits])
+        return (self.opacities * factor).clamp_max(1)
 
 
 class Composition:
@@ -89,12 +116,14 @@ class Composition:
 
     Args:
         models: relightable, with or without texture, all with the same low-pass filter.
+        segments: of each model the masks [N] bool of its segments; by default there are none.
 
     Raises:
-        ArgumentError: if there is no model, one has no shading, or their filters differ.
+        ArgumentError, ShapeError: if there is no model, one has no shading, their filters differ, or a mask
+            is not one of its model.
     """
 
-    def __init__(self, models: Sequence[Model]) -> None:
+    def __init__(self, models: Sequence[Model], segments: Sequence[Sequence[Tensor]] | None = None) -> None:
         if not models:
             raise ArgumentError("models: expected at least one, got none")
         passes = sorted({model.optics.low_pass for model in models})
@@ -102,7 +131,8 @@ class Composition:
             raise ArgumentError(
                 f"models: expected one low_pass, got {' and '.join(map(str, passes))}; fit them by one recipe"
             )
-        self.parts = [Part.of(model) for model in models]
+        masks = [()] * len(models) if segments is None else segments
+        self.parts = [Part.of(model, own) for model, own in zip(models, masks, strict=True)]
         self.options = models[0].optics.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
@@ -127,21 +157,19 @@ class Composition:
         Args:
             camera: on the models' device.
             light: shines on all models.
-            edits: one for each model; by default nothing is changed.
+            edits: one for each model, and behind it one for each of its segments; by default nothing is
+                changed.
             look: what colour shows: with light, without, or one factor of the material.
             background: [3]; white by default, for a factor black.
             outputs: of the rasterizer.
 
         Raises:
-            ArgumentError: if the number of edits is not that of models, or one cannot be applied.
+            ArgumentError: if there are not as many edits as models and segments, or one cannot be applied.
         """
-        edits = [Edit()] * len(self.parts) if edits is None else edits
-        if len(edits) != len(self.parts):
-            raise ArgumentError(f"edits: expected one for each of {len(self.parts)} models, got {len(edits)}")
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
-        pairs = list(zip(self.parts, edits, strict=True))
-        looks = [part.look(edit, camera, light, look) for part, edit in pairs]
+        pairs = list(zip(self.parts, by_part(self.parts, edits), strict=True))
+        looks = [part.look(own, camera, light, look) for part, own in pairs]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
         if background is None:
             background = self.means.new_full((3,), float(look in ("shaded", "unshaded")))
@@ -149,7 +177,7 @@ class Composition:
             self.means,
             self.quats,
             self.scales,
-            torch.cat([part.opacity(edit) for part, edit in pairs]),
+            torch.cat([part.opacity(own) for part, own in pairs]),
             camera.viewmat,
             camera.K,
             camera.width,
@@ -159,6 +187,21 @@ class Composition:
             outputs=outputs,
             options=self.options,
         )
+
+
+def by_part(parts: Sequence[Part], edits: Sequence[Edit] | None) -> list[Sequence[Edit]]:
+    """The edits of each part: of what no segment holds, and of each segment. None changes nothing.
+
+    Raises:
+        ArgumentError: if their number is not that of models and segments.
+    """
+    counts = [1 + part.segments for part in parts]
+    edits = [Edit()] * sum(counts) if edits is None else edits
+    if len(edits) != sum(counts):
+        segments = sum(counts) - len(parts)
+        more = f" and {segments} segments" if segments else ""
+        raise ArgumentError(f"edits: expected one for each of {len(parts)} models{more}, got {len(edits)}")
+    return [edits[end - count : end] for count, end in zip(counts, accumulate(counts), strict=True)]
 
 
 def joined_textures(models: Sequence[Model]) -> tuple[Tensor, Tensor, Tensor]:

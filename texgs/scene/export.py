@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.scene.composition import Part
+from texgs.scene.composition import Part, by_part
 from texgs.scene.edits import Edit
 from texgs.scene.model import Model, geometry
 from texgs.scene.ply import Y00
@@ -25,17 +25,15 @@ def joined(parts: Sequence[Part], edits: Sequence[Edit]) -> Model:
 
     Args:
         parts: of a `Composition`.
-        edits: one for each; palette, opacity and visibility count.
+        edits: one for each, and behind it those of its segments; palette, opacity and visibility count.
 
     Returns:
         A model with one harmonic, that of the colour without light (palette + offset + mean texel).
 
     Raises:
-        ArgumentError: if nothing is visible, or the number of edits is not that of parts.
+        ArgumentError: if nothing is visible, or the number of edits is not that of parts and segments.
     """
-    if len(edits) != len(parts):
-        raise ArgumentError(f"edits: expected one for each of {len(parts)} models, got {len(edits)}")
-    found = [_surfels(part, edit) for part, edit in zip(parts, edits, strict=True)]
+    found = [_surfels(part, own) for part, own in zip(parts, by_part(parts, edits), strict=True)]
     together = {name: torch.cat([each[name] for each in found]) for name in found[0]}
     if not len(together["means"]):
         raise ArgumentError("models: expected at least one visible surfel, got none; show a model")
@@ -81,13 +79,13 @@ def fill(vertices: np.ndarray, places: Tensor, colors: Tensor) -> None:
             vertices[name] = column
 
 
-def _surfels(part: Part, edit: Edit) -> dict[str, Tensor]:
+def _surfels(part: Part, edits: Sequence[Edit]) -> dict[str, Tensor]:
     """Raw parameters of a part's visible surfels."""
     p = part.model.parameters
-    colors = part.colored(edit).double()
+    colors = part.colored(edits).double()
     if "texels" in p:
         colors = colors + mean_texels(p)
-    opacities = part.opacity(edit)
+    opacities = part.opacity(edits)
     found = {
         **{name: p[name] for name in ("means", "quats", "scales")},
         "opacities": opacities.clamp_max(MOST_OPAQUE).logit(),

@@ -40,7 +40,7 @@ def frame(
         scene: to show.
         camera: from where; moved to the scene's device.
         light: shines on it.
-        edits: one for each model.
+        edits: one for each model, and behind it those of its segments.
         mode: what to show.
         background: behind it.
 

@@ -4,36 +4,76 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
 import torch
 import yaml
+from torch import Tensor
 
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
 from texgs.scene.compact import open_model
 from texgs.scene.composition import Composition
 from texgs.scene.edits import Edit, color, is_number
+from texgs.scene.model import Model
+from texgs.scene.segment import labels_of, with_variants
+from texgs.scene.segment_file import read_segment
 from texgs.scene.texture_file import with_texture
 from texgs.volume.view_set import Light
 
 VERSION = 1
 KEYS = ("texgs-scene", "light", "background", "models")
 EDITS = tuple(each.name for each in fields(Edit))
-MODEL_KEYS = ("file", "texture", *EDITS)
+SEGMENT_KEYS = ("file", "texture", *EDITS)
+MODEL_KEYS = (*SEGMENT_KEYS, "segments")
+RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
 WHITE = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
+class SceneSegment:
+    """Surfels of a model that are edited on their own: the model's edit does not count for them."""
+
+    file: Path  # mask of surfels, see `write_segment`
+    edit: Edit = field(default_factory=Edit)
+    texture: Path | None = None  # variant of the whole model, of which these surfels take their texels
+
+
+@dataclass(frozen=True)
 class SceneModel:
-    """One model of a scene."""
+    """One model of a scene.
+
+    Segments have an order: a surfel that two of them hold belongs to the first.
+    """
 
     file: Path  # lossless or compact
-    edit: Edit = field(default_factory=Edit)
+    edit: Edit = field(default_factory=Edit)  # of what no segment holds
     texture: Path | None = None  # variant in place of the model's own texels
+    segments: Mapping[str, SceneSegment] = field(default_factory=dict)
+
+    def open(self) -> tuple[Model, list[Tensor]]:
+        """The model with the texels of all variants, and the masks [N] of its segments.
+
+        Raises:
+            ArgumentError, ShapeError: naming the file.
+        """
+        fitted = open_model(self.file)
+        model = fitted if self.texture is None else with_texture(fitted, self.texture)
+        masks, texels = [], []
+        for name, segment in self.segments.items():
+            try:
+                masks.append(read_segment(segment.file, fitted))
+                own = fitted if segment.texture is None else with_texture(fitted, segment.texture)
+            except TexgsError as error:
+                raise type(error)(f"segments.{name}: {error}") from error
+            if "texels" in own.parameters:
+                texels.append(own.parameters["texels"])
+        if texels:
+            model = with_variants(model, labels_of(masks, len(model)), texels)
+        return model, masks
 
 
 @dataclass(frozen=True)
@@ -50,8 +90,11 @@ class Scene:
 
     @property
     def edits(self) -> list[Edit]:
-        """Of all models."""
-        return [model.edit for model in self.models.values()]
+        """Of all models; behind the edit of a model those of its segments."""
+        edits = []
+        for model in self.models.values():
+            edits += [model.edit, *(segment.edit for segment in model.segments.values())]
+        return edits
 
     def open(self, device: torch.device | str = "cpu") -> Composition:
         """Read and join the models.
@@ -59,16 +102,15 @@ class Scene:
         Raises:
             ArgumentError, ShapeError: naming the model and its file.
         """
-        found = []
+        models, segments = [], []
         for name, entry in self.models.items():
             try:
-                model = open_model(entry.file)
-                found.append(
-                    (model if entry.texture is None else with_texture(model, entry.texture)).to(device)
-                )
+                model, masks = entry.open()
             except TexgsError as error:
                 raise type(error)(f"models.{name}: {error}") from error
-        return Composition(found)
+            models.append(model.to(device))
+            segments.append([mask.to(device) for mask in masks])
+        return Composition(models, segments)
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -131,12 +173,8 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
 
     models = {}
     for name, entry in scene.models.items():
-        plain = asdict(Edit())
-        changed = {key: value for key, value in asdict(entry.edit).items() if value != plain[key]}
-        if "palette" in changed:
-            changed["palette"] = list(changed["palette"])
-        variant = {} if entry.texture is None else {"texture": relative(entry.texture)}
-        models[name] = {"file": relative(entry.file), **variant, **changed}
+        segments = {key: _plain(segment, relative) for key, segment in entry.segments.items()}
+        models[name] = _plain(entry, relative) | ({"segments": segments} if segments else {})
     light: Any = "headlight"
     if scene.light.kind == "directional":
         light = {"azimuth": scene.light.azimuth, "polar": scene.light.polar}
@@ -145,10 +183,34 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
     return write_bytes(path, text.encode())
 
 
+def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) -> dict[str, Any]:
+    """File, texture and what is edited, as a scene file has them."""
+    unedited = asdict(Edit())
+    changed = {key: value for key, value in asdict(entry.edit).items() if value != unedited[key]}
+    if "palette" in changed:
+        changed["palette"] = list(changed["palette"])
+    variant = {} if entry.texture is None else {"texture": relative(entry.texture)}
+    return {"file": relative(entry.file), **variant, **changed}
+
+
 def _model(where: str, values: Any, folder: Path) -> SceneModel:
     known(values, MODEL_KEYS, where)
+    entries = values.get("segments", {})
+    known(entries, None, f"{where}.segments")
+    segments = {}
+    for name, entry in entries.items():
+        if not str(name) or any(mark in str(name) for mark in RESERVED):
+            raise ArgumentError(
+                f"{where}.segments: expected names without {' '.join(RESERVED)}, got {name!r}"
+            )
+        known(entry, SEGMENT_KEYS, f"{where}.segments.{name}")
+        segments[str(name)] = SceneSegment(*_entry(f"{where}.segments.{name}", entry, folder, "a segment"))
+    return SceneModel(*_entry(where, values, folder, "a model"), segments)
+
+
+def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Edit, Path | None]:
     if not isinstance(values.get("file"), str):
-        raise ArgumentError(f"{where}.file: expected the path of a model, got {values.get('file')!r}")
+        raise ArgumentError(f"{where}.file: expected the path of {kind}, got {values.get('file')!r}")
     texture = values.get("texture")
     if texture is not None and not isinstance(texture, str):
         raise ArgumentError(f"{where}.texture: expected the path of a texture variant, got {texture!r}")
@@ -156,7 +218,7 @@ def _model(where: str, values: Any, folder: Path) -> SceneModel:
         edit = Edit(**{key: value for key, value in values.items() if key in EDITS})
     except ArgumentError as error:
         raise ArgumentError(f"{where}.{error}") from error
-    return SceneModel(folder / values["file"], edit, None if texture is None else folder / texture)
+    return folder / values["file"], edit, None if texture is None else folder / texture
 
 
 def _light(value: Any) -> Light:

@@ -1,0 +1,217 @@
+"""Segments of models: pictures of edited segments against models that were split by hand."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+import yaml
+from safetensors.torch import load_file, save_file
+from torch.testing import assert_close
+
+from tests.scene.samples import sample
+from tests.scene.test_composition import CAMERA, OUTPUTS, SIDE, ball
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.scene.compact import write_compact
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.export import joined
+from texgs.scene.model import Model
+from texgs.scene.model_file import write_model
+from texgs.scene.scene_file import Scene, SceneModel, SceneSegment, read_scene, write_scene
+from texgs.scene.segment import labels_of, with_variants
+from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.texture_file import write_texture
+
+HALF = torch.arange(150) % 2 == 0
+TENTH = torch.arange(150) < 15
+
+
+def only(model, mask):
+    """The surfels of a mask as a model of their own; the list of texels stays whole."""
+    p = dict(model.parameters)
+    for name in ("means", "quats", "scales", "opacities", "colors", "sizes", "offsets"):
+        p[name] = p[name][mask]
+    for name in ("ambient", "diffuse", "specular", "shininess"):
+        p[name] = p[name] if len(p[name]) == 1 else p[name][mask]
+    return Model(p, model.optics)
+
+
+def with_texels(model, texels):
+    return replace(model, parameters={**model.parameters, "texels": texels})
+
+
+@pytest.mark.parametrize("shared", [True, False])
+@pytest.mark.parametrize("edit", [Edit(), Edit(palette=(0.3, 0.2, 0.9), opacity=0.5, shininess=2.0)])
+def test_the_same_edit_everywhere_is_the_edit_of_the_model_bit_for_bit(shared, edit):
+    models = [ball(1, shared=shared), ball(2, middle=0.2)]
+    plain = Composition(models).render(CAMERA, SIDE, [edit, Edit()], outputs=OUTPUTS)
+    scene = Composition(models, [[HALF, TENTH], []])
+    found = scene.render(CAMERA, SIDE, [edit, edit, edit, Edit()], outputs=OUTPUTS)
+    for name in ("color", "alpha", *OUTPUTS):
+        assert torch.equal(getattr(found, name), getattr(plain, name)), name
+    if edit == Edit():
+        assert torch.equal(scene.render(CAMERA, SIDE).color, plain.color)
+
+
+def test_segments_are_edited_as_models_of_their_own():
+    """The scene that has each segment as a separate model is the oracle."""
+    model, other = ball(1, shared=False), ball(2, middle=0.2)
+    third = TENTH & ~HALF  # what the first segment left of the second
+    edits = [
+        Edit(palette=(1, 0, 0), opacity=0.7),
+        Edit(opacity=0.3, diffuse=1.5),
+        Edit(palette=(0, 0, 1), ambient=0.5, specular=3, shininess=0.25),
+        Edit(diffuse=0.5),
+    ]
+    split = [only(model, ~HALF & ~third), only(model, HALF), only(model, third), other]
+    expected = Composition(split).render(CAMERA, SIDE, edits)
+    found = Composition([model, other], [[HALF, TENTH], []]).render(CAMERA, SIDE, edits)
+    assert_close(found.color, expected.color, atol=1e-5, rtol=0)
+    assert_close(found.alpha, expected.alpha, atol=1e-5, rtol=0)
+
+
+def test_hiding_a_segment_is_removing_it():
+    model = ball(3)
+    found = Composition([model], [[HALF]]).render(CAMERA, SIDE, [Edit(), Edit(visible=False)])
+    assert torch.equal(found.color, Composition([only(model, ~HALF)]).render(CAMERA, SIDE).color)
+    alone = Composition([model], [[HALF]]).render(CAMERA, SIDE, [Edit(visible=False), Edit()])
+    assert torch.equal(alone.color, Composition([only(model, HALF)]).render(CAMERA, SIDE).color)
+
+
+def test_the_first_segment_keeps_what_two_hold():
+    first, second = torch.tensor([[1, 1, 0, 0], [0, 1, 1, 0]]).bool()
+    assert labels_of([first, second], 4).tolist() == [1, 1, 2, 0]
+    assert labels_of([second, first], 4).tolist() == [2, 1, 1, 0]
+
+
+def test_texels_of_variants_go_to_their_surfels():
+    model = ball(4)
+    p = model.parameters
+    styles = [p["texels"] + 1, p["texels"] + 2]
+    found = with_variants(model, labels_of([HALF, TENTH], 150), styles).parameters["texels"]
+    for surfel in range(150):
+        own = slice(int(p["offsets"][surfel]), int(p["offsets"][surfel] + p["sizes"][surfel].prod()))
+        added = 1 if HALF[surfel] else 2 if TENTH[surfel] else 0
+        assert torch.equal(found[own], p["texels"][own] + added)
+    assert with_variants(model, labels_of([HALF], 150), [p["texels"]]) is model, "nothing is copied"
+
+
+def test_what_other_programs_read_has_the_edits_of_segments():
+    model = ball(5)
+    scene = Composition([model], [[HALF]])
+    split = Composition([only(model, ~HALF), only(model, HALF)])
+    edits = [Edit(palette=(0, 1, 0)), Edit(opacity=0.5)]
+    found, expected = joined(scene.parts, edits), joined(split.parts, edits)
+    for mask, part in ((~HALF, slice(75)), (HALF, slice(75, 150))):
+        for name, values in found.parameters.items():
+            assert torch.equal(values[mask], expected.parameters[name][part]), name
+
+
+@pytest.mark.parametrize(
+    ("masks", "edits", "error", "message"),
+    [
+        ([HALF[:9]], None, ShapeError, r"segment: expected \[150\], got \[9\]"),
+        ([HALF.float()], None, ArgumentError, "segment: expected a mask of type bool, got torch.float32"),
+        ([HALF], [Edit()], ArgumentError, "one for each of 1 models and 1 segments, got 1"),
+    ],
+)
+def test_segments_that_do_not_fit(masks, edits, error, message):
+    with pytest.raises(error, match=message):
+        Composition([ball(1)], [masks]).render(CAMERA, SIDE, edits)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A model, two segments of it and a style of it."""
+    model = ball(1)
+    write_model(tmp_path / "model.safetensors", model)
+    write_segment(tmp_path / "half.safetensors", model, HALF, {"clicks": [[1, 2]]})
+    write_segment(tmp_path / "tenth.safetensors", model, TENTH)
+    write_texture(tmp_path / "style.safetensors", with_texels(model, 1 - model.parameters["texels"]))
+    return tmp_path
+
+
+def scene_in(folder, **segments):
+    return Scene({"TF01": SceneModel(folder / "model.safetensors", segments=segments)})
+
+
+def test_a_scene_with_segments_is_saved_and_opened(folder):
+    styled = SceneSegment(folder / "half.safetensors", Edit(opacity=0.5), folder / "style.safetensors")
+    plain = SceneSegment(folder / "tenth.safetensors")
+    path = write_scene(folder / "scenes" / "scene.yaml", scene_in(folder, shell=styled, core=plain))
+    values = yaml.safe_load(path.read_text())["models"]["TF01"]["segments"]
+    assert values["core"] == {"file": "../tenth.safetensors"}, "only what is edited"
+    scene = read_scene(path)
+    assert list(scene.models["TF01"].segments) == ["shell", "core"]
+    assert scene.edits == [Edit(), Edit(opacity=0.5), Edit()]
+    model = ball(1)
+    style = with_texels(model, 1 - model.parameters["texels"])
+    split = [only(model, ~HALF & ~TENTH), only(style, HALF), only(model, TENTH & ~HALF)]
+    expected = Composition(split).render(CAMERA, edits=scene.edits)
+    assert_close(scene.open().render(CAMERA, edits=scene.edits).color, expected.color, atol=1e-5, rtol=0)
+
+
+def test_a_segment_without_a_variant_has_the_texels_of_the_model(folder):
+    scene = scene_in(folder, shell=SceneSegment(folder / "half.safetensors"))
+    entry = replace(scene.models["TF01"], texture=folder / "style.safetensors")
+    model = ball(1)
+    style = with_texels(model, 1 - model.parameters["texels"])
+    expected = Composition([only(style, ~HALF), only(model, HALF)]).render(CAMERA).color
+    assert_close(Scene({"TF01": entry}).open().render(CAMERA).color, expected, atol=1e-5, rtol=0)
+
+
+def test_a_segment_outlives_an_exchange_of_formats(folder):
+    compact = write_compact(folder / "model.texgs", ball(1))
+    entry = SceneModel(compact, segments={"shell": SceneSegment(folder / "half.safetensors")})
+    assert torch.equal(Scene({"TF01": entry}).open().parts[0].labels, HALF.long())
+
+
+@pytest.mark.parametrize("model", [ball(2), ball(1, n=151), sample("texture", 7), sample("shading", 0)])
+def test_a_segment_of_another_model(folder, model):
+    with pytest.raises(ArgumentError, match="expected a segment of this model, got one of another with 150"):
+        read_segment(folder / "half.safetensors", model)
+    write_model(folder / "model.safetensors", model)
+    with pytest.raises(ArgumentError, match=r"models\.TF01: segments\.shell: .*half\.safetensors"):
+        scene_in(folder, shell=SceneSegment(folder / "half.safetensors")).open()
+
+
+def test_masks_that_are_not_written(tmp_path):
+    for mask in (torch.zeros(150, dtype=torch.bool), HALF.float()):
+        with pytest.raises(ArgumentError, match="expected a mask of type bool that holds a surfel"):
+            write_segment(tmp_path / "x.safetensors", ball(1), mask)
+    assert not (tmp_path / "x.safetensors").exists()
+
+
+def test_files_that_are_no_segment(folder):
+    for name in ("model.safetensors", "style.safetensors"):
+        with pytest.raises(ArgumentError, match="expected a texgs-segment file, got safetensors of another"):
+            read_segment(folder / name, ball(1))
+    with pytest.raises(ArgumentError, match="no such file"):
+        read_segment(folder / "none", ball(1))
+    damaged = folder / "damaged.safetensors"
+    damaged.write_bytes((folder / "half.safetensors").read_bytes()[:60])
+    with pytest.raises(ArgumentError, match="expected a texgs-segment file, got"):
+        read_segment(damaged, ball(1))
+    tensors = load_file(folder / "half.safetensors")
+    save_file({**tensors, "mask": tensors["mask"].float()}, damaged, {"texgs-segment": "{}"})
+    with pytest.raises(ArgumentError, match="expected a mask and anchors"):
+        read_segment(damaged, ball(1))
+
+
+@pytest.mark.parametrize(
+    ("segments", "message"),
+    [
+        ([1], r"models.TF01.segments: expected a table of keys and values, got \[1\]"),
+        ({"a.b": {"file": "x"}}, "models.TF01.segments: expected names without / . =, got 'a.b'"),
+        ({"a": {}}, "models.TF01.segments.a.file: expected the path of a segment, got None"),
+        ({"a": {"file": "x", "opasity": 1}}, "segments.a: no such key 'opasity', did you mean opacity?"),
+        ({"a": {"file": "x", "opacity": -1}}, "models.TF01.segments.a.opacity: expected a factor from 0"),
+    ],
+)
+def test_a_mistake_in_a_segment_is_named_with_its_place(folder, segments, message):
+    path = write_scene(folder / "scene.yaml", scene_in(folder))
+    values = yaml.safe_load(path.read_text())
+    values["models"]["TF01"]["segments"] = segments
+    path.write_text(yaml.safe_dump(values))
+    with pytest.raises(ArgumentError, match=message):
+        read_scene(path)

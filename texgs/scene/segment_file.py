@@ -1,0 +1,92 @@
+"""Files of segments: which surfels of a basic model belong to one, and enough to know the model by."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_bytes
+from texgs.scene.model import Model
+
+FORMAT = "texgs-segment"
+VERSION = 1
+ANCHORS = 64  # surfels whose place a file keeps, spread over the list
+TOLERANCE = 1e-3  # of the model's extent: places survive exchange in other formats, another fit is elsewhere
+
+
+def write_segment(
+    path: str | Path, model: Model, mask: Tensor, metadata: Mapping[str, Any] | None = None
+) -> Path:
+    """Write a segment in one step: a safetensors file with `mask` [N] and `anchors`, places of some surfels.
+
+    Args:
+        path: target.
+        model: of any stage, that the mask belongs to.
+        mask: [N] bool.
+        metadata: JSON, such as the clicks that it came from.
+
+    Raises:
+        ArgumentError, ShapeError: if the mask is not one of this model or empty, or the file cannot be
+            written.
+    """
+    from safetensors.torch import save
+
+    check.shape("mask", mask, "N", N=len(model))
+    if mask.dtype != torch.bool or not bool(mask.any()):
+        raise ArgumentError(
+            f"{path}: expected a mask of type bool that holds a surfel, got {mask.dtype} with "
+            f"{int(mask.count_nonzero())}"
+        )
+    header = {FORMAT: json.dumps({"version": VERSION, "metadata": dict(metadata or {})}, allow_nan=False)}
+    tensors = {"mask": mask.cpu().contiguous(), "anchors": _anchors(model)}
+    return write_bytes(path, save(tensors, header))
+
+
+def read_segment(path: str | Path, model: Model) -> Tensor:
+    """The mask [N] bool of a segment, on the model's device.
+
+    Raises:
+        ArgumentError: if the file is missing, of another kind, or of another model.
+    """
+    found = _read(Path(path))
+    mask, anchors, expected = found["mask"], found["anchors"], _anchors(model)
+    # A model without surfels has no places; segments of it are empty, and refused when they are written.
+    extent = float((expected.amax(0) - expected.amin(0)).max()) if len(expected) else 0.0
+    belongs = len(mask) == len(model) and anchors.shape == expected.shape
+    if not belongs or bool(((anchors - expected).abs() > TOLERANCE * extent).any()):
+        raise ArgumentError(
+            f"{path}: expected a segment of this model, got one of another with {len(mask)} surfels; "
+            "segment this model again"
+        )
+    return mask.to(model.parameters["means"].device)
+
+
+def _anchors(model: Model) -> Tensor:
+    """Means [A, 3] of surfels spread over the list."""
+    means = model.parameters["means"].detach().cpu()
+    return means[torch.linspace(0, max(len(means) - 1, 0), min(ANCHORS, len(means))).long()].contiguous()
+
+
+def _read(path: Path) -> dict[str, Tensor]:
+    from safetensors import SafetensorError, safe_open
+
+    try:
+        with safe_open(path, framework="pt") as file:
+            if FORMAT not in (file.metadata() or {}):
+                raise ArgumentError(f"{path}: expected a {FORMAT} file, got safetensors of another kind")
+            found = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+    except FileNotFoundError as error:
+        raise ArgumentError(f"{path}: no such file") from error
+    except (OSError, SafetensorError) as error:
+        raise ArgumentError(f"{path}: expected a {FORMAT} file, got {error}") from error
+    mask, anchors = found.get("mask"), found.get("anchors")
+    if mask is None or anchors is None or mask.dtype != torch.bool or mask.ndim != 1:
+        raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(found)}; make it again")
+    return found
