@@ -11,7 +11,19 @@ import torch
 from benchmarks.scenes import KINDS
 from texgs.core.errors import ArgumentError
 
-SECTIONS = ("rasterize", "outputs", "losses", "peers", "growth", "memory", "views", "fit", "scene", "style")
+SECTIONS = (
+    "rasterize",
+    "outputs",
+    "losses",
+    "peers",
+    "growth",
+    "memory",
+    "views",
+    "fit",
+    "scene",
+    "style",
+    "segment",
+)
 ROUNDS = 5  # visits to each case, see timing.py
 
 

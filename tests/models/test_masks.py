@@ -180,7 +180,7 @@ def test_a_sam_folder_agrees_with_the_pipeline_of_transformers(tiny_sam):
     points = torch.tensor([[20.0, 30.0], [30.0, 40.0]])
     processor = SamImageProcessorPil(size={"longest_edge": 64}, pad_size={"height": 64, "width": 64})
     pixels = processor((image * 255).byte().numpy(), return_tensors="pt")["pixel_values"]
-    sam = sam_folder(tiny_sam)
+    sam = sam_folder(tiny_sam, dtype=torch.float32)
     torch.testing.assert_close(sam.prepared(image), pixels.float(), atol=1e-5, rtol=1e-5)
     model = SamModel.from_pretrained(tiny_sam).eval()
     with torch.no_grad():

@@ -87,13 +87,18 @@ def test_the_first_segment_keeps_what_two_hold():
 def test_texels_of_variants_go_to_their_surfels():
     model = ball(4)
     p = model.parameters
-    styles = [p["texels"] + 1, p["texels"] + 2]
-    found = with_variants(model, labels_of([HALF, TENTH], 150), styles).parameters["texels"]
+    styles = [
+        replace(model, parameters={**p, "texels": p["texels"] + 1}),
+        replace(model, parameters={**p, "texels": p["texels"] + 2, "colors": p["colors"] - 3}),
+    ]
+    joined = with_variants(model, labels_of([HALF, TENTH], 150), styles).parameters
+    found, second = joined["texels"], TENTH & ~HALF
+    assert torch.equal(joined["colors"], torch.where(second[:, None], p["colors"] - 3, p["colors"]))
     for surfel in range(150):
         own = slice(int(p["offsets"][surfel]), int(p["offsets"][surfel] + p["sizes"][surfel].prod()))
         added = 1 if HALF[surfel] else 2 if TENTH[surfel] else 0
         assert torch.equal(found[own], p["texels"][own] + added)
-    assert with_variants(model, labels_of([HALF], 150), [p["texels"]]) is model, "nothing is copied"
+    assert with_variants(model, labels_of([HALF], 150), [model]) is model, "nothing is copied"
 
 
 def test_what_other_programs_read_has_the_edits_of_segments():

@@ -13,6 +13,7 @@ from torch.nn import functional as F
 from texgs.core.errors import ArgumentError
 from texgs.models.folder import read_folder
 from texgs.models.masks import Remembered, check_clicks
+from texgs.models.precision import fast_dtype
 from texgs.models.tensors import read_tensors
 from texgs.models.weights import locate
 
@@ -81,14 +82,14 @@ class Sam:
 def mobile_sam(
     path: str | Path | None = None,
     device: torch.device | str = "cpu",
-    dtype: torch.dtype = torch.float32,
+    dtype: torch.dtype | None = None,
 ) -> Sam:
     """MobileSAM (Zhang et al. 2023) from its official file.
 
     Args:
         path: mobile_sam.pt; by default where it is found.
         device: that computes.
-        dtype: of the encoder, which takes nearly all of the time.
+        dtype: of the encoder, which takes nearly all of the time; by default `fast_dtype`.
 
     Raises:
         ArgumentError, MissingDataError: if kornia is missing, or there is no such file, or it is another one.
@@ -101,6 +102,7 @@ def mobile_sam(
             "mobile_sam: expected kornia, which is not installed; pip install kornia"
         ) from error
     path = locate("mobile_sam") if path is None else path
+    dtype = fast_dtype(device) if dtype is None else dtype
     network = Network.from_config(SamConfig("mobile_sam")).eval().requires_grad_(False)
     try:
         network.load_state_dict(read_tensors(path))
@@ -126,18 +128,19 @@ def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
 
 
 def sam_folder(
-    folder: str | Path, device: torch.device | str = "cpu", dtype: torch.dtype = torch.float32
+    folder: str | Path, device: torch.device | str = "cpu", dtype: torch.dtype | None = None
 ) -> Sam:
     """A SAM of any size from a folder of transformers, such as a copy of facebook/sam-vit-base.
 
     Args:
         folder: with config.json and model.safetensors.
         device: that computes.
-        dtype: of the encoder.
+        dtype: of the encoder; by default `fast_dtype`.
 
     Raises:
         ArgumentError: if transformers is missing, or the folder holds no SAM or a damaged one.
     """
+    dtype = fast_dtype(device) if dtype is None else dtype
     (model,) = read_folder(folder, "sam", ("SamModel",))
     model.to(device)
     model.vision_encoder.to(dtype)

@@ -62,17 +62,16 @@ class SceneModel:
         """
         fitted = open_model(self.file)
         model = fitted if self.texture is None else with_texture(fitted, self.texture)
-        masks, texels = [], []
+        masks, variants = [], []
         for name, segment in self.segments.items():
             try:
                 masks.append(read_segment(segment.file, fitted))
                 own = fitted if segment.texture is None else with_texture(fitted, segment.texture)
             except TexgsError as error:
                 raise type(error)(f"segments.{name}: {error}") from error
-            if "texels" in own.parameters:
-                texels.append(own.parameters["texels"])
-        if texels:
-            model = with_variants(model, labels_of(masks, len(model)), texels)
+            variants.append(own)
+        if masks and fitted.stage == "texture":
+            model = with_variants(model, labels_of(masks, len(model)), variants)
         return model, masks
 
 

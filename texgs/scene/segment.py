@@ -1,4 +1,4 @@
-"""Segments of a model: surfels that are edited on their own, and take their texels from their own variant."""
+"""Segments of a model: surfels that are edited on their own and have their own variant of the texture."""
 
 from __future__ import annotations
 
@@ -35,25 +35,26 @@ def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
     return labels
 
 
-def with_variants(model: Model, labels: Tensor, texels: Sequence[Tensor]) -> Model:
-    """The model with the texels of each segment taken from its own list; all lists are laid out alike.
+def with_variants(model: Model, labels: Tensor, variants: Sequence[Model]) -> Model:
+    """The model with the texture of each segment taken from its own variant of the model.
 
     Args:
-        model: textured; its texels are those of what no segment holds.
+        model: textured; what no segment holds stays as it is here.
         labels: [N], see `labels_of`.
-        texels: [T, 3] of each segment; the same tensor as the model's means that nothing changes.
+        variants: of each segment the model with other texels and colours (offsets from the palette), laid out
+            alike; with the same tensors as the model's nothing changes.
 
     Returns:
-        The model itself where nothing changes, else one with a new list of texels.
+        The model itself where nothing changes, else one with new texels and colours.
     """
     p = model.parameters
-    changed = [number for number, own in enumerate(texels, start=1) if own is not p["texels"]]
-    if not changed:
-        return model
-    joined = p["texels"].clone()
     places, surfel = owners(p)
-    segment = labels[surfel]
-    for number in changed:
-        mine = places[segment == number]
-        joined[mine] = texels[number - 1][mine]
-    return replace(model, parameters={**p, "texels": joined})
+    of_texel = torch.zeros(len(p["texels"]), dtype=labels.dtype, device=labels.device)
+    of_texel[places] = labels[surfel]
+    joined: dict[str, Tensor] = {}
+    for name, segment in (("texels", of_texel), ("colors", labels)):
+        changed = [number for number, own in enumerate(variants, 1) if own.parameters[name] is not p[name]]
+        for number in changed:
+            mine = segment == number
+            joined.setdefault(name, p[name].clone())[mine] = variants[number - 1].parameters[name][mine]
+    return replace(model, parameters={**p, **joined}) if joined else model
