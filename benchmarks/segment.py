@@ -59,8 +59,8 @@ def run(settings: Settings) -> Section:
 
 def truths(whole: Model, half: Tensor, cameras: Sequence[Camera]) -> list[Tensor]:
     """Masks [H, W] of where a part of the surfels makes up most of a view."""
-    shown = [ContributionVotes(whole).shown(camera, half.float()) for camera in cameras]
-    return [(part > 0.5 * alpha) & (alpha > 0.1) for part, alpha in shown]
+    shown = [ContributionVotes(whole).shown(camera, half.float()[:, None]) for camera in cameras]
+    return [(x.color[..., 0] > 0.5 * x.alpha) & (x.alpha > 0.1) for x in shown]
 
 
 def counted(

@@ -69,16 +69,17 @@ def lift(
     prompts, camera = prompts_at(model, clicks), clicks.camera
     views = Views(model, light, masks)
     reference = views.mask(clicks)
-    so_far = ContributionVotes(model, rounds=0)
-    so_far.add(camera, reference)
     votes = votes_of(vote, model, threshold)
-    votes.add(camera, reference)
+    so_far = votes if isinstance(votes, ContributionVotes) else ContributionVotes(model, rounds=0)
+    counted = [votes] if so_far is votes else [votes, so_far]
+    for each in counted:
+        each.add(camera, reference)
     used = 1
     for other in progress(by_angle(camera, cameras), title=title, unit="view"):
         mask = _mask(views, so_far, prompts, other)
         if mask is not None:
-            so_far.add(other, mask)
-            votes.add(other, mask)
+            for each in counted:
+                each.add(other, mask)
             used += 1
     selected = votes.selected()
     if not bool(selected.any()):
@@ -119,12 +120,12 @@ def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:
 def _mask(views: Views, so_far: ContributionVotes, prompts: Prompts, camera: Camera) -> Tensor | None:
     """The mask of a view, or None where it sees nothing of the object or contradicts the views before."""
     model = views.model
-    median = render(model, camera, views.light, outputs=("median",)).median
+    values = torch.stack([so_far.seen.float(), so_far.shares], dim=1)
+    shown = so_far.shown(camera, values, ("median",))
+    (has_votes, is_object), alpha = shown.color.unbind(2), shown.alpha
     pixels, depths = projected(prompts.places, camera)
-    seen = is_visible(pixels, depths, median, TOLERANCE * extent(model))  # type: ignore[arg-type]
+    seen = is_visible(pixels, depths, shown.median, TOLERANCE * extent(model))  # type: ignore[arg-type]
     points, positive = pixels[seen], prompts.positive[seen]
-    has_votes, alpha = so_far.shown(camera, so_far.seen.float())
-    is_object, _ = so_far.shown(camera, so_far.shares)
     if not bool(positive.any()):
         inner = middle_of((is_object > CERTAIN * alpha) & (alpha > 0.5))
         if inner is None:

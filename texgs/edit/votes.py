@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Literal, Protocol
 
 import torch
@@ -9,7 +10,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.edit.clicks import projected
-from texgs.raster import rasterize, splat
+from texgs.raster import Render, rasterize, splat
 from texgs.scene.model import Model, geometry
 
 Vote = Literal["contribution", "centre"]
@@ -81,8 +82,9 @@ class ContributionVotes:
         for _ in range(self.rounds):
             change = torch.zeros_like(shares)
             for camera, mask in self.views:
-                shown, alpha = self.shown(camera, shares)
-                change += self._splat(camera, mask - shown / alpha.clamp_min(1e-6))[0]
+                shown = self.shown(camera, shares[:, None])
+                mean = shown.color[..., 0] / shown.alpha.clamp_min(1e-6)
+                change += self._splat(camera, mask - mean)[0]
             shares = (shares + change / self.weights.clamp_min(SEEN)).clamp(0, 1)
         return shares
 
@@ -99,11 +101,10 @@ class ContributionVotes:
             shares[~seen] = shares[seen][torch.from_numpy(nearest).to(shares.device)].mean(1)
         return shares > self.threshold
 
-    def shown(self, camera: Camera, values: Tensor) -> tuple[Tensor, Tensor]:
-        """Values [N] of surfels as a view shows them over 0 [H, W], and its alpha [H, W]."""
+    def shown(self, camera: Camera, values: Tensor, outputs: Collection[str] = ()) -> Render:
+        """Values [N, C] of surfels as a view shows them over 0."""
         lens = (camera.viewmat, camera.K, camera.width, camera.height)
-        found = rasterize(*self.geometry, *lens, features=values[:, None], options=self.options)
-        return found.color[..., 0], found.alpha
+        return rasterize(*self.geometry, *lens, features=values, outputs=outputs, options=self.options)
 
     def _splat(self, camera: Camera, image: Tensor) -> tuple[Tensor, Tensor]:
         """Sums [N] of weight * image [H, W], and sums [N] of weights."""
