@@ -22,6 +22,7 @@ def test_features_see_a_reduced_image_of_a_large_view():
     [
         ({"iterations": -1}, "iterations: expected 0 or more, got -1"),
         ({"rate": float("nan")}, "rate: expected 0 or more, got nan"),
+        ({"features": 0, "patches": 0}, "features, patches: expected a weight above 0 for one of them"),
         ({"lambda_s": 1.5}, "lambda_s: expected a share from 0 to 1, got 1.5"),
         ({"pattern": 0}, "pattern: expected more than 0, got 0"),
         ({"positions": 0}, "positions: expected more than 0, got 0"),

@@ -51,6 +51,10 @@ class Recipe:
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise ArgumentError(f"{name}: expected more than 0, got {value}")
+        if self.iterations > 0 and self.features == self.patches == 0:
+            raise ArgumentError(
+                "features, patches: expected a weight above 0 for one of them, got 0 for both"
+            )
         if not 0 <= self.lambda_s <= 1:
             raise ArgumentError(f"lambda_s: expected a share from 0 to 1, got {self.lambda_s}")
         for name, known in (("start", get_args(Start)), ("behind", ("style", "white"))):
@@ -80,7 +84,7 @@ PRESETS = {
     "patches": replace(DEFAULT, features=0.0, iterations=150, rate=0.025),
     # Layers are averaged in a pixel: each learns as if it were opaque, and colours are held less tightly,
     # because an average that has to show all of a style's contrast drives its layers to pure colours.
-    "translucent": replace(DEFAULT, opacity=8.0, patches=10.0),
+    "translucent": replace(DEFAULT, opacity=8.0, patches=20.0),
     "preview": replace(DEFAULT, iterations=0),
     "paper": Recipe(
         iterations=3000,
