@@ -1,0 +1,86 @@
+import pytest
+import torch
+
+from tests.edit.scenes import ball, views
+from texgs.edit.canvas import extent, paint, visible_part
+from texgs.scene.composition import Composition
+from texgs.scene.edits import Edit
+from texgs.scene.model import Model
+
+
+@pytest.fixture
+def scene():
+    """A ball with random texels, beside the middle of the first view."""
+    p = ball().parameters
+    texels = torch.rand(p["texels"].shape, generator=torch.Generator().manual_seed(0))
+    return Model({**p, "texels": texels, "means": p["means"] + torch.tensor([0.0, 0.1, 0.15])})
+
+
+def pasted(canvas, full):
+    """Places of a full view [H, W, 3] over black at which it shows what a canvas does."""
+    height, width = canvas.alpha.shape
+    found = [
+        (top, left)
+        for top in range(full.shape[0] - height + 1)
+        for left in range(full.shape[1] - width + 1)
+        if torch.allclose(
+            full[top : top + height, left : left + width], canvas.color.permute(1, 2, 0), atol=2e-5
+        )
+    ]
+    return found
+
+
+@pytest.mark.parametrize(("is_lit", "look"), [(True, "shaded"), (False, "unshaded")])
+@pytest.mark.parametrize("opacity", [1.0, 0.3])
+def test_a_part_is_what_the_scene_renders_there(scene, is_lit, look, opacity):
+    cameras, lights = views()
+    scene.parameters["opacities"].fill_(0.5)
+    full = Composition([scene]).render(
+        cameras[0], lights[0], [Edit(opacity=opacity)], look=look, background=torch.zeros(3)
+    )
+    canvas = paint(scene, scene.parameters["texels"], cameras[0], lights[0], opacity=opacity, is_lit=is_lit)
+    assert canvas.alpha.numel() < full.alpha.numel()
+    assert len(pasted(canvas, full.color)) == 1
+    torch.testing.assert_close(canvas.alpha.sum(), full.alpha.sum())
+    whole = paint(
+        scene,
+        scene.parameters["texels"],
+        cameras[0],
+        lights[0],
+        opacity=opacity,
+        is_lit=is_lit,
+        cropped=False,
+    )
+    torch.testing.assert_close(whole.color.permute(1, 2, 0), full.color, atol=1e-5, rtol=0)
+
+
+def test_the_share_of_chosen_surfels_and_of_the_others_make_up_alpha(scene):
+    cameras, lights = views()
+    chosen = scene.parameters["means"][:, 1] > 0.1
+    shares = [
+        paint(scene, scene.parameters["texels"], cameras[0], lights[0], chosen=mask).share
+        for mask in (chosen, ~chosen)
+    ]
+    alpha = paint(scene, scene.parameters["texels"], cameras[0], lights[0]).alpha
+    torch.testing.assert_close(shares[0] + shares[1], alpha, atol=1e-5, rtol=0)
+    assert min(share.max() for share in shares) > 0.9
+
+
+def test_the_visible_part_holds_all_that_is_seen_in_multiples_of_eight():
+    alpha = torch.zeros(60, 90)
+    alpha[20:31, 50:52] = 0.5
+    rows, columns = visible_part(alpha)
+    assert (rows.start, rows.stop) == (16, 40)
+    assert (columns.start, columns.stop) == (46, 62)
+    assert alpha[rows, columns].sum() == alpha.sum()
+
+
+@pytest.mark.parametrize(
+    ("size", "places", "expected"),
+    [(30, [0], (0, 8)), (30, [29], (25, 30)), (5, [2], (0, 5)), (30, [], (0, 8)), (5, [], (0, 5))],
+)
+def test_an_extent_stays_within_the_image(size, places, expected):
+    seen = torch.zeros(size, dtype=torch.bool)
+    seen[places] = True
+    found = extent(seen)
+    assert (found.start, found.stop) == expected

@@ -1,0 +1,63 @@
+import pytest
+import torch
+
+from tests.models.networks import random_weights
+from texgs.edit.objective import Objective, pooled
+from texgs.edit.pictures import picture
+from texgs.edit.recipe import preset
+from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
+from texgs.edit.style_picture import StylePicture
+from texgs.models.nnfm import StyleFeatures, nnfm
+from texgs.models.vgg import Vgg
+
+
+@pytest.fixture(scope="module")
+def vgg(tmp_path_factory):
+    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
+    torch.save(random_weights(last=14), path)
+    return Vgg.load(path, dtype=torch.float32)
+
+
+STYLE = StylePicture.of(picture("weave", 64))
+EXACT = {"positions": None, "dimensions": None, "queries": None}
+
+
+def test_terms_are_the_losses_times_their_weights(vgg):
+    image, share = torch.rand(3, 48, 40), torch.rand(48, 40).round()
+    recipe = preset("default", features=2.0, lambda_s=0.75, patches=3.0, **EXACT)
+    terms = Objective.of(recipe, STYLE, 1, vgg, lambda x: x[0, 0, 0]).terms(image, share, 5)
+    where = pooled(share, 4, torch.Size((12, 10)))
+    exact = nnfm(vgg.features(image), StyleFeatures.of(vgg.features(STYLE.image)), where)
+    assert float(terms["nnfm"]) == pytest.approx(2 * 0.75 * float(exact), rel=1e-5)
+    assert float(terms["clip"]) == pytest.approx(2 * 0.25 * float(image[0, 0, 0]))
+    distance = sliced_wasserstein(image, PatchStatistics.of(STYLE.image), share, bank=5, seed=5)
+    assert float(terms["patches"]) == pytest.approx(3 * float(distance), rel=1e-5)
+
+
+def test_at_lower_resolution_image_and_style_are_both_reduced(vgg):
+    recipe = preset("default", patches=0.0, **EXACT)
+    small = STYLE.scaled(32)
+    half = Objective.of(recipe, STYLE, 2, vgg, None)
+    assert len(half.style.unit) == 64
+    image = small.image.repeat_interleave(2, 1).repeat_interleave(2, 2)
+    assert float(half.terms(image, torch.ones(64, 64), 0)["nnfm"]) < 1e-5
+
+
+def test_only_the_region_of_the_style_is_searched(vgg):
+    region = torch.zeros(64, 64, dtype=torch.bool)
+    region[:32] = True
+    style = StylePicture(STYLE.image, region)
+    found = Objective.of(preset("default", patches=0.0, **EXACT), style, 1, vgg, None)
+    assert len(found.style.unit) == 16 * 8
+
+
+def test_what_is_not_on_the_object_does_not_count(vgg):
+    image, share = torch.rand(3, 48, 48), torch.zeros(48, 48)
+    share[:, :24] = 1
+    for name in ("default", "paper"):
+        recipe = preset(name, patches=20.0, lambda_s=1.0)
+        x = image.clone().requires_grad_()
+        terms = Objective.of(recipe, STYLE, 1, vgg, None).terms(x, share, 0)
+        (gradient,) = torch.autograd.grad(sum(terms.values()), x)
+        far = gradient[:, :, 46:].abs().max()  # farther than a filter or a patch reaches from the object
+        assert bool(far > 0) == (name == "paper")
