@@ -6,10 +6,13 @@ from math import sqrt
 import pytest
 import torch
 
+from tests.edit.scenes import two_balls
 from tests.raster.scenes import random_scene
-from texgs.core.camera import Camera, intrinsics, look_at
+from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.metrics.consistency import Frame, consistency, warp
+from texgs.metrics.consistency import Frame, consistency, frames_of, warp
+from texgs.scene.composition import Composition
+from texgs.volume.view_set import Light
 
 SIZE = 64
 
@@ -108,6 +111,18 @@ def test_rendered_views_of_surfels_are_consistent_with_themselves():
     found = consistency([frame, frame])
     assert found.rmse < 1e-5
     assert found.covered > 0.9
+
+
+def test_a_scene_is_consistent_without_light_and_less_so_under_a_light_that_moves():
+    """Opaque shells of one colour: without light all views agree, under a headlight shading moves along."""
+    scene = Composition([two_balls(opacity=0.999)[0]])
+    views = [orbit(-90 + 6 * i, 10, 4.0, 22.0, 96, 96) for i in range(4)]
+    light = Light("headlight")
+    flat = consistency(list(frames_of(scene, views, light, look="unshaded")), tolerance=0.005)
+    lit = consistency(list(frames_of(scene, views, light)), tolerance=0.005)
+    assert flat.covered > 0.5
+    assert flat.rmse < 0.03
+    assert lit.rmse > flat.rmse
 
 
 def test_frames_that_cannot_be_compared():

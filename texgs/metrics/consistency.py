@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean
@@ -14,6 +14,9 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.scene.composition import Composition, Look
+from texgs.scene.edits import Edit
+from texgs.volume.view_set import Light
 
 SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
 OPAQUE = 0.5  # least alpha of a pixel that has a depth
@@ -81,6 +84,27 @@ def consistency(
         raise ArgumentError("frames: expected pairs that see the same, got none; use views closer together")
     mean_distance = fmean(distances) if distances else None
     return Consistency(sqrt(fmean(squares)), mean_distance, fmean(shares), len(squares))
+
+
+def frames_of(
+    scene: Composition,
+    cameras: Iterable[Camera],
+    light: Light,
+    edits: Sequence[Edit] | None = None,
+    look: Look = "shaded",
+) -> Iterator[Frame]:
+    """Views of a scene with what `consistency` needs.
+
+    Args:
+        scene: to show.
+        cameras: along a path, on the scene's device.
+        light: shines on it.
+        edits: as for `Composition.render`.
+        look: "unshaded" measures textures alone.
+    """
+    for camera in cameras:
+        shown = scene.render(camera, light, edits, look=look, outputs=("median",))
+        yield Frame(shown.color.clamp(0, 1), shown.median, shown.alpha, camera)  # type: ignore[arg-type]
 
 
 @torch.no_grad()

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from texgs.core.errors import ArgumentError
 from texgs.models.masks import check_clicks
 
 SIZE = 320  # pixels of the longer side that is segmented; larger images are reduced, and masks enlarged
@@ -34,14 +33,10 @@ class GrabCut:
         """The object [H, W] bool in an image, on the image's device; see `MaskModel`.
 
         Raises:
-            ArgumentError, ShapeError: if OpenCV is missing, no point is positive, or one is outside.
+            ArgumentError, ShapeError: if no point is positive, or one is outside of the image.
         """
-        try:
-            import cv2
-        except ImportError as error:
-            raise ArgumentError(
-                "grabcut: expected OpenCV, which is not installed; pip install opencv-python-headless"
-            ) from error
+        import cv2
+
         check_clicks(image, points, positive)
         shape = (image.shape[0], image.shape[1])
         scale = min(SIZE / max(shape), 1.0)
