@@ -56,6 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
     )
     parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
+    add_views(parser)
+
+
+def add_views(parser: argparse.ArgumentParser) -> None:
+    """The views that vote, and the lens of all views."""
     parser.add_argument("--views", type=int, default=42, help="that vote, 10 f^2 + 2 (%(default)s)")
     parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
     parser.add_argument("--width", type=int, default=800, help="of the view clicked on (%(default)s)")
