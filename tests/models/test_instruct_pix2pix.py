@@ -1,6 +1,7 @@
 """InstructPix2Pix of random weights in the files of the real one: the loop around the network."""
 
 import math
+import sys
 
 import pytest
 import torch
@@ -138,6 +139,27 @@ def test_damaged_weights_are_one_sentence(tmp_path):
     path.write_bytes(path.read_bytes()[:1000])
     with pytest.raises(ArgumentError, match=r"expected the files of InstructPix2Pix, got .*copy them again"):
         InstructPix2Pix.open(folder)
+
+
+def test_missing_libraries_are_named(folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "diffusers", None)
+    with pytest.raises(MissingDataError, match="expected the packages diffusers and transformers"):
+        InstructPix2Pix.open(folder)
+
+
+def test_half_precision_keeps_the_loop_in_single(folder):
+    """As on a GPU: networks in half precision, latents between steps in single."""
+    model = InstructPix2Pix.open(folder, steps=3)
+    single = model(random_views(1), "make it gold", seeded())
+    for part in (model.unet, model.vae, model.text_encoder):
+        part.half()
+    seen = []
+    predict = model.predict
+    model.predict = lambda latents, *rest: seen.append(latents.dtype) or predict(latents, *rest)
+    half = model(random_views(1), "make it gold", seeded())
+    assert half.dtype == torch.float32
+    assert set(seen) == {torch.float32}
+    assert (half - single).abs().mean() < 0.01
 
 
 def test_another_model_is_refused(tmp_path):

@@ -81,7 +81,7 @@ class InstructPix2Pix:
             options: of the constructor.
 
         Raises:
-            MissingDataError: if the folder or a part of it is not there.
+            MissingDataError: if the folder or a part of it is not there, or the libraries are not installed.
             ArgumentError: if a file is damaged or of another model.
         """
         folder = Path(folder)
@@ -92,6 +92,11 @@ class InstructPix2Pix:
             )
         try:
             modules, scheduler = _read(folder, torch.device(device))
+        except ImportError as error:
+            raise MissingDataError(
+                f"InstructPix2Pix: expected the packages diffusers and transformers, got {first_line(error)}; "
+                "install them, or choose the guidance filters"
+            ) from error
         except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
             raise ArgumentError(
                 f"{folder}: expected the files of InstructPix2Pix, got {first_line(error)}; copy them again"
@@ -145,10 +150,14 @@ class InstructPix2Pix:
 
     def decode(self, latents: Tensor) -> Tensor:
         """Images [V, 3, 8h, 8w] in [0, 1] of latents [V, 4, h, w]."""
-        return (self.vae.decode(latents / self.vae.config.scaling_factor).sample / 2 + 0.5).clamp(0, 1)
+        scaled = (latents / self.vae.config.scaling_factor).to(self.vae.dtype)
+        return (self.vae.decode(scaled).sample.float() / 2 + 0.5).clamp(0, 1)
 
     def denoise(self, clean: Tensor, kept: Tensor, texts: Tensor, generator: torch.Generator) -> Tensor:
         """Noise latents [V, 4, h, w] to the first level and denoise them step by step (DDIM)."""
+        clean = (
+            clean.float() if clean.dtype == torch.float16 else clean
+        )  # the network alone is in half precision
         first = float(self.alphas[self.times[0]])
         noise = torch.randn(clean.shape, generator=generator).to(clean)
         latents = first**0.5 * clean + (1 - first) ** 0.5 * noise
@@ -170,11 +179,12 @@ class InstructPix2Pix:
 
         def branches(ids: list[int]) -> Tensor:
             """Noise [3, K, 4, h, w] of some views: text and image, image alone, neither."""
-            condition = torch.stack([kept[ids], kept[ids], torch.zeros_like(kept[ids])])
+            condition = torch.stack([kept[ids], kept[ids], torch.zeros_like(kept[ids])]).to(latents)
             stacked = torch.cat([latents[ids].expand(3, -1, -1, -1, -1), condition], dim=2)
             words = texts[:, None].expand(-1, len(ids), -1, -1)
-            found = self.unet(stacked.flatten(0, 1), time, words.flatten(0, 1).to(stacked)).sample
-            return found.unflatten(0, (3, len(ids)))
+            inputs, dtype = stacked.flatten(0, 1).to(self.unet.dtype), self.unet.dtype
+            found = self.unet(inputs, time, words.flatten(0, 1).to(dtype)).sample
+            return found.to(latents).unflatten(0, (3, len(ids)))
 
         if self.consistency is not None:
             noise = self.consistency.run(branches, len(latents), time, generator)

@@ -33,19 +33,21 @@ def oil(surface: Surface) -> Tensor:
         relief = torch.where(is_top, bristles, relief)
     steps = (surface.shade * 4).floor() / 4 + 0.2
     base = surface.color * (0.55 + 0.55 * steps[:, None])
-    hue = base.new_tensor((0.13, 0.02, -0.15)) * warm[:, None]
-    return (base * (1 + 0.22 * value + 0.14 * relief)[:, None] + hue).clamp(0, 1)
+    hue = base.new_tensor((0.20, -0.03, -0.18)) * warm[:, None]
+    return (base * (1 + 0.30 * value + 0.16 * relief)[:, None] + hue).clamp(0, 1)
 
 
 def watercolour(surface: Surface) -> Tensor:
     """Washes of pigment [P, 3] on paper: pools with dark rims, blooms, the paper's grain, blue shadows."""
     points, seed = surface.points, surface.seed
-    pool = fractal_noise(points * 0.22, seed, octaves=3)
-    rim = torch.exp(-((torch.remainder(pool * 7.0, 1.0) - 0.5) / 0.10).square())
+    pool = fractal_noise(points * 0.30, seed, octaves=3)
+    level = 5.0 * pool
+    rim = torch.exp(-((torch.remainder(level, 1.0) - 0.08) / 0.07).square())  # where a wash has dried last
     grain = value_noise(points * 4.5, seed + 9)
-    density = 0.28 + 0.95 * (pool - 0.25) + 0.20 * rim + 0.22 * (grain - 0.5)
-    density = (density + 0.35 * (1 - surface.shade)).clamp(0.05, 1.15)
-    pigment = _saturated(surface.color, 1.35)
+    density = 0.30 * (level.floor() - 1).clamp_min(0) + 0.45 * rim + 0.25 * (grain - 0.5)
+    density = (density + 0.35 * (1 - surface.shade)).clamp(0.03, 1.3)
+    bloom = (value_noise(points * 0.18, seed + 21) - 0.5)[:, None]  # pigments part: warm here, cool there
+    pigment = _saturated(surface.color, 1.35) + bloom * surface.color.new_tensor((0.35, -0.25, 0.45))
     shadow = pigment.new_tensor((0.36, 0.42, 0.72))
     pigment = torch.lerp(pigment, pigment * shadow * 1.4, (1 - surface.shade)[:, None] * 0.75)
     paper = pigment.new_tensor((0.985, 0.975, 0.95))
@@ -55,12 +57,12 @@ def watercolour(surface: Surface) -> Tensor:
 
 def cartoon(surface: Surface) -> Tensor:
     """Three flat tones [P, 3] of a strong colour, and a line of ink where shadow begins."""
-    tone = surface.shade + 0.04 * (value_noise(surface.points * 0.5, surface.seed) - 0.5)
+    tone = surface.shade
     strong = _saturated(surface.color, 1.5)
     levels = [strong * strong.new_tensor((0.42, 0.38, 0.55)), strong * 0.82]
     levels.append(torch.lerp(strong, torch.ones_like(strong), 0.35))
-    width = 0.06
-    is_lit, is_bright = (((tone - border) / 0.02 + 0.5).clamp(0, 1)[:, None] for border in (0.42, 0.80))
+    width = 0.05
+    is_lit, is_bright = (((tone - border) / 0.04 + 0.5).clamp(0, 1)[:, None] for border in (0.42, 0.80))
     flat = torch.lerp(torch.lerp(levels[0], levels[1], is_lit), levels[2], is_bright)
     ink = surface.ramp(((tone - 0.42).abs() - width / 2) * 4)
     return torch.lerp(flat, flat.new_tensor((0.05, 0.04, 0.08)).expand_as(flat), ink[:, None])
