@@ -92,6 +92,18 @@ def test_only_chosen_surfels_change(model):
     assert (colors[place[upper[surfel]]] - torch.tensor(BLUE)).abs().mean() < 0.02
 
 
+@pytest.mark.parametrize("options", [{"sweeps": 1}, {"iterations": 30}])
+def test_later_rounds_see_the_others_as_they_are(model, options):
+    upper = model.parameters["means"][:, 1] > 0
+    guidance = Watching(BLUE)
+    policy = Policy(rounds=2, opacities=(1.0,), **options)
+    update(model, around(6), guidance, "x", policy, surfels=upper)
+    first, second = (views.images[0] for views in guidance.seen)  # from below
+    lower = (guidance.seen[0].points[0, ..., 1] < -0.2) & (guidance.seen[0].alphas[0] > 0.99)
+    assert int(lower.sum()) > 50
+    assert_close(second[lower], first[lower], atol=0.02, rtol=0)
+
+
 def test_the_palette_still_recolours(model):
     done = update(model, around(6), Tint((0.5, 0.5, 0.5)), "x", QUICK)
     shift = torch.tensor([0.2, -0.1, 0.1])

@@ -143,7 +143,7 @@ def test_damaged_weights_are_one_sentence(tmp_path):
 
 def test_missing_libraries_are_named(folder, monkeypatch):
     monkeypatch.setitem(sys.modules, "diffusers", None)
-    with pytest.raises(MissingDataError, match="expected the packages diffusers and transformers"):
+    with pytest.raises(MissingDataError, match="expected packages diffusers and transformers"):
         InstructPix2Pix.open(folder)
 
 

@@ -11,10 +11,9 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.edit.back_projection import back_project, fill_unseen, seen_texels
+from texgs.edit.back_projection import seen_texels
 from texgs.edit.exposures import Exposure, expose
-from texgs.edit.target_adam import Reconstruction
-from texgs.edit.target_solve import solve
+from texgs.edit.followers import AdamFollower, Follower, SolveFollower
 from texgs.edit.target_views import bare_colors, render_views, require_texture
 from texgs.models.guidance import Guidance, Views, require_edited, require_instruction
 from texgs.scene.model import Model
@@ -105,34 +104,21 @@ def update(
     changing = _changing(model, surfels)
     shine = light if (guidance.lit if lit is None else lit) else None
     generator = torch.Generator().manual_seed(seed)
-    colors = bare_colors(model).clamp(0, 1)
-    originals = render_views(model, bare_colors(model), cameras, shine)
+    colors = bare_colors(model)
+    originals = render_views(model, colors, cameras, shine).images
+    follower = _follower(model, policy, generator)
+    own = colors
+    moving = changing_texels(model, changing)[:, None]
     targets = _Targets(len(policy.opacities))
-    adam = (
-        Reconstruction(colors, policy.rate, policy.rounds * policy.iterations) if policy.iterations else None
-    )
-    seen = colors.new_zeros(len(colors))
     for round_ in range(policy.rounds):
         ids = _group(round_, policy.group, len(cameras))
-        current = bare_colors(model) if round_ == 0 else colors
-        views = render_views(model, current, [cameras[i] for i in ids], shine, originals.conditions[ids])
+        views = render_views(model, colors, [cameras[i] for i in ids], shine, originals[ids])
         edited = require_edited(guidance(views, instruction, generator), views, guidance.name)
         targets.put(ids, views, edited, expose(model, views, edited, shine, policy.opacities, changing))
         name = title if policy.rounds == 1 else f"{title}, round {round_ + 1} of {policy.rounds}"
-        if adam is None:
-            flat = [exposure for row in targets.rows for exposure in row]
-            sums = back_project(flat, model)
-            start = fill_unseen(sums, model)
-            colors = solve(flat, model, sums, start, sweeps=policy.sweeps, generator=generator, title=name)
-            seen = sums.weights
-        else:
-            adam.run(targets.rows, model, policy.iterations, generator, name)
-            colors = adam.colors
-    if adam is not None:
-        sums = back_project([x for row in targets.rows for x in row], model)
-        colors = fill_unseen(replace(sums, colors=colors), model)
-        seen = sums.weights
-    share = _share(seen, model, changing)
+        colors = torch.where(moving, follower.follow(targets.rows, name), own)
+    colors, weights = follower.finish(targets.rows)
+    share = _share(weights, model, changing)
     return Edited(recolored(model, colors, changing), targets.views, targets.images, share)
 
 
@@ -148,12 +134,12 @@ def recolored(model: Model, colors: Tensor, surfels: Tensor | None = None) -> Mo
         surfels: [N] bool, which change; all by default.
     """
     p = model.parameters
-    place, surfel = owners(p)
     changing = torch.ones_like(p["opacities"], dtype=torch.bool) if surfels is None else surfels
     mean = mean_texels({**p, "texels": colors}).to(colors)  # [N, 3]
     offsets = torch.where(changing[:, None], mean - p["palette"], p["colors"])
-    texels = p["texels"].clone()
+    place, surfel = owners(p)
     moved = changing[surfel]
+    texels = p["texels"].clone()
     texels[place[moved]] = colors[place[moved]] - mean[surfel[moved]]
     return replace(model, parameters={**p, "colors": offsets, "texels": texels})
 
@@ -193,6 +179,21 @@ class _Targets:
         return [[found[k] for found in self.exposures.values()] for k in range(self.opacities)]
 
 
+def changing_texels(model: Model, surfels: Tensor) -> Tensor:
+    """Which texels [T] belong to some surfels [N], in their places in the list."""
+    place, surfel = owners(model.parameters)
+    mine = torch.zeros(len(model.parameters["texels"]), dtype=torch.bool, device=place.device)
+    mine[place] = surfels[surfel]
+    return mine
+
+
+def _follower(model: Model, policy: Policy, generator: torch.Generator) -> Follower:
+    """What makes texels follow."""
+    if policy.iterations:
+        return AdamFollower(model, policy.iterations, policy.rounds, policy.rate, generator)
+    return SolveFollower(model, policy.sweeps, generator)
+
+
 def _group(round_: int, size: int | None, count: int) -> list[int]:
     """Views of a round: the next ones in turn."""
     if size is None or size >= count:
@@ -220,5 +221,4 @@ def _changing(model: Model, surfels: Tensor | None) -> Tensor:
 
 def _share(weights: Tensor, model: Model, changing: Tensor) -> float:
     """Share of the texels that may change that are seen."""
-    place, surfel = owners(model.parameters)
-    return float(seen_texels(weights)[place[changing[surfel]]].double().mean())
+    return float(seen_texels(weights)[changing_texels(model, changing)].double().mean())

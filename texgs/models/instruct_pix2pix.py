@@ -94,7 +94,7 @@ class InstructPix2Pix:
             modules, scheduler = _read(folder, torch.device(device))
         except ImportError as error:
             raise MissingDataError(
-                f"InstructPix2Pix: expected the packages diffusers and transformers, got {first_line(error)}; "
+                f"InstructPix2Pix: expected packages diffusers and transformers, got {first_line(error)}; "
                 "install them, or choose the guidance filters"
             ) from error
         except (OSError, ValueError, KeyError, RuntimeError, TypeError) as error:
@@ -155,9 +155,8 @@ class InstructPix2Pix:
 
     def denoise(self, clean: Tensor, kept: Tensor, texts: Tensor, generator: torch.Generator) -> Tensor:
         """Noise latents [V, 4, h, w] to the first level and denoise them step by step (DDIM)."""
-        clean = (
-            clean.float() if clean.dtype == torch.float16 else clean
-        )  # the network alone is in half precision
+        if clean.dtype == torch.float16:
+            clean = clean.float()  # the networks alone are in half precision
         first = float(self.alphas[self.times[0]])
         noise = torch.randn(clean.shape, generator=generator).to(clean)
         latents = first**0.5 * clean + (1 - first) ** 0.5 * noise
