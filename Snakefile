@@ -17,6 +17,7 @@ include: "workflow/rules/volume.smk"
 include: "workflow/rules/views.smk"
 include: "workflow/rules/fit.smk"
 include: "workflow/rules/scene.smk"
+include: "workflow/rules/edit.smk"
 include: "workflow/rules/tables.smk"
 
 

@@ -18,7 +18,7 @@ HEADER = """\
 def resolve() -> dict[str, str]:
     """Names and versions of texgs' dependencies with all optional groups."""
     command = [sys.executable, "-m", "pip", "install", "--quiet", "--dry-run", "--ignore-installed"]
-    command += ["--report", "-", TORCH, ".[dev,bench]"]
+    command += ["--report", "-", TORCH, ".[dev,bench,models]"]
     report = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
     found = (item["metadata"] for item in report["install"])
     return {item["name"].lower().replace("_", "-"): item["version"].split("+")[0] for item in found}

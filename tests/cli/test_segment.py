@@ -105,7 +105,7 @@ def test_a_preview_writes_no_scene(scene, tmp_path):
         (["--point", LEFT, "--name", "a.b"], "--name: expected a name without / . =, got a.b"),
         (
             ["--point", LEFT, "--views", "40"],
-            "--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got 40",
+            "views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got 40",
         ),
         (["--point", LEFT, "--masks", "none"], "none/config.json: no such file"),
         (["--point", LEFT, "--threshold", "2"], "expected surfels that most masks"),
@@ -121,5 +121,5 @@ def test_a_name_that_is_taken(scene, tmp_path, capsys):
     mask = write_segment(tmp_path / "half", two_balls()[0], torch.arange(3000) < 9)
     assert main(["edit", str(scene), f"balls/red={mask}", "--output", str(tmp_path / "half.yaml")]) == 0
     assert segment(tmp_path / "half.yaml", "--point", LEFT) == 2
-    message = "--name: expected a new name, got red, which balls has; remove it by texgs edit balls/red="
+    message = "balls/red: is there already; choose another name, or remove it by texgs edit balls/red="
     assert message in capsys.readouterr().err

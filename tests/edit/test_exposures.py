@@ -6,7 +6,8 @@ from torch.testing import assert_close
 
 from tests.edit.textured import around, shell
 from texgs.edit.exposures import content, expose, straight_colors
-from texgs.edit.target_views import bare_colors, render_views
+from texgs.edit.target_views import render_views
+from texgs.scene.texels import bare_colors
 from texgs.volume.view_set import Light
 
 HEADLIGHT = Light("headlight")

@@ -139,6 +139,9 @@ def test_the_palette_of_a_styled_model_can_still_be_changed(style):
     edited = scene.render(cameras[0], edits=[moved], look="unshaded")
     expected = plain.color + plain.alpha[..., None] * torch.tensor([0.1, 0.0, 0.2])
     torch.testing.assert_close(edited.color, expected, atol=1e-5, rtol=0)
+    darker = Edit(palette=tuple((palette - 0.1).clamp_min(0).tolist()))
+    lit, dark = (scene.render(cameras[0], edits=[edit]).color.mean() for edit in (Edit(), darker))
+    assert dark < lit - 0.01, "with light, too, and where colours become smaller"
 
 
 def test_a_clip_term_is_any_loss_of_an_image(vgg, style):

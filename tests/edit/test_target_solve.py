@@ -9,10 +9,10 @@ from texgs.edit.back_projection import BackProjection, back_project, fill_unseen
 from texgs.edit.exposures import expose
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
-from texgs.edit.target_views import bare_colors, render_views
+from texgs.edit.target_views import render_views
 from texgs.raster.ssim import l1_dssim
 from texgs.scene.model import Model
-from texgs.scene.texels import owners
+from texgs.scene.texels import bare_colors, owners
 from texgs.volume.view_set import Light
 
 STRIPES = 9.0  # for each world unit

@@ -9,11 +9,11 @@ from tests.edit.textured import around, shell
 from tests.scene.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.edit.axis_views import axis_cameras
-from texgs.edit.target_update import Policy, recolored, update
-from texgs.edit.target_views import bare_colors, render_views
+from texgs.edit.target_update import Policy, update
+from texgs.edit.target_views import render_views
 from texgs.scene.composition import Composition
 from texgs.scene.edits import Edit
-from texgs.scene.texels import owners
+from texgs.scene.texels import bare_colors, owners, recolored
 from texgs.volume.view_set import Light
 
 BLUE = (0.2, 0.3, 0.8)

@@ -9,10 +9,10 @@ from torch.testing import assert_close
 from tests.edit.textured import RADIUS, around, shell
 from tests.scene.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.edit.target_views import bare_colors, render_views, require_texture, unproject
+from texgs.edit.target_views import render_views, require_texture, unproject
 from texgs.scene.composition import Composition
 from texgs.scene.model import Model
-from texgs.scene.texels import owners
+from texgs.scene.texels import bare_colors, owners
 from texgs.volume.view_set import Light
 
 

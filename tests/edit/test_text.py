@@ -6,9 +6,10 @@ import torch
 from tests.edit.guidances import Tint, Watching
 from tests.edit.textured import around, shell
 from texgs.core.errors import ArgumentError
-from texgs.edit.target_views import bare_colors, render_views
+from texgs.edit.target_views import render_views
 from texgs.edit.text import RECIPES, edit_by_text
 from texgs.models.filters import ProceduralFilters
+from texgs.scene.texels import bare_colors
 
 
 @pytest.fixture(scope="module")

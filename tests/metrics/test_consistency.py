@@ -6,7 +6,7 @@ from math import sqrt
 import pytest
 import torch
 
-from tests.edit.scenes import two_balls
+from tests.edit.lift_scenes import two_balls
 from tests.raster.scenes import random_scene
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError

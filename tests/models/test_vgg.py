@@ -6,8 +6,7 @@ from torch.testing import assert_close
 from tests.models.networks import features, random_weights
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.models import vgg
-from texgs.models.vgg import Vgg, fast_dtype
+from texgs.models.vgg import Vgg
 
 STYLE = {11: "relu3_1", 13: "relu3_2", 15: "relu3_3"}  # by index of the module in torchvision's list
 
@@ -76,27 +75,6 @@ def test_weights_of_something_else_are_refused(tmp_path):
     torch.save({**weights, "features.5.weight": torch.ones(128, 32, 3, 3)}, tmp_path / "other.pth")
     with pytest.raises(ShapeError, match=r"other\.pth: features\.5\.weight: expected \[128, 64, 3, 3\]"):
         Vgg.load(tmp_path / "other.pth")
-
-
-@pytest.mark.parametrize(
-    ("text", "native"),
-    [
-        ("processor : 0\nflags\t\t: fpu avx512f avx512_bf16 amx\n", True),
-        ("processor : 0\nflags\t\t: fpu avx2\n", False),
-        ("Features\t: fp asimd bf16 i8mm\n", True),
-        ("", False),
-    ],
-)
-def test_bfloat16_is_used_where_the_processor_has_it(tmp_path, monkeypatch, text, native):
-    (tmp_path / "cpuinfo").write_text(text)
-    monkeypatch.setattr(vgg, "CPUINFO", tmp_path / "cpuinfo")
-    vgg.has_bfloat16.cache_clear()
-    assert fast_dtype(torch.device("cpu")) == (torch.bfloat16 if native else torch.float32)
-    monkeypatch.setattr(vgg, "CPUINFO", tmp_path / "none")
-    vgg.has_bfloat16.cache_clear()
-    assert fast_dtype(torch.device("cpu")) == torch.float32
-    assert fast_dtype(torch.device("cuda")) == torch.float16
-    vgg.has_bfloat16.cache_clear()
 
 
 def test_real_weights_tell_an_edge_from_noise():

@@ -24,6 +24,10 @@ STAGE_VERBS = {
     "compose": "make one scene of the basic models of a data set",
     "pse": "edit colours, opacities and lights of a scene beside those of its volume",
     "timing": "measure how long frames of a scene and of its volume take",
+    "edit_image": "give a scene the style of a picture",
+    "edit_text": "give a scene the look that an instruction asks for",
+    "edit_segment": "make a segment of a model of a scene, by clicks of the configuration",
+    "edit_metrics": "measure an edited scene: CLIP, style, consistency, time, size",
 }
 VERBS = {
     "new": "start a data set from a volume file of your own, with suggested transfer functions",

@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     import torch
@@ -85,13 +85,14 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.edit.lift import lift
     from texgs.edit.preview import preview
     from texgs.scene.compact import open_model
-    from texgs.scene.scene_file import read_scene
+    from texgs.scene.scene_file import read_scene, write_scene
 
     scene = read_scene(arguments.scene)
     name = chosen(arguments, scene)
     device = torch_device(arguments.device)
     clicks = clicks_of(arguments, device)
-    around = [camera.to(device) for camera in cameras(arguments)]
+    lens = (arguments.radius, arguments.fov, arguments.size)
+    around = [camera.to(device) for camera in voting_views(arguments.views, *lens)]
     masks = mask_model(arguments.masks, device)
     model = open_model(scene.models[name].file).to(device)
     if arguments.preview:
@@ -104,7 +105,11 @@ def run(arguments: argparse.Namespace) -> int:
         threshold=arguments.threshold,
         title=f"segment {arguments.name}",
     )
-    print(*write(arguments, scene, name, model, found.mask), sep="\n")
+    keys = ("view", "point", "other", "masks", "vote")
+    facts = {key: getattr(arguments, key) for key in keys}
+    file = arguments.output.with_name(f"{arguments.output.stem}-{name}-{arguments.name}.safetensors")
+    changed = with_segment(scene, f"{name}/{arguments.name}", model, found.mask, file, facts)
+    print(write_scene(arguments.output, changed), file, sep="\n")
     return 0
 
 
@@ -130,21 +135,21 @@ def clicks_of(arguments: argparse.Namespace, device: "torch.device") -> "Clicks"
     return Clicks(camera, pixels + 0.5, positive)
 
 
-def cameras(arguments: argparse.Namespace) -> "list[Camera]":
-    """Of the views that vote.
+def voting_views(count: int, radius: float, fov: float, size: int) -> "list[Camera]":
+    """Cameras on an icosphere, of square views.
 
     Raises:
-        ArgumentError: if no icosphere has so many views.
+        ArgumentError: if no icosphere has so many.
     """
     from math import isqrt
 
     from texgs.core.errors import ArgumentError
     from texgs.volume.cameras import icosphere
 
-    frequency = isqrt(max(arguments.views - 2, 0) // 10)
-    if frequency < 1 or 10 * frequency**2 + 2 != arguments.views:
-        raise ArgumentError(f"--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {arguments.views}")
-    return icosphere(frequency, arguments.radius, arguments.fov, arguments.size, arguments.size)
+    frequency = isqrt(max(count - 2, 0) // 10)
+    if frequency < 1 or 10 * frequency**2 + 2 != count:
+        raise ArgumentError(f"views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")
+    return icosphere(frequency, radius, fov, size, size)
 
 
 def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
@@ -164,10 +169,7 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
     new = arguments.name
     if not new or any(mark in new for mark in RESERVED):
         raise ArgumentError(f"--name: expected a name without {' '.join(RESERVED)}, got {new}")
-    if new in scene.models[name].segments:
-        raise ArgumentError(
-            f"--name: expected a new name, got {new}, which {name} has; remove it by texgs edit {name}/{new}="
-        )
+    require_new(scene, f"{name}/{new}")
     if not arguments.output:
         raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
     return str(name)
@@ -183,10 +185,33 @@ def mask_model(name: str, device: "torch.device") -> "MaskModel":
     return mobile_sam(device=device) if name == "mobile_sam" else sam_folder(name, device)
 
 
-def write(
-    arguments: argparse.Namespace, scene: "Scene", name: str, model: "Model", mask: "torch.Tensor"
-) -> tuple[Path, Path]:
-    """Write the segment beside the new scene, then the scene.
+def require_new(scene: "Scene", part: str) -> None:
+    """Require that the model of MODEL/SEGMENT has no such segment.
+
+    Raises:
+        ArgumentError: if it has.
+    """
+    from texgs.core.errors import ArgumentError
+
+    name, _, new = part.partition("/")
+    if new in scene.models[name].segments:
+        raise ArgumentError(
+            f"{part}: is there already; choose another name, or remove it by texgs edit {part}="
+        )
+
+
+def with_segment(
+    scene: "Scene", part: str, model: "Model", mask: "torch.Tensor", file: Path, facts: dict[str, Any]
+) -> "Scene":
+    """Write the file of a new segment; the scene that has it, and looks as before.
+
+    Args:
+        scene: that gets it.
+        part: MODEL/SEGMENT.
+        model: of that name.
+        mask: [N] bool.
+        file: target.
+        facts: what the segment comes from, JSON.
 
     Raises:
         ArgumentError: if earlier segments have all of its surfels.
@@ -194,31 +219,23 @@ def write(
     import sys
 
     from texgs.core.errors import ArgumentError
-    from texgs.scene.scene_file import SceneSegment, write_scene
+    from texgs.scene.scene_file import SceneSegment
     from texgs.scene.segment_file import read_segment, write_segment
 
+    name, _, new = part.partition("/")
     entry = scene.models[name]
     free = mask.clone()
     for other in entry.segments.values():
         free &= ~read_segment(other.file, model)
     if not bool(free.any()):
         raise ArgumentError(
-            f"segment: expected surfels that no segment of {name} has, got none; remove one that has them "
+            f"{part}: expected surfels that no segment of {name} has, got none; remove one that has them "
             f"({', '.join(entry.segments)})"
         )
     held, count = int((mask & ~free).sum()), int(mask.sum())
     note = f", of which {held} stay with earlier segments" if held else ""
-    sys.stderr.write(f"{name}/{arguments.name}: {count} of {len(mask)} surfels{note}\n")
-    facts = {
-        "view": arguments.view,
-        "points": arguments.point,
-        "not": arguments.other,
-        "masks": arguments.masks,
-        "vote": arguments.vote,
-    }
-    file = arguments.output.with_name(f"{arguments.output.stem}-{name}-{arguments.name}.safetensors")
+    sys.stderr.write(f"{part}: {count} of {len(mask)} surfels{note}\n")
     write_segment(file, model, mask, facts)
-    # It starts as the model is now, so that nothing changes until it is edited.
     segment = SceneSegment(file, entry.edit, entry.texture)
-    changed = replace(entry, segments={**entry.segments, arguments.name: segment})
-    return write_scene(arguments.output, replace(scene, models={**scene.models, name: changed})), file
+    changed = replace(entry, segments={**entry.segments, new: segment})
+    return replace(scene, models={**scene.models, name: changed})

@@ -66,12 +66,14 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
     from texgs.cli.job import BY_HAND, Job, discard, execute
     from texgs.config.locate import tf_names
-    from texgs.config.stage import for_tf
+    from texgs.config.stage import EDITS, for_tf
     from texgs.config.stages import STAGES
 
     stage = STAGES[name]
     inputs = stage.inputs(config)
     for needed in stage.needs:
+        if needed in EDITS and config.edit.kind not in EDITS[needed]:
+            continue
         once_per_tf = STAGES[needed].per_tf and not stage.per_tf
         for each in [for_tf(config, tf) for tf in tf_names(config)] if once_per_tf else [config]:
             if any(path.is_relative_to(STAGES[needed].output(each)) for path in inputs.values()):

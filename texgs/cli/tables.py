@@ -16,6 +16,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the tables and print them."""
     from texgs.core.errors import ArgumentError
     from texgs.report.fitting import fitting
+    from texgs.report.looks import looks
     from texgs.report.scene_tables import SCENE_TABLES
     from texgs.report.sweep import sweep
 
@@ -27,7 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.sweep:
         tables = {f"sweep-{arguments.sweep}": sweep(paths, arguments.sweep)}
     else:
-        tables = {"fitting": fitting(paths), **{name: make(paths) for name, make in SCENE_TABLES.items()}}
+        makers = {"fitting": fitting, **SCENE_TABLES, "looks": looks}
+        tables = {name: make(paths) for name, make in makers.items()}
     for name, table in tables.items():
         table.write(arguments.output, name)
         print(table.markdown())

@@ -77,6 +77,7 @@ def check(config: DictConfig) -> None:
     """
     check_name("dataset.name", config.dataset.name)
     check_name("fit.name", config.fit.name)
+    check_name("edit.name", config.edit.name)
     for key, name in (("variant", config.variant), ("sweep.name", config.sweep.name)):
         if not re.fullmatch(r"[A-Za-z0-9_-]*", name):
             raise ConfigError(f"{key}: expected letters, digits, _ or -, got {name!r}")

@@ -9,6 +9,7 @@ from typing import Any
 
 from omegaconf import II, MISSING
 
+from texgs.config.edit import Edit
 from texgs.config.fit import Fit
 from texgs.config.keys import key
 
@@ -143,6 +144,18 @@ class Device:
 
 
 @dataclass
+class Metric:
+    """What edited scenes are measured with, besides what needs no weights."""
+
+    clip: str = key(
+        "clip-vit-base-patch32",
+        "backbone of CLIP's metrics, where its weights are on this machine",
+        choices=("clip-vit-base-patch32", "clip-vit-large-patch14"),
+    )
+    views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
+
+
+@dataclass
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
@@ -162,6 +175,9 @@ class Config:
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: Views = key(Views, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")
+    edit: Edit = key(Edit, "a new look for the scene")
+    edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
+    metric: Metric = key(Metric, "what edits are measured with")
     sweep: Sweep = key(Sweep, "variants of the experiment")
     sweeps: dict[str, str] = field(
         default_factory=dict,

@@ -14,6 +14,30 @@ from omegaconf import DictConfig, OmegaConf
 from texgs.config.code import code_digest, digest
 from texgs.core.io import write_atomic
 
+FOLDERS = {  # of their files, below `results`
+    "volume": "{dataset}/volume",
+    "transfer": "{dataset}/transfer",
+    "views": "{dataset}/{tf}/{views}",
+    "sheet": "{dataset}/{tf}/sheet",
+    "surfels": "{dataset}/{tf}/{fit}/surfels",
+    "shading": "{dataset}/{tf}/{fit}/shading",
+    "texture": "{dataset}/{tf}/{fit}/texture",
+    "figure": "{dataset}/{tf}/{fit}/figure",
+    "compose": "{dataset}/scene/{fit}/compose",
+    "pse": "{dataset}/scene/{fit}/pse",
+    "timing": "{dataset}/scene/{fit}/timing",
+    "edit_image": "{dataset}/scene/{fit}/edits/{edit}",
+    "edit_text": "{dataset}/scene/{fit}/edits/{edit}",
+    "edit_segment": "{dataset}/scene/{fit}/edits/{edit}",
+    "edit_metrics": "{dataset}/scene/{fit}/edit_metrics/{edit}",
+}
+EDITS = {  # stages of edits, and the kinds of edit that they are for
+    "edit_image": ("image",),
+    "edit_text": ("text",),
+    "edit_segment": ("segment",),
+    "edit_metrics": ("image", "text"),
+}
+
 
 @dataclass(frozen=True)
 class Stage:
@@ -22,7 +46,6 @@ class Stage:
     name: str
     module: str  # what the job runs
     select: Callable[[DictConfig], dict[str, Any]]  # the part of the configuration that the job reads
-    folder: str  # of its files, below `results`
     inputs: Callable[[DictConfig], dict[str, Path]]  # the files it reads
     needs: tuple[str, ...] = ()  # stages that make these files
     per_tf: bool = False  # a job per basic TF, not per data set
@@ -41,6 +64,10 @@ class Stage:
 
     def applies(self, config: DictConfig) -> bool:
         """Whether the data set goes through this stage: one of views has no volume."""
+        if self.name in EDITS:
+            return config.tf is None and config.edit.kind in EDITS[self.name]
+        if config.edit.kind != "none":  # the scene that is edited is that of another configuration
+            return False
         if self.name == "sheet":  # of the views of a sweep there is none
             return bool(config.views.name == "views")
         if self.name in ("compose", "pse", "timing"):  # of all basic TFs
@@ -49,14 +76,23 @@ class Stage:
 
     def output(self, config: DictConfig) -> Path:
         """Folder of the job's files."""
-        return Path(config.results) / self.folder.format(
-            dataset=config.dataset.name, tf=config.tf, views=config.views.name, fit=fit_folder(config)
-        )
+        return folder_of(self.name, config)
 
     @property
     def code(self) -> str:
         """Digest of the code that the job runs."""
         return code_digest(self.module)
+
+
+def folder_of(stage: str, config: DictConfig) -> Path:
+    """Folder of the files of a stage's job."""
+    return Path(config.results) / FOLDERS[stage].format(
+        dataset=config.dataset.name,
+        tf=config.tf,
+        views=config.views.name,
+        fit=fit_folder(config),
+        edit=config.edit.name,
+    )
 
 
 def fit_folder(config: DictConfig) -> str:

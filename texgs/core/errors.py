@@ -35,3 +35,10 @@ class MissingDataError(ConfigError):
 
 class FitError(TexgsError, ArithmeticError):
     """A fit cannot go on."""
+
+
+def first_line(error: Exception) -> str:
+    """Enough of an error to recognise it, on one line."""
+    lines = str(error).strip().splitlines()
+    text = lines[0] if lines else type(error).__name__
+    return text if len(text) <= 120 else f"{text[:120]}..."

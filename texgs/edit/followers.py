@@ -12,8 +12,8 @@ from texgs.edit.back_projection import back_project, fill_unseen
 from texgs.edit.exposures import Exposure
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
-from texgs.edit.target_views import bare_colors
 from texgs.scene.model import Model
+from texgs.scene.texels import bare_colors
 
 
 class Follower(Protocol):

@@ -13,7 +13,7 @@ from texgs.edit.recipe import Start
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.triplanar import project
 from texgs.scene.model import Model
-from texgs.scene.texels import owners
+from texgs.scene.texels import bare_colors
 
 
 def start_colors(kind: Start, model: Model, style: StylePicture, pixel: float, seed: int) -> Tensor:
@@ -36,10 +36,7 @@ def start_colors(kind: Start, model: Model, style: StylePicture, pixel: float, s
         generator = torch.Generator().manual_seed(seed)
         chosen = torch.randint(len(pixels), (len(p["texels"]),), generator=generator)
         return pixels[chosen.to(pixels.device)]
-    places, surfels = owners(p)
-    own = p["texels"].clone()
-    own[places] += p["colors"][surfels] + p["palette"]
-    own = own.clamp(0, 1)
+    own = bare_colors(model).clamp(0, 1)
     matrix, shift = color_map(own, style.pixels)
     return (own @ matrix.T.to(own) + shift.to(own)).clamp(0, 1)
 

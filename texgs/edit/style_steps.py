@@ -21,7 +21,7 @@ from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
 from texgs.models.vgg import Vgg
 from texgs.scene.model import Model
-from texgs.scene.texels import owners
+from texgs.scene.texels import owners, recolored
 from texgs.volume.view_set import Light
 
 LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
@@ -143,5 +143,4 @@ class StyleSteps:
 
     def result(self) -> Model:
         """The model with the texels as they are now."""
-        parameters = {**self.model.parameters, "texels": self.texels.detach()}
-        return Model(parameters, self.model.optics, self.model.metadata)
+        return recolored(self.model, self.texels.detach(), self.surfels)

@@ -52,9 +52,9 @@ def stylize(
 ) -> Stylized:
     """Give a model the style of a picture (the paper's section Image-Driven NPSE).
 
-    Only texels and the surfels' colours (offsets from the palette) change: palette + offset is 0 and the
-    texel is the stylised colour without light, in [0, 1], so that the palette, lights and opacities can be
-    edited as before and highlights stay what they were. What no view shows keeps the colour of the start.
+    Only texels and the surfels' colours (offsets from the palette) change: palette + offset + texel is the
+    stylised colour without light, in [0, 1], so that the palette, lights and opacities can be edited as
+    before and highlights stay what they were. What no view shows keeps the colour of the start.
 
     Args:
         model: of stage texture.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -14,10 +14,10 @@ from texgs.core.errors import ArgumentError
 from texgs.edit.back_projection import seen_texels
 from texgs.edit.exposures import Exposure, expose
 from texgs.edit.followers import AdamFollower, Follower, SolveFollower
-from texgs.edit.target_views import bare_colors, render_views, require_texture
+from texgs.edit.target_views import render_views, require_texture
 from texgs.models.guidance import Guidance, Views, require_edited, require_instruction
 from texgs.scene.model import Model
-from texgs.scene.texels import mean_texels, owners
+from texgs.scene.texels import bare_colors, owners, recolored
 from texgs.volume.view_set import Light
 
 
@@ -120,28 +120,6 @@ def update(
     colors, weights = follower.finish(targets.rows)
     share = _share(weights, model, changing)
     return Edited(recolored(model, colors, changing), targets.views, targets.images, share)
-
-
-def recolored(model: Model, colors: Tensor, surfels: Tensor | None = None) -> Model:
-    """The model with other bare colours: offsets of surfels become their means, texels what is left.
-
-    Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in
-    that colour, or highlights would take on the hue that the surfel had before.
-
-    Args:
-        model: textured.
-        colors: [T, 3] bare colours of all texels, in their places in the list.
-        surfels: [N] bool, which change; all by default.
-    """
-    p = model.parameters
-    changing = torch.ones_like(p["opacities"], dtype=torch.bool) if surfels is None else surfels
-    mean = mean_texels({**p, "texels": colors}).to(colors)  # [N, 3]
-    offsets = torch.where(changing[:, None], mean - p["palette"], p["colors"])
-    place, surfel = owners(p)
-    moved = changing[surfel]
-    texels = p["texels"].clone()
-    texels[place[moved]] = colors[place[moved]] - mean[surfel[moved]]
-    return replace(model, parameters={**p, "colors": offsets, "texels": texels})
 
 
 class _Targets:

@@ -14,7 +14,6 @@ from texgs.raster import Texture, rasterize
 from texgs.raster.shading import blinn_phong_texture
 from texgs.scene.model import Model, geometry, material
 from texgs.scene.render import light_direction, viewer
-from texgs.scene.texels import owners
 from texgs.volume.view_set import Light
 
 
@@ -26,15 +25,6 @@ def require_texture(model: Model) -> None:
     """
     if model.stage != "texture":
         raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
-
-
-def bare_colors(model: Model) -> Tensor:
-    """c_ind of all texels [T, 3], each in its place in the list: palette + offset of its surfel + texel."""
-    p = model.parameters
-    place, surfel = owners(p)
-    offsets = torch.zeros_like(p["texels"])
-    offsets[place] = p["colors"][surfel]
-    return p["palette"] + offsets + p["texels"]
 
 
 def light_on(model: Model, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:

@@ -7,9 +7,8 @@ from typing import Any
 
 import torch
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, first_line
 from texgs.core.io import read_json
-from texgs.models.tensors import first_line
 
 DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
 

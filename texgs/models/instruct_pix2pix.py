@@ -9,11 +9,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import interpolate, pad
 
-from texgs.core.errors import ArgumentError, MissingDataError
+from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.progress import progress
 from texgs.models.epipolar import Consistency
 from texgs.models.guidance import Views, require_instruction
-from texgs.models.tensors import first_line
 
 PARTS = ("unet", "vae", "text_encoder", "tokenizer", "scheduler")  # folders of the file format
 LONGEST = 512  # pixels: the size the model was trained at

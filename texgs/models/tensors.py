@@ -10,7 +10,7 @@ from zipfile import BadZipFile, is_zipfile
 import torch
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, first_line
 
 DAMAGE = (OSError, EOFError, BadZipFile, RuntimeError, UnpicklingError, TypeError, ValueError)
 
@@ -54,10 +54,3 @@ def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> l
             f"{path}: expected tensor {missing[0]}, got {', '.join(there[:4])} ...; use weights of this model"
         )
     return wanted
-
-
-def first_line(error: Exception) -> str:
-    """Enough of an error to recognise it, on one line."""
-    lines = str(error).strip().splitlines()
-    text = lines[0] if lines else type(error).__name__
-    return text if len(text) <= 120 else f"{text[:120]}..."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 
 import torch
@@ -12,6 +11,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core import check
+from texgs.models.precision import fast_dtype
 from texgs.models.tensors import read_tensors
 from texgs.models.weights import locate
 
@@ -19,8 +19,6 @@ MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of ImageNet, p
 BLOCKS = (2, 2, 3, 3, 3)  # convolutions between poolings
 CHANNELS = (64, 128, 256, 512, 512)  # of the blocks
 STYLE_LAYERS = ("relu3_1", "relu3_2", "relu3_3")  # 3 x 256 channels, a quarter of the resolution
-CPUINFO = Path("/proc/cpuinfo")
-BFLOAT16_FLAGS = {"avx512_bf16", "amx_bf16", "bf16"}  # what Linux calls instructions for it, x86 and Arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,20 +102,3 @@ def place(name: str) -> int:
     """Index of a convolution in torchvision's list of features: each has a ReLU, each block a pooling."""
     block, conv = int(name[4]) - 1, int(name[6]) - 1
     return sum(2 * count + 1 for count in BLOCKS[:block]) + 2 * conv
-
-
-def fast_dtype(device: torch.device) -> torch.dtype:
-    """float16 on a GPU, bfloat16 on a CPU with instructions for it, else float32."""
-    if device.type == "cuda":
-        return torch.float16
-    return torch.bfloat16 if has_bfloat16() else torch.float32
-
-
-@cache
-def has_bfloat16() -> bool:
-    """Whether the processor multiplies bfloat16 itself; where nothing tells, no."""
-    if not CPUINFO.exists():
-        return False
-    lines = CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines()
-    flags = next((line for line in lines if line.lower().startswith(("flags", "features"))), "")
-    return bool(BFLOAT16_FLAGS & set(flags.split()))

@@ -11,6 +11,7 @@ from typing import Any
 
 from texgs.core.io import write_bytes
 from texgs.report.fitting import fitting
+from texgs.report.looks import looks
 from texgs.report.metrics_files import PHASES, read
 from texgs.report.scene_tables import SCENE_TABLES, label
 from texgs.report.table import Table
@@ -23,10 +24,27 @@ PICTURES = {  # files beside the metrics of a stage, and what they show
     },
     "transfer": {"transfer.png": "Histogram of the volume with the basic transfer functions."},
     "sheet": {"sheet.png": "Views that the model was fitted to, and test views."},
+    "edit_image": {
+        "style.png": "The style picture.",
+        "edit.png": "Before and after the edit, under the light of the scene and under another one.",
+        "convergence.png": "Terms of the loss in each iteration.",
+    },
+    "edit_text": {
+        "views.png": "Views before and after they were edited as the instruction says.",
+        "edit.png": "Before and after the edit, under the light of the scene and under another one.",
+    },
+    "edit_segment": {
+        "edit.png": "Clicks with the mask of their view, and the segment that all views agree on."
+    },
     "figure": {"figure.png": "Test views, the phases of the fit, errors, normals, depth and material."},
 }
 ORDER = tuple(PICTURES)
-NARROW = ("scene.png", "transfer.png")  # readable at any width; the others scroll on a narrow window
+NARROW = (
+    "scene.png",
+    "transfer.png",
+    "style.png",
+    "convergence.png",
+)  # readable at any width; the others scroll on a narrow window
 JOB = ("stage", "dataset", "tf", "recipe", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
 
@@ -49,7 +67,8 @@ def write_report(path: str | Path, metrics_files: Iterable[str | Path]) -> Path:
     jobs = read(metrics_files)
     paths = [file for file, _ in jobs]
     tables = {"Fitting": fitting(paths)}
-    tables |= {name.replace("_", " ").capitalize(): make(paths) for name, make in SCENE_TABLES.items()}
+    makers = {**SCENE_TABLES, "looks": looks}
+    tables |= {name.replace("_", " ").capitalize(): make(paths) for name, make in makers.items()}
     template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
@@ -73,7 +92,7 @@ def sections(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> dict[str, list[d
         for name, words in PICTURES[metrics["stage"]].items():
             picture = path.with_name(name)
             if picture.is_file():
-                words_before = (metrics.get("tf"), label(metrics))
+                words_before = (metrics.get("tf"), label(metrics), metrics["numbers"].get("edit"))
                 entry = {
                     "kind": "" if name in NARROW else "wide",
                     "uri": data_uri(picture.read_bytes()),

@@ -1,11 +1,14 @@
-"""The list that holds the texels of all surfels: whose each is, and what each surfel's come to."""
+"""The list that holds the texels of all surfels: whose each is, and the colours that they stand for."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import torch
 from torch import Tensor
+
+from texgs.scene.model import Model
 
 
 def owners(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
@@ -23,3 +26,34 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
     running = torch.cat([texels.new_zeros(1, 3), texels.cumsum(0)])  # [T + 1, 3]
     counts, offsets = parameters["sizes"].long().prod(1), parameters["offsets"]  # [N]
     return (running[offsets + counts] - running[offsets]) / counts[:, None]
+
+
+def bare_colors(model: Model) -> Tensor:
+    """c_ind of all texels [T, 3], each in its place in the list: palette + offset of its surfel + texel."""
+    p = model.parameters
+    place, surfel = owners(p)
+    offsets = torch.zeros_like(p["texels"])
+    offsets[place] = p["colors"][surfel]
+    return p["palette"] + offsets + p["texels"]
+
+
+def recolored(model: Model, colors: Tensor, surfels: Tensor | None = None) -> Model:
+    """The model with other bare colours: offsets of surfels become their means, texels what is left.
+
+    Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in
+    that colour, or highlights would take on the hue that the surfel had before.
+
+    Args:
+        model: textured.
+        colors: [T, 3] bare colours of all texels, in their places in the list.
+        surfels: [N] bool, which change; all by default.
+    """
+    p = model.parameters
+    place, surfel = owners(p)
+    changing = torch.ones_like(p["opacities"], dtype=torch.bool) if surfels is None else surfels
+    mean = mean_texels({**p, "texels": colors}).to(colors)  # [N, 3]
+    offsets = torch.where(changing[:, None], mean - p["palette"], p["colors"])
+    texels = p["texels"].clone()
+    moved = changing[surfel]
+    texels[place[moved]] = colors[place[moved]] - mean[surfel[moved]]
+    return replace(model, parameters={**p, "colors": offsets, "texels": texels})

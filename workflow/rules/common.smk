@@ -8,13 +8,14 @@ from pathlib import Path
 from texgs.cli.stages.tf import check_basic_tfs
 from texgs.config.code import code_digest, digest
 from texgs.config.compose import compose
+from texgs.config.edits import edits
 from texgs.config.locate import tf_names
-from texgs.config.stage import fit_folder, for_tf, settings_file
+from texgs.config.stage import EDITS, FOLDERS, fit_folder, for_tf, settings_file
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError, MissingDataError, TexgsError
 
-GROUPS = ("experiment", "dataset", "views", "fit", "sweep", "device", "tracking")
+GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
 
 
 def overrides():
@@ -37,7 +38,7 @@ def overrides():
 
 
 def experiments(words):
-    """Configurations by the name of their sweep; None for those of none: one for each data set and variant."""
+    """Configurations by the name of their sweep, None for those of none: one for each data set and variant or edit."""
     base = compose(words)
     names = [(*words, f"dataset={name}") for name in base.datasets] or [words]
     repeated = [name for name in base.datasets if base.datasets.count(name) > 1]
@@ -47,10 +48,14 @@ def experiments(words):
     for each in names:
         config = compose(each)
         name = config.sweep.name if config.sweep.variants else None
-        found.setdefault(name, []).extend(compose(variant) for variant in variants(each))
+        fitted = (*each, "edit=none")
+        found.setdefault(name, []).extend(compose(variant) for variant in variants(fitted))
+        if name is None:
+            found[name] += [compose(edit) for edit in edits(each)]
     for name, dataset in base.sweeps.items():
         found[name] = [
-            compose(variant) for variant in variants((*words, f"dataset={dataset}", f"sweep={name}"))
+            compose(variant)
+            for variant in variants((*words, f"dataset={dataset}", f"sweep={name}", "edit=none"))
         ]
     return found
 
@@ -80,7 +85,7 @@ def jobs(configs):
 
 def job(stage, wildcards):
     """Settings file and input files of the job that wildcards describe."""
-    folder = Path(RESULTS, STAGES[stage].folder.format(**dict(wildcards.items())))
+    folder = Path(RESULTS, FOLDERS[stage].format(**dict(wildcards.items())))
     return JOBS[stage, folder.as_posix()]
 
 
@@ -99,6 +104,24 @@ def done(*stages, sweep=None):
     return sorted(f"{folder}/metrics.json" for stage, folder in OF_SWEEP.get(sweep, ()) if stage in stages)
 
 
+def edits_of(kind):
+    """The wildcard's values: names of edits of a kind."""
+    names = sorted({re.escape(each.edit.name) for each in CONFIGS if each.edit.kind == kind})
+    return "|".join(names) or "no-edit"
+
+
+def missing_weights(configs):
+    """What edits need and this machine has not; without a dry run what can be had is downloaded now."""
+    edited = [config for config in configs if config.edit.kind != "none"]
+    if not edited:
+        return []
+    from texgs.cli.weights import missing  # not at the top: most runs have no edits
+
+    return list(dict.fromkeys(line for config in edited for line in missing(config, download=not IS_DRY)))
+
+
+IS_DRY = any(re.fullmatch(r"--dry-?run|--lint|-[a-zA-Z]*n[a-zA-Z]*", word) for word in sys.argv)
+
 # A mistake of the user ends here in one sentence, before any job.
 try:
     WORDS = overrides()
@@ -107,6 +130,7 @@ try:
     CONFIGS = [config for configs in EXPERIMENTS.values() for config in configs]
     RESULTS = CONFIG.results
     JOBS, MISSING = jobs(CONFIGS)
+    MISSING += missing_weights(CONFIGS)
     OF_SWEEP = {sweep: set(jobs(configs)[0]) for sweep, configs in EXPERIMENTS.items()}
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
@@ -115,7 +139,7 @@ except TexgsError as error:
 # Missing files are told together and before any job; a dry run shows what would be done with them.
 if MISSING:
     print("\n".join(f"texgs: {line}" for line in MISSING), file=sys.stderr)
-    if not any(re.fullmatch(r"--dry-?run|--lint|-[a-zA-Z]*n[a-zA-Z]*", word) for word in sys.argv):
+    if not IS_DRY:
         sys.exit(2)
 
 STORE = CONFIG.tracking.uri
@@ -144,3 +168,4 @@ wildcard_constraints:
     tf="[A-Za-z][A-Za-z0-9_-]*",
     views="|".join(sorted({re.escape(each.views.name) for each in CONFIGS})),
     fit="|".join(sorted({re.escape(fit_folder(each)) for each in CONFIGS})),
+    edit="|".join(sorted({re.escape(each.edit.name) for each in CONFIGS})),

@@ -2,12 +2,12 @@
 
 
 SWEEPS = sorted(filter(None, EXPERIMENTS))
-TABLES = ["fitting", "datasets", "rendering", "model_size", "edits"] if None in EXPERIMENTS else []
+TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if None in EXPERIMENTS else []
 
 
 rule tables:
     input:
-        done("volume", "views", "surfels", "shading", "texture", "pse", "timing"),
+        done("volume", "views", "surfels", "shading", "texture", "pse", "timing", *EDITS),
     output:
         collect("<results>/tables/{name}.{format}", name=TABLES, format=("csv", "md", "tex")),
     log:

@@ -1,0 +1,122 @@
+"""Scenes with a new look, from the volume on, by hand: no weights are needed for any of it."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from tests.cli.test_scene_stages import WORDS
+from texgs.cli.main import main
+from texgs.scene.scene_file import read_scene
+
+FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """All kinds of edits, and their measures."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("edits")
+        patch.chdir(folder)
+        patch.setenv("TEXGS_WEIGHTS", str(folder / "none"))
+        patch.setenv("TORCH_HOME", str(folder / "none"))
+        patch.setenv("HF_HOME", str(folder / "none"))
+        patch.setenv("XDG_CACHE_HOME", str(folder / "none"))
+        for verb, edit in (
+            ("edit_image", "glass"),
+            ("edit_text", "marble"),
+            ("edit_segment", "pick"),
+            ("edit_image", "dots"),
+        ):
+            assert main([verb, *WORDS, *FEW, f"edit={edit}"]) == 0
+        assert main(["edit_metrics", *WORDS, *FEW, "edit=glass"]) == 0
+        yield folder / "results" / "turbulence" / "scene" / "demo"
+
+
+def numbers(folder):
+    return json.loads((folder / "metrics.by_hand.json").read_text())["numbers"]
+
+
+def parameters(results, scene, name):
+    return read_scene(results / scene / "scene.yaml").models[name].open()[0].parameters
+
+
+@pytest.mark.parametrize("edit", ["glass", "marble"])
+def test_only_colours_change(results, edit):
+    for name in ("TF01", "TF02"):
+        before, after = parameters(results, "compose", name), parameters(results, f"edits/{edit}", name)
+        same = {key for key in before if torch.equal(before[key], after[key])}
+        assert same == set(before) - {"texels", "colors"}
+
+
+def test_pictures_show_both(results):
+    for edit, files in {
+        "glass": ("style.png", "edit.png", "convergence.png"),
+        "marble": ("views.png", "edit.png"),
+        "pick": ("edit.png",),
+    }.items():
+        for name in files:
+            picture = np.asarray(Image.open(results / "edits" / edit / name).convert("RGB"))
+            assert picture.std() > 5, f"{edit}/{name} shows nothing"
+    assert (results / "edits" / "glass" / "turntable.mp4").stat().st_size > 1000
+
+
+def test_numbers_name_the_method(results):
+    glass, marble = (numbers(results / "edits" / edit) for edit in ("glass", "marble"))
+    assert glass["method"] == "patches (no weights)"
+    assert marble["method"] == "procedural filters, default"
+    assert set(glass["parts"]) == {"TF01", "TF02"}
+    assert glass["edit_seconds"] > 0
+
+
+def test_a_part_of_a_model_is_edited_alone(results):
+    models = read_scene(results / "edits" / "dots" / "scene.yaml").models
+    before, after = parameters(results, "compose", "TF01"), parameters(results, "edits/dots", "TF01")
+    (mask,) = models["TF01"].open()[1]
+    assert 0 < int(mask.sum()) == numbers(results / "edits" / "pick")["surfels"]
+    counts = before["sizes"].long().prod(1)
+    owner = torch.repeat_interleave(counts)
+    changed = (before["texels"] != after["texels"]).any(1)
+    assert bool(changed[mask[owner]].any())
+    assert not bool(changed[~mask[owner]].any())
+    assert torch.equal(before["colors"][~mask], after["colors"][~mask])
+    assert models["TF02"].texture is None
+
+
+def test_measures_without_weights_say_what_is_missing(results):
+    found = numbers(results / "edit_metrics" / "glass")
+    assert found["geometry_kept"] is True
+    assert "clip-vit-base-patch32 are not on this machine" in found["clip_missing"]
+    assert "similarity" not in found
+    assert 0 <= found["short_rmse"] <= 0.2
+    assert found["short_lpips"] is None
+    assert found["megabytes"] > 0
+
+
+def test_a_part_that_is_not_there(results, capsys, monkeypatch):
+    monkeypatch.chdir(results.parents[3])
+    assert main(["edit_image", *WORDS, *FEW, "edit=glass", "edit.parts=[TF07]", "edit.name=other"]) == 2
+    assert "edit.parts: expected some of TF01, TF02, got TF07" in capsys.readouterr().err
+
+
+def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results):
+    monkeypatch.chdir(results.parents[3])
+    assert main(["edit_image", *WORDS, *FEW, "edit=dots", "edit.base=nothing", "edit.name=other"]) == 2
+    assert "run the stage that makes it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ("edit.segment.points=[]", "edit.segment.points: expected one at least"),
+        ("edit.segment.points=[[2, 0]]", r"edit.segment.points: expected two shares from 0 to 1"),
+        ("edit.segment.points=[[0.01, 0.01]]", "expected a place on the model, got background"),
+        ("edit.segment.model=TF9", "edit.segment.model: expected one of TF01, TF02"),
+    ],
+)
+def test_wrong_clicks(results, capsys, monkeypatch, words, message):
+    monkeypatch.chdir(results.parents[3])
+    assert main(["edit_segment", *WORDS, *FEW, "edit=pick", words, "edit.name=other"]) == 2
+    assert message in capsys.readouterr().err

@@ -1,0 +1,66 @@
+import pytest
+
+from texgs.config.compose import compose, members
+from texgs.config.edits import edits
+from texgs.config.stage import EDITS
+from texgs.config.stages import STAGES
+from texgs.core.errors import ConfigError
+
+
+def names(*words):
+    return [compose(each).edit.name for each in edits(words)]
+
+
+def test_without_an_edit_there_is_none():
+    assert edits(("dataset=engine",)) == []
+
+
+def test_every_edit_of_conf_composes_and_is_named_after_its_file():
+    for name in members("edit"):
+        edit = compose(("dataset=engine", f"edit={name}")).edit
+        assert edit.name == name
+        assert (edit.kind == "none") == (name == "none")
+        assert edit.base is None or edit.base in members("edit")
+
+
+def test_what_an_edit_starts_from_comes_before_it():
+    assert names("edit=dots") == ["pick", "dots"]
+    assert names("edits=[glass, dots, pick]") == ["glass", "pick", "dots"]
+
+
+def test_a_changed_value_holds_for_the_edit():
+    (words,) = edits(("edit=glass", "edit.image.iterations=7"))
+    assert compose(words).edit.image.iterations == 7
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("edits=[glass, glass]",), "edits: expected different names, got glass twice"),
+        (("edits=[glas]",), "edit: expected one of dots, glass, "),
+        (("edit=glass", "edit.base=glass"), "edit.base: glass starts from itself"),
+        (("edit=glass", "edit.image.lambda_s=1.5"), "edit.image.lambda_s: expected at most 1, got 1.5"),
+        (("edit=glass", "edit.image.recipe=patch"), "expected one of default, .* did you mean patches"),
+        (("edit=glass", "edit.name=a/b"), "edit.name: expected a letter and then letters"),
+    ],
+)
+def test_a_mistake_is_one_sentence(words, message):
+    with pytest.raises(ConfigError, match=message):
+        [compose(each) for each in edits(words)]
+
+
+def test_each_kind_has_its_stage_and_the_models_are_those_of_another_configuration():
+    for name, kind in (("glass", "image"), ("marble", "text"), ("pick", "segment")):
+        config = compose(("dataset=engine", f"edit={name}"))
+        applying = [stage for stage in STAGES.values() if stage.applies(config)]
+        assert {stage.name for stage in applying} == {key for key, kinds in EDITS.items() if kind in kinds}
+
+
+def test_an_edit_reads_the_scene_of_its_base():
+    config = compose(("dataset=engine", "edit=dots"))
+    files = STAGES["edit_image"].inputs(config)
+    assert files["scene"].parts[-3:] == ("edits", "pick", "scene.yaml")
+    assert files["views.TF02"].parts[-3:] == ("TF02", "views", "transforms_train.json")
+    assert STAGES["edit_image"].output(config).parts[-2:] == ("edits", "dots")
+    with pytest.raises(ConfigError, match="an edit is of a scene, with all basic TFs"):
+        STAGES["edit_image"].inputs(compose(("dataset=engine", "edit=dots", "tf=TF01")))

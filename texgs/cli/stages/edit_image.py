@@ -1,0 +1,96 @@
+"""Stage `edit_image`: the parts of a scene take on the style of a picture."""
+
+import time
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from texgs.cli.stages.before_after import show
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.parts import edit_parts
+from texgs.core.device import torch_device
+from texgs.core.image import write_png
+from texgs.edit.clip_loss import ClipLoss
+from texgs.edit.pictures import PICTURES, picture
+from texgs.edit.recipe import Recipe, preset
+from texgs.edit.style_picture import StylePicture, read_style
+from texgs.edit.stylize import stylize
+from texgs.models.clip import Clip
+from texgs.models.vgg import Vgg
+from texgs.report.convergence import write_convergence
+from texgs.scene.model import Model
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.volume.reduced import smaller
+from texgs.volume.view_set import read_views
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write scene.yaml, a texture for each part, style.png, edit.png, convergence.png and turntable.mp4.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
+        output: folder.
+    """
+    edit, image, title = settings["edit"], settings["edit"]["image"], f"{settings['dataset']}: edit"
+    device, scene = torch_device(settings["fit"]["device"]), read_scene(inputs["scene"])
+    recipe, style = recipe_of(image, edit["seed"]), style_of(image["style"])
+    write_png(output / "style.png", style.image.permute(1, 2, 0))
+    vgg = Vgg.load(device=device) if recipe.needs_vgg else None
+    clip = None
+    if recipe.needs_clip:
+        clip = ClipLoss(Clip.load(settings["clip"], device), style.image.permute(1, 2, 0).to(device))
+    curves: dict[str, dict[str, list[float]]] = {}
+
+    def one(name: str, model: Model, surfels: Tensor | None) -> tuple[Model, dict[str, Any]]:
+        views = read_views(inputs[f"views.{name.split('/')[0]}"].parent).train
+        start = time.monotonic()
+        result = stylize(
+            model,
+            [smaller(view.camera, settings["reduce"]) for view in views],
+            [view.light for view in views],
+            style,
+            recipe,
+            vgg=vgg,
+            clip=clip,
+            surfels=surfels,
+            title=f"{title} {edit['name']}, {name}",
+        )
+        curves[name] = result.history.losses
+        return result.model, {"seconds": time.monotonic() - start, "by_part": result.history.seconds}
+
+    after, found = edit_parts(scene, edit["parts"], output, device, one)
+    write_scene(output / "scene.yaml", after)
+    drawn = [write_convergence(output / "convergence.png", curves)]
+    numbers = {
+        "edit": edit["name"],
+        "kind": "image",
+        "method": method(recipe),
+        "lambda_s": recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
+        "edit_seconds": sum(each["seconds"] for each in found.values()),
+        "parts": found,
+    }
+    return Outcome(numbers, [*show(scene, after, output, device, title), *drawn])
+
+
+def recipe_of(image: dict[str, Any], seed: int) -> Recipe:
+    """The recipe of an edit, with what the configuration changes about it."""
+    changes = {key: image[key] for key in ("iterations", "lambda_s") if image[key] is not None}
+    return preset(image["recipe"], pattern=image["pattern"], seed=seed, **changes)
+
+
+def style_of(name: str) -> StylePicture:
+    """The picture of texgs that has this name, or of a file."""
+    return StylePicture.of(picture(name)) if name in PICTURES else read_style(name)
+
+
+def method(recipe: Recipe) -> str:
+    """What the edit works with, for tables."""
+    names = {
+        "VGG-16": recipe.needs_vgg,
+        "CLIP": recipe.needs_clip,
+        "patches": recipe.patches > 0 and recipe.iterations > 0,
+    }
+    found = [name for name, is_used in names.items() if is_used] or ["projection"]
+    return " + ".join(found) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")

@@ -1,0 +1,152 @@
+"""Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import torch
+
+from texgs.cli.stages.edit_image import style_of
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.parts import parts_of
+from texgs.cli.stages.timing import milliseconds
+from texgs.core.camera import Camera
+from texgs.core.device import torch_device
+from texgs.core.progress import progress
+from texgs.metrics.clip import clip_scores
+from texgs.metrics.consistency import LONG, SHORT, Frame, consistency
+from texgs.metrics.style import likeness
+from texgs.models.clip import Clip
+from texgs.models.lpips import Lpips
+from texgs.models.vgg import Vgg
+from texgs.models.weights import available
+from texgs.scene.composition import Composition
+from texgs.scene.scene_file import Scene, read_scene
+from texgs.scene.size import sizes
+from texgs.volume.cameras import test_path
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Measure; nothing but the numbers is written.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `scene`, edited, and `before`, as fitted.
+        output: folder.
+    """
+    edit, views = settings["edit"], settings["views"]
+    title = f"{settings['dataset']}: {edit['name']}"
+    device = torch_device(settings["fit"]["device"])
+    after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
+    scenes = after.open(device), before.open(device)
+    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
+    cameras = [camera.to(device) for camera in test_path(views["test"]["count"], *lens)]
+    some = cameras[:: max(1, len(cameras) // settings["compared"])]
+    frames = milliseconds(lambda camera: scenes[0].render(camera, after.light, after.edits), cameras, title)
+    numbers = {
+        "edit": edit["name"],
+        "kind": edit["kind"],
+        "frame_mean_ms": fmean(frames),
+        "frame_max_ms": max(frames),
+        "primitives": len(scenes[0]),
+        "megabytes": sum(size_of(after)) * 2**20 / 1e6,
+        "geometry_kept": is_geometry_kept(*scenes, some),
+        **agreement(scenes[0], after, cameras, settings["compared"]),
+        **style_distance(after, edit, some, device, title),
+        **clip_numbers(settings, (after, before), scenes, cameras, title),
+    }
+    return Outcome(numbers)
+
+
+def size_of(scene: Scene) -> list[float]:
+    """MiB of each model, as the paper counts them."""
+    return [sizes(entry.open()[0])["total_mib"] for entry in scene.models.values()]
+
+
+@torch.no_grad()
+def is_geometry_kept(after: Composition, before: Composition, cameras: Sequence[Camera]) -> bool:
+    """Whether depth, normals and alpha of all views are the same, bit for bit."""
+    outputs = ("depth", "normal")
+    pairs = [[scene.render(camera, outputs=outputs) for scene in (after, before)] for camera in cameras]
+    return all(
+        torch.equal(one.alpha, two.alpha)
+        and torch.equal(one.depth, two.depth)  # type: ignore[arg-type]
+        and torch.equal(one.normal, two.normal)  # type: ignore[arg-type]
+        for one, two in pairs
+    )
+
+
+@torch.no_grad()
+def agreement(
+    composition: Composition, scene: Scene, cameras: Sequence[Camera], count: int
+) -> dict[str, float | None]:
+    """Consistency of consecutive views in the middle of the path, near and far, without light."""
+    start = max(0, (len(cameras) - count - LONG) // 2)
+    frames = []
+    for camera in cameras[start : start + count + LONG]:
+        seen = composition.render(camera, scene.light, scene.edits, look="unshaded", outputs=("median",))
+        frames.append(Frame(seen.color.clamp(0, 1), seen.median, seen.alpha, camera))  # type: ignore[arg-type]
+    perceptual = None
+    if available("vgg16") and available("lpips_vgg"):
+        lpips = Lpips.load(device=composition.means.device)
+        perceptual = lambda one, two: float(lpips.distance(one, two))  # noqa: E731
+    found: dict[str, float | None] = {}
+    for name, apart in (("short", SHORT), ("long", LONG)):
+        if len(frames) > apart:
+            measured = consistency(frames, apart, perceptual)
+            found |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
+    return found
+
+
+def style_distance(
+    scene: Scene, edit: dict[str, Any], cameras: Sequence[Camera], device: torch.device, title: str
+) -> dict[str, float]:
+    """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
+    parts = parts_of(scene, edit["parts"])
+    if edit["kind"] != "image" or any(part.segment for part in parts) or not available("vgg16"):
+        return {}
+    vgg = Vgg.load(device=device)
+    style = style_of(edit["image"]["style"]).scaled(max(cameras[0].width, cameras[0].height))
+    found = [
+        likeness(
+            scene.models[part.model].open()[0].to(device),
+            cameras,
+            [scene.light] * len(cameras),
+            style.image,
+            vgg,
+            style.region,
+            f"{title}, {part.name}",
+        )
+        for part in parts
+    ]
+    return {
+        "style_nnfm": fmean(each.nnfm for each in found),
+        "style_gram": fmean(each.gram for each in found),
+    }
+
+
+@torch.no_grad()
+def clip_numbers(
+    settings: dict[str, Any],
+    scenes: tuple[Scene, Scene],
+    compositions: tuple[Composition, Composition],
+    cameras: Sequence[Camera],
+    title: str,
+) -> dict[str, Any]:
+    """CLIP's similarity and directional similarity over all views, or why they were not measured."""
+    edit, backbone = settings["edit"], settings["clip"]
+    if not available(backbone):
+        return {"clip_missing": f"the weights of {backbone} are not on this machine"}
+    if not edit["source_caption"] or not edit["target_caption"]:
+        return {"clip_missing": "the edit has no captions"}
+    clip = Clip.load(backbone, compositions[0].means.device)
+    edited, originals = (
+        (
+            composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
+            for camera in progress(cameras, title=f"{title}, CLIP", unit="view")
+        )
+        for scene, composition in zip(scenes, compositions, strict=True)
+    )
+    scores = clip_scores(clip, edited, originals, edit["source_caption"], edit["target_caption"])
+    return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}

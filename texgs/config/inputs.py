@@ -1,0 +1,134 @@
+"""Which files and settings the stages of the workflow read."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from omegaconf import DictConfig
+
+from texgs.config.locate import source_file, tf_names, views_folder
+from texgs.config.stage import folder_of, for_tf
+from texgs.core.errors import ConfigError
+
+
+def volume_inputs(config: DictConfig) -> dict[str, Path]:
+    """The volume's file, where there is one."""
+    path = source_file(config)
+    return {} if path is None else {"source": path}
+
+
+def prepared_volume(config: DictConfig) -> dict[str, Path]:
+    """What stage `volume` writes."""
+    return {"volume": folder_of("volume", config) / "volume.nrrd"}
+
+
+def view_set(config: DictConfig) -> dict[str, Path]:
+    """The views: those that stage `views` renders, or those that the data set consists of."""
+    return {"views": (views_folder(config) or folder_of("views", config)) / "transforms_train.json"}
+
+
+def seeded(config: DictConfig) -> dict[str, Path]:
+    """The views, and the volume where surfels start in its voxels."""
+    from_voxels = config.fit.seeds.kind == "voxels" and config.dataset.views_folder is None
+    return {**view_set(config), **(prepared_volume(config) if from_voxels else {})}
+
+
+def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
+    """The model that a stage of the fit writes, and the views."""
+    return lambda config: {"model": folder_of(stage, config) / "model.safetensors", **view_set(config)}
+
+
+def all_models(config: DictConfig) -> dict[str, Path]:
+    """The textured models of all basic TFs, by name.
+
+    Raises:
+        ConfigError: if one basic TF is chosen.
+    """
+    if config.tf is not None:
+        raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
+    return {
+        name: folder_of("texture", for_tf(config, name)) / "model.safetensors" for name in tf_names(config)
+    }
+
+
+def scene_and_volume(config: DictConfig) -> dict[str, Path]:
+    """The scene, and the prepared volume where there is one."""
+    scene = {"scene": folder_of("compose", config) / "scene.yaml"}
+    return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
+
+
+def scene_settings(config: DictConfig) -> dict[str, Any]:
+    """What stages read that compare a scene with its volume."""
+    basic = {} if config.dataset.views_folder is not None else config.dataset.basic_tfs
+    return {
+        "tf_values": config.dataset.tf_values,
+        "basic_tfs": {name: basic[name] for name in tf_names(config) if name in basic},
+        "views": view_settings(config),
+        **fit_label(config),
+    }
+
+
+def fit_label(config: DictConfig) -> dict[str, Any]:
+    """Which fit this is, and what it runs on."""
+    return {
+        "fit": {
+            "name": config.fit.name,
+            "seed": config.fit.seed,
+            "sweep": config.sweep.name,
+            "variant": config.variant,
+            "device": config.device.name,
+        }
+    }
+
+
+def view_settings(config: DictConfig) -> dict[str, Any]:
+    """How views are rendered, without the name of their folder."""
+    return {name: value for name, value in config.views.items() if name != "name"}
+
+
+def models(config: DictConfig) -> dict[str, Path]:
+    """The models that the three phases of the fit write, and the views."""
+    phases = ("surfels", "shading", "texture")
+    return {
+        **{name: folder_of(name, config) / "model.safetensors" for name in phases},
+        **view_set(config),
+    }
+
+
+def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
+    """What a stage of the fit reads: what holds for all of them, and its own parts."""
+    return lambda config: {
+        "fit": {**fit_label(config)["fit"], **{part: config.fit[part] for part in ("reduce", *parts)}}
+    }
+
+
+def edited_scene(config: DictConfig) -> dict[str, Path]:
+    """The scene that an edit starts from, and the training views of all basic TFs.
+
+    Raises:
+        ConfigError: if one basic TF is chosen.
+    """
+    if config.tf is not None:
+        raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
+    before = folder_of("compose", config)
+    if config.edit.base is not None:
+        before = folder_of("edit_image", config).with_name(config.edit.base)
+    views = {f"views.{name}": view_set(for_tf(config, name))["views"] for name in tf_names(config)}
+    return {"scene": before / "scene.yaml", **views}
+
+
+def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:
+    """The scene as fitted and as edited, and the views of all basic TFs."""
+    after = folder_of("edit_image", config) / "scene.yaml"
+    return {**edited_scene(config), "scene": after, "before": folder_of("compose", config) / "scene.yaml"}
+
+
+def edit_settings(part: str | None = None) -> Callable[[DictConfig], dict[str, Any]]:
+    """What a stage of edits reads: what holds for all kinds, and its own part of the edit."""
+
+    def select(config: DictConfig) -> dict[str, Any]:
+        parts = ("image", "text", "segment")
+        edit = {name: value for name, value in config.edit.items() if name not in parts or name == part}
+        return {"edit": edit, **fit_label(config), "reduce": config.fit.reduce, "clip": config.metric.clip}
+
+    return select

@@ -1,0 +1,109 @@
+"""Table `looks`: scenes with a new look, by pictures and by words, beside the paper's two tables of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from texgs.report.metrics_files import paper, read
+from texgs.report.scene_tables import label
+from texgs.report.table import Cell, Column, Row, Table
+
+EDITS = ("edit_image", "edit_text", "edit_segment")
+MEASURED = (
+    "similarity",
+    "direction",
+    "frame_mean_ms",
+    "frame_max_ms",
+    "megabytes",
+    "primitives",
+    "style_nnfm",
+    "style_gram",
+    "short_rmse",
+    "long_rmse",
+    "short_lpips",
+    "long_lpips",
+)
+COLUMNS = (
+    Column("data set"),
+    Column("recipe"),
+    Column("edit"),
+    Column("method"),
+    Column("lambda_s", 2, "-"),
+    Column("minutes", 2),
+    Column("CLIP similarity", 3),
+    Column("CLIP direction", 3),
+    Column("mean ms", 2),
+    Column("max ms", 2),
+    Column("MB", 1),
+    Column("primitives", 0),
+    Column("NNFM", 3),
+    Column("Gram", 3),
+    Column("RMSE, near", 4),
+    Column("RMSE, far", 4),
+    Column("LPIPS, near", 4),
+    Column("LPIPS, far", 4),
+    Column("geometry kept"),
+)
+PUBLISHED = {  # columns of the paper's files by our own
+    "minutes": "editing_min",
+    "CLIP similarity": "clip_similarity",
+    "CLIP direction": "clip_directional_similarity",
+    "mean ms": "render_mean_ms",
+    "max ms": "render_max_ms",
+    "MB": "model_mb",
+    "primitives": "primitives",
+}
+
+
+def looks(paths: Iterable[str | Path]) -> Table:
+    """The table of all edits among some metrics files; without any it is empty.
+
+    Raises:
+        ArgumentError: if a file is no metrics file.
+    """
+    edits: dict[tuple[str, str, str], tuple[Path, dict[str, Any]]] = {}
+    measures: dict[tuple[str, str, str], tuple[Path, dict[str, Any]]] = {}
+    for path, metrics in read(paths):
+        if metrics["stage"] in (*EDITS, "edit_metrics"):
+            key = (metrics["dataset"], label(metrics), metrics["numbers"]["edit"])
+            (measures if metrics["stage"] == "edit_metrics" else edits)[key] = (path, metrics["numbers"])
+    rows = []
+    for key, (path, numbers) in sorted(edits.items()):
+        measured_in, measured = measures.get(key, (None, {}))
+        own: list[Cell] = [*key, numbers["method"], numbers.get("lambda_s"), numbers["edit_seconds"] / 60]
+        kept = None
+        if "geometry_kept" in measured:
+            kept = "bit for bit" if measured["geometry_kept"] else "no"
+        sources = [each for each in (path, measured_in) if each]
+        rows.append(Row([*own, *(measured.get(name) for name in MEASURED), kept], sources))
+    return Table(caption(measures.values()), COLUMNS, rows + published() if rows else [])
+
+
+def published() -> list[Row]:
+    """Rows of the paper, means over four data sets each."""
+    rows = []
+    for table, size in (("image_npse", "image-driven, 800x800"), ("text_npse", "text-driven, 512x512")):
+        for (method, *_), line in paper(table).items():
+            cells: list[Cell] = [None] * len(COLUMNS)
+            cells[:4] = ["the paper", "-", size, method]
+            for place, column in enumerate(COLUMNS):
+                value = line.get(PUBLISHED.get(column.title, ""))
+                cells[place] = float(value) if value else cells[place]
+            rows.append(Row(cells, []))
+    return rows
+
+
+def caption(measured: Iterable[tuple[Path, dict[str, Any]]]) -> str:
+    """What the columns are, which CLIP it was, and why it was not."""
+    notes = {numbers.get("clip_missing") for _, numbers in measured} - {None}
+    backbones = {numbers.get("clip") for _, numbers in measured} - {None}
+    words = [
+        "Minutes of the edit alone; frames along the test path; NNFM and Gram distance to the style in views "
+        "that it was not learned from; RMSE and LPIPS between views warped by their depth, without light.",
+        "The paper: means over four data sets, on an RTX 4090.",
+    ]
+    words += [f"CLIP: {name}." for name in sorted(map(str, backbones))]
+    words += [f"CLIP not measured: {note}." for note in sorted(map(str, notes))]
+    return " ".join(words)
