@@ -12,6 +12,7 @@ from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
+CLICK = ("edit=tube", "edit.segment.model=TF01", "edit.segment.points=[[0.5, 0.5]]")
 
 
 @pytest.fixture(scope="module")
@@ -24,13 +25,15 @@ def results(tmp_path_factory):
         patch.setenv("TORCH_HOME", str(folder / "none"))
         patch.setenv("HF_HOME", str(folder / "none"))
         patch.setenv("XDG_CACHE_HOME", str(folder / "none"))
-        for verb, edit in (
-            ("edit_image", "glass"),
-            ("edit_text", "marble"),
-            ("edit_segment", "pick"),
-            ("edit_image", "dots"),
+        part = ("edit.base=tube", "edit.parts=[TF01/tube]")
+        for verb, *words in (
+            ("edit_image", "edit=glass"),
+            ("edit_text", "edit=gold"),
+            ("edit_segment", *CLICK),
+            ("edit_image", "edit=glass", *part, "edit.name=part"),
+            ("edit_text", "edit=crimson", *part),
         ):
-            assert main([verb, *WORDS, *FEW, f"edit={edit}"]) == 0
+            assert main([verb, *WORDS, *FEW, *words]) == 0
         assert main(["edit_metrics", *WORDS, *FEW, "edit=glass"]) == 0
         yield folder / "results" / "turbulence" / "scene" / "demo"
 
@@ -43,7 +46,7 @@ def parameters(results, scene, name):
     return read_scene(results / scene / "scene.yaml").models[name].open()[0].parameters
 
 
-@pytest.mark.parametrize("edit", ["glass", "marble"])
+@pytest.mark.parametrize("edit", ["glass", "gold"])
 def test_only_colours_change(results, edit):
     for name in ("TF01", "TF02"):
         before, after = parameters(results, "compose", name), parameters(results, f"edits/{edit}", name)
@@ -54,8 +57,8 @@ def test_only_colours_change(results, edit):
 def test_pictures_show_both(results):
     for edit, files in {
         "glass": ("style.png", "edit.png", "convergence.png"),
-        "marble": ("views.png", "edit.png"),
-        "pick": ("edit.png",),
+        "gold": ("views.png", "edit.png"),
+        "tube": ("edit.png",),
     }.items():
         for name in files:
             picture = np.asarray(Image.open(results / "edits" / edit / name).convert("RGB"))
@@ -64,18 +67,19 @@ def test_pictures_show_both(results):
 
 
 def test_numbers_name_the_method(results):
-    glass, marble = (numbers(results / "edits" / edit) for edit in ("glass", "marble"))
+    glass, gold = (numbers(results / "edits" / edit) for edit in ("glass", "gold"))
     assert glass["method"] == "patches (no weights)"
-    assert marble["method"] == "procedural filters, default"
+    assert gold["method"] == "procedural filters, default"
     assert set(glass["parts"]) == {"TF01", "TF02"}
     assert glass["edit_seconds"] > 0
 
 
-def test_a_part_of_a_model_is_edited_alone(results):
-    models = read_scene(results / "edits" / "dots" / "scene.yaml").models
-    before, after = parameters(results, "compose", "TF01"), parameters(results, "edits/dots", "TF01")
+@pytest.mark.parametrize("edit", ["part", "crimson"])
+def test_a_part_of_a_model_is_edited_alone(results, edit):
+    models = read_scene(results / "edits" / edit / "scene.yaml").models
+    before, after = parameters(results, "compose", "TF01"), parameters(results, f"edits/{edit}", "TF01")
     (mask,) = models["TF01"].open()[1]
-    assert 0 < int(mask.sum()) == numbers(results / "edits" / "pick")["surfels"]
+    assert 0 < int(mask.sum()) == numbers(results / "edits" / "tube")["surfels"]
     counts = before["sizes"].long().prod(1)
     owner = torch.repeat_interleave(counts)
     changed = (before["texels"] != after["texels"]).any(1)
@@ -103,7 +107,7 @@ def test_a_part_that_is_not_there(results, capsys, monkeypatch):
 
 def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results):
     monkeypatch.chdir(results.parents[3])
-    assert main(["edit_image", *WORDS, *FEW, "edit=dots", "edit.base=nothing", "edit.name=other"]) == 2
+    assert main(["edit_text", *WORDS, *FEW, "edit=crimson", "edit.base=nothing", "edit.name=other"]) == 2
     assert "run the stage that makes it" in capsys.readouterr().err
 
 
@@ -118,5 +122,5 @@ def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results)
 )
 def test_wrong_clicks(results, capsys, monkeypatch, words, message):
     monkeypatch.chdir(results.parents[3])
-    assert main(["edit_segment", *WORDS, *FEW, "edit=pick", words, "edit.name=other"]) == 2
+    assert main(["edit_segment", *WORDS, *FEW, *CLICK, words, "edit.name=other"]) == 2
     assert message in capsys.readouterr().err

@@ -24,8 +24,8 @@ def test_every_edit_of_conf_composes_and_is_named_after_its_file():
 
 
 def test_what_an_edit_starts_from_comes_before_it():
-    assert names("edit=dots") == ["pick", "dots"]
-    assert names("edits=[glass, dots, pick]") == ["glass", "pick", "dots"]
+    assert names("edit=crimson") == ["tube", "crimson"]
+    assert names("edits=[glass, crimson, tube]") == ["glass", "tube", "crimson"]
 
 
 def test_a_changed_value_holds_for_the_edit():
@@ -37,7 +37,7 @@ def test_a_changed_value_holds_for_the_edit():
     ("words", "message"),
     [
         (("edits=[glass, glass]",), "edits: expected different names, got glass twice"),
-        (("edits=[glas]",), "edit: expected one of dots, glass, "),
+        (("edits=[glas]",), "edit: expected one of crimson, glass, "),
         (("edit=glass", "edit.base=glass"), "edit.base: glass starts from itself"),
         (("edit=glass", "edit.image.lambda_s=1.5"), "edit.image.lambda_s: expected at most 1, got 1.5"),
         (("edit=glass", "edit.image.recipe=patch"), "expected one of default, .* did you mean patches"),
@@ -50,17 +50,17 @@ def test_a_mistake_is_one_sentence(words, message):
 
 
 def test_each_kind_has_its_stage_and_the_models_are_those_of_another_configuration():
-    for name, kind in (("glass", "image"), ("marble", "text"), ("pick", "segment")):
+    for name, kind in (("glass", "image"), ("gold", "text"), ("tube", "segment")):
         config = compose(("dataset=engine", f"edit={name}"))
         applying = [stage for stage in STAGES.values() if stage.applies(config)]
         assert {stage.name for stage in applying} == {key for key, kinds in EDITS.items() if kind in kinds}
 
 
 def test_an_edit_reads_the_scene_of_its_base():
-    config = compose(("dataset=engine", "edit=dots"))
-    files = STAGES["edit_image"].inputs(config)
-    assert files["scene"].parts[-3:] == ("edits", "pick", "scene.yaml")
+    config = compose(("dataset=engine", "edit=crimson"))
+    files = STAGES["edit_text"].inputs(config)
+    assert files["scene"].parts[-3:] == ("edits", "tube", "scene.yaml")
     assert files["views.TF02"].parts[-3:] == ("TF02", "views", "transforms_train.json")
-    assert STAGES["edit_image"].output(config).parts[-2:] == ("edits", "dots")
+    assert STAGES["edit_text"].output(config).parts[-2:] == ("edits", "crimson")
     with pytest.raises(ConfigError, match="an edit is of a scene, with all basic TFs"):
-        STAGES["edit_image"].inputs(compose(("dataset=engine", "edit=dots", "tf=TF01")))
+        STAGES["edit_text"].inputs(compose(("dataset=engine", "edit=crimson", "tf=TF01")))
