@@ -16,7 +16,8 @@ from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import History, stylize
-from texgs.models.vgg import CHANNELS, STYLE_LAYERS, Vgg, fast_dtype
+from texgs.models.precision import fast_dtype
+from texgs.models.vgg import CHANNELS, STYLE_LAYERS, Vgg
 from texgs.scene.model import Model
 from texgs.volume.view_set import Light
 
