@@ -124,3 +124,40 @@ def test_wrong_clicks(results, capsys, monkeypatch, words, message):
     monkeypatch.chdir(results.parents[3])
     assert main(["edit_segment", *WORDS, *FEW, *CLICK, words, "edit.name=other"]) == 2
     assert message in capsys.readouterr().err
+
+
+def test_the_style_of_an_object_of_a_picture(results, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(results.parents[3])
+    pixels = np.full((90, 120, 3), 240, dtype=np.uint8)
+    pixels[20:70, 30:90] = (200, 30, 20)
+    Image.fromarray(pixels).save(tmp_path / "red.png")
+    words = (f"edit.image.style={tmp_path / 'red.png'}", "edit.image.masks=grabcut", "edit.name=red")
+    region = "edit.image.region=[[0.5, 0.5]]"
+    assert main(["edit_image", *WORDS, *FEW, "edit=glass", *words, region]) == 0
+    style = np.asarray(Image.open(results / "edits" / "red" / "style.png"))[..., :3]
+    assert style[..., 1].mean() < 90, "the box around the object"
+    assert main(["edit_image", *WORDS, *FEW, "edit=glass", *words, "edit.image.region=[[2, 0]]"]) == 2
+    assert "edit.image.region: expected two shares from 0 to 1, got [2, 0]" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("edit=style",), "vgg16: its weights (29.4 MB) are not on this machine"),
+        (("edit=glass", "edit.image.style=none.png"), "none.png: expected a picture, got"),
+        (("edit=gold", "edit.text.instruction=''"), "instruction: expected what to do in words"),
+        (("edit=gold", "edit.text.instruction='make it sing'"), "expected one of stipple drawing, "),
+    ],
+)
+def test_what_cannot_be_edited(results, capsys, monkeypatch, words, message):
+    monkeypatch.chdir(results.parents[3])
+    monkeypatch.setattr("texgs.models.weights._download_file", refused)
+    verb = "edit_text" if words[0] == "edit=gold" else "edit_image"
+    assert main([verb, *WORDS, *FEW, *words, "edit.name=other"]) == 2
+    assert message in capsys.readouterr().err
+
+
+def refused(name, entry):
+    from texgs.models.weights import _missing
+
+    raise _missing(name, entry, [file.name for file in entry.files], entry.files[0].megabytes)

@@ -144,6 +144,14 @@ def test_the_palette_of_a_styled_model_can_still_be_changed(style):
     assert dark < lit - 0.01, "with light, too, and where colours become smaller"
 
 
+def test_without_texture_each_surfel_has_one_colour_that_learns(style):
+    start = stylize(ball(), *views(), style, short("preview", is_textured=False, iterations=0)).model
+    done = stylize(ball(), *views(), style, short("patches", is_textured=False)).model
+    for model in (start, done):
+        assert model.parameters["texels"].abs().max() < 1e-6, "the colour is that of the surfel"
+    assert (done.parameters["colors"] - start.parameters["colors"]).abs().max() > 0.01
+
+
 def test_a_clip_term_is_any_loss_of_an_image(vgg, style):
     """A term that wants red: with lambda_s 0 nothing else speaks, and VGG is not needed."""
     seen = []

@@ -13,7 +13,9 @@ def needed(config: DictConfig) -> list[str]:
     if edit.kind == "image":
         changes = {key: edit.image[key] for key in ("iterations", "lambda_s") if edit.image[key] is not None}
         recipe = preset(edit.image.recipe, **changes)
-        return ["vgg16"] * recipe.needs_vgg + [config.metric.clip] * recipe.needs_clip
+        clicked = bool(edit.image.region) and edit.image.masks == "mobile_sam"
+        own = {"vgg16": recipe.needs_vgg, config.metric.clip: recipe.needs_clip, "mobile_sam": clicked}
+        return [name for name, is_needed in own.items() if is_needed]
     if edit.kind == "text":
         return ["instruct-pix2pix"] * (edit.text.guidance == "instruct_pix2pix")
     return ["mobile_sam"] * (edit.kind == "segment" and edit.segment.masks == "mobile_sam")

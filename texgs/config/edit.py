@@ -23,6 +23,19 @@ class ImageEdit:
         None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
     )
     pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
+    start: str | None = key(
+        None,
+        "colours at the start: the picture laid onto the surface, its mean, random pixels of it, or the "
+        "model's own moved to its colours; default the recipe's",
+        choices=("projected", "mean", "random", "transfer"),
+    )
+    textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
+    region: list[Any] = key(
+        [], "clicks on the object of the picture that counts, as shares; default all"
+    )
+    masks: str = key(
+        "mobile_sam", "what finds that object; grabcut needs no weights", choices=("mobile_sam", "grabcut")
+    )
 
 
 @dataclass

@@ -40,6 +40,7 @@ class Recipe:
     dimensions: int | None = 64  # of that search, by principal components; None: all, the search is exact
     reduce: int | None = None  # features see averages of so many pixels each way; None: by the views' size
     opacity: float = 1.0  # factor on opacities while stylising, so that what is in front counts more
+    is_textured: bool = True  # whether each texel learns, or each surfel one colour: the paper's ablation
     is_lit: bool = True  # whether the losses see the light of the views, or colours without any
     seed: int = 0
 

@@ -21,7 +21,7 @@ from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
 from texgs.models.vgg import Vgg
 from texgs.scene.model import Model
-from texgs.scene.texels import owners, recolored
+from texgs.scene.texels import mean_texels, owners, recolored
 from texgs.volume.view_set import Light
 
 LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
@@ -57,6 +57,7 @@ class StyleSteps:
     generator: torch.Generator
     surfels: Tensor | None  # [N] bool, those that change
     fixed: Tensor | None  # [F] indices of texels that stay
+    owner: Tensor  # [T] surfel of each texel
 
     @classmethod
     def prepare(
@@ -76,16 +77,19 @@ class StyleSteps:
         objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
         texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed)
         colors, fixed = -p["palette"].expand_as(p["colors"]), None
+        places, surfel = owners(p)
+        owner = torch.empty_like(surfel).index_copy_(0, places, surfel)
+        if not recipe.is_textured:
+            texels = mean_texels({**p, "texels": texels}).to(texels)[owner]
         if surfels is not None:
             colors = torch.where(surfels[:, None], colors, p["colors"])
-            places, owner = owners(p)
-            fixed = places[~surfels[owner]]
+            fixed = (~surfels[owner]).nonzero()[:, 0]
             texels[fixed] = p["texels"][fixed]
         bare = Model({**p, "colors": colors.contiguous()}, model.optics, model.metadata)
         texels.requires_grad_()
         adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
         generator = torch.Generator().manual_seed(recipe.seed)
-        return cls(bare, recipe, scaled, objective, texels, adam, generator, surfels, fixed)
+        return cls(bare, recipe, scaled, objective, texels, adam, generator, surfels, fixed, owner)
 
     def step(self, camera: Camera, light: Light, iteration: int, watch: Stopwatch) -> dict[str, float]:
         """Learn from one view; the terms of its loss."""
@@ -135,6 +139,9 @@ class StyleSteps:
         """A step of Adam, after which colours are in [0, 1] again."""
         recipe = self.recipe
         self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
+        if not recipe.is_textured:  # equal gradients keep equal what starts equal
+            p = {**self.model.parameters, "texels": self.texels.grad}
+            self.texels.grad = mean_texels(p).to(self.texels)[self.owner]  # type: ignore[arg-type]
         self.adam.step()
         self.adam.zero_grad(set_to_none=True)
         self.texels.clamp_(0, 1)

@@ -1,14 +1,17 @@
 """Stage `edit_image`: the parts of a scene take on the style of a picture."""
 
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
+from texgs.cli.segment import mask_model
 from texgs.cli.stages.before_after import show
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.parts import edit_parts
+from texgs.cli.stages.parts import edit_parts, shares
 from texgs.core.device import torch_device
 from texgs.core.image import write_png
 from texgs.edit.clip_loss import ClipLoss
@@ -35,7 +38,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     """
     edit, image, title = settings["edit"], settings["edit"]["image"], f"{settings['dataset']}: edit"
     device, scene = torch_device(settings["fit"]["device"]), read_scene(inputs["scene"])
-    recipe, style = recipe_of(image, edit["seed"]), style_of(image["style"])
+    recipe, style = recipe_of(image, edit["seed"]), style_of(image)
     write_png(output / "style.png", style.image.permute(1, 2, 0))
     vgg = Vgg.load(device=device) if recipe.needs_vgg else None
     clip = None
@@ -76,13 +79,22 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 
 def recipe_of(image: dict[str, Any], seed: int) -> Recipe:
     """The recipe of an edit, with what the configuration changes about it."""
-    changes = {key: image[key] for key in ("iterations", "lambda_s") if image[key] is not None}
-    return preset(image["recipe"], pattern=image["pattern"], seed=seed, **changes)
+    changes = {key: image[key] for key in ("iterations", "lambda_s", "start") if image[key] is not None}
+    kept = {"pattern": image["pattern"], "is_textured": image["textured"], "seed": seed}
+    return preset(image["recipe"], **kept, **changes)
 
 
-def style_of(name: str) -> StylePicture:
-    """The picture of texgs that has this name, or of a file."""
-    return StylePicture.of(picture(name)) if name in PICTURES else read_style(name)
+def style_of(image: Mapping[str, Any]) -> StylePicture:
+    """The picture of texgs that has this name, or of a file; of it the object that was clicked on."""
+    name = image["style"]
+    style = StylePicture.of(picture(name)) if name in PICTURES else read_style(name)
+    if not image["region"]:
+        return style
+    height, width = style.region.shape
+    points = torch.tensor(shares("edit.image.region", image["region"])) * torch.tensor([width, height])
+    positive = torch.ones(len(points), dtype=torch.bool)
+    masks = mask_model(image["masks"], torch.device("cpu"))
+    return StylePicture.of(style.image, masks(style.image.permute(1, 2, 0), points, positive) & style.region)
 
 
 def method(recipe: Recipe) -> str:
@@ -93,4 +105,5 @@ def method(recipe: Recipe) -> str:
         "patches": recipe.patches > 0 and recipe.iterations > 0,
     }
     found = [name for name, is_used in names.items() if is_used] or ["projection"]
-    return " + ".join(found) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")
+    words = " + ".join(found) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")
+    return words if recipe.is_textured else f"{words}, without texture"

@@ -107,7 +107,7 @@ def style_distance(
     if edit["kind"] != "image" or any(part.segment for part in parts) or not available("vgg16"):
         return {}
     vgg = Vgg.load(device=device)
-    style = style_of(edit["image"]["style"]).scaled(max(cameras[0].width, cameras[0].height))
+    style = style_of(edit["image"]).scaled(max(cameras[0].width, cameras[0].height))
     found = [
         likeness(
             scene.models[part.model].open()[0].to(device),

@@ -8,6 +8,7 @@ import torch
 
 from texgs.cli.segment import mask_model, require_new, voting_views, with_segment
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.parts import shares
 from texgs.core.camera import Camera, orbit
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
@@ -83,15 +84,12 @@ def clicks_of(wanted: dict[str, Any], device: torch.device) -> Clicks:
     Raises:
         ArgumentError: if one is no place in the view, or none is on the object.
     """
-    shares = [*wanted["points"], *wanted["others"]]
-    for share in shares:
-        if not isinstance(share, list) or len(share) != 2 or not all(0 <= x < 1 for x in share):
-            raise ArgumentError(f"edit.segment.points: expected two shares from 0 to 1, got {share}")
+    places = shares("edit.segment.points", [*wanted["points"], *wanted["others"]])
     if not wanted["points"]:
         raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
     azimuth, polar = wanted["view"]
     camera = orbit(azimuth, polar, DISTANCE, FOV, SIZE, SIZE).to(device)
-    points = SIZE * torch.tensor(shares, dtype=torch.float32, device=device)
+    points = SIZE * torch.tensor(places, dtype=torch.float32, device=device)
     positive = torch.arange(len(points), device=device) < len(wanted["points"])
     return Clicks(camera, points, positive)
 

@@ -52,6 +52,19 @@ def parts_of(scene: Scene, names: Sequence[str]) -> list[Part]:
     return [by_name[name] for name in names] or [Part(model) for model in scene.models]
 
 
+def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
+    """Clicks as shares of the sides of a picture.
+
+    Raises:
+        ArgumentError: naming the key, if one is no place in the picture.
+    """
+    for point in points:
+        is_pair = isinstance(point, list) and len(point) == 2
+        if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):
+            raise ArgumentError(f"{name}: expected two shares from 0 to 1, got {point}")
+    return list(points)
+
+
 def edit_parts(
     scene: Scene, names: Sequence[str], output: Path, device: torch.device, edit: Editor
 ) -> tuple[Scene, dict[str, dict[str, Any]]]:
