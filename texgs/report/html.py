@@ -22,8 +22,6 @@ PICTURES = {  # files beside the metrics of a stage, and what they show
         "pse.png": "Edits of colour, opacity and light; below each the volume with the same edit.",
         "relight.png": "A light that moves from below to above, and the volume under the same light.",
     },
-    "transfer": {"transfer.png": "Histogram of the volume with the basic transfer functions."},
-    "sheet": {"sheet.png": "Views that the model was fitted to, and test views."},
     "edit_image": {
         "style.png": "The style picture.",
         "edit.png": "Before and after the edit, under the light of the scene and under another one.",
@@ -36,6 +34,8 @@ PICTURES = {  # files beside the metrics of a stage, and what they show
     "edit_segment": {
         "edit.png": "Clicks with the mask of their view, and the segment that all views agree on."
     },
+    "transfer": {"transfer.png": "Histogram of the volume with the basic transfer functions."},
+    "sheet": {"sheet.png": "Views that the model was fitted to, and test views."},
     "figure": {"figure.png": "Test views, the phases of the fit, errors, normals, depth and material."},
 }
 ORDER = tuple(PICTURES)
