@@ -1,11 +1,3 @@
-import pytest
-import torch
+from tests.one_thread import one_thread
 
-
-@pytest.fixture(autouse=True)
-def one_thread():
-    """Images of a thousand pixels are not worth a second thread; results are the same with any number."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+__all__ = ["one_thread"]

@@ -30,9 +30,7 @@ class ImageEdit:
         choices=("projected", "mean", "random", "transfer"),
     )
     textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
-    region: list[Any] = key(
-        [], "clicks on the object of the picture that counts, as shares; default all"
-    )
+    region: list[Any] = key([], "clicks on the object of the picture that counts, as shares; default all")
     masks: str = key(
         "mobile_sam", "what finds that object; grabcut needs no weights", choices=("mobile_sam", "grabcut")
     )

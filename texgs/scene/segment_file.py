@@ -14,6 +14,7 @@ from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 from texgs.scene.model import Model
+from texgs.scene.tensor_file import read_tensor_file
 
 FORMAT = "texgs-segment"
 VERSION = 1
@@ -75,17 +76,7 @@ def _anchors(model: Model) -> Tensor:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(path, framework="pt") as file:
-            if FORMAT not in (file.metadata() or {}):
-                raise ArgumentError(f"{path}: expected a {FORMAT} file, got safetensors of another kind")
-            found = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except (OSError, SafetensorError) as error:
-        raise ArgumentError(f"{path}: expected a {FORMAT} file, got {error}") from error
+    found = read_tensor_file(path, FORMAT)
     mask, anchors = found.get("mask"), found.get("anchors")
     if mask is None or anchors is None or mask.dtype != torch.bool or mask.ndim != 1:
         raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(found)}; make it again")

@@ -15,6 +15,7 @@ from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
 from texgs.scene.model import Model
+from texgs.scene.tensor_file import read_tensor_file
 
 FORMAT = "texgs-texture"
 VERSION = 1
@@ -66,17 +67,7 @@ def with_texture(model: Model, path: str | Path) -> Model:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    from safetensors import SafetensorError, safe_open
-
-    try:
-        with safe_open(path, framework="pt") as file:
-            if FORMAT not in (file.metadata() or {}):
-                raise ArgumentError(f"{path}: expected a {FORMAT} file, got safetensors of another kind")
-            found = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except (OSError, SafetensorError) as error:
-        raise ArgumentError(f"{path}: expected a {FORMAT} file, got {error}") from error
+    found = read_tensor_file(path, FORMAT)
     shapes = [found[name].shape[1:] for name in ("texels", "sizes") if name in found]
     if shapes != [(3,), (2,)] or len(found["texels"]) != int(found["sizes"].long().prod(1).sum()):
         raise ArgumentError(f"{path}: expected texels and sizes that fit each other; make it again")
