@@ -76,6 +76,8 @@ def test_a_large_picture_is_reduced_and_a_tiny_one_refused(tmp_path):
     Image.new("L", (10000, 10000), 90).save(tmp_path / "large.png")
     style = read_style(tmp_path / "large.png")
     assert style.image.shape == (3, 2048, 2048)
+    Image.new("RGB", (9000, 40)).save(tmp_path / "narrow.png")
+    assert read_style(tmp_path / "narrow.png").image.shape == (3, 32, 7200), "wide enough to hold a pattern"
     Image.new("RGB", (10, 10)).save(tmp_path / "tiny.png")
     with pytest.raises(ArgumentError, match=r"tiny\.png: .*at least 32 x 32 pixels, got 10 x 10;"):
         read_style(tmp_path / "tiny.png")

@@ -116,8 +116,11 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
 
 
 def reduced(picture: Image.Image) -> Image.Image:
-    """A picture as red, green, blue and alpha with 2,048 pixels along its longer side at most."""
-    scale = min(1.0, LARGEST / max(picture.size))
+    """A picture as red, green, blue and alpha with 2,048 pixels along its longer side at most.
+
+    One so narrow that its shorter side would hold no pattern then keeps more.
+    """
+    scale = min(1.0, max(LARGEST / max(picture.size), SMALLEST / min(picture.size)))
     width, height = (max(1, round(scale * side)) for side in picture.size)
     picture.draft("RGB", (2 * width, 2 * height))  # JPEG files are decoded at a lower resolution
     if picture.mode.startswith("I"):  # grey values of 16 bits
