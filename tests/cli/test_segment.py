@@ -107,7 +107,10 @@ def test_a_preview_writes_no_scene(scene, tmp_path):
             ["--point", LEFT, "--views", "40"],
             "views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got 40",
         ),
-        (["--point", LEFT, "--masks", "none"], "none/config.json: no such file"),
+        (
+            ["--point", LEFT, "--masks", "none"],
+            "masks: expected mobile_sam, grabcut or a folder with a SAM",
+        ),
         (["--point", LEFT, "--threshold", "2"], "expected surfels that most masks"),
     ],
 )
@@ -115,6 +118,14 @@ def test_a_mistake_writes_nothing(scene, tmp_path, capsys, words, message):
     assert segment(scene, *words) == 2
     assert message in capsys.readouterr().err
     assert sorted(x.name for x in tmp_path.iterdir()) == ["model.safetensors", "scene.yaml"]
+
+
+def test_a_model_whose_name_has_a_slash(scene, tmp_path):
+    model = read_scene(scene).models["balls"]
+    other = write_scene(tmp_path / "other.yaml", Scene({"run/balls": model}))
+    assert segment(other, "--point", LEFT, "--not", RIGHT) == 0
+    assert list(read_scene(tmp_path / "new.yaml").models["run/balls"].segments) == ["red"]
+    assert (tmp_path / "new-run-balls-red.safetensors").is_file()
 
 
 def test_a_name_that_is_taken(scene, tmp_path, capsys):

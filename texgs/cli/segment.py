@@ -107,7 +107,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     keys = ("view", "point", "other", "masks", "vote")
     facts = {key: getattr(arguments, key) for key in keys}
-    file = arguments.output.with_name(f"{arguments.output.stem}-{name}-{arguments.name}.safetensors")
+    stem = f"{arguments.output.stem}-{name}-{arguments.name}".replace("/", "-")
+    file = arguments.output.with_name(f"{stem}.safetensors")
     changed = with_segment(scene, f"{name}/{arguments.name}", model, found.mask, file, facts)
     print(write_scene(arguments.output, changed), file, sep="\n")
     return 0
@@ -159,7 +160,6 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
         ArgumentError: if there is no such model, the new name cannot be one, or nothing is to be written.
     """
     from texgs.core.errors import ArgumentError
-    from texgs.scene.scene_file import RESERVED
 
     name = next(iter(scene.models)) if arguments.model is None and len(scene.models) == 1 else arguments.model
     if name not in scene.models:
@@ -167,8 +167,7 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
     if arguments.preview:
         return str(name)
     new = arguments.name
-    if not new or any(mark in new for mark in RESERVED):
-        raise ArgumentError(f"--name: expected a name without {' '.join(RESERVED)}, got {new}")
+    require_name(new, "--name")
     require_new(scene, f"{name}/{new}")
     if not arguments.output:
         raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
@@ -176,13 +175,35 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
 
 
 def mask_model(name: str, device: "torch.device") -> "MaskModel":
-    """The mask model of a name, or in a folder."""
+    """The mask model of a name, or in a folder.
+
+    Raises:
+        ArgumentError, MissingDataError: if there is neither, or its weights are missing or damaged.
+    """
+    from texgs.core.errors import ArgumentError
     from texgs.models.grabcut import GrabCut
     from texgs.models.sam import mobile_sam, sam_folder
 
     if name == "grabcut":
         return GrabCut()
-    return mobile_sam(device=device) if name == "mobile_sam" else sam_folder(name, device)
+    if name == "mobile_sam":
+        return mobile_sam(device=device)
+    if not Path(name).is_dir():
+        raise ArgumentError(f"masks: expected mobile_sam, grabcut or a folder with a SAM, got {name}")
+    return sam_folder(name, device)
+
+
+def require_name(name: str | None, where: str) -> None:
+    """Require a name that a segment can have.
+
+    Raises:
+        ArgumentError: naming where it comes from.
+    """
+    from texgs.core.errors import ArgumentError
+    from texgs.scene.scene_file import RESERVED
+
+    if not name or any(mark in name for mark in RESERVED):
+        raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
 
 
 def require_new(scene: "Scene", part: str) -> None:
@@ -193,7 +214,7 @@ def require_new(scene: "Scene", part: str) -> None:
     """
     from texgs.core.errors import ArgumentError
 
-    name, _, new = part.partition("/")
+    name, _, new = part.rpartition("/")  # names of models may have the mark
     if new in scene.models[name].segments:
         raise ArgumentError(
             f"{part}: is there already; choose another name, or remove it by texgs edit {part}="
@@ -222,7 +243,7 @@ def with_segment(
     from texgs.scene.scene_file import SceneSegment
     from texgs.scene.segment_file import read_segment, write_segment
 
-    name, _, new = part.partition("/")
+    name, _, new = part.rpartition("/")  # names of models may have the mark
     entry = scene.models[name]
     free = mask.clone()
     for other in entry.segments.values():

@@ -87,6 +87,8 @@ def clicks_of(wanted: dict[str, Any], device: torch.device) -> Clicks:
     places = shares("edit.segment.points", [*wanted["points"], *wanted["others"]])
     if not wanted["points"]:
         raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
+    if len(wanted["view"]) != 2:
+        raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {wanted['view']}")
     azimuth, polar = wanted["view"]
     camera = orbit(azimuth, polar, DISTANCE, FOV, SIZE, SIZE).to(device)
     points = SIZE * torch.tensor(places, dtype=torch.float32, device=device)
