@@ -9,6 +9,7 @@ from PIL import Image
 
 from tests.cli.test_scene_stages import WORDS
 from texgs.cli.main import main
+from texgs.core.errors import MissingDataError
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
@@ -27,14 +28,14 @@ def results(tmp_path_factory):
         patch.setenv("XDG_CACHE_HOME", str(folder / "none"))
         part = ("edit.base=tube", "edit.parts=[TF01/tube]")
         for verb, *words in (
-            ("edit_image", "edit=glass"),
+            ("edit_image", "edit=glass", "edit.seed=3"),
             ("edit_text", "edit=gold"),
             ("edit_segment", *CLICK),
             ("edit_image", "edit=glass", *part, "edit.name=part"),
             ("edit_text", "edit=crimson", *part),
         ):
             assert main([verb, *WORDS, *FEW, *words]) == 0
-        assert main(["edit_metrics", *WORDS, *FEW, "edit=glass"]) == 0
+        assert main(["edit_metrics", *WORDS, *FEW, "edit=glass", "edit.seed=3"]) == 0
         yield folder / "results" / "turbulence" / "scene" / "demo"
 
 
@@ -72,6 +73,7 @@ def test_numbers_name_the_method(results):
     assert gold["method"] == "procedural filters, default"
     assert set(glass["parts"]) == {"TF01", "TF02"}
     assert glass["edit_seconds"] > 0
+    assert json.loads((results / "edits" / "glass" / "metrics.by_hand.json").read_text())["seed"] == 3
 
 
 @pytest.mark.parametrize("edit", ["part", "crimson"])
@@ -105,6 +107,52 @@ def test_a_part_that_is_not_there(results, capsys, monkeypatch):
     assert "edit.parts: expected some of TF01, TF02, got TF07" in capsys.readouterr().err
 
 
+def test_a_part_named_twice(results, capsys, monkeypatch):
+    monkeypatch.chdir(results.parents[3])
+    words = ("edit=glass", "edit.parts=[TF01,TF01]", "edit.name=other")
+    assert main(["edit_image", *WORDS, *FEW, *words]) == 2
+    assert "edit.parts: expected different names, got TF01 twice" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("verb", "words", "message"),
+    [
+        ("edit_text", ["edit=glass"], "edit.kind: expected text, got image (edit=glass)"),
+        ("edit_image", ["edit=glass", "edit.base=glass"], "edit.base: glass starts from itself"),
+        ("edit_image", ["edit=glass", "edit.image.style=glas"], "edit.image.style: expected the file of a"),
+        ("edit_image", ["edit=glass", "edit.image.recipe=default"], "edit glass: vgg16: its weights"),
+        ("edit_text", ["edit=gold", "edit.text.instruction=fur"], "instruction: expected one of stipple"),
+        ("edit_segment", [*CLICK, "edit.segment.name=a.b"], "edit.segment.name: expected a name without"),
+    ],
+)
+def test_a_mistake_leaves_the_earlier_result(results, capsys, monkeypatch, verb, words, message):
+    monkeypatch.chdir(results.parents[3])
+    monkeypatch.setattr("texgs.models.weights._download_file", no_network)
+    folder = results / "edits" / words[0].removeprefix("edit=")
+    before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    assert main([verb, *WORDS, *FEW, *words]) == 2
+    assert message in capsys.readouterr().err
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == before
+
+
+def no_network(name, entry):
+    raise MissingDataError(f"{name}: its weights are not on this machine, and a download failed")
+
+
+def test_another_picture_in_the_same_file_is_another_style(results, tmp_path, monkeypatch):
+    monkeypatch.chdir(results.parents[3])
+    style, folder = tmp_path / "mine.png", results / "edits" / "mine"
+    words = [*WORDS, *FEW, "edit=glass", f"edit.image.style={style}", "edit.name=mine"]
+    found = []
+    for level in (0, 0, 255):
+        if not found or level:
+            Image.new("RGB", (64, 64 + level), (level, 0, 0)).save(style)
+        assert main(["edit_image", *words]) == 0
+        found.append((folder / "TF01.safetensors").stat().st_mtime_ns)
+    assert found[0] == found[1], "nothing has changed"
+    assert found[1] != found[2]
+
+
 def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results):
     monkeypatch.chdir(results.parents[3])
     assert main(["edit_text", *WORDS, *FEW, "edit=crimson", "edit.base=nothing", "edit.name=other"]) == 2
@@ -117,6 +165,8 @@ def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results)
         ("edit.segment.points=[]", "edit.segment.points: expected one at least"),
         ("edit.segment.points=[[2, 0]]", r"edit.segment.points: expected two shares from 0 to 1"),
         ("edit.segment.points=[[0.01, 0.01]]", "expected a place on the model, got background"),
+        ("edit.segment.points=[[a, b]]", "edit.segment.points: expected two shares from 0 to 1"),
+        ("edit.segment.view=[3]", "edit.segment.view: expected azimuth and polar angle, got [3.0]"),
         ("edit.segment.model=TF9", "edit.segment.model: expected one of TF01, TF02"),
     ],
 )

@@ -64,7 +64,7 @@ def device(settings: Mapping[str, Any]) -> str:
 
 def seed(settings: Mapping[str, Any]) -> int | None:
     """The seed of the stage's random numbers, where it has one."""
-    parts = [settings.get(name, {}) for name in ("fit", "volume")]
+    parts = [settings.get(name, {}) for name in ("edit", "fit", "volume")]
     return next((part["seed"] for part in parts if "seed" in part), None)
 
 

@@ -52,14 +52,48 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
+    from texgs.config.stage import EDITS
     from texgs.config.stages import STAGES
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
+    if stage.name in EDITS:
+        require_edit(stage.name, config)
     for name in tf_names(config) if stage.per_tf else [None]:
         chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
         ensure(arguments.verb, chosen, force=arguments.force)
     return 0
+
+
+def require_edit(name: str, config: DictConfig) -> None:
+    """Require that the edit of a configuration is one for this stage, without mistakes.
+
+    Raises:
+        ConfigError, ArgumentError: naming what is not as it should be.
+    """
+    from texgs.cli.edits import check_edit
+    from texgs.config.stage import EDITS
+    from texgs.core.errors import ConfigError
+
+    if config.edit.kind not in EDITS[name]:
+        raise ConfigError(
+            f"edit.kind: expected {' or '.join(EDITS[name])}, got {config.edit.kind} "
+            f"(edit={config.edit.name}); choose another edit of conf/edit"
+        )
+    check_edit(config)
+
+
+def require_weights(config: DictConfig) -> None:
+    """Require the weights that an edit works with; they are downloaded where they can be.
+
+    Raises:
+        MissingDataError, ArgumentError: if they are not to be had, or damaged.
+    """
+    from texgs.cli.weights import missing
+    from texgs.core.errors import MissingDataError
+
+    if lines := missing(config, download=True):
+        raise MissingDataError("; ".join(lines))
 
 
 def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
@@ -79,11 +113,13 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
             if any(path.is_relative_to(STAGES[needed].output(each)) for path in inputs.values()):
                 ensure(needed, each)
     job = Job(stage, stage.settings(config), inputs, stage.output(config))
-    if force:
-        discard(job)
-    if job.is_done():
+    if job.is_done() and not force:
         print(f"{job.output}: up to date")
         return
+    if name in EDITS and name != "edit_metrics":
+        require_weights(config)  # before an earlier result is removed
+    if force:
+        discard(job)
     execute(job, config.tracking.uri, config.tracking.experiment, BY_HAND)
     print(f"{job.output}: done")
 

@@ -103,18 +103,22 @@ def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
 
 
 def edited_scene(config: DictConfig) -> dict[str, Path]:
-    """The scene that an edit starts from, and the training views of all basic TFs.
+    """The scene that an edit starts from, the training views of all basic TFs, and a style picture's file.
 
     Raises:
-        ConfigError: if one basic TF is chosen.
+        ConfigError: if one basic TF is chosen, or the edit starts from itself.
     """
+    if config.edit.base == config.edit.name:
+        raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
     if config.tf is not None:
         raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
     before = folder_of("compose", config)
     if config.edit.base is not None:
         before = folder_of("edit_image", config).with_name(config.edit.base)
     views = {f"views.{name}": view_set(for_tf(config, name))["views"] for name in tf_names(config)}
-    return {"scene": before / "scene.yaml", **views}
+    style = Path(config.edit.image.style)
+    picture = {"style": style} if config.edit.kind == "image" and style.is_file() else {}
+    return {"scene": before / "scene.yaml", **views, **picture}
 
 
 def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:

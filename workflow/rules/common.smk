@@ -111,12 +111,18 @@ def edits_of(kind):
 
 
 def missing_weights(configs):
-    """What edits need and this machine has not; without a dry run what can be had is downloaded now."""
+    """What edits need and this machine has not; without a dry run what can be had is downloaded now.
+
+    Mistakes in edits are told before anything is downloaded.
+    """
     edited = [config for config in configs if config.edit.kind != "none"]
     if not edited:
         return []
-    from texgs.cli.weights import missing  # not at the top: most runs have no edits
+    from texgs.cli.edits import check_edit  # not at the top: most runs have no edits
+    from texgs.cli.weights import missing
 
+    for config in edited:
+        check_edit(config)
     return list(dict.fromkeys(line for config in edited for line in missing(config, download=not IS_DRY)))
 
 

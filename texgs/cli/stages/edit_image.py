@@ -13,6 +13,7 @@ from texgs.cli.stages.before_after import show
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.parts import edit_parts, shares
 from texgs.core.device import torch_device
+from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.edit.clip_loss import ClipLoss
 from texgs.edit.pictures import PICTURES, picture
@@ -86,8 +87,7 @@ def recipe_of(image: dict[str, Any], seed: int) -> Recipe:
 
 def style_of(image: Mapping[str, Any]) -> StylePicture:
     """The picture of texgs that has this name, or of a file; of it the object that was clicked on."""
-    name = image["style"]
-    style = StylePicture.of(picture(name)) if name in PICTURES else read_style(name)
+    style = picture_of(image["style"])
     if not image["region"]:
         return style
     height, width = style.region.shape
@@ -95,6 +95,21 @@ def style_of(image: Mapping[str, Any]) -> StylePicture:
     positive = torch.ones(len(points), dtype=torch.bool)
     masks = mask_model(image["masks"], torch.device("cpu"))
     return StylePicture.of(style.image, masks(style.image.permute(1, 2, 0), points, positive) & style.region)
+
+
+def picture_of(name: str) -> StylePicture:
+    """The picture of texgs that has this name, or of a file.
+
+    Raises:
+        ArgumentError: if there is neither, or the file holds no picture that can be used.
+    """
+    if name in PICTURES:
+        return StylePicture.of(picture(name))
+    if not Path(name).exists():
+        raise ArgumentError(
+            f"edit.image.style: expected the file of a picture, or one of {', '.join(PICTURES)}; got {name!r}"
+        )
+    return read_style(name)
 
 
 def method(recipe: Recipe) -> str:

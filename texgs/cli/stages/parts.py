@@ -41,7 +41,7 @@ def parts_of(scene: Scene, names: Sequence[str]) -> list[Part]:
     """The parts that have these names; all models by default.
 
     Raises:
-        ArgumentError: naming the one that is not in the scene.
+        ArgumentError: naming the one that is not in the scene, or there twice.
     """
     known = [Part(model) for model in scene.models]
     known += [Part(model, segment) for model, entry in scene.models.items() for segment in entry.segments]
@@ -49,6 +49,8 @@ def parts_of(scene: Scene, names: Sequence[str]) -> list[Part]:
     for name in names:
         if name not in by_name:
             raise ArgumentError(f"edit.parts: expected some of {', '.join(by_name)}, got {name}")
+        if names.count(name) > 1:
+            raise ArgumentError(f"edit.parts: expected different names, got {name} twice")
     return [by_name[name] for name in names] or [Part(model) for model in scene.models]
 
 
