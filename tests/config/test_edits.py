@@ -28,6 +28,13 @@ def test_what_an_edit_starts_from_comes_before_it():
     assert names("edits=[glass, crimson, tube]") == ["glass", "tube", "crimson"]
 
 
+def test_a_base_and_parts_can_be_given_as_words():
+    words = ("edit=glass", "edit.base=tube", "edit.parts=[TF02/tube]", "edit.name=part")
+    tube, part = (compose(each).edit for each in edits(words))
+    assert (tube.name, tube.kind, tube.base, list(tube.parts)) == ("tube", "segment", None, [])
+    assert (part.name, part.kind, part.base, list(part.parts)) == ("part", "image", "tube", ["TF02/tube"])
+
+
 def test_a_changed_value_holds_for_the_edit():
     (words,) = edits(("edit=glass", "edit.image.iterations=7"))
     assert compose(words).edit.image.iterations == 7

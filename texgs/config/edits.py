@@ -3,6 +3,8 @@
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
 
+OF_ONE = ("edit.name=", "edit.kind=", "edit.base=", "edit.parts=")  # not of what an edit starts from
+
 
 def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     """The words of each edit of the experiment, those that it starts from before it; none without edits.
@@ -27,6 +29,8 @@ def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
 def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     """Name and words of an edit and of all that it starts from, the first one first.
 
+    Changed values hold for all of them, but for the name, the kind, the base and the parts.
+
     Raises:
         ConfigError: if it starts from itself.
     """
@@ -37,5 +41,6 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
         if edit.name in [name for name, _ in found]:
             raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
         found.append((edit.name, following))
-        following = None if edit.base is None else (*words, f"edit={edit.base}")
+        rest = [word for word in words if not word.startswith(OF_ONE)]
+        following = None if edit.base is None else (*rest, f"edit={edit.base}")
     return found[::-1]
