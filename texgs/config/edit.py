@@ -89,7 +89,9 @@ class Edit:
     name: str = key(MISSING, "name, also of its folder; that of its file in conf/edit")
     kind: str = key("none", "what it is", choices=("none", "image", "text", "segment"))
     base: str | None = key(None, "edit whose scene this starts from; default the scene as fitted")
-    parts: list[str] = key([], "models, or MODEL/SEGMENT, that get the new look; default all models")
+    parts: list[str] = key(
+        [], "MODEL/SEGMENT, or models without their segments, that get the new look; default all models"
+    )
     seed: int = key(0, "random numbers")
     source_caption: str = key("", "the scene before, in words, for CLIP's metrics")
     target_caption: str = key("", "the scene afterwards, in words, for CLIP's metrics")

@@ -13,9 +13,10 @@ from texgs.cli.stages.parts import parts_of
 from texgs.cli.stages.timing import milliseconds
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
+from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.metrics.clip import clip_scores
-from texgs.metrics.consistency import LONG, SHORT, Frame, consistency
+from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
 from texgs.metrics.style import likeness
 from texgs.models.clip import Clip
 from texgs.models.lpips import Lpips
@@ -81,12 +82,13 @@ def is_geometry_kept(after: Composition, before: Composition, cameras: Sequence[
 def agreement(
     composition: Composition, scene: Scene, cameras: Sequence[Camera], count: int
 ) -> dict[str, float | None]:
-    """Consistency of consecutive views in the middle of the path, near and far, without light."""
+    """Consistency of consecutive views in the middle of the path, near and far, without light.
+
+    None where no two views see the same, as of a scene that is nowhere opaque.
+    """
     start = max(0, (len(cameras) - count - LONG) // 2)
-    frames = []
-    for camera in cameras[start : start + count + LONG]:
-        seen = composition.render(camera, scene.light, scene.edits, look="unshaded", outputs=("median",))
-        frames.append(Frame(seen.color.clamp(0, 1), seen.median, seen.alpha, camera))  # type: ignore[arg-type]
+    some = cameras[start : start + count + LONG]
+    frames = list(frames_of(composition, some, scene.light, scene.edits, look="unshaded"))
     perceptual = None
     if available("vgg16") and available("lpips_vgg"):
         lpips = Lpips.load(device=composition.means.device)
@@ -94,7 +96,11 @@ def agreement(
     found: dict[str, float | None] = {}
     for name, apart in (("short", SHORT), ("long", LONG)):
         if len(frames) > apart:
-            measured = consistency(frames, apart, perceptual)
+            try:
+                measured = consistency(frames, apart, perceptual)
+            except ArgumentError:
+                found |= {f"{name}_rmse": None, f"{name}_lpips": None}
+                continue
             found |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
     return found
 

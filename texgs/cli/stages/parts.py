@@ -96,12 +96,22 @@ def edit_parts(
 
 
 def surfels_of(part: Part, entry: SceneModel, masks: Sequence[Tensor], model: Model) -> Tensor | None:
-    """Surfels [N] bool of a part, those of no segment for a model that has some; None for all of them."""
+    """Surfels [N] bool of a part, those of no segment for a model that has some; None for all of them.
+
+    Raises:
+        ArgumentError: if there is none.
+    """
     if not masks:
         return None
     labels = labels_of(masks, len(model)).to(model.parameters["means"].device)
     number = 0 if part.segment is None else 1 + list(entry.segments).index(part.segment)
-    return labels == number
+    surfels = labels == number
+    if not bool(surfels.any()):
+        raise ArgumentError(
+            f"edit.parts: expected surfels of {part.name}, got none, for (other) segments hold all of them; "
+            "name other parts"
+        )
+    return surfels
 
 
 def with_texture_of(part: Part, entry: SceneModel, path: Path) -> SceneModel:

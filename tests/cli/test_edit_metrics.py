@@ -1,0 +1,22 @@
+"""Measures of scenes that leave some of them undefined."""
+
+import torch
+
+from tests.scene.test_composition import ball
+from texgs.cli.stages.edit_metrics import agreement
+from texgs.scene.composition import Composition
+from texgs.scene.model import Model
+from texgs.scene.scene_file import Scene, SceneModel
+from texgs.volume.cameras import test_path as path
+
+
+def test_a_scene_that_is_nowhere_opaque_has_no_consistency(tmp_path):
+    model = ball(1)
+    faint = torch.full_like(model.parameters["opacities"], -6.0)
+    scene, cameras = Scene({"ball": SceneModel(tmp_path)}), path(12, 4.0, 30.0, 32, 32)
+    seen, unseen = (
+        agreement(Composition([Model({**model.parameters, **change}, model.optics)]), scene, cameras, 4)
+        for change in ({}, {"opacities": faint})
+    )
+    assert 0 < seen["short_rmse"] < 0.5
+    assert unseen == {"short_rmse": None, "short_lpips": None, "long_rmse": None, "long_lpips": None}

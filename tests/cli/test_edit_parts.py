@@ -1,0 +1,22 @@
+"""Parts of a scene that edits take, from the masks of its segments."""
+
+import pytest
+import torch
+
+from tests.scene.test_composition import ball
+from texgs.cli.stages.parts import Part, surfels_of
+from texgs.core.errors import ArgumentError
+from texgs.scene.scene_file import SceneModel, SceneSegment
+
+
+def test_a_part_has_what_earlier_segments_left(tmp_path):
+    model = ball(1)
+    entry = SceneModel(tmp_path, segments={name: SceneSegment(tmp_path) for name in ("a", "b", "c")})
+    first, all_of_them = torch.arange(len(model)) < 10, torch.ones(len(model), dtype=torch.bool)
+    masks = [first, all_of_them, ~first]
+    assert torch.equal(surfels_of(Part("ball", "a"), entry, masks, model), first)
+    assert torch.equal(surfels_of(Part("ball", "b"), entry, masks, model), ~first)
+    for part in (Part("ball"), Part("ball", "c")):
+        with pytest.raises(ArgumentError, match=f"edit.parts: expected surfels of {part.name}, got none"):
+            surfels_of(part, entry, masks, model)
+    assert surfels_of(Part("ball"), SceneModel(tmp_path), [], model) is None
