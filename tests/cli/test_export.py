@@ -13,6 +13,8 @@ from texgs.scene.edits import Edit
 from texgs.scene.model_file import write_model
 from texgs.scene.ply import read_ply
 from texgs.scene.scene_file import Scene, SceneModel, write_scene
+from texgs.scene.texels import bare_colors
+from texgs.scene.texture_file import write_texture
 
 
 @pytest.fixture
@@ -50,6 +52,26 @@ def test_the_ending_chooses(model, tmp_path):
     assert len(read_compact(tmp_path / "m.texgs")) == 150
     assert export(tmp_path / "m.texgs", tmp_path / "again.ply", "--kind", "release") == 0
     assert "ambient_factor" in vertices(tmp_path / "again.ply").dtype.names
+
+
+@pytest.mark.parametrize("kind", ["compact", "release"])
+def test_a_model_of_a_scene_has_its_texture_there(model, tmp_path, kind, capsys):
+    own = ball(1)
+    p = own.parameters
+    other = type(own)({**p, "texels": torch.full_like(p["texels"], 0.25)}, own.optics)
+    texture = write_texture(tmp_path / "style.safetensors", other)
+    scene = write_scene(tmp_path / "styled.yaml", Scene({"A": SceneModel(model, texture=texture)}))
+    target = tmp_path / ("a.texgs" if kind == "compact" else "a.ply")
+    assert export(scene, target, "--kind", kind) == 2
+    assert "export its models one by one, by --model" in capsys.readouterr().err
+    assert export(scene, target, "--kind", kind, "--model", "B") == 2
+    assert "--model: expected one of A, got B" in capsys.readouterr().err
+    assert not target.exists()
+    assert export(scene, target, "--kind", kind, "--model", "A") == 0
+    if kind == "compact":
+        torch.testing.assert_close(bare_colors(read_compact(target)), bare_colors(other), atol=0.02, rtol=0)
+        assert (bare_colors(read_compact(target)) - bare_colors(own)).abs().max() > 0.1
+    assert export(model, target, "--kind", kind, "--model", "A") == 2
 
 
 def test_textures_of_surfels_that_nobody_sees_are_dropped(tmp_path):

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from texgs.scene.composition import Composition
     from texgs.scene.edits import Edit
     from texgs.scene.model import Model
+    from texgs.scene.scene_file import Scene, SceneModel
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
 DEFAULTS = {".ply": "3dgs", ".texgs": "compact"}
@@ -28,6 +29,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         choices=KINDS,
         help="3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with "
         "colours, mesh, or compact; default 3dgs for .ply, compact for .texgs",
+    )
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="one model of a scene, with the textures that it has there and no other edit of it",
     )
     parser.add_argument("--opacity", type=float, default=0.5, help="least of points (%(default)s)")
     parser.add_argument("--voxel", type=float, default=1 / 256, help="of a mesh, world units (%(default)s)")
@@ -47,10 +53,27 @@ def run(arguments: argparse.Namespace) -> int:
     kind = kind_of(arguments)
     if arguments.source.suffix in (".yaml", ".yml"):
         scene = read_scene(arguments.source)
+        if arguments.model is not None:
+            entry = chosen(scene, arguments.model)
+            print(of_model(arguments, entry.open()[0].to(arguments.device), kind))
+            return 0
         print(of_scene(arguments, scene.open(arguments.device), scene.edits, kind))
     else:
         print(of_model(arguments, open_model(arguments.source).to(arguments.device), kind))
     return 0
+
+
+def chosen(scene: "Scene", name: str) -> "SceneModel":
+    """The model of a scene that has a name.
+
+    Raises:
+        ArgumentError: if there is none.
+    """
+    from texgs.core.errors import ArgumentError
+
+    if name not in scene.models:
+        raise ArgumentError(f"--model: expected one of {', '.join(scene.models)}, got {name}")
+    return scene.models[name]
 
 
 def kind_of(arguments: argparse.Namespace) -> str:
@@ -66,9 +89,15 @@ def kind_of(arguments: argparse.Namespace) -> str:
     expected = {None: ".ply or .texgs", "compact": ".texgs"}.get(kind, ".ply")
     if kind is None or ending != expected:
         raise ArgumentError(f"--to: expected a file that ends in {expected}, got {arguments.to}")
-    if kind in OF_MODELS and arguments.source.suffix in (".yaml", ".yml"):
+    is_scene = arguments.source.suffix in (".yaml", ".yml")
+    if arguments.model is not None and not is_scene:
         raise ArgumentError(
-            f"--kind {kind}: expected a model file, got {arguments.source}; export its models one by one"
+            f"--model: expected a scene to choose it from, got {arguments.source}; leave it out"
+        )
+    if kind in OF_MODELS and is_scene and arguments.model is None:
+        raise ArgumentError(
+            f"--kind {kind}: expected a model file, got {arguments.source}; export its models one by one, "
+            "by --model"
         )
     return kind
 
