@@ -53,7 +53,9 @@ def test_a_segment_is_made_edited_and_taken_back(scene, tmp_path, capsys):
     assert segment(scene, "--point", LEFT, "--not", RIGHT) == 0
     printed = capsys.readouterr()
     assert f"{tmp_path / 'new.yaml'}\n{tmp_path / 'new-balls-red.safetensors'}" in printed.out
-    assert "balls/red: " in printed.err
+    assert "balls/red: masks of " in printed.err
+    assert " of 13 views\n" in printed.err
+    assert " of 3000 surfels" in printed.err
     new = tmp_path / "new.yaml"
     assert np.array_equal(colors(new, tmp_path / "1.png")[2], before), "nothing is edited yet"
     edited = tmp_path / "edited.yaml"

@@ -80,6 +80,8 @@ def numbers(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the preview, or the segment and the scene that has it."""
+    import sys
+
     from texgs.core.device import torch_device
     from texgs.core.image import write_png
     from texgs.edit.lift import lift
@@ -109,6 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
     facts = {key: getattr(arguments, key) for key in keys}
     stem = f"{arguments.output.stem}-{name}-{arguments.name}".replace("/", "-")
     file = arguments.output.with_name(f"{stem}.safetensors")
+    sys.stderr.write(f"{name}/{arguments.name}: {found.basis}\n")
     changed = with_segment(scene, f"{name}/{arguments.name}", model, found.mask, file, facts)
     print(write_scene(arguments.output, changed), file, sep="\n")
     return 0

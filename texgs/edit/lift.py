@@ -33,6 +33,11 @@ class Lifted:
     used: int  # views whose masks have votes
     left_out: int  # views that see nothing of the object, or whose masks disagree with the others
 
+    @property
+    def basis(self) -> str:
+        """How many views it rests on, in words."""
+        return f"masks of {self.used} of {self.used + self.left_out} views"
+
 
 @torch.no_grad()
 def lift(

@@ -1,5 +1,6 @@
 """Stage `edit_segment`: clicks on a view of a model become a segment of it."""
 
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -52,6 +53,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
     seconds = time.monotonic() - start
     file = output / f"{name}-{wanted['name']}.safetensors"
+    sys.stderr.write(f"{part}: {found.basis}\n")
     after = with_segment(scene, part, model, found.mask, file, wanted)
     write_scene(output / "scene.yaml", after)
     numbers = {
