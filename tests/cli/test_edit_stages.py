@@ -194,7 +194,10 @@ def test_the_style_of_an_object_of_a_picture(results, tmp_path, monkeypatch, cap
     ("words", "message"),
     [
         (("edit=style",), "vgg16: its weights (29.4 MB) are not on this machine"),
-        (("edit=glass", "edit.image.style=none.png"), "none.png: expected a picture, got"),
+        (
+            ("edit=glass", "edit.image.style=none.png"),
+            "edit.image.style: expected the file of a picture, or one of strokes",
+        ),
         (("edit=gold", "edit.text.instruction=''"), "instruction: expected what to do in words"),
         (("edit=gold", "edit.text.instruction='make it sing'"), "expected one of stipple drawing, "),
     ],
