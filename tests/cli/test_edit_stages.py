@@ -1,6 +1,7 @@
 """Scenes with a new look, from the volume on, by hand: no weights are needed for any of it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,9 @@ from PIL import Image
 
 from tests.cli.test_scene_stages import WORDS
 from texgs.cli.main import main
+from texgs.cli.stages.edit_image import method, with_what_is_there
 from texgs.core.errors import MissingDataError
+from texgs.edit.recipe import preset
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
@@ -214,3 +217,25 @@ def refused(name, entry):
     from texgs.models.weights import _missing
 
     raise _missing(name, entry, [file.name for file in entry.files], entry.files[0].megabytes)
+
+
+def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(results.parents[3])
+    base = f"edit.base={results / 'edits' / 'tube' / 'scene.yaml'}"
+    words = (base, "edit.parts=[TF01/tube]", "edit.name=other")
+    assert main(["edit_image", *WORDS, *FEW, "edit=glass", *words]) == 0
+    assert read_scene(results / "edits" / "other" / "scene.yaml").models["TF01"].segments["tube"].texture
+    assert main(["edit_image", *WORDS, *FEW, "edit=glass", "edit.base=none.yaml"]) == 2
+    assert "edit.base: none.yaml is not there" in capsys.readouterr().err
+
+
+def test_without_clip_lambda_s_is_one_and_says_so():
+    wanted = preset("paper")
+    settings = {"edit": {"image": {"lambda_s": None}}, "clip": "clip-vit-base-patch32"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("texgs.cli.stages.edit_image.available", lambda name: False)
+        found = with_what_is_there(wanted, settings)
+    assert found == replace(wanted, lambda_s=1.0)
+    assert method(found, wanted) == "VGG-16 without CLIP, its weights are missing"
+    asked = {**settings, "edit": {"image": {"lambda_s": 0.9}}}
+    assert with_what_is_there(wanted, asked) == wanted

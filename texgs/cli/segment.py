@@ -56,6 +56,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
     )
     parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
+    parser.add_argument(
+        "--connected", action="store_true", help="keep only the connected pieces that hold a point"
+    )
     add_views(parser)
 
 
@@ -105,9 +108,10 @@ def run(arguments: argparse.Namespace) -> int:
         light=scene.light,
         vote=arguments.vote,
         threshold=arguments.threshold,
+        connected=arguments.connected,
         title=f"segment {arguments.name}",
     )
-    keys = ("view", "point", "other", "masks", "vote")
+    keys = ("view", "point", "other", "masks", "vote", "connected")
     facts = {key: getattr(arguments, key) for key in keys}
     stem = f"{arguments.output.stem}-{name}-{arguments.name}".replace("/", "-")
     file = arguments.output.with_name(f"{stem}.safetensors")

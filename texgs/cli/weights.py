@@ -14,7 +14,8 @@ def needed(config: DictConfig) -> list[str]:
         changes = {key: edit.image[key] for key in ("iterations", "lambda_s") if edit.image[key] is not None}
         recipe = preset(edit.image.recipe, **changes)
         clicked = bool(edit.image.region) and edit.image.masks == "mobile_sam"
-        own = {"vgg16": recipe.needs_vgg, config.metric.clip: recipe.needs_clip, "mobile_sam": clicked}
+        asks_for_clip = recipe.needs_clip and edit.image.lambda_s is not None  # else it is left out
+        own = {"vgg16": recipe.needs_vgg, config.metric.clip: asks_for_clip, "mobile_sam": clicked}
         return [name for name, is_needed in own.items() if is_needed]
     if edit.kind == "text":
         return ["instruct-pix2pix"] * (edit.text.guidance == "instruct_pix2pix")

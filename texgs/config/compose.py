@@ -78,6 +78,8 @@ def check(config: DictConfig) -> None:
     check_name("dataset.name", config.dataset.name)
     check_name("fit.name", config.fit.name)
     check_name("edit.name", config.edit.name)
+    if config.edit.base is not None and not is_scene_file(config.edit.base):
+        check_name("edit.base", config.edit.base)
     for key, name in (("variant", config.variant), ("sweep.name", config.sweep.name)):
         if not re.fullmatch(r"[A-Za-z0-9_-]*", name):
             raise ConfigError(f"{key}: expected letters, digits, _ or -, got {name!r}")
@@ -100,6 +102,11 @@ def check(config: DictConfig) -> None:
             is_number = isinstance(value, int | float) and not isinstance(value, bool)
             if is_number and (expected := entry.bounds.complaint(value)):
                 raise ConfigError(f"{name}: expected {expected}, got {value:g}")
+
+
+def is_scene_file(base: str) -> bool:
+    """Whether what an edit starts from is the file of a scene, not the name of another edit."""
+    return base.endswith((".yaml", ".yml"))
 
 
 def check_name(key: str, name: str) -> None:

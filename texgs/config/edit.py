@@ -78,6 +78,7 @@ class SegmentEdit:
         "how masks become surfels; centre: as in the paper",
         choices=("contribution", "centre"),
     )
+    connected: bool = key(False, "only the connected pieces that hold a click are kept")
     views: int = key(42, "that vote, 10 f^2 + 2", least=12)
     size: int = key(512, "of these views", "pixels", least=32)
 
@@ -88,7 +89,9 @@ class Edit:
 
     name: str = key(MISSING, "name, also of its folder; that of its file in conf/edit")
     kind: str = key("none", "what it is", choices=("none", "image", "text", "segment"))
-    base: str | None = key(None, "edit whose scene this starts from; default the scene as fitted")
+    base: str | None = key(
+        None, "edit whose scene this starts from, or a scene.yaml file; default the scene as fitted"
+    )
     parts: list[str] = key(
         [], "MODEL/SEGMENT, or models without their segments, that get the new look; default all models"
     )

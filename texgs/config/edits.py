@@ -1,6 +1,6 @@
 """The edits of an experiment, as more words for `compose`."""
 
-from texgs.config.compose import compose
+from texgs.config.compose import compose, is_scene_file
 from texgs.core.errors import ConfigError
 
 OF_ONE = ("edit.name=", "edit.kind=", "edit.base=", "edit.parts=")  # not of what an edit starts from
@@ -42,5 +42,5 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
             raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
         found.append((edit.name, following))
         rest = [word for word in words if not word.startswith(OF_ONE)]
-        following = None if edit.base is None else (*rest, f"edit={edit.base}")
+        following = None if edit.base is None or is_scene_file(edit.base) else (*rest, f"edit={edit.base}")
     return found[::-1]

@@ -6,9 +6,10 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from texgs.config.compose import is_scene_file
 from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.config.stage import folder_of, for_tf
-from texgs.core.errors import ConfigError
+from texgs.core.errors import ConfigError, MissingDataError
 
 
 def volume_inputs(config: DictConfig) -> dict[str, Path]:
@@ -112,13 +113,26 @@ def edited_scene(config: DictConfig) -> dict[str, Path]:
         raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
     if config.tf is not None:
         raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
-    before = folder_of("compose", config)
-    if config.edit.base is not None:
-        before = folder_of("edit_image", config).with_name(config.edit.base)
     views = {f"views.{name}": view_set(for_tf(config, name))["views"] for name in tf_names(config)}
     style = Path(config.edit.image.style)
     picture = {"style": style} if config.edit.kind == "image" and style.is_file() else {}
-    return {"scene": before / "scene.yaml", **views, **picture}
+    return {"scene": scene_before(config), **views, **picture}
+
+
+def scene_before(config: DictConfig) -> Path:
+    """The scene.yaml that an edit starts from.
+
+    Raises:
+        MissingDataError: if it is a file that is not there.
+    """
+    base = config.edit.base
+    if base is None:
+        return folder_of("compose", config) / "scene.yaml"
+    if not is_scene_file(base):
+        return folder_of("edit_image", config).with_name(base) / "scene.yaml"
+    if not Path(base).is_file():
+        raise MissingDataError(f"edit.base: {base} is not there; name the file of a scene, or another edit")
+    return Path(base)
 
 
 def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:

@@ -12,6 +12,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, projected, prompts_at
+from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
 from texgs.models.masks import MaskModel
 from texgs.scene.crop import surfel_box
@@ -49,6 +50,7 @@ def lift(
     light: Light = HEADLIGHT,
     vote: Vote = "contribution",
     threshold: float | None = None,
+    connected: bool = False,
     title: str = "segment",
 ) -> Lifted:
     """Segment a model by clicks on one view of it (the paper's 2D-lift-3D segmentation).
@@ -66,6 +68,7 @@ def lift(
         light: in all views.
         vote: how masks become surfels; "centre" is the paper's way.
         threshold: of the votes; by default 0.5 of contributions, 0.7 of views.
+        connected: whether only the connected pieces that hold a positive click are kept.
         title: of the progress bar.
 
     Raises:
@@ -92,6 +95,8 @@ def lift(
             f"segment: expected surfels that most masks of {used} views hold, got none; click elsewhere on "
             "the object, or lower the threshold"
         )
+    if connected:
+        selected = pieces_at(model, selected, prompts.places[prompts.positive])
     return Lifted(selected, reference, used, 1 + len(cameras) - used)
 
 

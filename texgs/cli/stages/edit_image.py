@@ -1,7 +1,9 @@
 """Stage `edit_image`: the parts of a scene take on the style of a picture."""
 
+import sys
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,7 @@ from torch import Tensor
 from texgs.cli.segment import mask_model
 from texgs.cli.stages.before_after import show
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.parts import edit_parts, shares
+from texgs.cli.stages.parts import edit_parts, shares, views_of
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
@@ -22,11 +24,11 @@ from texgs.edit.style_picture import StylePicture, read_style
 from texgs.edit.stylize import stylize
 from texgs.models.clip import Clip
 from texgs.models.vgg import Vgg
+from texgs.models.weights import available
 from texgs.report.convergence import write_convergence
 from texgs.scene.model import Model
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.reduced import smaller
-from texgs.volume.view_set import read_views
 
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
@@ -39,16 +41,15 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     """
     edit, image, title = settings["edit"], settings["edit"]["image"], f"{settings['dataset']}: edit"
     device, scene = torch_device(settings["fit"]["device"]), read_scene(inputs["scene"])
-    recipe, style = recipe_of(image, edit["seed"]), style_of(image)
-    write_png(output / "style.png", style.image.permute(1, 2, 0))
+    recipe, style = with_what_is_there(recipe_of(image, edit["seed"]), settings), style_of(image)
+    pixels = style.image.permute(1, 2, 0)
+    write_png(output / "style.png", pixels)
     vgg = Vgg.load(device=device) if recipe.needs_vgg else None
-    clip = None
-    if recipe.needs_clip:
-        clip = ClipLoss(Clip.load(settings["clip"], device), style.image.permute(1, 2, 0).to(device))
+    clip = ClipLoss(Clip.load(settings["clip"], device), pixels.to(device)) if recipe.needs_clip else None
     curves: dict[str, dict[str, list[float]]] = {}
 
     def one(name: str, model: Model, surfels: Tensor | None) -> tuple[Model, dict[str, Any]]:
-        views = read_views(inputs[f"views.{name.split('/')[0]}"].parent).train
+        views = views_of(inputs, name)
         start = time.monotonic()
         result = stylize(
             model,
@@ -70,7 +71,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     numbers = {
         "edit": edit["name"],
         "kind": "image",
-        "method": method(recipe),
+        "method": method(recipe, wanted=recipe_of(image, edit["seed"])),
         "lambda_s": recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
         "edit_seconds": sum(each["seconds"] for each in found.values()),
         "parts": found,
@@ -83,6 +84,15 @@ def recipe_of(image: dict[str, Any], seed: int) -> Recipe:
     changes = {key: image[key] for key in ("iterations", "lambda_s", "start") if image[key] is not None}
     kept = {"pattern": image["pattern"], "is_textured": image["textured"], "seed": seed}
     return preset(image["recipe"], **kept, **changes)
+
+
+def with_what_is_there(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
+    """The recipe with lambda_s 1 where CLIP's weights are missing and nobody has asked for another value."""
+    is_asked = settings["edit"]["image"]["lambda_s"] is not None
+    if not recipe.needs_clip or is_asked or available(settings["clip"]):
+        return recipe
+    sys.stderr.write(f"the weights of {settings['clip']} are not on this machine: lambda_s is 1\n")
+    return replace(recipe, lambda_s=1.0)
 
 
 def style_of(image: Mapping[str, Any]) -> StylePicture:
@@ -112,8 +122,8 @@ def picture_of(name: str) -> StylePicture:
     return read_style(name)
 
 
-def method(recipe: Recipe) -> str:
-    """What the edit works with, for tables."""
+def method(recipe: Recipe, wanted: Recipe) -> str:
+    """What the edit works with, for tables; and that CLIP is missing, where a recipe wants it."""
     names = {
         "VGG-16": recipe.needs_vgg,
         "CLIP": recipe.needs_clip,
@@ -121,4 +131,5 @@ def method(recipe: Recipe) -> str:
     }
     found = [name for name, is_used in names.items() if is_used] or ["projection"]
     words = " + ".join(found) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")
+    words += " without CLIP, its weights are missing" if wanted.needs_clip and not recipe.needs_clip else ""
     return words if recipe.is_textured else f"{words}, without texture"

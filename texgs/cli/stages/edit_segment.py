@@ -49,6 +49,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         *(model, clicks, cameras, mask_model(wanted["masks"], device)),
         light=scene.light,
         vote=wanted["vote"],
+        connected=wanted["connected"],
         title=f"{settings['dataset']}: edit {edit['name']}",
     )
     seconds = time.monotonic() - start

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from texgs.cli.stages.before_after import show
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.parts import edit_parts
+from texgs.cli.stages.parts import edit_parts, views_of
 from texgs.core.device import torch_device
 from texgs.edit.text import edit_by_text
 from texgs.models.filters import ProceduralFilters
@@ -21,7 +21,6 @@ from texgs.report.strip import write_strip
 from texgs.scene.model import Model
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.reduced import smaller
-from texgs.volume.view_set import read_views
 
 SHOWN = 6  # edited views in the picture of them
 
@@ -40,7 +39,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     rows: dict[str, list[np.ndarray]] = {}
 
     def one(name: str, model: Model, surfels: Tensor | None) -> tuple[Model, dict[str, Any]]:
-        views = read_views(inputs[f"views.{name.split('/')[0]}"].parent).train
+        views = views_of(inputs, name)
         start = time.monotonic()
         result = edit_by_text(
             model,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from texgs.scene.model import Model
 from texgs.scene.scene_file import Scene, SceneModel
 from texgs.scene.segment import labels_of
 from texgs.scene.texture_file import write_texture
+from texgs.volume.view_set import View, read_views
 
 Editor = Callable[[str, Model, Tensor | None], tuple[Model, dict[str, Any]]]
 
@@ -52,6 +53,21 @@ def parts_of(scene: Scene, names: Sequence[str]) -> list[Part]:
         if names.count(name) > 1:
             raise ArgumentError(f"edit.parts: expected different names, got {name} twice")
     return [by_name[name] for name in names] or [Part(model) for model in scene.models]
+
+
+def views_of(inputs: Mapping[str, Path], part: str) -> Sequence[View]:
+    """Training views of the model of a part.
+
+    Raises:
+        ArgumentError: if the model is none of the data set's.
+    """
+    model = part.split("/")[0]
+    if f"views.{model}" not in inputs:
+        known = ", ".join(name.removeprefix("views.") for name in inputs if name.startswith("views."))
+        raise ArgumentError(
+            f"scene: expected models named after basic TFs of the data set ({known}), got {model}"
+        )
+    return read_views(inputs[f"views.{model}"].parent).train
 
 
 def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
