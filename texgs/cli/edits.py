@@ -5,7 +5,7 @@ from typing import Any
 import torch
 from omegaconf import DictConfig, OmegaConf
 
-from texgs.cli.segment import require_name, voting_views
+from texgs.cli.segments import require_name, voting_views
 from texgs.cli.stages.edit_image import picture_of, recipe_of
 from texgs.cli.stages.edit_segment import DISTANCE, FOV, clicks_of
 from texgs.cli.stages.parts import shares

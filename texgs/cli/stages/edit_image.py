@@ -10,7 +10,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.cli.segment import mask_model
+from texgs.cli.segments import mask_model
 from texgs.cli.stages.before_after import show
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.parts import edit_parts, shares, views_of

@@ -7,7 +7,7 @@ from typing import Any
 
 import torch
 
-from texgs.cli.segment import mask_model, require_new, voting_views, with_segment
+from texgs.cli.segments import mask_model, require_new, voting_views, with_segment
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.parts import shares
 from texgs.core.camera import Camera, orbit
