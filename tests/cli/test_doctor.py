@@ -52,11 +52,19 @@ def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
     assert "TEXGS_CACHE" in finding.advice
 
 
-@pytest.mark.parametrize("names", [[], ["a.safetensors", "b.pt"]])
-def test_weights_are_listed(monkeypatch, tmp_path, names):
-    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path))
-    for name in names:
-        (tmp_path / name).touch()
+def test_weights_are_listed(monkeypatch, tmp_path):
+    for name in ("TEXGS_WEIGHTS", "TEXGS_CACHE", "TORCH_HOME", "HF_HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
     finding = probes.weights()
-    assert finding.state == ("ok" if names else "missing")
-    assert all(name in finding.found for name in names)
+    assert (finding.state, finding.found[:14]) == ("missing", "none of vgg16,")
+    folder = tmp_path / "clip-vit-base-patch32"
+    folder.mkdir()
+    for name in ("config.json", "model.safetensors"):
+        (folder / name).touch()
+    finding = probes.weights()
+    assert finding.state == "ok"
+    assert finding.found.startswith("clip-vit-base-patch32; not vgg16, ")
+    (tmp_path / "mobile_sam.pt").touch()
+    finding = probes.weights()
+    assert finding.state == "warning"
+    assert "expected the weights of mobile_sam with checksum" in finding.found

@@ -124,14 +124,21 @@ def cache() -> Finding:
 
 
 def weights() -> Finding:
-    """The files with weights of pretrained models; without them their offline counterparts are used."""
-    folder = weights_folder()
-    suffixes = {".safetensors", ".pt", ".pth"}
-    names = sorted(path.name for path in folder.glob("*") if path.suffix in suffixes)
-    if not names:
-        advice = "optional: put weights there or set TEXGS_WEIGHTS to the folder that holds them"
-        return Finding("weights", "missing", f"none in {folder}", advice)
-    return Finding("weights", "ok", f"{', '.join(names)} in {folder}")
+    """Weights of pretrained models that are on this machine; edits say what works without any."""
+    from texgs.models.catalogue import CATALOGUE
+    from texgs.models.weights import available
+
+    try:
+        there = [name for name in CATALOGUE if available(name)]
+    except TexgsError as error:
+        what, _, advice = str(error).partition("; ")
+        return Finding("weights", "warning", what, advice)
+    lacking = [name for name in CATALOGUE if name not in there]
+    where = f"optional: put them into {weights_folder()}, or set TEXGS_WEIGHTS; edits download what they can"
+    if not there:
+        return Finding("weights", "missing", f"none of {', '.join(lacking)}", where)
+    found = f"{', '.join(there)}" + (f"; not {', '.join(lacking)}" if lacking else "")
+    return Finding("weights", "ok", found, where if lacking else "")
 
 
 def _sentence(error: BaseException) -> str:
