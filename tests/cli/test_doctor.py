@@ -1,7 +1,5 @@
 import subprocess
 
-import pytest
-
 from texgs.cli import probes
 from texgs.cli.doctor import examine, show
 from texgs.cli.main import main
