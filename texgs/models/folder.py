@@ -30,7 +30,7 @@ def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[A
         import transformers
     except ImportError as error:
         raise ArgumentError(
-            f"{folder}: expected transformers, which is not installed; pip install texgs[models]"
+            f"{folder}: expected transformers, which is not installed; pip install '.[models]'"
         ) from error
     from safetensors import SafetensorError
 

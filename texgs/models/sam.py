@@ -99,7 +99,7 @@ def mobile_sam(
         from kornia.models.sam import SamConfig
     except ImportError as error:
         raise ArgumentError(
-            "mobile_sam: expected kornia, which is not installed; pip install texgs[models]"
+            "mobile_sam: expected kornia, which is not installed; pip install '.[models]'"
         ) from error
     path = locate("mobile_sam") if path is None else path
     dtype = fast_dtype(device) if dtype is None else dtype
