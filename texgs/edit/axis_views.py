@@ -1,69 +1,27 @@
-"""Six views along the axes: front, back, left, right, top and bottom, chosen by direction or made."""
+"""Six views along the axes: front, back, left, right, top and bottom."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
-from math import acos, atan, cos, degrees, radians
+from math import atan, degrees
 
-import torch
 from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
 
-# Direction from the object to the camera; the front is +z, as for the paths of cameras.
-AXES = {
-    "front": (0.0, 0.0, 1.0),
-    "back": (0.0, 0.0, -1.0),
-    "left": (-1.0, 0.0, 0.0),
-    "right": (1.0, 0.0, 0.0),
-    "top": (0.0, 1.0, 0.0),
-    "bottom": (0.0, -1.0, 0.0),
+ANGLES = {  # azimuth and polar of the camera in degrees; the front is +z, as for the paths of cameras
+    "front": (-90, 0),
+    "back": (90, 0),
+    "left": (180, 0),
+    "right": (0, 0),
+    "top": (-90, 90),
+    "bottom": (-90, -90),
 }
-ANGLES = {"front": (-90, 0), "back": (90, 0), "left": (180, 0), "right": (0, 0), "top": (-90, 90)} | {
-    "bottom": (-90, -90)
-}  # azimuth and polar in degrees
-FARTHEST = 45.0  # degrees from its axis: beyond, another axis is nearer
+ANY_FOV = 45.0  # degrees, of cameras that only their directions are needed of
 BORDER = 1.06  # of the field of view against what holds the scene, for surfels have an extent
 NEAREST = 0.05  # distance to the nearest point against that to the middle
-
-
-def choose_axis_views(cameras: Sequence[Camera], center: Tensor | None = None) -> dict[str, int]:
-    """For each axis the camera that sees the object most nearly along it (the paper's section Text-Driven).
-
-    Indices depend on the order of views and their number; directions do not.
-
-    Args:
-        cameras: of which six are chosen, all different.
-        center: [3] of the object, world units; the origin by default.
-
-    Returns:
-        Index by name, in the order of `AXES`.
-
-    Raises:
-        ArgumentError: if an axis has no camera within 45 degrees that is not taken by another.
-    """
-    found: dict[str, int] = {}
-    middle = torch.zeros(3) if center is None else center
-    check.shape("center", middle, "3")
-    toward = [camera.position.double().cpu() - middle.double().cpu() for camera in cameras]
-    for name, axis in AXES.items():
-        cosines = {
-            index: float(x @ x.new_tensor(axis) / x.norm().clamp_min(1e-12))
-            for index, x in enumerate(toward)
-            if index not in found.values()
-        }
-        best = max(cosines, key=cosines.__getitem__, default=None)
-        if best is None or cosines[best] < cos(radians(FARTHEST)):
-            nearest = "none" if best is None else f"one at {degrees(acos(max(-1.0, cosines[best]))):.0f}"
-            raise ArgumentError(
-                f"cameras: expected one within {FARTHEST:g} degrees of the {name} view, got {nearest}; "
-                "make views with axis_cameras"
-            )
-        found[name] = best
-    return found
 
 
 def axis_cameras(
@@ -81,7 +39,7 @@ def axis_cameras(
         height: pixels; as `like` by default.
 
     Returns:
-        Camera by name, in the order of `AXES`, on the device of `like`.
+        Camera by name, in the order of `ANGLES`, on the device of `like`.
 
     Raises:
         ArgumentError: if `like` is too near to see the scene from there.
@@ -107,7 +65,7 @@ def _widest(points: Tensor, radius: float, aspect: float) -> float:
     """Tangent of half the vertical field of view that holds points [N, 3] around the origin in six views."""
     widest = 1e-3
     for azimuth, polar in ANGLES.values():
-        R_cw = orbit(azimuth, polar, radius, FARTHEST, 2, 2).viewmat[:3, :3].to(points)
+        R_cw = orbit(azimuth, polar, radius, ANY_FOV, 2, 2).viewmat[:3, :3].to(points)
         x, y, z = (points @ R_cw.T).unbind(dim=1)
         if float(z.min()) + radius < NEAREST * radius:
             raise ArgumentError(
