@@ -33,6 +33,10 @@ rule all:
         collect("<results>/tables/sweep-{sweep}.csv", sweep=SWEEPS),
 
 
+onstart:
+    begin()
+
+
 onsuccess:
     print(
         "Done:",

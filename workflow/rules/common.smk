@@ -5,15 +5,19 @@ import sys
 from importlib.resources import files
 from pathlib import Path
 
+from texgs.cli.job import Job
+from texgs.cli.result import METRICS, run_alone
 from texgs.cli.stages.tf import check_basic_tfs
 from texgs.config.code import code_digest, digest
 from texgs.config.compose import compose
 from texgs.config.edits import edits
 from texgs.config.locate import tf_names
-from texgs.config.stage import EDITS, FOLDERS, fit_folder, for_tf, settings_file
+from texgs.config.stage import EDITS, FOLDERS, fit_folder, for_tf, note_result, settings_file
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
+from texgs.core.checksum import Checksums
 from texgs.core.errors import ConfigError, MissingDataError, TexgsError
+from texgs.track import close_dead_runs
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
 
@@ -61,7 +65,7 @@ def experiments(words):
 
 
 def jobs(configs):
-    """Settings file and input files of each job, by stage and folder; and what is missing for some."""
+    """The jobs by stage and folder; and what is missing for some."""
     found, missing = {}, []
     for config in configs:
         check_basic_tfs(config.dataset)
@@ -73,30 +77,53 @@ def jobs(configs):
         for name, stage in STAGES.items():
             for each in (by_tf if stage.per_tf else [config]) if stage.applies(config) else ():
                 try:
-                    files = stage.inputs(each)
+                    made = Job.of(stage, each, CHECKSUMS)
                 except MissingDataError as error:
                     missing.append(str(error))
-                    files = {}
-                made = settings_file(stage, each), files
-                if found.setdefault((name, stage.output(each).as_posix()), made) != made:
-                    raise ConfigError(f"{stage.output(each)}: two variants go there; give one another name")
+                    made = Job(stage, stage.settings(each), {}, stage.output(each))
+                if found.setdefault((name, made.output.as_posix()), made) != made:
+                    raise ConfigError(f"{made.output}: two variants go there; give one another name")
     return found, list(dict.fromkeys(missing))
 
 
 def job(stage, wildcards):
-    """Settings file and input files of the job that wildcards describe."""
-    folder = Path(RESULTS, FOLDERS[stage].format(**dict(wildcards.items())))
-    return JOBS[stage, folder.as_posix()]
+    """The job that wildcards describe."""
+    return JOBS[stage, Path(RESULTS, FOLDERS[stage].format(**dict(wildcards.items()))).as_posix()]
 
 
-def settings(stage, wildcards):
-    """The file with the settings of a job: its name is the digest of its contents."""
-    return job(stage, wildcards)[0]
+def reads(stage):
+    """The files a job reads, first its settings, as a function of wildcards."""
+
+    def of(wildcards):
+        made = job(stage, wildcards)
+        files = [path.as_posix() for path in made.inputs.values()]
+        return [settings_file(made.settings, RESULTS), *files]
+
+    return of
 
 
-def inputs(stage, wildcards):
-    """The files a job reads."""
-    return {name: path.as_posix() for name, path in job(stage, wildcards)[1].items()}
+def words(stage):
+    """The command line of a job after the name of its stage, as a function of wildcards."""
+
+    def of(wildcards):
+        made = job(stage, wildcards)
+        files = [f"{name}={path.as_posix()}" for name, path in made.inputs.items()]
+        inputs = ["--input", *files] if files else []
+        settings = settings_file(made.settings, RESULTS)
+        return ["--settings", settings, *inputs, "--output", made.output.as_posix()]
+
+    return of
+
+
+def renew_settings():
+    """Change the settings files of jobs whose results are not whole, or not of these jobs.
+
+    Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the result
+    before it in place, it learns by this. It takes a file for changed where its contents are.
+    """
+    for made in JOBS.values():
+        if (made.output / METRICS).exists() and not made.is_done():
+            note_result(settings_file(made.settings, RESULTS), f"{made.output}: not whole, or of another job")
 
 
 def done(*stages, sweep=None):
@@ -111,10 +138,7 @@ def edits_of(kind):
 
 
 def missing_weights(configs):
-    """What edits need and this machine has not; without a dry run what can be had is downloaded now.
-
-    Mistakes in edits are told before anything is downloaded.
-    """
+    """What edits need and this machine has not; mistakes in edits are told first."""
     edited = [config for config in configs if config.edit.kind != "none"]
     if not edited:
         return []
@@ -123,10 +147,23 @@ def missing_weights(configs):
 
     for config in edited:
         check_edit(config)
-    return list(dict.fromkeys(line for config in edited for line in missing(config, download=not IS_DRY)))
+    return list(dict.fromkeys(line for config in edited for line in missing(config)))
+
+
+def begin():
+    """Hold the results before the first job, and close the tracked runs of processes that were killed."""
+    global RUN_LOCK
+    try:
+        RUN_LOCK = run_alone(RESULTS)  # it goes with the process, however that ends
+        close_dead_runs(STORE, CONFIG.tracking.experiment)
+    except TexgsError as error:
+        print(f"texgs: {error}", file=sys.stderr)
+        sys.exit(2)
 
 
 IS_DRY = any(re.fullmatch(r"--dry-?run|--lint|-[a-zA-Z]*n[a-zA-Z]*", word) for word in sys.argv)
+
+CHECKSUMS = Checksums.load()
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
@@ -138,6 +175,9 @@ try:
     JOBS, MISSING = jobs(CONFIGS)
     MISSING += missing_weights(CONFIGS)
     OF_SWEEP = {sweep: set(jobs(configs)[0]) for sweep, configs in EXPERIMENTS.items()}
+    if workflow.is_main_process:
+        renew_settings()
+        CHECKSUMS.save()
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
@@ -160,6 +200,13 @@ shell.prefix(
     "set -euo pipefail; "
     f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -P -m texgs.cli.main "$@"; }}}}; '
 )
+
+# One command for all stages: a rule has the name of its stage.
+RUN = "texgs {rule} {params.words:q} 2>&1 | tee {log:q}"
+
+
+# What is there stays until the job has made something better: it swaps its files in at the end.
+outputflags: update
 
 
 pathvars:

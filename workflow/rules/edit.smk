@@ -8,7 +8,7 @@ rule edits:
 
 rule edit_image:
     input:
-        lambda wildcards: list(inputs("edit_image", wildcards).values()),
+        reads("edit_image"),
     output:
         scene="<results>/{dataset}/scene/{fit}/edits/{edit}/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/edits/{edit}/edit.png",
@@ -24,18 +24,15 @@ rule edit_image:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_image", wildcards),
         code=STAGES["edit_image"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_image", wildcards).items()],
+        words=words("edit_image"),
     shell:
-        "texgs edit_image --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule edit_text:
     input:
-        lambda wildcards: list(inputs("edit_text", wildcards).values()),
+        reads("edit_text"),
     output:
         scene="<results>/{dataset}/scene/{fit}/edits/{edit}/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/edits/{edit}/edit.png",
@@ -51,18 +48,15 @@ rule edit_text:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_text", wildcards),
         code=STAGES["edit_text"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_text", wildcards).items()],
+        words=words("edit_text"),
     shell:
-        "texgs edit_text --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule edit_segment:
     input:
-        lambda wildcards: list(inputs("edit_segment", wildcards).values()),
+        reads("edit_segment"),
     output:
         scene="<results>/{dataset}/scene/{fit}/edits/{edit}/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/edits/{edit}/edit.png",
@@ -77,18 +71,15 @@ rule edit_segment:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_segment", wildcards),
         code=STAGES["edit_segment"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_segment", wildcards).items()],
+        words=words("edit_segment"),
     shell:
-        "texgs edit_segment --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule edit_metrics:
     input:
-        lambda wildcards: list(inputs("edit_metrics", wildcards).values()),
+        reads("edit_metrics"),
     output:
         metrics="<results>/{dataset}/scene/{fit}/edit_metrics/{edit}/metrics.json",
     log:
@@ -97,10 +88,7 @@ rule edit_metrics:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_metrics", wildcards),
         code=STAGES["edit_metrics"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_metrics", wildcards).items()],
+        words=words("edit_metrics"),
     shell:
-        "texgs edit_metrics --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN

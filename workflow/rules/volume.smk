@@ -8,7 +8,7 @@ rule volumes:
 
 rule volume:
     input:
-        unpack(lambda wildcards: inputs("volume", wildcards)),
+        reads("volume"),
     output:
         volume="<results>/{dataset}/volume/volume.nrrd",
         summary="<results>/{dataset}/volume/volume.json",
@@ -19,19 +19,15 @@ rule volume:
         "<benchmarks>/{dataset}/volume.tsv"
     threads: 1
     params:
-        settings=lambda wildcards: settings("volume", wildcards),
         code=STAGES["volume"].code,
-        folder=subpath(output.metrics, parent=True),
-        source=lambda wildcards, input: (f"--input source={shlex.quote(input.source)}" if input else ""),
+        words=words("volume"),
     shell:
-        "texgs volume --settings {params.settings:q} {params.source} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule transfer:
     input:
-        volume="<results>/{dataset}/volume/volume.nrrd",
-        summary="<results>/{dataset}/volume/volume.json",
+        reads("transfer"),
     output:
         plot="<results>/{dataset}/transfer/transfer.png",
         metrics="<results>/{dataset}/transfer/metrics.json",
@@ -40,9 +36,7 @@ rule transfer:
     benchmark:
         "<benchmarks>/{dataset}/transfer.tsv"
     params:
-        settings=lambda wildcards: settings("transfer", wildcards),
         code=STAGES["transfer"].code,
-        folder=subpath(output.metrics, parent=True),
+        words=words("transfer"),
     shell:
-        "texgs transfer --settings {params.settings:q} --input volume={input.volume:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
