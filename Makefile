@@ -43,12 +43,14 @@ $(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt $(NATIVE)
 	@$(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 
-$(VENV)/dependencies: requirements.lock
+$(VENV)/dependencies: requirements.lock requirements-torch.lock
 	@$(PYTHON) tools/check_python.py
 	@echo "Creating $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
-	@echo "Installing the packages of requirements.lock (torch alone is 200 MB, several GB with CUDA)"
-	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements.lock
+	@echo "Installing the packages of requirements*.lock (torch alone is 200 MB, several GB with CUDA)"
+	@$(PIP) install --no-deps --require-hashes --requirement requirements.lock
+	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements-torch.lock
+	@$(PIP) check
 	@touch $@
 
 lock: $(VENV)/dependencies
