@@ -20,8 +20,13 @@ help:
 
 install: $(VENV)/installed
 
+# All tests: a worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
 test: $(VENV)/installed
+ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
+else
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+endif
 
 bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
