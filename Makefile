@@ -20,8 +20,13 @@ help:
 
 install: $(VENV)/installed
 
+# All tests: a worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
 test: $(VENV)/installed
+ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
+else
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+endif
 
 bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
@@ -43,12 +48,14 @@ $(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/conf
 	@$(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 
-$(VENV)/dependencies: requirements.lock
+$(VENV)/dependencies: requirements.lock requirements-torch.lock
 	@$(PYTHON) tools/check_python.py
 	@echo "Creating $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
-	@echo "Installing the packages of requirements.lock (torch alone is 200 MB, several GB with CUDA)"
-	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements.lock
+	@echo "Installing the packages of requirements*.lock (torch alone is 200 MB, several GB with CUDA)"
+	@$(PIP) install --no-deps --require-hashes --requirement requirements.lock
+	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements-torch.lock
+	@$(PIP) check
 	@touch $@
 
 lock: $(VENV)/dependencies

@@ -15,7 +15,7 @@ def test_killed_in_the_middle_of_the_views(tmp_path):
     views = project.work / "results" / "turbulence" / "TF01" / "views"
     work = views.with_name(".views.work")
     process = project.start(overrides=LONG)
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     while len(images(work)) < 5 and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     assert process.poll() is None, process.communicate()
@@ -47,7 +47,7 @@ def test_a_second_run_in_the_same_results_is_refused_and_harms_nothing(tmp_path)
     project = Project(tmp_path)
     work = project.work / "results" / "turbulence" / "TF01" / ".views.work"
     first = project.start("--nolock", overrides=LONG)
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 300
     while len(images(work)) < 2 and first.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     second = project.snakemake("--nolock", overrides=f"{LONG} views.step=0.2")
