@@ -10,12 +10,15 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from texgs.config.kept import kept_by_source
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = "texgs"
 LENGTH = 12  # hexadecimal digits of all digests
 
 
 @cache
+@kept_by_source(lambda: ROOT)
 def code_digest(module: str) -> str:
     """Digest of a module such as ``texgs.volume.render`` and what it imports from texgs."""
     seen: dict[str, str] = {}

@@ -1,4 +1,5 @@
 # Configuration, data sets with their basic TFs, and what the command lines of all jobs share.
+import os
 import re
 import shlex
 import sys
@@ -6,9 +7,10 @@ from importlib.resources import files
 from pathlib import Path
 
 from texgs.cli.stages.tf import check_basic_tfs
-from texgs.config.code import code_digest, digest
-from texgs.config.compose import compose
+from texgs.config.code import ROOT, code_digest, digest
+from texgs.config.compose import FOLDER, compose
 from texgs.config.edits import edits
+from texgs.config.kept import fingerprint, keep, recall
 from texgs.config.locate import tf_names
 from texgs.config.stage import EDITS, FOLDERS, fit_folder, for_tf, settings_file
 from texgs.config.stages import STAGES
@@ -106,8 +108,7 @@ def done(*stages, sweep=None):
 
 def edits_of(kind):
     """The wildcard's values: names of edits of a kind."""
-    names = sorted({re.escape(each.edit.name) for each in CONFIGS if each.edit.kind == kind})
-    return "|".join(names) or "no-edit"
+    return any_of(PLAN["edit"].get(kind, ()), "no-edit")
 
 
 def missing_weights(configs):
@@ -126,21 +127,72 @@ def missing_weights(configs):
     return list(dict.fromkeys(line for config in edited for line in missing(config, download=not IS_DRY)))
 
 
+def plain(jobs):
+    """Jobs as lists of names."""
+    return [
+        [stage, folder, settings, {name: path.as_posix() for name, path in files.items()}]
+        for (stage, folder), (settings, files) in jobs.items()
+    ]
+
+
+def restored(lists):
+    """The jobs that such lists name."""
+    return {
+        (stage, folder): (settings, {name: Path(path) for name, path in files.items()})
+        for stage, folder, settings, files in lists
+    }
+
+
+def plan():
+    """All that the rules read of the configuration, in plain values; and what is missing for some jobs."""
+    config = compose(WORDS)
+    by_sweep = experiments(WORDS)
+    configs = [each for found in by_sweep.values() for each in found]
+    found, missing = jobs(configs)
+    kinds = {each.edit.kind for each in configs}
+    return {
+        "results": config.results,
+        "tracking": [config.tracking.uri, config.tracking.experiment],
+        "gpu": [int(config.device.mapper == "gpu"), int(config.device.name == "cuda")],
+        "jobs": plain(found),
+        "sweeps": [[sweep, list(jobs(each)[0])] for sweep, each in by_sweep.items()],
+        "dataset": sorted({each.dataset.name for each in configs}),
+        "views": sorted({each.views.name for each in configs}),
+        "fit": sorted({fit_folder(each) for each in configs}),
+        "edit": {kind: sorted({e.edit.name for e in configs if e.edit.kind == kind}) for kind in kinds},
+    }, missing + missing_weights(configs)
+
+
+def planned():
+    """The plan of this run, and what is missing. A job on a cluster finds the plan that it was submitted by."""
+    kept = Path(".snakemake", "texgs", f"plan-{digest(repr(WORDS))}.json")
+    data = os.environ.get("TEXGS_DATA", "")
+    key = digest("\n".join([*WORDS, data, fingerprint(ROOT / "texgs"), fingerprint(FOLDER)]))
+    if not workflow.is_main_process and (found := recall(kept, key)):
+        return found, []
+    found, missing = plan()
+    keep(kept, key, found)
+    return found, missing
+
+
+def any_of(names, otherwise="none"):
+    """A wildcard's values."""
+    return "|".join(map(re.escape, names)) or otherwise
+
+
 IS_DRY = any(re.fullmatch(r"--dry-?run|--lint|-[a-zA-Z]*n[a-zA-Z]*", word) for word in sys.argv)
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
     WORDS = overrides()
-    CONFIG = compose(WORDS)
-    EXPERIMENTS = experiments(WORDS)
-    CONFIGS = [config for configs in EXPERIMENTS.values() for config in configs]
-    RESULTS = CONFIG.results
-    JOBS, MISSING = jobs(CONFIGS)
-    MISSING += missing_weights(CONFIGS)
-    OF_SWEEP = {sweep: set(jobs(configs)[0]) for sweep, configs in EXPERIMENTS.items()}
+    PLAN, MISSING = planned()
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
+
+RESULTS = PLAN["results"]
+JOBS = restored(PLAN["jobs"])
+OF_SWEEP = {sweep: {tuple(each) for each in folders} for sweep, folders in PLAN["sweeps"]}
 
 # Missing files are told together and before any job; a dry run shows what would be done with them.
 if MISSING:
@@ -148,13 +200,11 @@ if MISSING:
     if not IS_DRY:
         sys.exit(2)
 
-STORE = CONFIG.tracking.uri
-MAPPER_GPU, FIT_GPU = int(CONFIG.device.mapper == "gpu"), int(CONFIG.device.name == "cuda")
+STORE, EXPERIMENT = PLAN["tracking"]
+MAPPER_GPU, FIT_GPU = PLAN["gpu"]
 
 # In front of the commands, not a parameter of the rules: where runs are recorded changes no result.
-ENVIRONMENT = (
-    {} if STORE is None else {"TEXGS_TRACKING": STORE, "TEXGS_EXPERIMENT": CONFIG.tracking.experiment}
-)
+ENVIRONMENT = {} if STORE is None else {"TEXGS_TRACKING": STORE, "TEXGS_EXPERIMENT": EXPERIMENT}
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 shell.prefix(
     "set -euo pipefail; "
@@ -169,9 +219,9 @@ pathvars:
 
 
 wildcard_constraints:
-    sweep="|".join(map(re.escape, filter(None, EXPERIMENTS))) or "no-sweep",
-    dataset="|".join(sorted({re.escape(each.dataset.name) for each in CONFIGS})),
+    sweep=any_of(filter(None, OF_SWEEP), "no-sweep"),
+    dataset=any_of(PLAN["dataset"]),
     tf="[A-Za-z][A-Za-z0-9_-]*",
-    views="|".join(sorted({re.escape(each.views.name) for each in CONFIGS})),
-    fit="|".join(sorted({re.escape(fit_folder(each)) for each in CONFIGS})),
-    edit="|".join(sorted({re.escape(each.edit.name) for each in CONFIGS})),
+    views=any_of(PLAN["views"]),
+    fit=any_of(PLAN["fit"]),
+    edit=any_of(sorted({name for names in PLAN["edit"].values() for name in names})),

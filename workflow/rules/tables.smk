@@ -1,8 +1,8 @@
 # Tables and the report, from the metrics files of jobs.
 
 
-SWEEPS = sorted(filter(None, EXPERIMENTS))
-TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if None in EXPERIMENTS else []
+SWEEPS = sorted(filter(None, OF_SWEEP))
+TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if None in OF_SWEEP else []
 
 
 rule tables:
