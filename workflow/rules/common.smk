@@ -203,8 +203,11 @@ if MISSING:
 STORE, EXPERIMENT = PLAN["tracking"]
 MAPPER_GPU, FIT_GPU = PLAN["gpu"]
 
-# In front of the commands, not a parameter of the rules: where runs are recorded changes no result.
-ENVIRONMENT = {} if STORE is None else {"TEXGS_TRACKING": STORE, "TEXGS_EXPERIMENT": EXPERIMENT}
+# In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
+# result. Threads that spin while they wait take the cores that other jobs and the other threads need.
+ENVIRONMENT = {"OMP_WAIT_POLICY": os.environ.get("OMP_WAIT_POLICY", "passive")}
+if STORE is not None:
+    ENVIRONMENT |= {"TEXGS_TRACKING": STORE, "TEXGS_EXPERIMENT": EXPERIMENT}
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 shell.prefix(
     "set -euo pipefail; "
