@@ -1,4 +1,4 @@
-"""What the Snakemake of a job on a cluster reads of the configuration: the plan of the run that submitted it."""
+"""What the Snakemake of a job on a cluster reads: the plan of the run that submitted the job."""
 
 import itertools
 import json

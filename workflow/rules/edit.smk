@@ -30,7 +30,7 @@ rule edit_image:
         files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_image", wildcards).items()],
     shell:
         "texgs edit_image --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 rule edit_text:
@@ -57,7 +57,7 @@ rule edit_text:
         files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_text", wildcards).items()],
     shell:
         "texgs edit_text --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 rule edit_segment:
@@ -83,7 +83,7 @@ rule edit_segment:
         files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_segment", wildcards).items()],
     shell:
         "texgs edit_segment --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 rule edit_metrics:
@@ -103,4 +103,4 @@ rule edit_metrics:
         files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_metrics", wildcards).items()],
     shell:
         "texgs edit_metrics --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"

@@ -31,7 +31,7 @@ rule surfels:
         files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
     shell:
         "texgs surfels --settings {params.settings:q} --input {params.files:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        "--output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule shading:
@@ -54,7 +54,7 @@ rule shading:
         folder=subpath(output.metrics, parent=True),
     shell:
         "texgs shading --settings {params.settings:q} --input model={input.model:q} views={input.views:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        "--output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule texture:
@@ -77,7 +77,7 @@ rule texture:
         folder=subpath(output.metrics, parent=True),
     shell:
         "texgs texture --settings {params.settings:q} --input model={input.model:q} views={input.views:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        "--output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule figure:
@@ -101,4 +101,4 @@ rule figure:
     shell:
         "texgs figure --settings {params.settings:q} --input surfels={input.surfels:q} "
         "shading={input.shading:q} texture={input.texture:q} views={input.views:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        "--output {params.folder:q} 2>&1 | tee --append {log:q}"

@@ -23,7 +23,7 @@ rule compose:
         models=lambda wildcards: [f"{tf}={path}" for tf, path in inputs("compose", wildcards).items()],
     shell:
         "texgs compose --settings {params.settings:q} --input {params.models:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 rule pse:
@@ -45,7 +45,7 @@ rule pse:
         files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
     shell:
         "texgs pse --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 # As many threads as most machines have: other jobs would be measured with it.
@@ -66,4 +66,4 @@ rule timing:
         files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
     shell:
         "texgs timing --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"

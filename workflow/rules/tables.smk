@@ -16,7 +16,7 @@ rule tables:
         code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
     shell:
-        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule sweep:
@@ -30,7 +30,7 @@ rule sweep:
         code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
     shell:
-        "texgs tables {input:q} --sweep {wildcards.sweep:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "texgs tables {input:q} --sweep {wildcards.sweep:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule report:
@@ -44,4 +44,4 @@ rule report:
         code=code_digest("texgs.cli.report"),
         template=digest(files("texgs.report").joinpath("report.html.j2").read_text()),
     shell:
-        "texgs report {input:q} --output {output:q} 2>&1 | tee {log:q}"
+        "texgs report {input:q} --output {output:q} 2>&1 | tee --append {log:q}"

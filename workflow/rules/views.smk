@@ -28,7 +28,7 @@ rule views:
         folder=subpath(output.metrics, parent=True),
     shell:
         "texgs views --settings {params.settings:q} --input volume={input.volume:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 rule sheet:
@@ -47,4 +47,4 @@ rule sheet:
         folder=subpath(output.metrics, parent=True),
     shell:
         "texgs sheet --settings {params.settings:q} --input views={input.views:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"

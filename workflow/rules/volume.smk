@@ -25,7 +25,7 @@ rule volume:
         source=lambda wildcards, input: (f"--input source={shlex.quote(input.source)}" if input else ""),
     shell:
         "texgs volume --settings {params.settings:q} {params.source} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
 
 
 rule transfer:
@@ -45,4 +45,4 @@ rule transfer:
         folder=subpath(output.metrics, parent=True),
     shell:
         "texgs transfer --settings {params.settings:q} --input volume={input.volume:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        "2>&1 | tee --append {log:q}"
