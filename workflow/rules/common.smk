@@ -11,11 +11,12 @@ from texgs.config.code import ROOT, code_digest, digest
 from texgs.config.compose import FOLDER, compose
 from texgs.config.edits import edits
 from texgs.config.kept import fingerprint, keep, recall
-from texgs.config.locate import tf_names
+from texgs.config.locate import cached_volume, tf_names
 from texgs.config.stage import EDITS, FOLDERS, fit_folder, for_tf, settings_file
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError, MissingDataError, TexgsError
+from texgs.core.folders import cache_folder
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
 
@@ -127,6 +128,16 @@ def missing_weights(configs):
     return list(dict.fromkeys(line for config in edited for line in missing(config, download=not IS_DRY)))
 
 
+def downloads(configs):
+    """Address and checksum of the volumes that are not in the data folder, by the files they are downloaded to."""
+    found = {}
+    for config in configs:
+        volume = config.dataset.volume
+        if volume.url and not Path(config.data_folder, volume.file).exists():
+            found[cached_volume(volume).as_posix()] = [volume.url, volume.sha256]
+    return found
+
+
 def plain(jobs):
     """Jobs as lists of names."""
     return [
@@ -156,6 +167,7 @@ def plan():
         "gpu": [int(config.device.mapper == "gpu"), int(config.device.name == "cuda")],
         "jobs": plain(found),
         "sweeps": [[sweep, list(jobs(each)[0])] for sweep, each in by_sweep.items()],
+        "downloads": downloads(configs),
         "dataset": sorted({each.dataset.name for each in configs}),
         "views": sorted({each.views.name for each in configs}),
         "fit": sorted({fit_folder(each) for each in configs}),
@@ -190,7 +202,7 @@ except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
 
-RESULTS = PLAN["results"]
+RESULTS, CACHE = PLAN["results"], (cache_folder() / "volumes").as_posix()
 JOBS = restored(PLAN["jobs"])
 OF_SWEEP = {sweep: {tuple(each) for each in folders} for sweep, folders in PLAN["sweeps"]}
 

@@ -6,6 +6,28 @@ rule volumes:
         done("transfer"),
 
 
+rule downloads:
+    input:
+        list(PLAN["downloads"]),
+
+
+# Nodes of a cluster often have no way to the internet: this runs where Snakemake does.
+rule download:
+    output:
+        update(f"{CACHE}/{{checksum}}/{{file}}"),
+    log:
+        "<logs>/downloads/{checksum}-{file}.log",
+    wildcard_constraints:
+        checksum="[0-9a-fA-F]{12}",
+        file="[^/]+",
+    localrule: True
+    params:
+        source=lambda wildcards, output: PLAN["downloads"][output[0]],
+    shell:
+        "texgs download {params.source[0]:q} --sha256 {params.source[1]:q} --output {output:q} "
+        "2>&1 | tee --append {log:q}"
+
+
 rule volume:
     input:
         unpack(lambda wildcards: inputs("volume", wildcards)),
