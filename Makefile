@@ -6,11 +6,12 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE))
 
-.PHONY: help install test bench lint demo lock clean
+.PHONY: help install test test-cluster bench lint demo lock clean
 
 help:
 	@echo "make demo      from a small simulated volume to an edited scene and results/report.html"
 	@echo "make test      run all tests; ARGS='-k name' picks some"
+	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
 	@echo "make install   compile what has changed and install it, without running anything"
@@ -27,6 +28,11 @@ ifdef ARGS
 else
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
 endif
+
+# Opt-in: it starts the daemons of SLURM. Without them it is skipped and says what to install.
+test-cluster: $(VENV)/installed
+	@$(PIP) install snakemake-executor-plugin-slurm
+	TEXGS_TEST_CLUSTER=1 $(BIN)/python -m pytest -rs tests/cluster $(ARGS)
 
 bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)

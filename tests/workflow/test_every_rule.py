@@ -17,7 +17,7 @@ EDITS = {
 SWEEP = "name: tiny\nvariants:\n  few: [fit.seeds.count=150]\n  more: [fit.seeds.count=250]\n"
 SMALL = (
     "fit.seeds.count=200 fit.surfels.iterations=4 fit.shading.iterations=12 fit.shading.densify.stop=10 "
-    "edits=[glass,gold,piece,red] edit.image.iterations=2 sweeps={tiny:sphere}"
+    "edits=[glass,gold,piece,red] edit.image.iterations=2 +sweeps.tiny=sphere"
 )
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
@@ -169,5 +169,5 @@ def test_what_was_made_by_hand_is_not_made_again(project):
     assert done.returncode == 0, done.stderr
     before = metrics(project)
     assert "sphere/TF01/demo-hand/figure" in before
-    run(project, "variant=hand edits=[] sweeps={}")
+    run(project, "variant=hand edits=[]")
     assert not made_again(before, metrics(project)) & {folder for folder in before if "demo-hand" in folder}

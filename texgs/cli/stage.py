@@ -96,6 +96,20 @@ def fetch_weights(config: DictConfig) -> None:
         locate(name)
 
 
+def fetch_volume(config: DictConfig) -> None:
+    """Download the volume's file, where it is not on this machine.
+
+    Raises:
+        ArgumentError: if it cannot be had, or is not the one expected.
+    """
+    from texgs.config.locate import cached_volume, source_file
+    from texgs.volume.download import download
+
+    volume, path = config.dataset.volume, source_file(config)
+    if path is not None and volume.url and path == cached_volume(volume) and not path.exists():
+        download(volume.url, volume.sha256, path)
+
+
 def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
     from texgs.cli.job import Job, execute
@@ -105,6 +119,8 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     from texgs.core.checksum import Checksums
 
     stage = STAGES[name]
+    if name == "volume":
+        fetch_volume(config)
     inputs = stage.inputs(config)
     for needed in stage.needs:
         if needed in EDITS and config.edit.kind not in EDITS[needed]:

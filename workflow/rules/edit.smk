@@ -3,7 +3,7 @@
 
 rule edits:
     input:
-        done(*EDITS),
+        PLAN.done(*EDITS),
 
 
 rule edit_image:
@@ -19,12 +19,12 @@ rule edit_image:
     benchmark:
         "<benchmarks>/{dataset}/scene/{fit}/edits/{edit}.tsv"
     wildcard_constraints:
-        edit=edits_of("image"),
+        edit=any_of(PLAN.edits["image"], "no-edit"),
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["edit_image"].code,
+        code=code("edit_image"),
         words=words("edit_image"),
     shell:
         RUN
@@ -43,12 +43,12 @@ rule edit_text:
     benchmark:
         "<benchmarks>/{dataset}/scene/{fit}/edits/{edit}.tsv"
     wildcard_constraints:
-        edit=edits_of("text"),
+        edit=any_of(PLAN.edits["text"], "no-edit"),
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["edit_text"].code,
+        code=code("edit_text"),
         words=words("edit_text"),
     shell:
         RUN
@@ -66,12 +66,12 @@ rule edit_segment:
     benchmark:
         "<benchmarks>/{dataset}/scene/{fit}/edits/{edit}.tsv"
     wildcard_constraints:
-        edit=edits_of("segment"),
+        edit=any_of(PLAN.edits["segment"], "no-edit"),
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["edit_segment"].code,
+        code=code("edit_segment"),
         words=words("edit_segment"),
     shell:
         RUN
@@ -88,7 +88,7 @@ rule edit_metrics:
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["edit_metrics"].code,
+        code=code("edit_metrics"),
         words=words("edit_metrics"),
     shell:
         RUN

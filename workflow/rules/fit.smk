@@ -3,12 +3,12 @@
 
 rule fits:
     input:
-        done("texture"),
+        PLAN.done("texture"),
 
 
 rule figures:
     input:
-        done("figure"),
+        PLAN.done("figure"),
 
 
 rule surfels:
@@ -25,7 +25,7 @@ rule surfels:
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["surfels"].code,
+        code=code("surfels"),
         words=words("surfels"),
     shell:
         RUN
@@ -45,7 +45,7 @@ rule shading:
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["shading"].code,
+        code=code("shading"),
         words=words("shading"),
     shell:
         RUN
@@ -65,7 +65,7 @@ rule texture:
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["texture"].code,
+        code=code("texture"),
         words=words("texture"),
     shell:
         RUN
@@ -83,7 +83,7 @@ rule figure:
         "<benchmarks>/{dataset}/{tf}/{fit}/figure.tsv"
     threads: 4
     params:
-        code=STAGES["figure"].code,
+        code=code("figure"),
         words=words("figure"),
     shell:
         RUN

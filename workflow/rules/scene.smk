@@ -3,7 +3,7 @@
 
 rule scenes:
     input:
-        done("compose", "pse", "timing"),
+        PLAN.done("compose", "pse", "timing"),
 
 
 rule compose:
@@ -17,7 +17,7 @@ rule compose:
         "<logs>/{dataset}/scene/{fit}/compose.log",
     threads: 4
     params:
-        code=STAGES["compose"].code,
+        code=code("compose"),
         words=words("compose"),
     shell:
         RUN
@@ -36,7 +36,7 @@ rule pse:
         "<benchmarks>/{dataset}/scene/{fit}/pse.tsv"
     threads: 4
     params:
-        code=STAGES["pse"].code,
+        code=code("pse"),
         words=words("pse"),
     shell:
         RUN
@@ -54,7 +54,7 @@ rule timing:
     resources:
         gpu=FIT_GPU,
     params:
-        code=STAGES["timing"].code,
+        code=code("timing"),
         words=words("timing"),
     shell:
         RUN

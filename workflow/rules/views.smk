@@ -3,7 +3,7 @@
 
 rule sheets:
     input:
-        done("sheet"),
+        PLAN.done("sheet"),
 
 
 rule views:
@@ -22,7 +22,7 @@ rule views:
     resources:
         gpu=MAPPER_GPU,
     params:
-        code=STAGES["views"].code,
+        code=code("views"),
         words=words("views"),
     shell:
         RUN
@@ -39,7 +39,7 @@ rule sheet:
     benchmark:
         "<benchmarks>/{dataset}/{tf}/sheet.tsv"
     params:
-        code=STAGES["sheet"].code,
+        code=code("sheet"),
         words=words("sheet"),
     shell:
         RUN

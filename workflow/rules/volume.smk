@@ -3,7 +3,29 @@
 
 rule volumes:
     input:
-        done("transfer"),
+        PLAN.done("transfer"),
+
+
+rule downloads:
+    input:
+        list(PLAN.downloads),
+
+
+# Nodes of a cluster often have no way to the internet: this runs where Snakemake does.
+rule download:
+    output:
+        f"{CACHE}/{{checksum}}/{{file}}",
+    log:
+        "<logs>/downloads/{checksum}-{file}.log",
+    wildcard_constraints:
+        checksum="[0-9a-fA-F]{12}",
+        file="[^/]+",
+    localrule: True
+    params:
+        source=lambda wildcards, output: PLAN.downloads[output[0]],
+    shell:
+        "texgs download {params.source[0]:q} --sha256 {params.source[1]:q} --output {output:q} "
+        "2>&1 | tee --append {log:q}"
 
 
 rule volume:
@@ -19,7 +41,7 @@ rule volume:
         "<benchmarks>/{dataset}/volume.tsv"
     threads: 1
     params:
-        code=STAGES["volume"].code,
+        code=code("volume"),
         words=words("volume"),
     shell:
         RUN
@@ -36,7 +58,7 @@ rule transfer:
     benchmark:
         "<benchmarks>/{dataset}/transfer.tsv"
     params:
-        code=STAGES["transfer"].code,
+        code=code("transfer"),
         words=words("transfer"),
     shell:
         RUN
