@@ -123,7 +123,7 @@ def test_a_part_named_twice(results, capsys, monkeypatch):
         ("edit_text", ["edit=glass"], "edit.kind: expected text, got image (edit=glass)"),
         ("edit_image", ["edit=glass", "edit.base=glass"], "edit.base: glass starts from itself"),
         ("edit_image", ["edit=glass", "edit.image.style=glas"], "edit.image.style: expected the file of a"),
-        ("edit_image", ["edit=glass", "edit.image.recipe=default"], "edit glass: vgg16: its weights"),
+        ("edit_image", ["edit=glass", "edit.image.recipe=default"], "vgg16: its weights"),
         ("edit_text", ["edit=gold", "edit.text.instruction=fur"], "instruction: expected one of stipple"),
         ("edit_segment", [*CLICK, "edit.segment.name=a.b"], "edit.segment.name: expected a name without"),
     ],
@@ -231,11 +231,11 @@ def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
 
 def test_without_clip_lambda_s_is_one_and_says_so():
     wanted = preset("paper")
-    settings = {"edit": {"image": {"lambda_s": None}}, "clip": "clip-vit-base-patch32"}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("texgs.cli.stages.edit_image.available", lambda name: False)
-        found = with_what_is_there(wanted, settings)
+    weights = {"clip-vit-base-patch32": None}
+    settings = {"edit": {"image": {"lambda_s": None}}, "clip": "clip-vit-base-patch32", "weights": weights}
+    found = with_what_is_there(wanted, settings)
     assert found == replace(wanted, lambda_s=1.0)
     assert method(found, wanted) == "VGG-16 without CLIP, its weights are missing"
     asked = {**settings, "edit": {"image": {"lambda_s": 0.9}}}
     assert with_what_is_there(wanted, asked) == wanted
+    assert with_what_is_there(wanted, {**settings, "weights": {"clip-vit-base-patch32": "0f3c"}}) == wanted

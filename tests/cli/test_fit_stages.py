@@ -1,6 +1,8 @@
 """The three phases by hand, on views of a small sphere."""
 
 import json
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -27,8 +29,42 @@ TINY = [
 ]
 
 
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory):
+    """Results with all three phases; tests work on copies of what they need of them."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("finished")
+        patch.chdir(folder)
+        assert main(["texture", *TINY]) == 0
+    return folder / "results"
+
+
+@pytest.fixture
+def fitted(finished, tmp_path, monkeypatch):
+    """The folder of the phases in a copy of finished results."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(finished, tmp_path / "results", symlinks=True)
+    return tmp_path / "results" / "sphere" / "TF01" / "demo"
+
+
+@pytest.fixture
+def seeded(fitted):
+    """The same before the shading phase: there are views, and surfels at seeds."""
+    for phase in ("shading", "texture"):
+        shutil.rmtree(fitted / phase)
+    return fitted
+
+
+@pytest.fixture
+def viewed(seeded):
+    """The same before all phases: there are only views."""
+    shutil.rmtree(seeded)
+    return seeded
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
+    """Where phases will be written, in a folder without results."""
     monkeypatch.chdir(tmp_path)
     return tmp_path / "results" / "sphere" / "TF01" / "demo"
 
@@ -53,38 +89,37 @@ def test_texture_makes_what_it_needs_first(folder):
     assert shading["losses"][-1] < 0.1
 
 
-def test_harmonics_first_as_in_the_paper(folder):
+def test_harmonics_first_as_in_the_paper(viewed):
     phase = ["fit.surfels.iterations=120", "fit.surfels.sh_every=40", "fit.surfels.densify.stop=0"]
     assert main(["shading", *TINY, *phase]) == 0
-    model = read_model(folder / "surfels" / "model.safetensors")
+    model = read_model(viewed / "surfels" / "model.safetensors")
     assert model.parameters["sh"].shape[1:] == (16, 3)
     assert model.parameters["sh"][:, 9:].abs().max() > 0, "degree 3 has learned"
-    assert numbers(folder, "surfels")["psnr"] > 22
-    assert "sh" not in read_model(folder / "shading" / "model.safetensors").parameters
+    assert numbers(viewed, "surfels")["psnr"] > 22
+    assert "sh" not in read_model(viewed / "shading" / "model.safetensors").parameters
 
 
-def test_a_material_per_surfel_on_request(folder):
+def test_a_material_per_surfel_on_request(seeded):
     main(["shading", *TINY, "fit.material=surfel", "fit.shading.losses.smoothness=0.01"])
-    ambient = read_model(folder / "shading" / "model.safetensors").parameters["ambient"]
+    ambient = read_model(seeded / "shading" / "model.safetensors").parameters["ambient"]
     assert len(ambient) == 400
     assert ambient.std() > 0.01
 
 
-def test_same_seed_same_model(folder):
+def test_same_seed_same_model(seeded):
     main(["shading", *TINY])
-    first = (folder / "shading" / "model.safetensors").read_bytes()
+    first = (seeded / "shading" / "model.safetensors").read_bytes()
     main(["shading", "--force", *TINY])
-    assert (folder / "shading" / "model.safetensors").read_bytes() == first
+    assert (seeded / "shading" / "model.safetensors").read_bytes() == first
     main(["shading", *TINY, "fit.seed=1"])
-    other = folder.with_name("demo-s1") / "shading" / "model.safetensors"
+    other = seeded.with_name("demo-s1") / "shading" / "model.safetensors"
     assert other.read_bytes() != first
 
 
-def test_the_time_before_an_interruption_counts(folder, monkeypatch):
+def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
     from texgs.cli.stages import phase
     from texgs.fit.loop import Fit
 
-    main(["surfels", *TINY])  # its seeds run a fit of their own
     run = Fit.run
 
     def interrupted(fit):
@@ -97,16 +132,16 @@ def test_the_time_before_an_interruption_counts(folder, monkeypatch):
     monkeypatch.setattr(Fit, "run", interrupted)
     assert main(["shading", *TINY]) == 130
     monkeypatch.setattr(Fit, "run", run)
-    state = phase.checkpoint.latest(folder / "shading" / "checkpoint")
+    state = phase.checkpoint.latest(seeded / ".shading.work" / "checkpoint")
     assert int(state["iteration"]) == 50
     monkeypatch.setattr(
         phase.checkpoint, "latest", lambda _folder: {**state, "seconds": state["seconds"] + 1000}
     )
     assert main(["shading", *TINY]) == 0
-    assert numbers(folder, "shading")["fit_seconds"] > 1000
+    assert numbers(seeded, "shading")["fit_seconds"] > 1000
 
 
-def test_figure_shows_test_views_and_says_what_was_not_fitted(folder, monkeypatch):
+def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatch):
     from texgs.cli.stages import figure
 
     drawn = []
@@ -117,34 +152,34 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(folder, monkeypatc
     assert list(models) == ["shading", "texture"], "this recipe only seeds surfels"
     assert list(views) == ["test view 0", "test view 1"]
     assert (reduce, title.partition(":")[0]) == (1, "sphere/TF01, recipe demo")
-    assert path == Path("results/sphere/TF01/demo/figure/figure.png")
-    assert path.stat().st_size > 10_000
-    assert numbers(folder, "figure")["shown"] == [0, 1]
+    assert path == Path("results/sphere/TF01/demo/.figure.work/figure.png")
+    assert (fitted / "figure" / "figure.png").stat().st_size > 10_000
+    assert numbers(fitted, "figure")["shown"] == [0, 1]
 
 
-def test_figure_without_test_views_shows_training_views(folder, monkeypatch):
+def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
     from texgs.cli.stages import figure
 
-    main(["texture", *TINY])
-    (folder.parent / "views" / "transforms_test.json").unlink()
     shown = []
+    read = figure.read_views
+    monkeypatch.setattr(figure, "read_views", lambda folder: replace(read(folder), test=[]))
     monkeypatch.setattr(figure, "write_fit_figure", lambda *args: shown.extend(args[2]) or args[0])
     assert main(["figure", *TINY]) == 0
     assert shown == ["training view 0", "training view 4"]
 
 
-def test_a_gpu_that_is_not_there_is_one_sentence(folder, capsys, monkeypatch):
+def test_a_gpu_that_is_not_there_is_one_sentence(seeded, capsys, monkeypatch):
     monkeypatch.setattr("torch.cuda.is_available", lambda: False)
     assert main(["shading", *TINY, "device.name=cuda"]) == 2
     assert "device=cuda: torch sees no GPU; leave it out to work on the CPU" in capsys.readouterr().err
 
 
-def test_a_finished_phase_leaves_no_checkpoint(folder, monkeypatch):
+def test_a_finished_phase_leaves_no_checkpoint(seeded, monkeypatch):
     from texgs.cli.stages import phase
 
     monkeypatch.setattr(phase, "SAVED_EVERY", 0.0)
     assert main(["shading", *TINY]) == 0
-    assert sorted(path.name for path in (folder / "shading").iterdir() if path.name[0] != ".") == [
+    assert sorted(path.name for path in (seeded / "shading").iterdir() if path.name[0] != ".") == [
         "metrics.json",
         "model.safetensors",
     ]

@@ -170,7 +170,7 @@ def test_a_job_of_the_workflow(folder, capsys):
     from texgs.config.stage import settings_file
     from texgs.config.stages import STAGES
 
-    settings = settings_file(STAGES["volume"], compose(tuple(TINY)))
+    settings = settings_file(STAGES["volume"].settings(compose(tuple(TINY))), "results")
     output = folder / "elsewhere"
     assert main(["volume", "--settings", settings, "--output", str(output)]) == 0
     assert (output / "volume.nrrd").exists()

@@ -27,9 +27,9 @@ def test_only_what_a_stage_reads_changes_its_digest():
 def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = compose(("dataset=turbulence", "tf=TF01"))
-    path = settings_file(STAGES["views"], config)
-    assert settings_file(STAGES["views"], config) == path
     settings = STAGES["views"].settings(config)
+    path = settings_file(settings, "results")
+    assert settings_file(settings, "results") == path
     assert OmegaConf.to_container(OmegaConf.load(path)) == settings
     assert settings_digest(settings) in path
 
