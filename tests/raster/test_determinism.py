@@ -9,6 +9,7 @@ from benchmarks.scenes import camera, surfels
 from tests.raster.agreement import IMAGES, gradients, images, random_cotangents
 from tests.raster.scenes import Scene, random_scene, textured
 from tests.raster.threads import with_threads
+from texgs.raster import native
 from texgs.raster.api import rasterize, splat
 from texgs.raster.types import OUTPUTS
 
@@ -50,12 +51,24 @@ def test_threads(name, count):
         assert torch.equal(value, alone[quantity]), quantity
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "small" else pytest.mark.large) for name in SCENES]
+)
 def test_runs(device, name):
     scene = SCENES[name]().to(device)
     first = everything(scene)
     for quantity, value in everything(scene).items():
         assert torch.equal(value, first[quantity]), quantity
+
+
+def test_more_pairs_of_surfels_and_tiles_than_in_the_view_before(device):
+    scene = random_scene(1, n=400, width=64, height=48).to(device)
+    native.release_memory(device.type)
+    expected = everything(scene)
+    native.release_memory(device.type)
+    replace(scene, scales=0.05 * scene.scales).render(rasterize)
+    for quantity, value in everything(scene).items():
+        assert torch.equal(value, expected[quantity]), quantity
 
 
 def test_other_work_in_between_changes_nothing(device):

@@ -113,6 +113,12 @@ def test_some_gradients_of_textures_only(device, wanted):
     check(textured(random_scene(12)), device, wanted=wanted)
 
 
+def test_surfels_that_are_not_drawn_among_others(device):
+    scene = random_scene(13)
+    behind = scene.means - 10 * scene.viewmat[2, :3]
+    check(replace(scene, means=torch.where(torch.arange(200)[:, None] % 3 == 0, behind, scene.means)), device)
+
+
 def test_two_uses_of_one_image_and_two_images_of_one_scene(device):
     scene = random_scene(14).to(device)
     means = scene.means.clone().requires_grad_()

@@ -25,6 +25,7 @@ def generated(kind, n, width, height):
     return Scene(**surfels(kind, n), viewmat=view.viewmat, K=K, width=width, height=height)
 
 
+@pytest.mark.large
 def test_a_million_surfels(device):
     scene = generated("light", 1_000_000, 1920, 1080).to(device)
     leaves = {name: leaf.requires_grad_() for name, leaf in scene.leaves().items()}

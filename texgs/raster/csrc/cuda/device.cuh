@@ -33,7 +33,11 @@ inline int64_t blocks_for(int64_t items, int per_block) { return (items + per_bl
 template <class... Parameters, class... Arguments>
 void launch(void (*kernel)(Parameters...), int64_t blocks, int threads, cudaStream_t stream, Arguments... arguments) {
     if (blocks == 0) return;
-    kernel<<<static_cast<unsigned>(blocks), threads, 0, stream>>>(arguments...);
+    cudaLaunchConfig_t config{};
+    config.gridDim = static_cast<unsigned>(blocks);
+    config.blockDim = threads;
+    config.stream = stream;
+    cudaLaunchKernelEx(&config, kernel, arguments...);
     check(cudaGetLastError(), "launching a kernel");
 }
 

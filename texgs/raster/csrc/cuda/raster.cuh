@@ -53,7 +53,7 @@ struct Raster {
     Record* records;        // [N]
     Footprint* footprints;  // [N]
     float* normals;         // [N, 3] facing the camera
-    uint32_t* depth_keys;   // [N] ordered as the depths; kCulled where invisible
+    uint32_t* depth_keys;   // [N] ordered as the depths, kCulled where invisible; sorting overwrites them
     uint32_t* order;        // [N] surfels by depth; ranks are places in it
 
     // Pairs of a surfel and a tile. Their slots are numbered by rank, then by tile, so that each surfel's are adjacent

@@ -50,7 +50,7 @@ __global__ __launch_bounds__(kBlock) void surfel_gradients_kernel(const Raster r
     store_channels(r, i, s, first);
     if (!r.geometry) return;
     SurfelGradient<float> gradient{};
-    if (r.depth_keys[i] != kCulled) {  // a surfel that is not drawn may have no finite projection
+    if (r.footprints[i].x0 < r.footprints[i].x1) {  // a surfel that is not drawn may have no finite projection
         Moments<float> m{s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9], s[10], 0, 0, {0, 0, 0}};
         if (depth) m.zc = s[kGeometrySums], m.zp = s[kGeometrySums + 1];
         const float* normal = s + first + r.surfels.channels;

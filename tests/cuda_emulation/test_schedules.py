@@ -1,0 +1,52 @@
+"""The CUDA kernels compute the same bits whatever the order of blocks, threads and streams."""
+
+import pytest
+import torch
+
+from tests.cuda_emulation import emulated
+from tests.raster import test_normals, test_shading, test_smoothness, test_ssim
+from tests.raster.scenes import random_scene, textured
+from tests.raster.test_determinism import everything
+from texgs.raster.normals import normal_consistency
+from texgs.raster.shading import blinn_phong_texture
+from texgs.raster.smoothness import bilateral_smoothness
+from texgs.raster.spherical_harmonics import spherical_harmonics
+from texgs.raster.ssim import l1_dssim
+
+SEEDS = range(4)
+
+
+def losses():
+    """Values and gradients of all losses and of shading, by name."""
+    found = {"D-SSIM": test_ssim.evaluate(l1_dssim, *test_ssim.pair(33, 70, 3))}
+    found["smoothness"] = test_smoothness.evaluate(bilateral_smoothness, *test_smoothness.maps(33, 70, 2))
+    depth, normal, *constants = test_normals.view(33, 70)
+    value, gradients = test_normals.gradients(
+        lambda n, z: normal_consistency(n, z, *constants), normal, depth
+    )
+    found["normals"] = (value, *gradients)
+    leaves, camera = test_shading.surfels(700, test_shading.MATERIAL), test_shading.CAMERA
+    found["shading"] = sum(map(tuple, test_shading.gradients(blinn_phong_texture, leaves, camera)), ())
+    sh = [torch.linspace(-1, 1, 700 * 48).reshape(700, 16, 3), leaves[-2]]
+    found["harmonics"] = sum(map(tuple, test_shading.gradients(spherical_harmonics, sh, camera)), ())
+    return {f"{name} {i}": x for name, all_ in found.items() for i, x in enumerate(all_)}
+
+
+COMPUTED = {
+    "surfels": lambda: everything(random_scene(1, n=150)),
+    "textured surfels": lambda: everything(textured(random_scene(2, n=150))),
+    "losses": losses,
+}
+
+
+@pytest.mark.parametrize("name", COMPUTED)
+def test_every_order_gives_the_same_bits(name):
+    if reason := emulated.missing():
+        pytest.skip(reason)
+    expected = None
+    for seed in SEEDS:
+        with emulated.emulated_cuda(seed):
+            found = COMPUTED[name]()
+        expected = expected or found
+        for quantity, value in found.items():
+            assert torch.equal(value, expected[quantity]), (seed, quantity)
