@@ -72,7 +72,7 @@ class Project:
         """Snakemake to its end; arguments as for `start`."""
         process = self.start(*words, **options)
         try:
-            out, err = process.communicate(timeout=300)
+            out, err = process.communicate(timeout=1500)
         finally:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
