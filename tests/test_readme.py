@@ -34,6 +34,8 @@ SMALL = {
     "views.turntable": "2",
     "fit.seeds.count": "300",
     "fit.shading.iterations": "30",
+    "edit.image.iterations": "5",
+    "edit.text.size": "64",
     "tracking": "none",
 }
 FILM = ["--width", "32", "--height", "32"]
@@ -121,6 +123,8 @@ def small(words):
     if verb == "render":
         rest = [word for word in rest if word not in ("--width", "1200")] + FILM
         return [verb, *rest, *(("--frames", "3") if "--path" in rest else ())]
+    if verb == "segment":
+        return [*words, "--views", "12", "--size", "64"]
     return words
 
 
