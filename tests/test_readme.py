@@ -54,7 +54,7 @@ INSTEAD = (
     (
         r"texgs run dataset=scan ",
         "texgs run {words} volumes sheets",
-        "for the rest it is the run of dataset=engine, which takes half a minute",
+        "the run of dataset=engine goes on to the report",
     ),
     (
         r"snakemake .*/profiles/local ",
