@@ -123,7 +123,7 @@ def small(words):
     verb, *rest = words
     if any(word.startswith("dataset=") for word in rest) and "--help" not in rest:
         given = {word.partition("=")[0] for word in rest}
-        return [verb, *rest, *(f"{key}={value}" for key, value in SMALL.items() if key not in given)]
+        return [verb, *(f"{key}={value}" for key, value in SMALL.items() if key not in given), *rest]
     if verb == "render":
         rest = [word for word in rest if word not in ("--width", "1200")] + FILM
         return [verb, *rest, *(("--frames", "3") if "--path" in rest else ())]
