@@ -33,6 +33,10 @@ rule all:
         collect("<results>/tables/sweep-{sweep}.csv", sweep=SWEEPS),
 
 
+onstart:
+    begin()
+
+
 onsuccess:
     print(
         "Done:",
@@ -42,5 +46,5 @@ onsuccess:
             else [f"{RESULTS}/tables/sweep-{name}.md" for name in SWEEPS]
         ),
     )
-    if STORE is not None and STORE.startswith("sqlite"):
-        print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")
+    if (PLAN.tracking or "").startswith("sqlite"):
+        print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")
