@@ -118,7 +118,7 @@ def box_of(views: ViewSet, half_size: float) -> Box:
         raise ArgumentError(
             f"{views.folder}: aabb: expected two corners of three numbers, got {aabb}"
         ) from error
-    if not bool((low <= high).all()):  # so is NaN
+    if not bool((low <= high).all()):  # NaN ends here too
         raise ArgumentError(f"{views.folder}: aabb: expected the lowest corner, then the highest, got {aabb}")
     margin = MARGIN * (high - low).max()
     return low - margin, high + margin
@@ -156,7 +156,7 @@ def columns(vertices: np.ndarray, names: tuple[str, ...]) -> Tensor:
 
 
 def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
-    """Raw geometry of surfels at points: round, as large as their neighbours are far, in random directions.
+    """Raw geometry of round surfels at points: sized by the distance to neighbours, turned at random.
 
     Args:
         points: [N, 3] world units, at least four.

@@ -83,7 +83,7 @@ class Row:
 def write_fit_figure(
     path: str | Path, models: Mapping[str, Model], views: Mapping[str, View], reduce: int = 1, title: str = ""
 ) -> Path:
-    """Draw what a fit is worth as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
+    """Draw a fit beside its views as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
 
     A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
     that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first

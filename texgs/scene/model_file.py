@@ -51,7 +51,7 @@ def write_model(path: str | Path, model: Model) -> Path:
 
 
 def describe(path: str | Path, model: Model) -> dict[str, Any]:
-    """What a file at `path` says about a model besides its tensors, in JSON, once these can be written.
+    """Describe a model for the JSON of a file at `path`, and check that its tensors can be written.
 
     Raises:
         ArgumentError, ShapeError: as `write_model`.
@@ -82,7 +82,7 @@ def read_model(path: str | Path) -> Model:
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Model:
-    """The model that the tensors of a file and what `describe` says about them make.
+    """Make a model of the tensors of a file and its description (see `describe`).
 
     Raises:
         ArgumentError, ShapeError: as `read_model`.
@@ -119,7 +119,7 @@ def _open(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
 
 
 def _damage(path: Path) -> str:
-    """What is wrong with a file that safetensors cannot open: it would begin with a length and then JSON."""
+    """What is wrong with a file that safetensors cannot open; a good one begins with a length and JSON."""
     with path.open("rb") as file:
         start = file.read(9)
     if start[8:] == b"{":
