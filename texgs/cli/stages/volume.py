@@ -9,7 +9,7 @@ from texgs.cli.stages.outcome import Outcome
 from texgs.core.io import write_json
 from texgs.core.progress import progress
 from texgs.volume.download import download
-from texgs.volume.generate import GENERATORS
+from texgs.volume.generate import GENERATORS, RANDOM
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource, Source
 from texgs.volume.sources import open_source
@@ -47,7 +47,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 def source(volume: dict[str, Any], path: Path | None) -> Source:
     """The field itself: generated, or read from a file that is there or in the cache after a download."""
     if volume["generator"] is not None:
-        options = {"seed": volume["seed"]} if volume["generator"] != "sphere" else {}
+        options = {"seed": volume["seed"]} if volume["generator"] in RANDOM else {}
         return ArraySource(GENERATORS[volume["generator"]](volume["size"], **options), volume["generator"])
     if path is None:
         path = download(volume["url"], volume["sha256"], Path(volume["file"]).name)
