@@ -7,7 +7,7 @@ from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError
 
 
-@pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "tube", "lambda_50"])
+@pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "lobe", "lambda_50"])
 def test_edits_of_the_project_have_none(edit):
     check_edit(compose((f"edit={edit}",)))
 
@@ -19,9 +19,9 @@ def test_edits_of_the_project_have_none(edit):
         ("glass", "edit.image.region=[[2, 0]]", "edit.image.region: expected two shares from 0 to 1"),
         ("text", "edit.text.instruction=", "instruction: expected what to do in words"),
         ("gold", "edit.text.instruction=fur", "which needs the guidance instruct-pix2pix"),
-        ("tube", "edit.segment.name=", "edit.segment.name: expected a name without / . ="),
-        ("tube", "edit.segment.points=[]", "edit.segment.points: expected one at least"),
-        ("tube", "edit.segment.views=40", "views: expected 12, 42, 92"),
+        ("lobe", "edit.segment.name=", "edit.segment.name: expected a name without / . ="),
+        ("lobe", "edit.segment.points=[]", "edit.segment.points: expected one at least"),
+        ("lobe", "edit.segment.views=40", "views: expected 12, 42, 92"),
     ],
 )
 def test_one_sentence_for_each(edit, word, message):

@@ -36,7 +36,7 @@ def test_the_command_line_starts_without_heavy_imports():
     """Help must answer at once: torch alone takes seconds to import."""
     code = (
         "import sys; import texgs.cli.main as m; m.parser();"
-        "heavy = {'torch', 'numpy', 'PIL', 'tqdm', 'omegaconf', 'mlflow'};"
+        "heavy = {'torch', 'kornia', 'numpy', 'PIL', 'tqdm', 'omegaconf', 'mlflow'};"
         "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

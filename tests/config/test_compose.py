@@ -89,7 +89,7 @@ def test_config_is_light():
     """A Snakefile imports it in every job."""
     code = (
         "import sys; import texgs.config.stage, texgs.config.compose;"
-        "heavy = {'torch', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'};"
+        "heavy = {'torch', 'kornia', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'};"
         "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
