@@ -50,7 +50,7 @@ def test_solves_the_schrodinger_equation(numbers):
 def test_orbitals_are_orthonormal():
     axis = np.linspace(-32, 32, 65)
     places = (axis, axis[:, None], axis[:, None, None])
-    smooth = [(n, degree, order) for n, degree, order in NUMBERS if 1 <= degree and n <= 3]
+    smooth = [(n, degree, order) for n, degree, order in NUMBERS if degree >= 1 and n <= 3]
     found = np.stack([wave_function(*numbers, *places).ravel() for numbers in smooth])
     np.testing.assert_allclose(found @ found.T, np.eye(len(found)), atol=2e-3)
 
