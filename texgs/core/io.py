@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from texgs.core.errors import ArgumentError
+from texgs.core.reading import reading
 
 
 def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
@@ -74,14 +75,8 @@ def read_json(path: str | Path) -> Any:
     Raises:
         ArgumentError: if the file is missing or no JSON, with the line.
     """
-    try:
+    with reading(path, "JSON"):
         return json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise ArgumentError(f"{path}: expected JSON, got {error}") from error
 
 
 def _umask() -> int:

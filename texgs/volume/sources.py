@@ -88,9 +88,11 @@ def open_source(
 
 
 def _try_to_read(path: Path) -> None:
-    """Raise OSError where that is not possible; the readers of the formats say it each in other words."""
+    """Raise where that is not possible; the readers of the formats say it each in other words."""
     if path.is_dir():
         next(path.iterdir(), None)
+    elif path.exists() and not path.is_file():
+        raise ArgumentError("expected a file or a folder, got a named pipe, a device or a socket")
     else:
         path.open("rb").close()
 

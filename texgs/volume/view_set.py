@@ -9,13 +9,13 @@ from typing import Any, Literal
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import Tensor
 
 from texgs.core.camera import Camera, orbit_direction
 from texgs.core.errors import ArgumentError
-from texgs.core.image import read_png
+from texgs.core.image import open_picture, read_png
 from texgs.core.io import read_json, write_json
+from texgs.core.names import named_file
 from texgs.volume.transforms import (
     LENS_KEYS,
     camera_to_world,
@@ -64,11 +64,8 @@ class View:
         Raises:
             ArgumentError: if the file is missing or no image.
         """
-        try:
-            with Image.open(self.path) as picture:
-                return torch.from_numpy(np.array(picture.convert("RGBA")))
-        except OSError as error:
-            raise ArgumentError(f"{self.path}: expected an image, got {error}") from error
+        with open_picture(self.path) as picture:
+            return torch.from_numpy(np.array(picture.convert("RGBA")))
 
     def image(self) -> tuple[Tensor, Tensor]:
         """Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; see `read_png`."""
@@ -178,10 +175,8 @@ def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
 
 def _image_path(path: Path, index: int, frame: Mapping[str, Any]) -> Path:
     """Image of a frame; the layout leaves out the extension."""
-    name = frame.get("file_path")
-    if not isinstance(name, str) or not name:
-        raise ArgumentError(f"{path}: frame {index}: expected file_path, the image's path; got {name!r}")
-    return path.parent / (name if name.endswith(".png") else f"{name}.png")
+    found = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"))
+    return found if found.suffix == ".png" else found.with_name(f"{found.name}.png")
 
 
 def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tuple[int, int]:
@@ -200,11 +195,8 @@ def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tupl
 
 def _png_size(image: Path) -> tuple[int, int]:
     """Width and height from the file's header."""
-    try:
-        with Image.open(image) as picture:
-            return picture.size
-    except OSError as error:
-        raise ArgumentError(f"{image}: expected an image, got {error}") from error
+    with open_picture(image) as picture:
+        return picture.size
 
 
 def _light(where: str, frame: Mapping[str, Any]) -> Light:
