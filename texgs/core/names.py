@@ -59,17 +59,18 @@ def part_file(where: str, *names: str) -> str:
     return file_name(where, f"{'-'.join(names)}.safetensors".replace("/", "-"))
 
 
-def named_file(where: str, folder: Path, path: object) -> Path:
+def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> Path:
     """The file that another file names, in its folder or elsewhere; it is only read.
 
     Args:
         where: the path comes from, for the message.
         folder: that the path is relative to.
         path: text.
+        kind: of file, such as "a model".
 
     Raises:
         ArgumentError: if it is no text, empty, too long, or has control characters.
     """
     if not isinstance(path, str) or not path or len(path) > LONGEST_PATH or not path.isprintable():
-        raise ArgumentError(f"{where}: expected the path of a file, got {path!r:.100}")
+        raise ArgumentError(f"{where}: expected the path of {kind}, got {path!r:.100}")
     return folder / path

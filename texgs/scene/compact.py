@@ -80,7 +80,9 @@ def read_compact(path: str | Path) -> Model:
     """
     from safetensors.numpy import load
 
-    with reading(path, f"a whole {FORMAT} file", "it is cut short or damaged: copy or write it again") as path:
+    with reading(
+        path, f"a whole {FORMAT} file", "it is cut short or damaged: copy or write it again"
+    ) as path:
         line, _, packed = path.read_bytes().partition(b"\n")
         header = _header(path, line)
         parameters = _parameters(load(_unpacked(path, packed)), float(header["step"]))
@@ -210,7 +212,8 @@ def _unpacked(path: Path, packed: bytes) -> bytes:
     what = f"{path}: a model of {n_bytes} bytes, as its header says,"
     require_memory(COPIES * n_bytes, what, "is it damaged?")
     tensors = _taken(stream, n_bytes)
-    if len(tensors) != n_bytes or _taken(stream, 1) or not stream.eof or stream.unused_data:  # at its end is the checksum
+    is_whole = len(tensors) == n_bytes and not _taken(stream, 1) and stream.eof  # where its checksum is
+    if not is_whole or stream.unused_data:
         raise ValueError(f"{len(tensors)} bytes of tensors, expected {n_bytes}")
     return start + header + tensors
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.memory import require_memory
 from texgs.core.reading import reading
+from texgs.core.torch_file import load_torch
 from texgs.raster import Texture
 from texgs.raster.atlas import check_texture
 
@@ -68,7 +69,7 @@ def _arrays(path: Path) -> tuple[Tensor, Tensor]:
 def _palette(path: Path) -> Tensor:
     """[3], clamped as the release does when it reads it."""
     with reading(path, "a palette as the release saves it, a list of one tensor and a number", RELEASE):
-        captured, _ = torch.load(path, map_location="cpu", weights_only=True)
+        captured, _ = load_torch(path)
         palette = captured[0].detach()
         check.shape("palette", palette, "3")
         return palette.float().clamp(0, 1)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.core.folders import cache_folder
+from texgs.core.names import file_name
 
 
 def download(url: str, sha256: str | None, name: str) -> Path:
@@ -18,10 +19,13 @@ def download(url: str, sha256: str | None, name: str) -> Path:
         ArgumentError: if there is no checksum, the address does not answer, or the file differs from its
             checksum; nothing is kept then.
     """
-    if not sha256:
-        raise ArgumentError(f"{name}: expected a checksum for {url}, got none; set dataset.volume.sha256")
+    if not sha256 or not sha256.isalnum():
+        raise ArgumentError(
+            f"{name}: expected a checksum for {url}, got {sha256!r}; set dataset.volume.sha256"
+        )
     import pooch
 
+    file_name("dataset.volume.file", name)
     pooch.get_logger().setLevel("WARNING")
     folder = cache_folder() / "volumes" / sha256[:12]  # another checksum is another file
     try:

@@ -16,6 +16,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.image import open_picture, read_png
 from texgs.core.io import read_json, write_json
 from texgs.core.names import named_file
+from texgs.core.reading import reading_as
 from texgs.volume.transforms import (
     LENS_KEYS,
     camera_to_world,
@@ -153,7 +154,12 @@ def _frame(folder: Path, view: View) -> dict[str, Any]:
 
 def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
     """Views and metadata of one transforms_*.json."""
-    values = read_json(path)
+    with reading_as("cameras of views", where=f"{path}: "):
+        return _split_of(path, read_json(path))
+
+
+def _split_of(path: Path, values: Any) -> tuple[list[View], dict[str, Any]]:
+    """The same, from the values of the file."""
     frames = values.pop("frames", None) if isinstance(values, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
         raise ArgumentError(f"{path}: expected an object with a list of frames, at least one; found none")
@@ -175,7 +181,7 @@ def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
 
 def _image_path(path: Path, index: int, frame: Mapping[str, Any]) -> Path:
     """Image of a frame; the layout leaves out the extension."""
-    found = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"))
+    found = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"), "an image")
     return found if found.suffix == ".png" else found.with_name(f"{found.name}.png")
 
 
