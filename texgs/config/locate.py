@@ -4,6 +4,7 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
+from texgs.config.compose import check_name
 from texgs.core.errors import ConfigError, MissingDataError
 
 
@@ -84,6 +85,8 @@ def tf_names(config: DictConfig) -> list[str]:
     if not names and config.dataset.views_folder is not None:
         folder = Path(config.data_folder, config.dataset.views_folder)
         names = sorted(path.parent.name for path in folder.glob("*/transforms_train.json"))
+        for name in names:
+            check_name(f"folder of views in {folder}", name)
         if not names:
             raise MissingDataError(
                 f"data set {config.dataset.name}: no folder of views in {folder}; "
