@@ -207,7 +207,7 @@ def test_mistakes_in_points_are_named(tmp_path):
         seeds(tmp_path)
     write_ply(path, xyz())
     path.write_bytes(path.read_bytes()[:-12])
-    with pytest.raises(ArgumentError, match="expected a PLY file with vertices"):
+    with pytest.raises(ArgumentError, match="expected a whole PLY file"):
         seeds(tmp_path)
 
 

@@ -4,7 +4,6 @@ import faulthandler
 import json
 import random
 import resource
-import shutil
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,42 +13,45 @@ from tests.fuzz.readers import READERS, Reader
 from texgs.core.errors import TexgsError
 
 MEMORY = 1 << 30  # bytes beyond those of the libraries
-SECONDS = 20.0  # for one file; the slowest takes a tenth of one
+SECONDS = 30.0  # for one file; the slowest takes a second
 
 
 def run(name: str, seeds: Iterable[int], folder: Path) -> None:
-    """Write `outcomes`, a line of JSON for each seed; the last line has none where the process died of it."""
+    """Read a whole file, and then a damaged one for each seed.
+
+    Writes `outcomes`, two lines of JSON for a seed: when it begins, and what came of it. The second is
+    missing where the process dies; `hangs` says where it was when time was up.
+    """
     sys.stdout = sys.stderr = (folder / "printed").open("w")
-    used = 4096 * int(Path("/proc/self/statm").read_text().split()[5])
+    used = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     resource.setrlimit(resource.RLIMIT_DATA, (used + MEMORY, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    reader, case = READERS[name], folder / "case"
+    case.mkdir()
+    path = reader.make(case)
+    reader.read(path)
+    victim = path if reader.victim is None else case / reader.victim
+    whole = victim.read_bytes()
     with (folder / "outcomes").open("w") as outcomes, (folder / "hangs").open("w") as hangs:
         for seed in seeds:
             outcomes.write(json.dumps([seed]) + "\n")
             outcomes.flush()
+            victim.write_bytes(damaged(reader, whole, seed))
             faulthandler.dump_traceback_later(SECONDS, exit=True, file=hangs)
-            outcome = read_damaged(READERS[name], seed, folder / "case")
+            outcome = outcome_of(reader, path)
             faulthandler.cancel_dump_traceback_later()
             outcomes.write(json.dumps([seed, *outcome]) + "\n")
 
 
-def damaged(reader: Reader, seed: int, folder: Path) -> Path:
-    """The file to open, with the damage of a seed."""
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    path = reader.make(folder)
-    victim = path if reader.victim is None else folder / reader.victim
-    data = victim.read_bytes()
+def damaged(reader: Reader, whole: bytes, seed: int) -> bytes:
+    """The bytes of a whole file with the damage of a seed."""
     if reader.unpack is not None and reader.pack is not None:
-        victim.write_bytes(reader.pack(mutated(reader.unpack(data), random.Random(seed))))
-    else:
-        victim.write_bytes(mutated(data, random.Random(seed)))
-    return path
+        return reader.pack(mutated(reader.unpack(whole), random.Random(seed)))
+    return mutated(whole, random.Random(seed))
 
 
-def read_damaged(reader: Reader, seed: int, folder: Path) -> tuple[str, str]:
+def outcome_of(reader: Reader, path: Path) -> tuple[str, str]:
     """What came of one file: valid, refused, or the name of another error; and its message."""
-    path = damaged(reader, seed, folder)
     try:
         reader.read(path)
     except TexgsError as error:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import gzip
-import json
 import lzma
-import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import torch
-import yaml
 from PIL import Image
 
 from tests.scene.samples import sample
@@ -105,7 +102,9 @@ def views(folder: Path) -> Path:
     pictures = []
     for index in range(2):
         Image.fromarray(np.full((16, 20, 4), 40 * index, np.uint8)).save(folder / f"r_{index}.png")
-        pictures.append(View(orbit(40 * index, 10, 4, 30, 20, 16), folder / f"r_{index}.png", Light("headlight")))
+        pictures.append(
+            View(orbit(40 * index, 10, 4, 30, 20, 16), folder / f"r_{index}.png", Light("headlight"))
+        )
     write_transforms(folder, "train", pictures, {"volume": "v", "tf": "TF01"})
     return folder
 
@@ -204,7 +203,9 @@ def checkpoint(folder: Path) -> Path:
 
 
 def metrics(folder: Path) -> Path:
-    return write_json(folder / "metrics.json", {"stage": "views", "numbers": {"a": [1, 2.5, None], "b": {"c": "d"}}})
+    return write_json(
+        folder / "metrics.json", {"stage": "views", "numbers": {"a": [1, 2.5, None], "b": {"c": "d"}}}
+    )
 
 
 def read_segment_file(path: Path) -> None:

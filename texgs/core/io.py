@@ -26,6 +26,8 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
         ArgumentError: if the folder cannot be created or written to, or the disk is full.
     """
     path = Path(path)
+    if path.exists() and not path.is_file() and not path.is_dir():  # it would be replaced by a file
+        raise ArgumentError(f"{path}: expected the name of a file, got a device or a named pipe")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)

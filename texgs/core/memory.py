@@ -4,6 +4,8 @@ import ctypes
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from texgs.core.errors import OutOfMemoryError
@@ -71,6 +73,27 @@ def require_memory(n_bytes: int, what: str, advice: str) -> None:
         raise OutOfMemoryError(
             f"{what}: needs {n_bytes / GIB:.3g} GiB of memory, but {free / GIB:.3g} GiB are free; {advice}"
         )
+
+
+@contextmanager
+def told() -> Iterator[None]:
+    """Turn what Python, NumPy or torch raise where memory ends into one sentence.
+
+    Raises:
+        OutOfMemoryError: in place of theirs; it says how much was wanted, where they do.
+    """
+    try:
+        yield
+    except OutOfMemoryError:
+        raise
+    except (MemoryError, RuntimeError) as error:
+        if not is_out_of_memory(error):
+            raise
+        wanted = re.search(r"[\d.]+ ?(bytes|[KMGTPE]iB)", str(error))
+        raise OutOfMemoryError(
+            f"the work needs more memory than there is ({wanted[0] if wanted else 'unknown'} wanted at once, "
+            f"{free_memory() / GIB:.3g} GiB are free); choose smaller images, fewer views or another machine"
+        ) from error
 
 
 def is_out_of_memory(error: BaseException) -> bool:

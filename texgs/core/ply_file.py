@@ -28,7 +28,8 @@ def read_vertices(path: str | Path) -> np.ndarray:
         if "vertex" not in data:
             found = ", ".join(element.name for element in data) or "nothing"
             raise ArgumentError(f"{path}: expected vertices, got {found}")
-        return data["vertex"].data
+        vertices: np.ndarray = data["vertex"].data
+        return vertices
 
 
 def _check_counts(path: Path) -> None:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from zipfile import is_zipfile
 
-import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.reading import reading
+from texgs.core.torch_file import load_torch
 
 
 def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[str, Tensor]:
@@ -30,14 +29,14 @@ def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[s
             with safe_open(path, framework="pt") as file:
                 found = _chosen(path, file.keys(), names)
                 return {name: file.get_tensor(name) for name in found}
-        stored = torch.load(path, map_location="cpu", weights_only=True, mmap=is_zipfile(path))
+        stored = load_torch(path)
         return {name: _whole(path, name, stored[name]) for name in _chosen(path, stored, names)}
 
 
 def _whole(path: Path, name: str, found: object) -> Tensor:
     """A tensor of which every number is in the file: few can be told to be read again and again."""
     if not isinstance(found, Tensor) or found.nbytes > found.untyped_storage().nbytes():
-        raise ArgumentError(f"{path}: {name}: expected a tensor, got something else; copy or download it again")
+        raise ArgumentError(f"{path}: {name}: expected a tensor, got something else; download it again")
     return found
 
 

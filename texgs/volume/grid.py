@@ -91,8 +91,10 @@ def require_room(dims: Dims, dtype: np.dtype) -> None:
     Raises:
         OutOfMemoryError: naming the size that the header claims.
     """
-    what = f"a volume of {' x '.join(map(str, dims))} samples ({dtype.name}), as its header says,"
-    require_memory(byte_count(dims, dtype), what, "store it uncompressed or as .nrrd with raw encoding")
+    what = f"{' x '.join(map(str, dims))} samples of {dtype.name}"
+    require_memory(
+        byte_count(dims, dtype), what, "is the header damaged? Else store it as .nrrd, not compressed"
+    )
 
 
 def _sides(dims: Dims, spacing: Triple) -> list[float]:

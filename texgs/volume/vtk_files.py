@@ -62,7 +62,7 @@ def _received(stream: IO[bytes]) -> tuple[dict[str, Any] | None, np.ndarray]:
     dims, dtype = said["dims"], np.dtype(said["dtype"])
     require_room(dims, dtype)
     values = np.empty(dims[::-1], dtype)
-    rest = memoryview(values.reshape(-1).view(np.uint8))
+    rest = memoryview(values.data).cast("B")
     while len(rest):
         count = stream.readinto(rest)  # type: ignore[attr-defined]
         if not count:

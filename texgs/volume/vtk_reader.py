@@ -26,7 +26,7 @@ def main(path: Path) -> None:
             said, values = {"error": str(error), "is_memory": isinstance(error, OutOfMemoryError)}, None
         output.write(json.dumps(said).encode() + b"\n")
         if values is not None:
-            output.write(memoryview(values.reshape(-1).view(np.uint8)))
+            output.write(memoryview(values.data).cast("B"))
 
 
 def limit_memory() -> None:
