@@ -44,6 +44,16 @@ def test_memory_that_is_not_there_says_how_much_was_wanted():
         memory.require_memory(2**60, "f", "go")
 
 
+def test_a_container_has_what_it_may_have_and_what_files_give_back(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    (tmp_path / "memory.current").write_text("900000\n")
+    (tmp_path / "memory.stat").write_text("anon 1\nfile 9\ninactive_file 300000\nactive_file 50000\n")
+    (tmp_path / "memory.max").write_text("1000000\n")
+    assert memory.free_memory() == 450_000
+    (tmp_path / "memory.max").write_text("max\n")
+    assert memory.free_memory() > 1e6
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="what counts is told by Linux")
 def test_a_limit_of_the_process_counts():
     import resource

@@ -11,7 +11,8 @@ from pathlib import Path
 from texgs.core.errors import OutOfMemoryError
 
 STATUS = Path("/proc/self/status")
-CGROUP = Path("/sys/fs/cgroup")  # what a container may have: memory.max, of which it uses memory.current
+CGROUP = Path("/sys/fs/cgroup")
+CONTAINER = ("memory.max", "memory.current", "memory.stat")  # what it may have, what it has, and which kinds
 GIB = 1 << 30
 SMALL = 64 << 20  # bytes that are there without asking
 GLIBC_OPTIONS = {-1: 1 << 30, -3: 32 << 20}  # M_TRIM_THRESHOLD; M_MMAP_THRESHOLD, the most it takes
@@ -38,8 +39,11 @@ def free_memory() -> int:
 
     limits = [int(psutil.virtual_memory().available)]
     try:
-        most, used = ((CGROUP / name).read_text() for name in ("memory.max", "memory.current"))
-        limits.append(int(most) - int(used))
+        most, used, kinds = ((CGROUP / name).read_text() for name in CONTAINER)
+        cached = re.findall(
+            r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE
+        )  # of files, given back on demand
+        limits.append(int(most) - int(used) + sum(map(int, cached)))
     except (OSError, ValueError):  # no container, or one without a limit: "max"
         pass
     if sys.platform == "linux":
