@@ -2,9 +2,9 @@
 
 import pytest
 
-from texgs.cli.edits import check_edit
+from texgs.cli.edits import check_edit, require_base
 from texgs.config.compose import compose
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 
 
 @pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "lobe", "lambda_50"])
@@ -27,3 +27,16 @@ def test_edits_of_the_project_have_none(edit):
 def test_one_sentence_for_each(edit, word, message):
     with pytest.raises(ArgumentError, match=message):
         check_edit(compose((f"edit={edit}", word)))
+
+
+def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
+    words = ("dataset=engine", "edit=crimson", f"results={tmp_path}")
+    with pytest.raises(
+        MissingDataError, match=r"edit\.base: tube is not done yet; run texgs edit_segment edit=tube"
+    ):
+        require_base(words)
+    with pytest.raises(ConfigError, match=r"edit\.base: expected the file of a scene or one of"):
+        require_base((*words, "edit.base=none-such"))
+    with pytest.raises(ConfigError, match=r"edit\.parts: expected some of"):
+        require_base(("dataset=engine", "edit=glass", "edit.parts=[nothing]"))
+    require_base(("dataset=engine", "edit=glass"))

@@ -202,11 +202,11 @@ def test_folders_that_hold_no_sam(tiny_sam, tmp_path):
         sam_folder(tmp_path)
     (tmp_path / "config.json").write_text((tiny_sam / "config.json").read_text())
     with pytest.raises(
-        ArgumentError, match="expected a sam model of transformers, got one that cannot be read"
+        ArgumentError, match=r"expected a sam model of transformers, got .*; copy or download it again"
     ):
         sam_folder(tmp_path)
     (tmp_path / "model.safetensors").write_bytes((tiny_sam / "model.safetensors").read_bytes()[:1000])
-    with pytest.raises(ArgumentError, match="got one that cannot be read"):
+    with pytest.raises(ArgumentError, match=r"got .*; copy or download it again"):
         sam_folder(tmp_path)
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from texgs import __version__
 from texgs.core.errors import TexgsError
-from texgs.core.memory import keep_freed_memory
+from texgs.core.memory import keep_freed_memory, told
 
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
 # the verbs of stages share the module texgs.cli.stage.
@@ -88,7 +88,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         signal.signal(signal.SIGTERM, signal.default_int_handler)
         keep_freed_memory()
     try:
-        return int(arguments.run(arguments))
+        with told():
+            return int(arguments.run(arguments))
     except TexgsError as error:
         print(f"texgs {arguments.verb}: {error}", file=sys.stderr)
         return 2

@@ -49,6 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the stage that the verb names."""
     if arguments.settings is not None:
         return run_settings(arguments)
+    from texgs.cli.edits import require_base
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
@@ -59,6 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_basic_tfs(config.dataset)
     if stage.name in EDITS:
         require_edit(stage.name, config)
+        require_base(tuple(arguments.overrides))
     for name in tf_names(config) if stage.per_tf else [None]:
         chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
         ensure(arguments.verb, chosen, force=arguments.force)

@@ -1,8 +1,9 @@
 """How the schema declares a key: default, meaning, unit, and the values that are allowed."""
 
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Any
+
+from texgs.core.numbers import is_number
 
 
 @dataclass(frozen=True)
@@ -16,7 +17,7 @@ class Bounds:
 
     def complaint(self, value: float) -> str | None:
         """What was expected of a number that is not allowed; None for one that is."""
-        if not isfinite(value):
+        if not is_number(value):
             return "a finite number"
         if self.least is not None and value < self.least:
             return f"at least {self.least:g}"

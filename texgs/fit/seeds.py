@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.ply_file import read_vertices
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
 from texgs.fit.visible import CANDIDATES, most_seen
 from texgs.scene.images import Images
@@ -130,17 +131,14 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
     Raises:
         ArgumentError: if the file is missing, no PLY file, or has no finite x, y and z.
     """
-    from plyfile import PlyData, PlyParseError
-
-    try:
-        vertices = PlyData.read(path)["vertex"].data
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points") from error
-    except (OSError, KeyError, ValueError, PlyParseError) as error:
-        raise ArgumentError(f"{path}: expected a PLY file with vertices, got {error}") from error
+    if not path.exists():
+        raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
+    vertices = read_vertices(path)
     names = vertices.dtype.names or ()
     if missing := [name for name in "xyz" if name not in names]:
         raise ArgumentError(f"{path}: expected vertices with x, y and z, found no {', '.join(missing)}")
+    if text := [name for name in names if vertices.dtype[name].kind not in "iuf"]:
+        raise ArgumentError(f"{path}: expected vertices with numbers, got lists: {', '.join(text)}")
     points = columns(vertices, ("x", "y", "z"))
     if not bool(points.isfinite().all()):
         raise ArgumentError(f"{path}: expected finite x, y and z, got NaN or infinity; remove those points")
