@@ -103,8 +103,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print(f"texgs {verb}: interrupted; {again(verb)}", file=sys.stderr)
         return 130
-    except BrokenPipeError:
-        leave_closed_pipe()
+    except BrokenPipeError:  # as `| head` leaves it; what is still in the buffer goes nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141
 
 
@@ -122,20 +122,6 @@ def again(verb: str) -> str:
     if verb in STAGE_VERBS or verb == "run":
         return "the same command goes on where it stopped"
     return "the same command starts again"
-
-
-def leave_closed_pipe() -> None:
-    """Let nothing more be written to a pipe that nobody reads, as `| head` leaves it.
-
-    Raises:
-        BrokenPipeError: if it was another pipe, which is an error.
-    """
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    else:
-        raise
 
 
 if __name__ == "__main__":

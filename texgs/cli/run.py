@@ -59,21 +59,31 @@ def snakemake(words: Sequence[str]) -> bool:
     Raises:
         SystemExit: for a mistake that snakemake or the Snakefile has told.
     """
-    from snakemake.cli import args_to_api, parse_args, parse_cores, print_exception
+    from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
 
-    words = located(words)
-    sys.argv = ["snakemake", *words]  # the Snakefile looks there
+    given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
+    chosen = [word for word in given.targets if WORD.fullmatch(word)]
+    rest = [word for word in words if word not in chosen]
+    sys.argv = ["snakemake", *rest]  # the Snakefile looks there
     try:
-        parser, options = parse_args([*defaults(words), *words])
+        parser, options = parse_args([*defaults(given), *located(rest)])
     except Exception as error:  # as the main of snakemake does
         print_exception(error)
         return False
-    chosen = [word for word in options.targets if WORD.fullmatch(word)]
-    options.targets = [word for word in options.targets if word not in chosen]
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
     return bool(args_to_api(options, parser))
+
+
+def defaults(given: argparse.Namespace) -> list[str]:
+    """Options that hold where the user says nothing else: the Snakefile of texgs and the local profile."""
+    from texgs.config.project import PROFILES, SNAKEFILE
+
+    options = ["--snakefile", str(SNAKEFILE)]
+    if given.profile is None and given.workflow_profile is None:
+        options += ["--workflow-profile", str(PROFILES / "local")]
+    return options
 
 
 def located(words: Sequence[str]) -> list[str]:
@@ -86,16 +96,6 @@ def located(words: Sequence[str]) -> list[str]:
         else word
         for before, word in zip(("", *words), words, strict=False)
     ]
-
-
-def defaults(words: Sequence[str]) -> list[str]:
-    """Options that hold where the user says nothing else: the Snakefile of texgs and the local profile."""
-    from texgs.config.project import PROFILES, SNAKEFILE
-
-    options = ["--snakefile", str(SNAKEFILE)]
-    if any(word.partition("=")[0] in ("--profile", "--workflow-profile") for word in words):
-        return options
-    return [*options, "--workflow-profile", str(PROFILES / "local")]
 
 
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
