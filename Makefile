@@ -6,11 +6,12 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE))
 
-.PHONY: help install test bench lint demo lock clean
+.PHONY: help install test test-cluster bench lint demo lock clean
 
 help:
 	@echo "make demo      from a small simulated volume to an edited scene and results/report.html"
 	@echo "make test      run all tests; ARGS='-k name' picks some"
+	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
 	@echo "make install   compile what has changed and install it, without running anything"
@@ -20,8 +21,18 @@ help:
 
 install: $(VENV)/installed
 
+# All tests: a worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
 test: $(VENV)/installed
+ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
+else
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+endif
+
+# Opt-in: it starts the daemons of SLURM. Without them it is skipped and says what to install.
+test-cluster: $(VENV)/installed
+	@$(PIP) install snakemake-executor-plugin-slurm
+	TEXGS_TEST_CLUSTER=1 $(BIN)/python -m pytest -rs tests/cluster $(ARGS)
 
 bench: $(VENV)/installed
 	OMP_PROC_BIND=true $(BIN)/python -m benchmarks $(ARGS)
@@ -38,17 +49,19 @@ lint: $(VENV)/dependencies
 	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
-$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt $(NATIVE)
+$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/config/native_sources.py $(NATIVE)
 	@echo "Compiling the native library (a minute, with CUDA some more) and installing texgs"
 	@$(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@
 
-$(VENV)/dependencies: requirements.lock
+$(VENV)/dependencies: requirements.lock requirements-torch.lock
 	@$(PYTHON) tools/check_python.py
 	@echo "Creating $(VENV)"
 	@$(PYTHON) -m venv $(VENV)
-	@echo "Installing the packages of requirements.lock (torch alone is 200 MB, several GB with CUDA)"
-	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements.lock
+	@echo "Installing the packages of requirements*.lock (torch alone is 200 MB, several GB with CUDA)"
+	@$(PIP) install --no-deps --require-hashes --requirement requirements.lock
+	@$(PIP) install $$($(PYTHON) tools/torch_index.py) --requirement requirements-torch.lock
+	@$(PIP) check
 	@touch $@
 
 lock: $(VENV)/dependencies

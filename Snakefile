@@ -33,11 +33,15 @@ rule all:
         collect("<results>/tables/sweep-{sweep}.csv", sweep=SWEEPS),
 
 
+onstart:
+    begin()
+
+
 onsuccess:
     made = {str(file) for each in workflow.dag.jobs for file in each.output}
     ends = (
         [f"{RESULTS}/report.html"] if TABLES else [f"{RESULTS}/tables/sweep-{name}.md" for name in SWEEPS]
     )
     print("Done:", *[file for file in ends if file in made] or ["what was asked for"])
-    if STORE is not None and STORE.startswith("sqlite"):
-        print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {STORE}")
+    if (PLAN.tracking or "").startswith("sqlite"):
+        print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")

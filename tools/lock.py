@@ -1,35 +1,37 @@
-"""Print requirements.lock: exact versions of everything the Makefile installs (`make lock` writes the file).
+"""Print requirements.lock: exact versions and hashes of what the Makefile installs. `make lock` writes it.
 
-pip resolves the loose bounds of pyproject.toml for the oldest supported Python, so that one file serves all.
+uv resolves the loose bounds of pyproject.toml for all supported Pythons and all platforms at once. torch has
+a file of its own, which says why. Packages that only a CUDA build of torch needs are left to torch.
 """
 
-import json
+import re
 import subprocess
 import sys
+from pathlib import Path
 
-TORCH = "torch==2.13.0"
-HEADER = """\
-# Versions that `make test` installs and tests with, for Python 3.11 to 3.13. Written by `make lock`.
-# torch comes as a build for the CPU or for CUDA, whichever is on offer; the packages with CUDA libraries
-# are not listed, because torch itself names their exact versions.
+TORCH_FILE = "requirements-torch.lock"
+EXTRAS = ("dev", "bench", "models")
+HEADER = f"""\
+# Versions that `make test` installs and tests with, for Python 3.11 to 3.13, and the hashes of their files.
+# Written by `make lock`. torch: see {TORCH_FILE}.
 """
 
 
-def resolve() -> dict[str, str]:
-    """Names and versions of texgs' dependencies with all optional groups."""
-    command = [sys.executable, "-m", "pip", "install", "--quiet", "--dry-run", "--ignore-installed"]
-    command += ["--report", "-", TORCH, ".[dev,bench,models]"]
-    report = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
-    found = (item["metadata"] for item in report["install"])
-    return {item["name"].lower().replace("_", "-"): item["version"].split("+")[0] for item in found}
+def resolve() -> str:
+    """All packages as a requirements file: a line for each, then indented lines with its hashes."""
+    command = [sys.executable, "-m", "uv", "pip", "compile", "pyproject.toml", "--constraints", TORCH_FILE]
+    command += [word for extra in EXTRAS for word in ("--extra", extra)]
+    command += ["--universal", "--python-version", "3.11", "--fork-strategy", "fewest"]
+    command += ["--generate-hashes", "--no-annotate", "--no-header", "--quiet"]
+    root = Path(__file__).parents[1]
+    return subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, cwd=root).stdout
 
 
-def is_cuda(name: str) -> bool:
-    """Whether a package holds CUDA libraries or serves only CUDA builds of torch."""
-    return name.startswith(("cuda-", "nvidia-")) or name == "triton"
+def without_torch(requirements: str) -> str:
+    """The requirements less torch and the packages that serve only CUDA builds of it."""
+    entries = re.findall(r"^\S.*\n(?:[ \t].*\n)*", requirements, flags=re.MULTILINE)
+    return "".join(entry for entry in entries if not re.match(r"(torch|triton)==|cuda-|nvidia-", entry))
 
 
 if __name__ == "__main__":
-    versions = resolve()
-    lines = [f"{name}=={version}" for name, version in sorted(versions.items()) if not is_cuda(name)]
-    print(HEADER + "\n".join(line for line in lines if not line.startswith("texgs==")))
+    print(HEADER + without_torch(resolve()), end="")

@@ -43,7 +43,7 @@ def results(tmp_path_factory):
 
 
 def numbers(folder):
-    return json.loads((folder / "metrics.by_hand.json").read_text())["numbers"]
+    return json.loads((folder / "metrics.json").read_text())["numbers"]
 
 
 def parameters(results, scene, name):
@@ -76,7 +76,7 @@ def test_numbers_name_the_method(results):
     assert gold["method"] == "procedural filters, default"
     assert set(glass["parts"]) == {"TF01", "TF02"}
     assert glass["edit_seconds"] > 0
-    assert json.loads((results / "edits" / "glass" / "metrics.by_hand.json").read_text())["seed"] == 3
+    assert json.loads((results / "edits" / "glass" / "metrics.json").read_text())["seed"] == 3
 
 
 @pytest.mark.parametrize("edit", ["part", "crimson"])

@@ -34,7 +34,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def numbers(folder, phase):
-    return json.loads((folder / phase / "metrics.by_hand.json").read_text())["numbers"]
+    return json.loads((folder / phase / "metrics.json").read_text())["numbers"]
 
 
 def test_texture_makes_what_it_needs_first(folder):
@@ -145,7 +145,7 @@ def test_a_finished_phase_leaves_no_checkpoint(folder, monkeypatch):
     monkeypatch.setattr(phase, "SAVED_EVERY", 0.0)
     assert main(["shading", *TINY]) == 0
     assert sorted(path.name for path in (folder / "shading").iterdir() if path.name[0] != ".") == [
-        "metrics.by_hand.json",
+        "metrics.json",
         "model.safetensors",
     ]
 

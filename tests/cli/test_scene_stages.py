@@ -26,7 +26,7 @@ def results(tmp_path_factory):
 
 
 def numbers(results, stage):
-    return json.loads((results / stage / "metrics.by_hand.json").read_text())["numbers"]
+    return json.loads((results / stage / "metrics.json").read_text())["numbers"]
 
 
 def test_the_scene_has_all_models_and_a_picture(results):

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from texgs.cli.job import BY_HAND
 from texgs.cli.main import main
+from texgs.cli.result import METRICS
 from texgs.cli.stages import views as views_stage
 from texgs.volume.view_set import read_views
 
@@ -47,7 +47,7 @@ def folder(tmp_path, monkeypatch):
 
 def numbers(views):
     """What the stage says about its folder."""
-    return json.loads((views / BY_HAND).read_text())["numbers"]
+    return json.loads((views / METRICS).read_text())["numbers"]
 
 
 def images(views):
@@ -107,16 +107,16 @@ def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):
         assert main(["views", *TINY]) == 2
         error = capsys.readouterr().err.splitlines()[-1]
         assert error.endswith("expected to see something, but all views are empty; raise its opacity")
-        (views,) = folder.glob("*/views")
-        assert len(list(views.glob("train/*.png"))) == 12
-        assert not list(views.glob("transforms_*.json"))
+        (work,) = folder.glob("*/.views.work")
+        assert len(list(work.glob("train/*.png"))) == 12
+        assert not list(folder.rglob("transforms_*.json"))
 
 
 def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
     main(["views", *TINY])
     (views,) = folder.glob("*/views")
     whole = numbers(views)
-    lost = [views / "train" / "r_0011.png", *(views / "test").iterdir(), views / BY_HAND]
+    lost = [views / "train" / "r_0011.png", *(views / "test").iterdir(), views / METRICS]
     for path in lost:
         path.unlink()
     monkeypatch.setattr(views_stage, "mapper_for", lambda *_: Blank())
@@ -143,16 +143,17 @@ def test_a_killed_job_goes_on_where_it_was(folder, tmp_path, monkeypatch):
     command = [sys.executable, "-m", "texgs.cli.main", *words]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     child = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline and len(list(folder.glob("*/views/train/r_*.png"))) < 4:
+    deadline = time.monotonic() + 300
+    while time.monotonic() < deadline and len(list(folder.glob("*/.views.work/train/r_*.png"))) < 4:
         time.sleep(0.02)
     child.send_signal(signal.SIGKILL)
     child.communicate()
-    (views,) = folder.glob("*/views")
-    assert not (views / "transforms_train.json").exists()
-    kept = {path.name: path.stat().st_mtime_ns for path in (views / "train").glob("r_*.png")}
+    (work,) = folder.glob("*/.views.work")
+    kept = {path.name: path.stat().st_mtime_ns for path in (work / "train").glob("r_*.png")}
     assert 4 <= len(kept) < 42
+    assert not list(folder.glob("*/views"))
     assert main(words) == 0
+    (views,) = folder.glob("*/views")
     assert len(read_views(views).train) == 42
     assert all((views / "train" / name).stat().st_mtime_ns == stamp for name, stamp in kept.items())
     assert len(numbers(views)["frames_ms"]) == 42 + 3 - 2, "one time per view, without the first of each run"

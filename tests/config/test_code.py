@@ -5,6 +5,12 @@ import pytest
 from texgs.config import code
 
 
+def forget():
+    """Read all sources anew."""
+    for cached in (code.code_digest, code.essence, code.library_sources):
+        cached.cache_clear()
+
+
 @pytest.fixture
 def tree(tmp_path, monkeypatch):
     """A package with a stage that imports one module of two."""
@@ -27,12 +33,12 @@ def tree(tmp_path, monkeypatch):
         path = tmp_path / name
         assert old in path.read_text()
         path.write_text(path.read_text().replace(old, new))
-        code.code_digest.cache_clear()
+        forget()
         return code.code_digest("texgs.volume.stage")
 
-    code.code_digest.cache_clear()
+    forget()
     yield edit, code.code_digest("texgs.volume.stage")
-    code.code_digest.cache_clear()
+    forget()
     shutil.rmtree(tmp_path)
 
 
@@ -64,3 +70,33 @@ def test_stages_exist_and_differ():
     assert len(digests) == len(STAGES)
     for stage in STAGES.values():
         assert code.source(stage.module) is not None, stage.module
+
+
+def test_help_texts_do_not_count_and_defaults_do(tree):
+    edit, _ = tree
+    before = edit(
+        "texgs/core/deep.py",
+        "LIMIT = 3",
+        "LIMIT = 3\nsize: int = key(64, 'samples', 'voxels', least=16)\n"
+        "parser.add_argument('--size', help='samples', default=64)\n"
+        "X = field(metadata={'help': 'samples'})\n",
+    )
+    assert edit("texgs/core/deep.py", "samples", "samples along each side") == before
+    assert edit("texgs/core/deep.py", "voxels", "samples") == before
+    assert edit("texgs/core/deep.py", "least=16", "least=8") != before
+    before = edit("texgs/core/deep.py", "least=8", "least=16")
+    assert edit("texgs/core/deep.py", "key(64", "key(65") != before
+
+
+def test_native_sources_count_where_the_native_library_is_called(tree, tmp_path):
+    edit, _ = tree
+    csrc = tmp_path / "texgs" / "raster" / "csrc"
+    csrc.mkdir(parents=True)
+    (csrc / "maths.h").write_text("int a = 1;")
+    before = edit("texgs/core/deep.py", "3", "3")
+    edit("texgs/raster/csrc/maths.h", "1", "2")
+    assert edit("texgs/core/deep.py", "3", "3") == before, "nothing calls the library yet"
+    (tmp_path / "texgs" / "raster" / "native.py").write_text("X = 1\n")
+    before = edit("texgs/core/deep.py", "LIMIT = 3", "import texgs.raster.native\nLIMIT = 3")
+    assert edit("texgs/raster/csrc/maths.h", "2", "3") != before
+    assert edit("texgs/raster/csrc/maths.h", "3", "2 /* three */") == before

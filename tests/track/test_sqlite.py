@@ -106,3 +106,11 @@ def test_relative_address_is_resolved_at_once(tmp_path, monkeypatch):
 def test_addresses_without_a_file_are_refused(uri):
     with pytest.raises(ArgumentError, match="expected sqlite:///PATH"):
         sqlite.path_of(uri)
+
+
+def test_what_a_killed_process_has_left_is_removed(tmp_path):
+    database = tmp_path / "mlflow.db"
+    (tmp_path / ".mlflow.db.4711").write_text("half a store")
+    (tmp_path / ".mlflow.db.4711-journal").write_text("and its journal")
+    sqlite.prepare(database)
+    assert {path.name for path in tmp_path.iterdir()} == {"mlflow.db", ".mlflow.db.lock"}

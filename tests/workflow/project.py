@@ -38,12 +38,17 @@ class Project:
             shutil.copytree(
                 ROOT / name,
                 self.sources / name,
-                ignore=shutil.ignore_patterns("csrc", "__pycache__", *([] if native else ["_native"])),
+                ignore=shutil.ignore_patterns("__pycache__", *([] if native else ["csrc", "_native"])),
             )
         for path in (self.sources / "conf" / "dataset").iterdir():
             if path.stem not in DATASETS:  # one of the user
                 path.unlink()
         shutil.copy(ROOT / "Snakefile", self.sources)
+
+    def texgs(self, *words: str) -> subprocess.CompletedProcess[str]:
+        """A verb of the command line, on the volume and views of TINY where it takes KEY=VALUE."""
+        command = [sys.executable, "-c", LAUNCHER, str(self.sources), "texgs.cli.main", *words, *TINY.split()]
+        return subprocess.run(command, cwd=self.work, text=True, capture_output=True, check=False)
 
     def start(
         self,

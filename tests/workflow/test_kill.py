@@ -13,17 +13,18 @@ LONG = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=160 views.he
 def test_killed_in_the_middle_of_the_views(tmp_path):
     project = Project(tmp_path)
     views = project.work / "results" / "turbulence" / "TF01" / "views"
+    work = views.with_name(".views.work")
     process = project.start(overrides=LONG)
-    deadline = time.monotonic() + 120
-    while len(images(views)) < 5 and process.poll() is None and time.monotonic() < deadline:
+    deadline = time.monotonic() + 300
+    while len(images(work)) < 5 and process.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
     assert process.poll() is None, process.communicate()
     os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
-    kept = images(views)
+    kept = images(work)
     assert 5 <= len(kept) < 42
     time.sleep(1)
-    assert images(views) == kept, "the job outlived the workflow"
+    assert images(work) == kept, "the job outlived the workflow"
     assert not (views / "metrics.json").exists()
     assert "locked" in project.snakemake(overrides=LONG).stderr
     done = project.snakemake("--unlock", overrides=LONG)
@@ -40,3 +41,18 @@ def test_killed_in_the_middle_of_the_views(tmp_path):
 def images(views):
     """When each training view was written."""
     return {path.name: path.stat().st_mtime_ns for path in views.glob("train/r_*.png")}
+
+
+def test_a_second_run_in_the_same_results_is_refused_and_harms_nothing(tmp_path):
+    project = Project(tmp_path)
+    work = project.work / "results" / "turbulence" / "TF01" / ".views.work"
+    first = project.start("--nolock", overrides=LONG)
+    deadline = time.monotonic() + 300
+    while len(images(work)) < 2 and first.poll() is None and time.monotonic() < deadline:
+        time.sleep(0.02)
+    second = project.snakemake("--nolock", overrides=f"{LONG} views.step=0.2")
+    assert second.returncode == 2
+    assert "results: another run works there; wait for it to end" in second.stderr
+    out, err = first.communicate(timeout=200)
+    assert first.returncode == 0, out + err
+    assert len(images(work.with_name("views"))) == 42

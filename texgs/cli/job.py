@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 import importlib
-import shutil
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from filelock import FileLock, Timeout
+from omegaconf import DictConfig
 
 from texgs import track
+from texgs.cli import result
 from texgs.cli.provenance import git_revision, record, user
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.weights import require_same, weights_of
 from texgs.config.stage import Stage, settings_digest
+from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json, write_json
-
-STAMP = ".job.json"
-FILES = ".files.json"  # names of what the job wrote
-METRICS = "metrics.json"  # its presence tells the workflow that a job is done
-BY_HAND = "metrics.by_hand.json"  # the same of a job that the workflow does not know of
+from texgs.core.io import write_json
 
 
 @dataclass(frozen=True)
@@ -34,84 +30,99 @@ class Job:
     settings: dict[str, Any]
     inputs: Mapping[str, Path]
     output: Path
+    checksums: Checksums = field(default_factory=Checksums, compare=False)  # what is known of files
+
+    @classmethod
+    def of(cls, stage: Stage, config: DictConfig, checksums: Checksums) -> Job:
+        """The job that a configuration describes; its settings name the weights that it works with.
+
+        Raises:
+            ConfigError: if the configuration does not fit the stage.
+            MissingDataError: if a file from elsewhere is not there.
+        """
+        settings, weights = stage.settings(config), weights_of(stage.name, config, checksums)
+        named = {"weights": weights} if weights else {}
+        return cls(stage, {**settings, **named}, stage.inputs(config), stage.output(config), checksums)
 
     def identity(self) -> dict[str, Any]:
-        """What the job's result depends on: settings, code and input files."""
-        files = {}
-        for name, path in self.inputs.items():
-            state = path.stat()
-            files[name] = [state.st_size, state.st_mtime_ns]
-        return {"settings": settings_digest(self.settings), "code": self.stage.code, "inputs": files}
+        """What the job's result depends on: settings, code and the contents of input files."""
+        files = {name: result.fingerprint(path, self.checksums) for name, path in self.inputs.items()}
+        return {
+            "stage": self.stage.name,
+            "settings": settings_digest(self.settings),
+            "code": self.stage.code,
+            "inputs": files,
+        }
 
     def is_done(self) -> bool:
-        """Whether the folder holds the finished result of exactly this job."""
-        stamp = self.output / STAMP
-        is_finished = any((self.output / name).exists() for name in (METRICS, BY_HAND))
-        return is_finished and stamp.exists() and read_json(stamp) == self.identity()
+        """Whether the folder holds the whole result of exactly this job."""
+        if not result.is_complete(self.output, self.checksums):
+            return False
+        return all(path.exists() for path in self.inputs.values()) and (
+            result.stamped(self.output) == self.identity()
+        )
 
 
-def discard(job: Job) -> None:
-    """Remove the result of a job, finished or not, so that it starts from nothing."""
-    if (job.output / STAMP).exists():
-        shutil.rmtree(job.output)
+def execute(job: Job, tracking: str | None, experiment: str, *, force: bool = False) -> bool:
+    """Run a job, unless its result is there; an interrupted run of the same job goes on.
 
-
-def adopt(job: Job) -> None:
-    """Let the workflow have a finished result that was made by hand."""
-    if not (job.output / METRICS).exists():
-        (job.output / BY_HAND).replace(job.output / METRICS)
-
-
-def execute(job: Job, tracking: str | None, experiment: str, metrics_name: str = METRICS) -> dict[str, Any]:
-    """Run a job and write its metrics; returns what they say.
-
-    Files that an interrupted run of the same job left in the folder are kept, those of any other job removed.
+    The result before it stays until this one is complete.
 
     Args:
         job: what to run.
         tracking: URI of the tracking store, or None.
         experiment: of the tracking store.
-        metrics_name: file of the metrics.
+        force: whether to begin from nothing in any case.
+
+    Returns:
+        Whether there was something to do.
 
     Raises:
         TexgsError: for a mistake of the user.
     """
-    with alone(job.output):
-        return _execute(job, tracking, experiment, metrics_name)
+    with result.alone(job.output):
+        result.recover(job.output)
+        if force:
+            result.discard_work(job.output)
+        elif job.is_done():
+            return False
+        _execute(job, tracking, experiment)
+    return True
 
 
-@contextmanager
-def alone(output: Path) -> Iterator[None]:
-    """Keep other processes out of a job's folder.
-
-    Raises:
-        ArgumentError: if another job works there, or the folder above it cannot be written to.
-    """
-    lock = FileLock(output.parent / f".{output.name}.lock")
-    try:
-        output.parent.mkdir(parents=True, exist_ok=True)
-        lock.acquire(blocking=False)
-    except Timeout as error:
-        raise ArgumentError(f"{output}: another job works there; wait for it to end") from error
-    except OSError as error:
-        raise ArgumentError(
-            f"{output}: cannot write there ({error.strerror}); choose other results"
-        ) from error
-    try:
-        yield
-    finally:
-        lock.release()
-
-
-def _execute(job: Job, tracking: str | None, experiment: str, metrics_name: str) -> dict[str, Any]:
+def _execute(job: Job, tracking: str | None, experiment: str) -> None:
     for name, path in job.inputs.items():
         if not path.exists():
             raise ArgumentError(
                 f"{name}: expected the file {path}, which is not there; run the stage that makes it"
             )
+        result.require_intact(path)
+    require_same(job.settings.get("weights", {}))
     identity = job.identity()
-    claim(job.output, identity)
-    tags = {
+    work = result.claim(job.output, identity)
+    name = " ".join(str(job.settings[key]) for key in ("dataset", "tf", "stage") if key in job.settings)
+    with track.run(
+        tracking, experiment=experiment, name=name, tags=_tags(job, identity), params=job.settings
+    ) as run:
+        start = time.perf_counter()
+        outcome: Outcome = importlib.import_module(job.stage.module).work(
+            job.settings, dict(job.inputs), work
+        )
+        seconds = time.perf_counter() - start
+        metrics = {**record(job.settings, identity, seconds), "run": run.id, "numbers": outcome.numbers}
+        write_json(work / result.METRICS, metrics)
+        result.publish(job.output)
+        run.log(
+            {"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(outcome.numbers)}
+        )
+        for step, values in enumerate(series(outcome.numbers)):
+            run.log(values, step)
+        for path in (*outcome.pictures, work / result.METRICS):
+            run.artifact(job.output / path.relative_to(work))
+
+
+def _tags(job: Job, identity: Mapping[str, Any]) -> dict[str, str]:
+    return {
         "mlflow.user": user(),
         "snakemake.rule": job.stage.name,
         **{f"wildcards.{key}": job.settings[key] for key in ("dataset", "tf") if key in job.settings},
@@ -119,60 +130,8 @@ def _execute(job: Job, tracking: str | None, experiment: str, metrics_name: str)
         "code.sha": identity["code"],
         "git.sha": git_revision(),
         "output": job.output.as_posix(),
+        **track.process_tags(job.output / result.METRICS),
     }
-    name = " ".join(str(job.settings[key]) for key in ("dataset", "tf", "stage") if key in job.settings)
-    with track.run(tracking, experiment=experiment, name=name, tags=tags, params=job.settings) as run:
-        start = time.perf_counter()
-        outcome: Outcome = importlib.import_module(job.stage.module).work(
-            job.settings, dict(job.inputs), job.output
-        )
-        seconds = time.perf_counter() - start
-        metrics = {**record(job.settings, identity, seconds), "run": run.id, "numbers": outcome.numbers}
-        write_json(
-            job.output / FILES, sorted({METRICS, BY_HAND, *(path.name for path in job.output.iterdir())})
-        )
-        write_json(job.output / metrics_name, metrics)
-        run.log(
-            {"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(outcome.numbers)}
-        )
-        for step, values in enumerate(series(outcome.numbers)):
-            run.log(values, step)
-        for path in (*outcome.pictures, job.output / metrics_name):
-            run.artifact(path)
-    return metrics
-
-
-def claim(output: Path, identity: dict[str, Any]) -> None:
-    """Make the folder this job's: empty, or with what the same job left there.
-
-    Raises:
-        ArgumentError: if the folder holds files that are not of texgs.
-    """
-    stamp = output / STAMP
-    for name in (METRICS, BY_HAND):  # the job is not done before it is written again
-        (output / name).unlink(missing_ok=True)
-    if stamp.exists() and read_json(stamp) == identity:
-        return
-    if output.exists() and any(output.iterdir()):
-        if not stamp.exists():
-            raise ArgumentError(
-                f"{output}: expected an empty folder or one of texgs, got other files; move them away"
-            )
-        if own := foreign_files(output):
-            raise ArgumentError(
-                f"{output}: the job is to be done again, but the folder also holds {', '.join(own[:3])}; "
-                "move what is yours away"
-            )
-        shutil.rmtree(output)
-    write_json(stamp, identity)
-
-
-def foreign_files(output: Path) -> list[str]:
-    """Files in the folder of a finished job that it did not write."""
-    if not (output / FILES).exists():
-        return []  # unfinished, or of no job at all
-    written = {*read_json(output / FILES), STAMP, FILES}
-    return sorted({path.name for path in output.iterdir()} - written)
 
 
 def series(numbers: Mapping[str, Any]) -> Iterator[dict[str, float]]:

@@ -6,6 +6,7 @@ import getpass
 import os
 import platform
 import subprocess
+import sys
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -14,7 +15,10 @@ from typing import Any
 from texgs import __version__
 from texgs.core.memory import peak_memory
 
-PACKAGES = ("torch", "numpy", "vtk", "pyvista")
+PACKAGES = (  # whose code decides results
+    *("torch", "numpy", "scipy", "kornia", "opencv-python-headless", "pillow", "matplotlib", "av"),
+    *("vtk", "pyvista", "pynrrd", "nibabel", "tifffile", "safetensors", "transformers", "diffusers"),
+)
 
 
 def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: float) -> dict[str, Any]:
@@ -22,7 +26,7 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
 
     Args:
         settings: of the job.
-        identity: digests of its settings and code.
+        identity: digests of its settings and code, checksums of its inputs.
         seconds: that its work took.
     """
     return {
@@ -35,7 +39,10 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
         "config_sha": identity["settings"],
         "code_sha": identity["code"],
         "git_sha": git_revision(),
+        "inputs": identity["inputs"],
+        "weights": settings.get("weights", {}),
         "versions": versions(),
+        "machine": machine(),
     }
 
 
@@ -79,6 +86,29 @@ def versions() -> dict[str, str]:
     return found
 
 
+def machine() -> dict[str, Any]:
+    """What else decides the last bits of results: processor, instruction sets, BLAS and threads.
+
+    Of torch and numpy only what the job has loaded.
+    """
+    found: dict[str, Any] = {"system": platform.platform(), "cores": os.cpu_count()}
+    if torch := sys.modules.get("torch"):
+        found |= {"threads": torch.get_num_threads(), "torch_cpu": torch.backends.cpu.get_cpu_capability()}
+        found["torch_blas"] = setting(torch.__config__.show(), "BLAS_INFO")
+    if numpy := sys.modules.get("numpy"):
+        found["numpy_blas"] = numpy.show_config(mode="dicts")["Build Dependencies"]["blas"].get("name")
+    native = sys.modules.get("texgs.raster.native")
+    if native and native.library_path().exists():
+        found["texgs_cpu"] = native.instruction_set()
+    return found
+
+
+def setting(text: str, name: str) -> str | None:
+    """The value of NAME=VALUE in what torch says about its build."""
+    words = text.replace(",", " ").split()
+    return next((word.partition("=")[2] for word in words if word.startswith(f"{name}=")), None)
+
+
 def user() -> str:
     """Who runs this; a number where the system has no name for it."""
     try:
@@ -89,7 +119,9 @@ def user() -> str:
 
 def git_revision() -> str:
     """Commit of the source tree, with "+" where files differ from it; "unknown" outside a clone."""
-    folder = Path(__file__).parent
+    folder = Path(__file__).parents[2]
+    if not (folder / ".git").exists():  # a wheel may be installed inside of the clone of something else
+        return "unknown"
     command = ["git", "-C", str(folder), "describe", "--always", "--abbrev=12", "--dirty=+", "--exclude=*"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=10)

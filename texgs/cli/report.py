@@ -14,8 +14,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its path."""
     from texgs.core.errors import ArgumentError
     from texgs.report.html import write_report
+    from texgs.report.metrics_files import below
 
-    paths = arguments.metrics or sorted(Path("results").rglob("metrics*.json"))
+    paths = arguments.metrics or below("results")
     if not paths:
         raise ArgumentError("report: no metrics.json below results; run something first, such as make demo")
     print(write_report(arguments.output, paths))

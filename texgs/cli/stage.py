@@ -84,27 +84,44 @@ def require_edit(name: str, config: DictConfig) -> None:
     check_edit(config)
 
 
-def require_weights(config: DictConfig) -> None:
-    """Require the weights that an edit works with; they are downloaded where they can be.
+def fetch_weights(config: DictConfig) -> None:
+    """Download the weights that an edit works with, where they are not on this machine.
 
     Raises:
         MissingDataError, ArgumentError: if they are not to be had, or damaged.
     """
-    from texgs.cli.weights import missing
-    from texgs.core.errors import MissingDataError
+    from texgs.cli.weights import needed
+    from texgs.models.weights import locate
 
-    if lines := missing(config, download=True):
-        raise MissingDataError("; ".join(lines))
+    for name in needed(config):
+        locate(name)
+
+
+def fetch_volume(config: DictConfig) -> None:
+    """Download the volume's file, where it is not on this machine.
+
+    Raises:
+        ArgumentError: if it cannot be had, or is not the one expected.
+    """
+    from texgs.config.locate import cached_volume, source_file
+    from texgs.volume.download import download
+
+    volume, path = config.dataset.volume, source_file(config)
+    if path is not None and volume.url and path == cached_volume(volume) and not path.exists():
+        download(volume.url, volume.sha256, path)
 
 
 def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
-    from texgs.cli.job import BY_HAND, Job, discard, execute
+    from texgs.cli.job import Job, execute
     from texgs.config.locate import tf_names
     from texgs.config.stage import EDITS, for_tf
     from texgs.config.stages import STAGES
+    from texgs.core.checksum import Checksums
 
     stage = STAGES[name]
+    if name == "volume":
+        fetch_volume(config)
     inputs = stage.inputs(config)
     for needed in stage.needs:
         if needed in EDITS and config.edit.kind not in EDITS[needed]:
@@ -113,16 +130,14 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
         for each in [for_tf(config, tf) for tf in tf_names(config)] if once_per_tf else [config]:
             if any(path.is_relative_to(STAGES[needed].output(each)) for path in inputs.values()):
                 ensure(needed, each)
-    job = Job(stage, stage.settings(config), inputs, stage.output(config))
-    if job.is_done() and not force:
-        print(f"{job.output}: up to date")
-        return
-    if name in EDITS and name != "edit_metrics":
-        require_weights(config)  # before an earlier result is removed
-    if force:
-        discard(job)
-    execute(job, config.tracking.uri, config.tracking.experiment, BY_HAND)
-    print(f"{job.output}: done")
+    checksums = Checksums.load()
+    job = Job.of(stage, config, checksums)
+    if name in EDITS and name != "edit_metrics" and (force or not job.is_done()):
+        fetch_weights(config)
+        job = Job.of(stage, config, checksums)  # with what was downloaded
+    has_run = execute(job, config.tracking.uri, config.tracking.experiment, force=force)
+    checksums.save()
+    print(f"{job.output}: {'done' if has_run else 'up to date'}")
 
 
 def run_settings(arguments: argparse.Namespace) -> int:
@@ -130,7 +145,7 @@ def run_settings(arguments: argparse.Namespace) -> int:
     from omegaconf import OmegaConf
     from yaml import YAMLError
 
-    from texgs.cli.job import Job, adopt, execute
+    from texgs.cli.job import Job, execute
     from texgs.config.stages import STAGES
 
     if arguments.overrides or arguments.output is None:
@@ -145,8 +160,5 @@ def run_settings(arguments: argparse.Namespace) -> int:
         )
     inputs = {name: Path(path) for name, _, path in (word.partition("=") for word in arguments.input)}
     job = Job(STAGES[arguments.verb], dict(settings), inputs, arguments.output)  # type: ignore[arg-type]
-    if job.is_done():
-        adopt(job)
-        return 0
     execute(job, os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs"))
     return 0

@@ -17,10 +17,11 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.errors import ArgumentError
     from texgs.report.fitting import fitting
     from texgs.report.looks import looks
+    from texgs.report.metrics_files import below
     from texgs.report.scene_tables import SCENE_TABLES
     from texgs.report.sweep import sweep
 
-    paths = arguments.metrics or sorted(Path("results").rglob("metrics*.json"))
+    paths = arguments.metrics or below("results")
     if not paths:
         raise ArgumentError("tables: no metrics.json below results; run something first, such as make demo")
     if arguments.sweep and not re.fullmatch(r"[A-Za-z0-9_-]+", arguments.sweep):

@@ -53,9 +53,14 @@ def all_models(config: DictConfig) -> dict[str, Path]:
 
 
 def scene_and_volume(config: DictConfig) -> dict[str, Path]:
-    """The scene, and the prepared volume where there is one."""
-    scene = {"scene": folder_of("compose", config) / "scene.yaml"}
+    """The scene with its models, and the prepared volume where there is one."""
+    scene = {"scene": folder_of("compose", config) / "scene.yaml", **models_of_scene(config)}
     return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
+
+
+def models_of_scene(config: DictConfig) -> dict[str, Path]:
+    """The models that a scene names, as inputs beside it."""
+    return {f"model.{name}": path for name, path in all_models(config).items()}
 
 
 def scene_settings(config: DictConfig) -> dict[str, Any]:
@@ -104,7 +109,7 @@ def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
 
 
 def edited_scene(config: DictConfig) -> dict[str, Path]:
-    """The scene that an edit starts from, the training views of all basic TFs, and a style picture's file.
+    """The scene that an edit starts from with its models, their training views, and a style picture's file.
 
     Raises:
         ConfigError: if one basic TF is chosen, or the edit starts from itself.
@@ -116,7 +121,8 @@ def edited_scene(config: DictConfig) -> dict[str, Path]:
     views = {f"views.{name}": view_set(for_tf(config, name))["views"] for name in tf_names(config)}
     style = Path(config.edit.image.style)
     picture = {"style": style} if config.edit.kind == "image" and style.is_file() else {}
-    return {"scene": scene_before(config), **views, **picture}
+    models = {} if is_scene_file(config.edit.base or "") else models_of_scene(config)
+    return {"scene": scene_before(config), **models, **views, **picture}
 
 
 def scene_before(config: DictConfig) -> Path:

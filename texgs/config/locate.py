@@ -1,14 +1,19 @@
 """Where the data of a data set are on this machine, and its basic TFs."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from omegaconf import DictConfig
 
 from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.folders import cache_folder
 
 
 def source_file(config: DictConfig) -> Path | None:
-    """The volume's file, or folder of slices; None if it is generated or still to be downloaded.
+    """The volume's file, or folder of slices; None if it is generated.
+
+    A file that can be downloaded may be still to come.
 
     Raises:
         MissingDataError: if it is not there and cannot be downloaded; says how to get it.
@@ -29,11 +34,22 @@ def source_file(config: DictConfig) -> Path | None:
     if path.exists():
         return path
     if volume.url:
-        return None
+        return cached_volume(volume)
     raise MissingDataError(
         f"data set {dataset.name}: {path} is not there; {volume.obtain or 'put it there'}, "
         "or name its folder with data_folder=FOLDER or TEXGS_DATA"
     )
+
+
+def cached_volume(volume: Mapping[str, Any]) -> Path:
+    """Where a volume's file is downloaded to; another checksum is another file.
+
+    Raises:
+        ConfigError: if there is no checksum to compare it with.
+    """
+    if not volume["sha256"]:
+        raise ConfigError(f"dataset.volume.sha256: expected the checksum of {volume['url']}, got none")
+    return cache_folder() / "volumes" / volume["sha256"][:12] / Path(volume["file"]).name
 
 
 def views_folder(config: DictConfig) -> Path | None:

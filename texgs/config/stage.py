@@ -1,11 +1,12 @@
 """What a stage of the workflow is: the configuration it reads, the code it runs, the place of its files.
 
-A job's settings are written once to a file named after their contents. Snakemake passes that name and the
-digest of the code as parameters of the job, so a changed value or line of code reruns what depends on it.
+A job's settings are written once to a file named after their contents. That file is an input of the job and
+the digest of the code a parameter, so a changed value or line of code reruns what depends on it.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -101,18 +102,30 @@ def fit_folder(config: DictConfig) -> str:
     return "-".join(part for part in (config.fit.name, config.variant, seed) if part)
 
 
-def settings_file(stage: Stage, config: DictConfig) -> str:
-    """Write a job's settings to `results/.conf/STAGE-DIGEST.yaml`, unless that is there; return its path."""
-    text = OmegaConf.to_yaml(OmegaConf.create(stage.settings(config)), sort_keys=True)
-    path = Path(config.results) / ".conf" / f"{stage.name}-{digest(text)}.yaml"
+def settings_file(settings: dict[str, Any], results: str) -> str:
+    """Write a job's settings to `RESULTS/.conf/STAGE-DIGEST.yaml`, unless that is there; return its path."""
+    text = _yaml(settings)
+    path = Path(results) / ".conf" / f"{settings['stage']}-{digest(text)}.yaml"
     if not path.exists():
         write_atomic(path, lambda file: file.write(text.encode()))
     return path.as_posix()
 
 
+def note_result(settings: str, note: str) -> None:
+    """Write a note on the results of a job, with the time, under its settings, in place of the one before."""
+    path = Path(settings)
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    lines.append(f"# {datetime.now().isoformat(timespec='microseconds')} {note}")
+    write_atomic(path, lambda file: file.write("\n".join([*lines, ""]).encode()))
+
+
 def settings_digest(settings: dict[str, Any]) -> str:
     """Digest of a job's settings: the one in the name of its file."""
-    return digest(OmegaConf.to_yaml(OmegaConf.create(settings), sort_keys=True))
+    return digest(_yaml(settings))
+
+
+def _yaml(settings: dict[str, Any]) -> str:
+    return OmegaConf.to_yaml(OmegaConf.create(settings), sort_keys=True)
 
 
 def for_tf(config: DictConfig, name: str) -> DictConfig:

@@ -3,12 +3,15 @@
 import errno
 import json
 import os
+import re
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
 
 from texgs.core.errors import ArgumentError
+
+SCRATCH = re.compile(r"\..+\.[a-z0-9_]{8}")  # files beside a target, as mkstemp names them
 
 
 def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
@@ -48,6 +51,16 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
             raise ArgumentError(f"{path}: expected the name of a file, got a folder; add a name") from error
         raise
     return path
+
+
+def remove_scratch(folder: Path) -> None:
+    """Remove what processes that were killed inside `write_atomic` have left in a folder and those below it.
+
+    Only for a folder that no other process writes to.
+    """
+    for path in folder.rglob(".*"):
+        if SCRATCH.fullmatch(path.name) and path.is_file():
+            path.unlink(missing_ok=True)
 
 
 def write_bytes(path: str | Path, data: bytes) -> Path:

@@ -22,6 +22,11 @@ class Single:
     files: tuple[File, ...]
     source: str  # where a person gets it
 
+    @property
+    def megabytes(self) -> float:
+        """Of the file that is downloaded, else of the first."""
+        return next((file for file in self.files if file.url), self.files[0]).megabytes
+
 
 @dataclass(frozen=True)
 class Snapshot:

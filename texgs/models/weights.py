@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 
+from texgs.core.checksum import Checksums, combined, sha256
 from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.folders import cache_folder, weights_folder
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
@@ -33,13 +33,37 @@ def locate(name: str) -> Path:
     return _download_file(name, entry) if isinstance(entry, Single) else _download_snapshot(name, entry)
 
 
-def available(name: str) -> bool:
-    """Whether the weights of a model are on this machine, so that nothing would be downloaded.
+def find(name: str) -> Path | None:
+    """Path of the weights of a model on this machine; None where `locate` would have to download them.
 
     Raises:
         ArgumentError: if the name is unknown, or a file is not what its checksum says.
     """
-    return _local(name, _entry(name)) is not None
+    return _local(name, _entry(name))
+
+
+def available(name: str) -> bool:
+    """Whether the weights of a model are on this machine; see `find`."""
+    return find(name) is not None
+
+
+def checksum(name: str, checksums: Checksums) -> str | None:
+    """Checksum of the weights that `locate` finds on this machine; None where there are none.
+
+    Args:
+        name: of the catalogue.
+        checksums: what is known of files.
+
+    Raises:
+        ArgumentError: if the name is unknown, or a file is not what its checksum says.
+    """
+    entry, found = _entry(name), find(name)
+    if found is None:
+        return None
+    if isinstance(entry, Single):
+        return checksums.of(found)
+    names = [next(each for each in names if (found / each).is_file()) for names in entry.needs]
+    return combined((each, checksums.of(found / each)) for each in names)
 
 
 def _entry(name: str) -> Single | Snapshot:
@@ -93,8 +117,7 @@ def _verify(name: str, file: File, path: Path) -> None:
 def _sha256(path: Path, size: int, time: int) -> str:
     """Checksum of a file, computed once for each size and time of it."""
     del size, time
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return sha256(path)
 
 
 def _download_file(name: str, entry: Single) -> Path:

@@ -18,12 +18,13 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from texgs.config.code import SUFFIX, built_from, library_sources
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 
 ABI_VERSION = 2
 FOLDER = Path(__file__).parent / "_native"
+CSRC = Path(__file__).parent / "csrc"
 INSTALL = "install texgs again (pip install .)"
-SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError}
 PASSES = ("project", "sort", "bin", "forward", "backward", "reduce")  # in the order of `texgs_pass`
 
@@ -126,6 +127,7 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
     found = function(lib, "texgs_abi_version")()
     if found != ABI_VERSION:
         raise NativeError(f"{path.name}: interface version {ABI_VERSION} expected, got {found}; {INSTALL}")
+    _require_own_sources(lib)
     for name, arguments in PROTOTYPES.items():
         function(lib, name).argtypes = arguments
     for name, result in RESULTS.items():
@@ -135,6 +137,20 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
     if lib.texgs_instruction_set() is None:
         raise NativeError(lib.texgs_error().decode())
     return lib
+
+
+def _require_own_sources(lib: ctypes.CDLL) -> None:
+    """Require of a library in a source tree that it was built from the sources there as they are now.
+
+    Raises:
+        NativeError: if a source was changed since.
+    """
+    expected, found = library_sources(), built_from(function(lib, "texgs_sources"))
+    if CSRC.is_dir() and found != expected:
+        raise NativeError(
+            f"{Path(lib._name).name}: built from other sources ({found}) than those in {CSRC} ({expected}); "
+            "compile them with `make install`"
+        )
 
 
 def function(lib: ctypes.CDLL, name: str) -> Any:

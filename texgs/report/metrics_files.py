@@ -29,6 +29,12 @@ def read(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
     return found
 
 
+def below(folder: str | Path) -> list[Path]:
+    """The metrics files of all results in a folder, without those of jobs that are still at work."""
+    paths = Path(folder).rglob("metrics.json")
+    return sorted(path for path in paths if not any(part.startswith(".") for part in path.parts))
+
+
 def fits(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
     """The metrics of the phases of fits; see `read`."""
     return [(path, metrics) for path, metrics in read(paths) if metrics["stage"] in PHASES]

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
+from texgs.track.dead import close_dead
 from texgs.track.errors import cause, public, reason, translated
 from texgs.track.fields import LONGEST_TAG, allowed_name, cut, flatten
 from texgs.track.store import SECONDS_TO_CONNECT, calm, connect
@@ -85,6 +86,22 @@ def run(
     recorded.end("FINISHED")
 
 
+def close_dead_runs(uri: str | None, experiment: str) -> None:
+    """End the runs of processes of this machine that were killed; a local store is made where there is none.
+
+    Args:
+        uri: as for `run`.
+        experiment: whose runs.
+
+    Raises:
+        ArgumentError, TrackingError: as `run`.
+    """
+    if uri is None:
+        return
+    with calm(MLFLOW_HTTP_REQUEST_TIMEOUT=str(SECONDS_TO_CONNECT)), translated(uri):
+        close_dead(*connect(uri, experiment))
+
+
 def _start(
     uri: str, experiment: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]
 ) -> "_Recorded":
@@ -93,6 +110,7 @@ def _start(
     with calm(), translated(uri):
         from mlflow.entities import Param
 
+        close_dead(client, experiment_id)
         texts = {allowed_name(key): cut(str(value), LONGEST_TAG) for key, value in tags.items()}
         created = client.create_run(experiment_id, tags=texts, run_name=title)
         entries = [Param(key, value) for key, value in flatten(params).items()]

@@ -89,6 +89,8 @@ def _bring_up(database: Path, newest: str | None) -> None:
     if revision == newest:
         return  # another process did it
     if revision is None:
+        for left in database.parent.glob(f".{database.name}.[0-9]*"):  # by a process that was killed
+            left.unlink()
         fresh = database.with_name(f".{database.name}.{os.getpid()}")
         try:
             _upgrade(fresh)

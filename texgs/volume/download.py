@@ -1,31 +1,27 @@
-"""Download volumes once, into the cache folder, with a checksum."""
+"""Download volumes once, compared with their checksums."""
 
 from pathlib import Path
 
 from texgs.core.errors import ArgumentError
-from texgs.core.folders import cache_folder
 
 
-def download(url: str, sha256: str | None, name: str) -> Path:
-    """Path of a file in the cache; downloaded with a progress bar unless it is there and whole.
+def download(url: str, sha256: str, path: Path) -> None:
+    """Download a file with a progress bar, unless it is there and whole.
 
     Args:
         url: http or https address.
-        sha256: hexadecimal checksum of the file; without one it is not downloaded.
-        name: file name in the cache.
+        sha256: hexadecimal checksum of the file.
+        path: where it goes.
 
     Raises:
-        ArgumentError: if there is no checksum, the address does not answer, or the file differs from its
-            checksum; nothing is kept then.
+        ArgumentError: if the address does not answer, or the file differs from its checksum; then nothing is
+            kept.
     """
-    if not sha256:
-        raise ArgumentError(f"{name}: expected a checksum for {url}, got none; set dataset.volume.sha256")
     import pooch
 
     pooch.get_logger().setLevel("WARNING")
-    folder = cache_folder() / "volumes" / sha256[:12]  # another checksum is another file
     try:
-        return Path(pooch.retrieve(url, f"sha256:{sha256}", name, folder, progressbar=True))
+        pooch.retrieve(url, f"sha256:{sha256}", path.name, path.parent, progressbar=True)
     except ValueError as error:
         raise ArgumentError(
             f"{url}: expected the checksum {sha256}, got another file; look at the address"
@@ -34,3 +30,17 @@ def download(url: str, sha256: str | None, name: str) -> Path:
         raise ArgumentError(
             f"{url}: cannot be downloaded ({error}); get the file elsewhere and put it into data_folder"
         ) from error
+
+
+def require_whole(path: Path, sha256: str) -> None:
+    """Compare a downloaded file with its checksum.
+
+    Raises:
+        ArgumentError: if it has been damaged since.
+    """
+    import pooch
+
+    if pooch.file_hash(str(path)) != sha256:
+        raise ArgumentError(
+            f"{path}: expected the checksum {sha256}, got another; delete the file and run again"
+        )

@@ -1,165 +1,103 @@
-# Configuration, data sets with their basic TFs, and what the command lines of all jobs share.
+# The plan of the run, and what the command lines of all jobs share.
+import os
 import re
 import shlex
 import sys
 from importlib.resources import files
 from pathlib import Path
 
-from texgs.cli.stages.tf import check_basic_tfs
-from texgs.config.code import code_digest, digest
-from texgs.config.compose import compose
-from texgs.config.edits import edits
-from texgs.config.locate import tf_names
-from texgs.config.stage import EDITS, FOLDERS, fit_folder, for_tf, settings_file
-from texgs.config.stages import STAGES
-from texgs.config.sweep import variants
-from texgs.core.errors import ConfigError, MissingDataError, TexgsError
-
-GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
-
-
-def overrides():
-    """What `--config` says, in Hydra's syntax."""
-    if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
-        expected = ", ".join(GROUPS)
-        raise ConfigError(
-            f'--config: expected {expected} or overrides="KEY=VALUE ...", got {", ".join(unknown)}'
-        )
-    lists = [group for group in GROUPS if not isinstance(config.get(group, ""), str)]
-    if lists:
-        raise ConfigError(
-            f"{lists[0]}: expected one name, got {config[lists[0]]}; several data sets go to datasets=[...]"
-        )
-    groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
-    try:
-        return (*groups, *shlex.split(str(config.get("overrides", ""))))
-    except ValueError as error:
-        raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
-
-
-def experiments(words):
-    """Configurations by the name of their sweep, None for those of none: one for each data set and variant or edit."""
-    base = compose(words)
-    names = [(*words, f"dataset={name}") for name in base.datasets] or [words]
-    repeated = [name for name in base.datasets if base.datasets.count(name) > 1]
-    if repeated:
-        raise ConfigError(f"datasets: expected different names, got {repeated[0]} twice")
-    found = {}
-    for each in names:
-        config = compose(each)
-        name = config.sweep.name if config.sweep.variants else None
-        fitted = (*each, "edit=none")
-        found.setdefault(name, []).extend(compose(variant) for variant in variants(fitted))
-        if name is None:
-            found[name] += [compose(edit) for edit in edits(each)]
-    for name, dataset in base.sweeps.items():
-        found[name] = [
-            compose(variant)
-            for variant in variants((*words, f"dataset={dataset}", f"sweep={name}", "edit=none"))
-        ]
-    return found
-
-
-def jobs(configs):
-    """Settings file and input files of each job, by stage and folder; and what is missing for some."""
-    found, missing = {}, []
-    for config in configs:
-        check_basic_tfs(config.dataset)
-        try:
-            by_tf = [for_tf(config, name) for name in tf_names(config)]
-        except MissingDataError as error:
-            missing.append(str(error))
-            continue
-        for name, stage in STAGES.items():
-            for each in (by_tf if stage.per_tf else [config]) if stage.applies(config) else ():
-                try:
-                    files = stage.inputs(each)
-                except MissingDataError as error:
-                    missing.append(str(error))
-                    files = {}
-                made = settings_file(stage, each), files
-                if found.setdefault((name, stage.output(each).as_posix()), made) != made:
-                    raise ConfigError(f"{stage.output(each)}: two variants go there; give one another name")
-    return found, list(dict.fromkeys(missing))
-
-
-def job(stage, wildcards):
-    """Settings file and input files of the job that wildcards describe."""
-    folder = Path(RESULTS, FOLDERS[stage].format(**dict(wildcards.items())))
-    return JOBS[stage, folder.as_posix()]
-
-
-def settings(stage, wildcards):
-    """The file with the settings of a job: its name is the digest of its contents."""
-    return job(stage, wildcards)[0]
-
-
-def inputs(stage, wildcards):
-    """The files a job reads."""
-    return {name: path.as_posix() for name, path in job(stage, wildcards)[1].items()}
-
-
-def done(*stages, sweep=None):
-    """The metrics files of all jobs of some stages, of a sweep or of none."""
-    return sorted(f"{folder}/metrics.json" for stage, folder in OF_SWEEP.get(sweep, ()) if stage in stages)
-
-
-def edits_of(kind):
-    """The wildcard's values: names of edits of a kind."""
-    names = sorted({re.escape(each.edit.name) for each in CONFIGS if each.edit.kind == kind})
-    return "|".join(names) or "no-edit"
-
-
-def missing_weights(configs):
-    """What edits need and this machine has not; without a dry run what can be had is downloaded now.
-
-    Mistakes in edits are told before anything is downloaded.
-    """
-    edited = [config for config in configs if config.edit.kind != "none"]
-    if not edited:
-        return []
-    from texgs.cli.edits import check_edit  # not at the top: most runs have no edits
-    from texgs.cli.weights import missing
-
-    for config in edited:
-        check_edit(config)
-    return list(dict.fromkeys(line for config in edited for line in missing(config, download=not IS_DRY)))
-
-
-IS_DRY = any(re.fullmatch(r"--dry-?run|--lint|-[a-zA-Z]*n[a-zA-Z]*", word) for word in sys.argv)
+from texgs.cli.plan import planned, words_of
+from texgs.config.code import digest
+from texgs.config.stage import EDITS, FOLDERS
+from texgs.core.errors import TexgsError
+from texgs.core.folders import cache_folder
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
-    WORDS = overrides()
-    CONFIG = compose(WORDS)
-    EXPERIMENTS = experiments(WORDS)
-    CONFIGS = [config for configs in EXPERIMENTS.values() for config in configs]
-    RESULTS = CONFIG.results
-    JOBS, MISSING = jobs(CONFIGS)
-    MISSING += missing_weights(CONFIGS)
-    OF_SWEEP = {sweep: set(jobs(configs)[0]) for sweep, configs in EXPERIMENTS.items()}
+    PLAN, MISSING = planned(words_of(config), is_job=not workflow.is_main_process)
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
 
-# Missing files are told together and before any job; a dry run shows what would be done with them.
+# Missing files are told together and before any job; where nothing is to be done with them, that goes on.
+NOTHING_IS_MADE = r"--dry-?run|--lint|--unlock|--summary|--dag|--rulegraph|-[a-zA-Z]*n[a-zA-Z]*"
 if MISSING:
     print("\n".join(f"texgs: {line}" for line in MISSING), file=sys.stderr)
-    if not IS_DRY:
+    if not any(re.fullmatch(NOTHING_IS_MADE, word) for word in sys.argv):
         sys.exit(2)
 
-STORE = CONFIG.tracking.uri
-MAPPER_GPU, FIT_GPU = int(CONFIG.device.mapper == "gpu"), int(CONFIG.device.name == "cuda")
+RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
+MAPPER_GPU, FIT_GPU = PLAN.mapper_gpu, PLAN.fit_gpu
 
-# In front of the commands, not a parameter of the rules: where runs are recorded changes no result.
-ENVIRONMENT = (
-    {} if STORE is None else {"TEXGS_TRACKING": STORE, "TEXGS_EXPERIMENT": CONFIG.tracking.experiment}
-)
+
+def job(stage, wildcards):
+    """Folder of the job that wildcards describe, and what the plan says of it."""
+    folder = Path(RESULTS, FOLDERS[stage].format(**dict(wildcards.items()))).as_posix()
+    return folder, PLAN.jobs[folder]
+
+
+def reads(stage):
+    """The files a job reads, first its settings, as a function of wildcards."""
+
+    def of(wildcards):
+        _, made = job(stage, wildcards)
+        return [made["settings"], *made["inputs"].values()]
+
+    return of
+
+
+def words(stage):
+    """The command line of a job after the name of its stage, as a function of wildcards."""
+
+    def of(wildcards):
+        folder, made = job(stage, wildcards)
+        inputs = [f"{name}={path}" for name, path in made["inputs"].items()]
+        return ["--settings", made["settings"], *(["--input", *inputs] if inputs else []), "--output", folder]
+
+    return of
+
+
+def code(stage):
+    """The digest of the code that a job runs, as a function of wildcards."""
+    return lambda wildcards: job(stage, wildcards)[1]["code"]
+
+
+def any_of(names, otherwise="none"):
+    """A wildcard's values."""
+    return "|".join(map(re.escape, names)) or otherwise
+
+
+def begin():
+    """Hold the results before the first job, and close the tracked runs of processes that were killed."""
+    global RUN_LOCK
+    from texgs.cli.result import run_alone
+    from texgs.track import close_dead_runs
+
+    try:
+        RUN_LOCK = run_alone(RESULTS)  # it goes with the process, however that ends
+        close_dead_runs(PLAN.tracking, PLAN.experiment)
+    except TexgsError as error:
+        print(f"texgs: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+# In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
+# result. Threads that spin while they wait take the cores that other jobs and the other threads need.
+ENVIRONMENT = {"OMP_WAIT_POLICY": os.environ.get("OMP_WAIT_POLICY", "passive")}
+if PLAN.tracking is not None:
+    ENVIRONMENT |= {"TEXGS_TRACKING": PLAN.tracking, "TEXGS_EXPERIMENT": PLAN.experiment}
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 shell.prefix(
     "set -euo pipefail; "
     f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -P -m texgs.cli.main "$@"; }}}}; '
 )
+# One command for all stages: a rule has the name of its stage. A second attempt adds to the log of the first.
+RUN = "texgs {rule} {params.words:q} 2>&1 | tee --append {log:q}"
+
+
+# What is there stays until the job has made something better: it swaps its files in at the end.
+outputflags:
+    update,
 
 
 pathvars:
@@ -169,9 +107,9 @@ pathvars:
 
 
 wildcard_constraints:
-    sweep="|".join(map(re.escape, filter(None, EXPERIMENTS))) or "no-sweep",
-    dataset="|".join(sorted({re.escape(each.dataset.name) for each in CONFIGS})),
+    sweep=any_of(filter(None, PLAN.sweeps), "no-sweep"),
+    dataset=any_of(PLAN.wildcards["dataset"]),
     tf="[A-Za-z][A-Za-z0-9_-]*",
-    views="|".join(sorted({re.escape(each.views.name) for each in CONFIGS})),
-    fit="|".join(sorted({re.escape(fit_folder(each)) for each in CONFIGS})),
-    edit="|".join(sorted({re.escape(each.edit.name) for each in CONFIGS})),
+    views=any_of(PLAN.wildcards["views"]),
+    fit=any_of(PLAN.wildcards["fit"]),
+    edit=any_of(sorted(name for names in PLAN.edits.values() for name in names)),

@@ -3,12 +3,12 @@
 
 rule edits:
     input:
-        done(*EDITS),
+        PLAN.done(*EDITS),
 
 
 rule edit_image:
     input:
-        lambda wildcards: list(inputs("edit_image", wildcards).values()),
+        reads("edit_image"),
     output:
         scene="<results>/{dataset}/scene/{fit}/edits/{edit}/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/edits/{edit}/edit.png",
@@ -19,23 +19,20 @@ rule edit_image:
     benchmark:
         "<benchmarks>/{dataset}/scene/{fit}/edits/{edit}.tsv"
     wildcard_constraints:
-        edit=edits_of("image"),
+        edit=any_of(PLAN.edits["image"], "no-edit"),
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_image", wildcards),
-        code=STAGES["edit_image"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_image", wildcards).items()],
+        code=code("edit_image"),
+        words=words("edit_image"),
     shell:
-        "texgs edit_image --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule edit_text:
     input:
-        lambda wildcards: list(inputs("edit_text", wildcards).values()),
+        reads("edit_text"),
     output:
         scene="<results>/{dataset}/scene/{fit}/edits/{edit}/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/edits/{edit}/edit.png",
@@ -46,23 +43,20 @@ rule edit_text:
     benchmark:
         "<benchmarks>/{dataset}/scene/{fit}/edits/{edit}.tsv"
     wildcard_constraints:
-        edit=edits_of("text"),
+        edit=any_of(PLAN.edits["text"], "no-edit"),
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_text", wildcards),
-        code=STAGES["edit_text"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_text", wildcards).items()],
+        code=code("edit_text"),
+        words=words("edit_text"),
     shell:
-        "texgs edit_text --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule edit_segment:
     input:
-        lambda wildcards: list(inputs("edit_segment", wildcards).values()),
+        reads("edit_segment"),
     output:
         scene="<results>/{dataset}/scene/{fit}/edits/{edit}/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/edits/{edit}/edit.png",
@@ -72,23 +66,20 @@ rule edit_segment:
     benchmark:
         "<benchmarks>/{dataset}/scene/{fit}/edits/{edit}.tsv"
     wildcard_constraints:
-        edit=edits_of("segment"),
+        edit=any_of(PLAN.edits["segment"], "no-edit"),
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_segment", wildcards),
-        code=STAGES["edit_segment"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_segment", wildcards).items()],
+        code=code("edit_segment"),
+        words=words("edit_segment"),
     shell:
-        "texgs edit_segment --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule edit_metrics:
     input:
-        lambda wildcards: list(inputs("edit_metrics", wildcards).values()),
+        reads("edit_metrics"),
     output:
         metrics="<results>/{dataset}/scene/{fit}/edit_metrics/{edit}/metrics.json",
     log:
@@ -97,10 +88,7 @@ rule edit_metrics:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("edit_metrics", wildcards),
-        code=STAGES["edit_metrics"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards: [f"{k}={v}" for k, v in inputs("edit_metrics", wildcards).items()],
+        code=code("edit_metrics"),
+        words=words("edit_metrics"),
     shell:
-        "texgs edit_metrics --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN

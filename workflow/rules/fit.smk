@@ -3,17 +3,17 @@
 
 rule fits:
     input:
-        done("texture"),
+        PLAN.done("texture"),
 
 
 rule figures:
     input:
-        done("figure"),
+        PLAN.done("figure"),
 
 
 rule surfels:
     input:
-        unpack(lambda wildcards: inputs("surfels", wildcards)),
+        reads("surfels"),
     output:
         model="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
         metrics="<results>/{dataset}/{tf}/{fit}/surfels/metrics.json",
@@ -25,19 +25,15 @@ rule surfels:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("surfels", wildcards),
-        code=STAGES["surfels"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
+        code=code("surfels"),
+        words=words("surfels"),
     shell:
-        "texgs surfels --settings {params.settings:q} --input {params.files:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        RUN
 
 
 rule shading:
     input:
-        unpack(lambda wildcards: {"views": inputs("shading", wildcards)["views"]}),
-        model="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
+        reads("shading"),
     output:
         model="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
         metrics="<results>/{dataset}/{tf}/{fit}/shading/metrics.json",
@@ -49,18 +45,15 @@ rule shading:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("shading", wildcards),
-        code=STAGES["shading"].code,
-        folder=subpath(output.metrics, parent=True),
+        code=code("shading"),
+        words=words("shading"),
     shell:
-        "texgs shading --settings {params.settings:q} --input model={input.model:q} views={input.views:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        RUN
 
 
 rule texture:
     input:
-        unpack(lambda wildcards: {"views": inputs("texture", wildcards)["views"]}),
-        model="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
+        reads("texture"),
     output:
         model="<results>/{dataset}/{tf}/{fit}/texture/model.safetensors",
         metrics="<results>/{dataset}/{tf}/{fit}/texture/metrics.json",
@@ -72,20 +65,15 @@ rule texture:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("texture", wildcards),
-        code=STAGES["texture"].code,
-        folder=subpath(output.metrics, parent=True),
+        code=code("texture"),
+        words=words("texture"),
     shell:
-        "texgs texture --settings {params.settings:q} --input model={input.model:q} views={input.views:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        RUN
 
 
 rule figure:
     input:
-        unpack(lambda wildcards: {"views": inputs("figure", wildcards)["views"]}),
-        surfels="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
-        shading="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
-        texture="<results>/{dataset}/{tf}/{fit}/texture/model.safetensors",
+        reads("figure"),
     output:
         figure="<results>/{dataset}/{tf}/{fit}/figure/figure.png",
         metrics="<results>/{dataset}/{tf}/{fit}/figure/metrics.json",
@@ -95,10 +83,7 @@ rule figure:
         "<benchmarks>/{dataset}/{tf}/{fit}/figure.tsv"
     threads: 4
     params:
-        settings=lambda wildcards: settings("figure", wildcards),
-        code=STAGES["figure"].code,
-        folder=subpath(output.metrics, parent=True),
+        code=code("figure"),
+        words=words("figure"),
     shell:
-        "texgs figure --settings {params.settings:q} --input surfels={input.surfels:q} "
-        "shading={input.shading:q} texture={input.texture:q} views={input.views:q} "
-        "--output {params.folder:q} 2>&1 | tee {log:q}"
+        RUN

@@ -3,12 +3,12 @@
 
 rule scenes:
     input:
-        done("compose", "pse", "timing"),
+        PLAN.done("compose", "pse", "timing"),
 
 
 rule compose:
     input:
-        lambda wildcards: list(inputs("compose", wildcards).values()),
+        reads("compose"),
     output:
         scene="<results>/{dataset}/scene/{fit}/compose/scene.yaml",
         picture="<results>/{dataset}/scene/{fit}/compose/scene.png",
@@ -17,18 +17,15 @@ rule compose:
         "<logs>/{dataset}/scene/{fit}/compose.log",
     threads: 4
     params:
-        settings=lambda wildcards: settings("compose", wildcards),
-        code=STAGES["compose"].code,
-        folder=subpath(output.metrics, parent=True),
-        models=lambda wildcards: [f"{tf}={path}" for tf, path in inputs("compose", wildcards).items()],
+        code=code("compose"),
+        words=words("compose"),
     shell:
-        "texgs compose --settings {params.settings:q} --input {params.models:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule pse:
     input:
-        unpack(lambda wildcards: inputs("pse", wildcards)),
+        reads("pse"),
     output:
         pse="<results>/{dataset}/scene/{fit}/pse/pse.png",
         relight="<results>/{dataset}/scene/{fit}/pse/relight.png",
@@ -39,19 +36,16 @@ rule pse:
         "<benchmarks>/{dataset}/scene/{fit}/pse.tsv"
     threads: 4
     params:
-        settings=lambda wildcards: settings("pse", wildcards),
-        code=STAGES["pse"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
+        code=code("pse"),
+        words=words("pse"),
     shell:
-        "texgs pse --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 # As many threads as most machines have: other jobs would be measured with it.
 rule timing:
     input:
-        unpack(lambda wildcards: inputs("timing", wildcards)),
+        reads("timing"),
     output:
         metrics="<results>/{dataset}/scene/{fit}/timing/metrics.json",
     log:
@@ -60,10 +54,7 @@ rule timing:
     resources:
         gpu=FIT_GPU,
     params:
-        settings=lambda wildcards: settings("timing", wildcards),
-        code=STAGES["timing"].code,
-        folder=subpath(output.metrics, parent=True),
-        files=lambda wildcards, input: [f"{name}={path}" for name, path in input.items()],
+        code=code("timing"),
+        words=words("timing"),
     shell:
-        "texgs timing --settings {params.settings:q} --input {params.files:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN

@@ -1,47 +1,47 @@
 # Tables and the report, from the metrics files of jobs.
 
 
-SWEEPS = sorted(filter(None, EXPERIMENTS))
-TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if None in EXPERIMENTS else []
+SWEEPS = sorted(filter(None, PLAN.sweeps))
+TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if "" in PLAN.sweeps else []
 
 
 rule tables:
     input:
-        done("volume", "views", "surfels", "shading", "texture", "pse", "timing", *EDITS),
+        PLAN.done("volume", "views", "surfels", "shading", "texture", "pse", "timing", *EDITS),
     output:
         collect("<results>/tables/{name}.{format}", name=TABLES, format=("csv", "md", "tex")),
     log:
         "<logs>/tables.log",
     params:
-        code=code_digest("texgs.cli.tables"),
+        code=PLAN.code["texgs.cli.tables"],
         folder=subpath(output[0], parent=True),
     shell:
-        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule sweep:
     input:
-        lambda wildcards: done("surfels", "shading", "texture", sweep=wildcards.sweep),
+        lambda wildcards: PLAN.done("surfels", "shading", "texture", sweep=wildcards.sweep),
     output:
         collect("<results>/tables/sweep-{{sweep}}.{format}", format=("csv", "md", "tex")),
     log:
         "<logs>/tables-{sweep}.log",
     params:
-        code=code_digest("texgs.cli.tables"),
+        code=PLAN.code["texgs.cli.tables"],
         folder=subpath(output[0], parent=True),
     shell:
-        "texgs tables {input:q} --sweep {wildcards.sweep:q} --output {params.folder:q} 2>&1 | tee {log:q}"
+        "texgs tables {input:q} --sweep {wildcards.sweep:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule report:
     input:
-        done(*STAGES),
+        PLAN.done(*FOLDERS),
     output:
         "<results>/report.html",
     log:
         "<logs>/report.log",
     params:
-        code=code_digest("texgs.cli.report"),
+        code=PLAN.code["texgs.cli.report"],
         template=digest(files("texgs.report").joinpath("report.html.j2").read_text()),
     shell:
-        "texgs report {input:q} --output {output:q} 2>&1 | tee {log:q}"
+        "texgs report {input:q} --output {output:q} 2>&1 | tee --append {log:q}"

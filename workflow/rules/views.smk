@@ -3,13 +3,12 @@
 
 rule sheets:
     input:
-        done("sheet"),
+        PLAN.done("sheet"),
 
 
 rule views:
     input:
-        volume="<results>/{dataset}/volume/volume.nrrd",
-        summary="<results>/{dataset}/volume/volume.json",
+        reads("views"),
     output:
         train="<results>/{dataset}/{tf}/{views}/transforms_train.json",
         test="<results>/{dataset}/{tf}/{views}/transforms_test.json",
@@ -23,17 +22,15 @@ rule views:
     resources:
         gpu=MAPPER_GPU,
     params:
-        settings=lambda wildcards: settings("views", wildcards),
-        code=STAGES["views"].code,
-        folder=subpath(output.metrics, parent=True),
+        code=code("views"),
+        words=words("views"),
     shell:
-        "texgs views --settings {params.settings:q} --input volume={input.volume:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN
 
 
 rule sheet:
     input:
-        unpack(lambda wildcards: inputs("sheet", wildcards)),
+        reads("sheet"),
     output:
         sheet="<results>/{dataset}/{tf}/sheet/sheet.png",
         metrics="<results>/{dataset}/{tf}/sheet/metrics.json",
@@ -42,9 +39,7 @@ rule sheet:
     benchmark:
         "<benchmarks>/{dataset}/{tf}/sheet.tsv"
     params:
-        settings=lambda wildcards: settings("sheet", wildcards),
-        code=STAGES["sheet"].code,
-        folder=subpath(output.metrics, parent=True),
+        code=code("sheet"),
+        words=words("sheet"),
     shell:
-        "texgs sheet --settings {params.settings:q} --input views={input.views:q} --output {params.folder:q} "
-        "2>&1 | tee {log:q}"
+        RUN

@@ -24,7 +24,6 @@ from texgs.edit.style_picture import StylePicture, read_style
 from texgs.edit.stylize import stylize
 from texgs.models.clip import Clip
 from texgs.models.vgg import Vgg
-from texgs.models.weights import available
 from texgs.report.convergence import write_convergence
 from texgs.scene.model import Model
 from texgs.scene.scene_file import read_scene, write_scene
@@ -89,7 +88,7 @@ def recipe_of(image: dict[str, Any], seed: int) -> Recipe:
 def with_what_is_there(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
     """The recipe with lambda_s 1 where CLIP's weights are missing and nobody has asked for another value."""
     is_asked = settings["edit"]["image"]["lambda_s"] is not None
-    if not recipe.needs_clip or is_asked or available(settings["clip"]):
+    if not recipe.needs_clip or is_asked or settings["weights"][settings["clip"]] is not None:
         return recipe
     sys.stderr.write(f"the weights of {settings['clip']} are not on this machine: lambda_s is 1\n")
     return replace(recipe, lambda_s=1.0)

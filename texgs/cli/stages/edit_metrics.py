@@ -1,6 +1,6 @@
 """Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -21,7 +21,6 @@ from texgs.metrics.style import likeness
 from texgs.models.clip import Clip
 from texgs.models.lpips import Lpips
 from texgs.models.vgg import Vgg
-from texgs.models.weights import available
 from texgs.scene.composition import Composition
 from texgs.scene.scene_file import Scene, read_scene
 from texgs.scene.size import sizes
@@ -36,7 +35,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         inputs: `scene`, edited, and `before`, as fitted.
         output: folder.
     """
-    edit, views = settings["edit"], settings["views"]
+    edit, views, weights = settings["edit"], settings["views"], settings["weights"]
     title = f"{settings['dataset']}: {edit['name']}"
     device = torch_device(settings["fit"]["device"])
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
@@ -53,8 +52,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         "primitives": len(scenes[0]),
         "megabytes": sum(size_of(after)) * 2**20 / 1e6,
         "geometry_kept": is_geometry_kept(*scenes, some),
-        **agreement(scenes[0], after, cameras, settings["compared"]),
-        **style_distance(after, edit, some, device, title),
+        **agreement(scenes[0], after, cameras, settings["compared"], weights),
+        **style_distance(after, edit, some, device, weights, title),
         **clip_numbers(settings, (after, before), scenes, cameras, title),
     }
     return Outcome(numbers)
@@ -80,7 +79,11 @@ def is_geometry_kept(after: Composition, before: Composition, cameras: Sequence[
 
 @torch.no_grad()
 def agreement(
-    composition: Composition, scene: Scene, cameras: Sequence[Camera], count: int
+    composition: Composition,
+    scene: Scene,
+    cameras: Sequence[Camera],
+    count: int,
+    weights: Mapping[str, str | None],
 ) -> dict[str, float | None]:
     """Consistency of consecutive views in the middle of the path, near and far, without light.
 
@@ -90,7 +93,7 @@ def agreement(
     some = cameras[start : start + count + LONG]
     frames = list(frames_of(composition, some, scene.light, scene.edits, look="unshaded"))
     perceptual = None
-    if available("vgg16") and available("lpips_vgg"):
+    if weights["vgg16"] and weights["lpips_vgg"]:
         lpips = Lpips.load(device=composition.means.device)
         perceptual = lambda one, two: float(lpips.distance(one, two))  # noqa: E731
     found: dict[str, float | None] = {}
@@ -106,11 +109,16 @@ def agreement(
 
 
 def style_distance(
-    scene: Scene, edit: dict[str, Any], cameras: Sequence[Camera], device: torch.device, title: str
+    scene: Scene,
+    edit: dict[str, Any],
+    cameras: Sequence[Camera],
+    device: torch.device,
+    weights: Mapping[str, str | None],
+    title: str,
 ) -> dict[str, float]:
     """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
     parts = parts_of(scene, edit["parts"])
-    if edit["kind"] != "image" or any(part.segment for part in parts) or not available("vgg16"):
+    if edit["kind"] != "image" or any(part.segment for part in parts) or not weights["vgg16"]:
         return {}
     vgg = Vgg.load(device=device)
     style = style_of(edit["image"]).scaled(max(cameras[0].width, cameras[0].height))
@@ -142,7 +150,7 @@ def clip_numbers(
 ) -> dict[str, Any]:
     """CLIP's similarity and directional similarity over all views, or why they were not measured."""
     edit, backbone = settings["edit"], settings["clip"]
-    if not available(backbone):
+    if settings["weights"][backbone] is None:
         return {"clip_missing": f"the weights of {backbone} are not on this machine"}
     if not edit["source_caption"] or not edit["target_caption"]:
         return {"clip_missing": "the edit has no captions"}

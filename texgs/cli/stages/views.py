@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from PIL import Image
 
+from texgs.cli.result import TIMES
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.tf import in_data_values
 from texgs.core.camera import Camera
@@ -50,7 +51,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
     appearance = Appearance(**views["shading"], step=views["step"], opacity_unit=views["opacity_unit"])
     mapper = mapper_for(views["mapper"], grid, appearance)
-    times, coverages = Times(output / "times.json"), []
+    times, coverages = Times(output / TIMES), []
     shots = {split: views_of(views, split, output) for split in SPLITS}
     for split, shot in shots.items():
         render_views(mapper, tf, shot, f"{title}: {split} views", times)

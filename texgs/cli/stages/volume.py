@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.config.locate import cached_volume
 from texgs.core.io import write_json
 from texgs.core.progress import progress
-from texgs.volume.download import download
+from texgs.volume.download import require_whole
 from texgs.volume.generate import GENERATORS
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource, Source
@@ -20,7 +21,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 
     Args:
         settings: what the stage reads of the configuration.
-        inputs: `source`, the volume's file, where it is neither generated nor downloaded.
+        inputs: `source`, the volume's file, where it is not generated.
         output: folder.
     """
     volume = settings["volume"]
@@ -29,7 +30,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         return progress(steps, total, title=f"{settings['dataset']}: volume", unit="slab")
 
     summary = prepare(
-        source(volume, inputs.get("source")),
+        generated(volume) if volume["generator"] is not None else source(volume, inputs["source"]),
         output / "volume.nrrd",
         crop=volume["crop"] and tuple(volume["crop"]),
         reduce=volume["reduce"],
@@ -44,12 +45,15 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     return Outcome({**numbers, "voxels": summary.voxels, "volume_mib": size})
 
 
-def source(volume: dict[str, Any], path: Path | None) -> Source:
-    """The field itself: generated, or read from a file that is there or in the cache after a download."""
-    if volume["generator"] is not None:
-        options = {"seed": volume["seed"]} if volume["generator"] != "sphere" else {}
-        return ArraySource(GENERATORS[volume["generator"]](volume["size"], **options), volume["generator"])
-    if path is None:
-        path = download(volume["url"], volume["sha256"], Path(volume["file"]).name)
+def generated(volume: dict[str, Any]) -> Source:
+    """The field of a generator."""
+    options = {"seed": volume["seed"]} if volume["generator"] != "sphere" else {}
+    return ArraySource(GENERATORS[volume["generator"]](volume["size"], **options), volume["generator"])
+
+
+def source(volume: dict[str, Any], path: Path) -> Source:
+    """The field of a file; one that was downloaded is compared with its checksum."""
+    if volume["url"] and path == cached_volume(volume):
+        require_whole(path, volume["sha256"])
     triples = {key: volume[key] and tuple(volume[key]) for key in ("dims", "spacing", "origin")}
     return open_source(path, dtype=volume["dtype"], endian=volume["endian"], skip=volume["skip"], **triples)

@@ -26,6 +26,9 @@ extern "C" {
 #endif
 
 #define TEXGS_ABI_VERSION 2
+#ifndef TEXGS_SOURCES /* the build defines it, see texgs_sources() */
+#define TEXGS_SOURCES "unknown"
+#endif
 #define TEXGS_MAX_CHANNELS 32
 #define TEXGS_MAX_SIDE 1048560 /* 2^20 - 16 pixels: 65535 tiles, which 16 bits can count */
 
@@ -99,6 +102,8 @@ typedef struct {
 typedef struct texgs_frame texgs_frame;
 
 TEXGS_API int32_t texgs_abi_version(void);
+/* Digest of the sources that the library was built from (texgs/config/native_sources.py). */
+TEXGS_API const char* texgs_sources(void);
 TEXGS_API const char* texgs_error(void);
 /* "avx512", "avx2", "portable" (CPU), or the compiled architectures (CUDA). */
 TEXGS_API const char* texgs_instruction_set(void);

@@ -43,6 +43,7 @@ FramePool& pool() {
 }  // namespace
 
 int32_t texgs_abi_version(void) { return TEXGS_ABI_VERSION; }
+const char* texgs_sources(void) { return TEXGS_SOURCES; }
 const char* texgs_error(void) { return last_error.c_str(); }
 int64_t texgs_memory(int32_t reset) { return memory_peak(reset != 0); }
 

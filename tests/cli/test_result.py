@@ -1,0 +1,208 @@
+"""The folder of a result: what survives failures and kills, what counts as damaged, what is refused."""
+
+import multiprocessing
+import os
+import time
+
+import pytest
+
+from texgs.cli import result
+from texgs.core.checksum import Checksums
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_json
+
+MINE, OTHER = {"stage": "views", "settings": "a"}, {"stage": "views", "settings": "b"}
+
+
+@pytest.fixture
+def output(tmp_path):
+    return tmp_path / "TF01" / "views"
+
+
+def make(output, identity=MINE, content="one"):
+    """The complete result of a job, with a file in a folder of its own."""
+    work = result.claim(output, identity)
+    (work / "train").mkdir(exist_ok=True)
+    (work / "train" / "r.png").write_text(content)
+    write_json(work / result.METRICS, {"seconds": time.perf_counter()})
+    result.publish(output)
+
+
+def files(folder):
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
+    }
+
+
+def test_a_result_is_complete_with_all_its_files_as_they_were(output):
+    assert not result.is_complete(output, Checksums())
+    make(output)
+    assert result.is_complete(output, Checksums())
+    assert set(read_json(output / result.FILES)) == {"train/r.png", result.METRICS}
+    assert [path.name for path in output.parent.iterdir()] == ["views"]
+    (output / "train" / "r.png").write_text("One")
+    assert not result.is_complete(output, Checksums())
+    assert result.damaged(output, None) == ["train/r.png"]
+    (output / "train" / "r.png").write_text("one")
+    assert result.is_complete(output, Checksums())
+    (output / "train" / "r.png").unlink()
+    assert result.damaged(output, None) == ["train/r.png"]
+
+
+@pytest.mark.parametrize("name", [result.STAMP, result.FILES])
+def test_damaged_records_are_of_no_job(output, name):
+    make(output)
+    (output / name).write_text('{"stage": "vie')
+    assert result.stamped(output) is None or not result.is_complete(output, Checksums())
+    make(output, content="two")
+    assert result.is_complete(output, Checksums())
+    assert result.stamped(output) == MINE
+
+
+def test_the_result_before_stays_until_there_is_a_better_one(output):
+    make(output)
+    before = files(output)
+    work = result.claim(output, OTHER)
+    (work / "half.png").write_text("half")
+    assert files(output) == before
+    make(output, OTHER, "two")
+    assert (output / "train" / "r.png").read_text() == "two"
+    assert result.stamped(output) == OTHER
+
+
+def test_an_interrupted_run_goes_on_and_that_of_another_job_does_not(output):
+    work = result.claim(output, MINE)
+    (work / "half.png").write_text("half")
+    (work / ".model.safetensors.ab12cd_8").write_text("of write_atomic, killed")
+    assert sorted(files(result.claim(output, MINE))) == [result.STAMP, "half.png"]
+    assert sorted(files(result.claim(output, OTHER))) == [result.STAMP]
+
+
+def test_a_damaged_result_is_where_its_repair_begins(output):
+    work = result.claim(output, MINE)
+    (work / "good.png").write_text("good")
+    make(output)
+    (output / "train" / "r.png").write_text("damaged")
+    assert sorted(files(result.claim(output, MINE))) == [result.STAMP, "good.png"]
+
+
+@pytest.mark.parametrize("killed_after", ["the first rename", "the second"])
+def test_a_swap_that_was_killed_is_finished(output, killed_after):
+    make(output, OTHER, "old")
+    result.claim(output, MINE)
+    make_beside = output.with_name("other")
+    make(make_beside, MINE, "new")
+    work, old = result.work_folder(output), output.with_name(".views.old")
+    result.discard_work(output)
+    output.rename(old)
+    make_beside.rename(work if killed_after == "the first rename" else output)
+    result.recover(output)
+    assert (output / "train" / "r.png").read_text() == "new"
+    assert result.is_complete(output, Checksums())
+    assert not old.exists()
+
+
+def test_a_killed_swap_without_a_complete_new_result_brings_the_old_one_back(output):
+    make(output, OTHER, "old")
+    output.rename(output.with_name(".views.old"))
+    output.mkdir()  # as Snakemake does before a job
+    result.recover(output)
+    assert (output / "train" / "r.png").read_text() == "old"
+
+
+@pytest.mark.parametrize("name", ["mine.txt", "train/mine.txt", "notes/a.md"])
+def test_files_of_the_user_are_never_lost(output, name):
+    make(output)
+    (output / name).parent.mkdir(exist_ok=True)
+    (output / name).write_text("mine")
+    for identity in (MINE, OTHER):
+        with pytest.raises(ArgumentError, match=rf"the folder also holds {name}; move what is yours away"):
+            result.claim(output, identity)
+    assert (output / name).read_text() == "mine"
+
+
+def test_a_folder_of_others_or_a_link_is_refused(output, tmp_path):
+    output.mkdir(parents=True)
+    (output / "thesis.tex").touch()
+    with pytest.raises(ArgumentError, match="expected an empty folder or one of texgs"):
+        result.claim(output, MINE)
+    link = tmp_path / "TF01" / "link"
+    link.symlink_to(output)
+    with pytest.raises(ArgumentError, match="expected a folder, got a link"):
+        result.claim(link, MINE)
+
+
+def test_fingerprints_know_contents_and_makers_but_no_times(output, tmp_path):
+    def of(path):
+        return result.fingerprint(path, Checksums())
+
+    make(output)
+    first = of(output / "transforms_train.json")
+    make(output)
+    assert of(output / "transforms_train.json") == first, "only metrics.json differs"
+    make(output, OTHER)
+    assert of(output / "transforms_train.json") != first, "the same bytes, by another job"
+    make(output, MINE, "two")
+    assert of(output / "transforms_train.json") != first
+    volume = tmp_path / "ct.raw"
+    volume.write_bytes(b"12")
+    alone = of(volume)
+    os.utime(volume, ns=(1, 1))
+    assert of(volume) == alone
+    volume.write_bytes(b"13")
+    assert of(volume) != alone
+
+
+def test_fingerprints_of_views_and_slices_from_elsewhere_know_all_files(tmp_path):
+    (tmp_path / "train").mkdir()
+    (tmp_path / "transforms_train.json").write_text("{}")
+    (tmp_path / "train" / "r_0.png").write_text("one")
+    views, slices = tmp_path / "transforms_train.json", tmp_path / "train"
+    before = [result.fingerprint(path, Checksums()) for path in (views, slices)]
+    (tmp_path / "train" / "r_0.png").write_text("two")
+    after = [result.fingerprint(path, Checksums()) for path in (views, slices)]
+    assert all(one != two for one, two in zip(before, after, strict=True))
+
+
+def test_a_damaged_input_names_its_maker_and_is_looked_at_anew(output, monkeypatch, tmp_path):
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "cache"))
+    make(output)
+    image = output / "train" / "r.png"
+    known = Checksums.load()
+    assert result.is_complete(output, known)
+    known.save()
+    status = image.stat()
+    image.write_text("eno")  # the same size ...
+    os.utime(image, ns=(status.st_atime_ns, status.st_mtime_ns))  # ... and time, as where a disk fails
+    assert result.is_complete(output, Checksums.load()), "this is what checksums of starting jobs are for"
+    with pytest.raises(ArgumentError, match=r"r\.png: missing or damaged since views made it; run the same"):
+        result.require_intact(output / "transforms_train.json")
+    assert not result.is_complete(output, Checksums.load())
+
+
+def hold(output, seconds, started):
+    with result.alone(output):
+        started.set()
+        time.sleep(seconds)
+
+
+def test_two_processes_do_not_work_in_one_folder(output, capsys):
+    spawn = multiprocessing.get_context("spawn")
+    started = spawn.Event()
+    other = spawn.Process(target=hold, args=(output, 1.0, started))
+    other.start()
+    assert started.wait(60)
+    begin = time.monotonic()
+    with result.alone(output):
+        waited = time.monotonic() - begin
+    other.join()
+    assert waited > 0.5
+    assert "another job works there; waiting for it to end" in capsys.readouterr().err
+
+
+def test_two_runs_do_not_share_results(tmp_path):
+    lock = result.run_alone(str(tmp_path))
+    with pytest.raises(ArgumentError, match="another run works there; wait for it to end"):
+        result.run_alone(str(tmp_path))
+    lock.release()
+    result.run_alone(str(tmp_path)).release()

@@ -1,0 +1,71 @@
+"""The digest of the native sources: what counts, and that libraries carry it."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from texgs.config import native_sources
+from texgs.config.native_sources import native_digest
+
+SOURCES = {
+    "maths.h": "// The sum.\ninline float sum(float a, float b) { return a + b; }\n",
+    "cuda/forward.cu": '/* two\nlines */ const char* text = "// no comment"; int quote = \'"\'; // one\n',
+    "cuda/CMakeLists.txt": "add_library(x SHARED forward.cu) # a library\n",
+}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, text in SOURCES.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("maths.h", "// The sum.", "// The sum of two numbers: 'a' and b."),
+        ("maths.h", " { return", "\n{\n    return"),
+        ("cuda/forward.cu", "/* two\nlines */", ""),
+        ("cuda/forward.cu", "// one", "// another"),
+        ("cuda/CMakeLists.txt", "# a library", "# nothing"),
+    ],
+)
+def test_comments_and_layout_do_not_count(folder, name, old, new):
+    before = native_digest(folder)
+    (folder / name).write_text(SOURCES[name].replace(old, new))
+    assert native_digest(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("maths.h", "a + b", "a - b"),
+        ("cuda/forward.cu", "// no comment", "// a comment"),
+        ("cuda/forward.cu", "quote", "mark"),
+        ("cuda/CMakeLists.txt", "SHARED", "STATIC"),
+    ],
+)
+def test_code_counts(folder, name, old, new):
+    before = native_digest(folder)
+    assert old in SOURCES[name]
+    (folder / name).write_text(SOURCES[name].replace(old, new))
+    assert native_digest(folder) != before
+
+
+def test_a_new_file_and_another_name_count(folder):
+    before = native_digest(folder)
+    shutil.move(folder / "maths.h", folder / "math.h")
+    renamed = native_digest(folder)
+    (folder / "more.h").write_text("int x;")
+    assert len({before, renamed, native_digest(folder)}) == 3
+
+
+def test_the_build_gets_the_same_digest_without_texgs(folder):
+    command = [sys.executable, "-I", str(Path(native_sources.__file__)), str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == native_digest(folder)

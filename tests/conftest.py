@@ -1,0 +1,22 @@
+"""How all tests run: at any speed of the machine, and long files first where several workers share them."""
+
+from pathlib import Path
+
+from hypothesis import HealthCheck, settings
+
+FOLDER = Path(__file__).parent
+
+# A busy machine is no defect: no example of a property has a time limit.
+settings.register_profile(
+    "texgs", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.load_profile("texgs")
+
+# Folders and files below tests/ that take longest, so that no worker is left with one of them at the end.
+LONG = ("workflow", "test_readme.py", "cli", "track", "test_benchmarks.py")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Long files first for workers; one process alone begins with what fails fastest, as collected."""
+    if config.getoption("numprocesses", None) or hasattr(config, "workerinput"):
+        items.sort(key=lambda item: not any(item.path.is_relative_to(FOLDER / name) for name in LONG))

@@ -1,0 +1,70 @@
+import hashlib
+import os
+
+import pytest
+
+from texgs.core import checksum
+from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.errors import ArgumentError
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache" / checksum.CACHE
+
+
+def test_it_is_the_sha256_of_the_contents(tmp_path):
+    path = tmp_path / "data"
+    path.write_bytes(b"texels" * 1000)
+    expected = hashlib.sha256(b"texels" * 1000).hexdigest()
+    assert sha256(path) == Checksums().of(path) == expected
+    with pytest.raises(ArgumentError, match="no: cannot be read"):
+        sha256(tmp_path / "no")
+    with pytest.raises(ArgumentError, match="no: cannot be read"):
+        Checksums().of(tmp_path / "no")
+
+
+def test_a_file_is_read_once_while_its_size_and_time_stay(tmp_path, monkeypatch):
+    path = tmp_path / "data"
+    path.write_bytes(b"one")
+    read = []
+    monkeypatch.setattr(checksum, "sha256", lambda path: read.append(path) or sha256(path))
+    known = Checksums()
+    first = known.of(path)
+    known.save()
+    again = Checksums.load()
+    assert again.of(path) == first
+    assert len(read) == 1
+    path.write_bytes(b"two")
+    os.utime(path, ns=(1, 1))
+    assert again.of(path) == sha256(path) != first
+    again.forget(path)
+    assert again.of(path) != first
+    assert len(read) == 3
+
+
+@pytest.mark.parametrize("content", ["", "[1]", '{"a": 3}', "{", "\x00"])
+def test_a_damaged_cache_is_an_empty_one(tmp_path, cache, content):
+    path = tmp_path / "data"
+    path.write_bytes(b"one")
+    cache.parent.mkdir()
+    cache.write_text(content)
+    assert Checksums.load().of(path) == sha256(path)
+    cache.write_text(f'{{"{path}": "not a list"}}')
+    assert Checksums.load().of(path) == sha256(path)
+
+
+def test_a_cache_that_cannot_be_written_costs_time_only(tmp_path, cache):
+    path = tmp_path / "data"
+    path.write_bytes(b"one")
+    cache.parent.write_text("a file where the folder should be")
+    known = Checksums()
+    assert known.of(path) == sha256(path)
+    known.save()
+
+
+def test_combined_knows_names_and_not_their_order():
+    assert combined([("a", "1"), ("b", "2")]) == combined([("b", "2"), ("a", "1")])
+    assert combined([("a", "1"), ("b", "2")]) != combined([("a", "2"), ("b", "1")])
+    assert combined([("a", "1")]) != combined([])

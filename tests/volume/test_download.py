@@ -1,0 +1,47 @@
+import hashlib
+import threading
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.download import download, require_whole
+
+DATA = b"a volume"
+SHA256 = hashlib.sha256(DATA).hexdigest()
+
+
+@pytest.fixture
+def address(tmp_path):
+    """Of a folder that holds a file, as long as the test runs."""
+    folder = tmp_path / "served"
+    folder.mkdir()
+    (folder / "a.raw").write_bytes(DATA)
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=folder))
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    yield f"http://127.0.0.1:{server.server_port}/a.raw"
+    server.shutdown()
+    server.server_close()
+    thread.join()
+
+
+def test_a_file_is_downloaded_once(address, tmp_path):
+    path = tmp_path / "cache" / "a.raw"
+    download(address, SHA256, path)
+    assert path.read_bytes() == DATA
+    download("http://127.0.0.1:9/nobody-listens", SHA256, path)
+    require_whole(path, SHA256)
+    path.write_bytes(b"A volume")
+    with pytest.raises(ArgumentError, match=r"a\.raw: expected the checksum .* delete the file"):
+        require_whole(path, SHA256)
+
+
+def test_another_file_or_none_is_one_sentence_and_keeps_nothing(address, tmp_path):
+    path = tmp_path / "cache" / "a.raw"
+    with pytest.raises(ArgumentError, match="got another file"):
+        download(address, "0" * 64, path)
+    with pytest.raises(ArgumentError, match="cannot be downloaded"):
+        download(f"{address}.not-there", SHA256, path)
+    assert not path.exists()

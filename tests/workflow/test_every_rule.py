@@ -1,0 +1,173 @@
+"""Every rule of the workflow, from the volume to the report, run by Snakemake: once, and after changes."""
+
+import json
+import re
+
+import pytest
+
+from tests.workflow.project import Project
+
+# A segment of the only model, and an edit of it alone.
+EDITS = {
+    "piece": "name: piece\nkind: segment\n"
+    "segment: {model: TF01, name: piece, points: [[0.5, 0.5]], masks: grabcut, views: 12, size: 64}\n",
+    "red": "name: red\nkind: text\nbase: piece\nparts: [TF01/piece]\n"
+    "text: {instruction: make it crimson, guidance: filters}\n",
+}
+SWEEP = "name: tiny\nvariants:\n  few: [fit.seeds.count=150]\n  more: [fit.seeds.count=250]\n"
+SMALL = (
+    "fit.seeds.count=200 fit.surfels.iterations=4 fit.shading.iterations=12 fit.shading.densify.stop=10 "
+    "edits=[glass,gold,piece,red] edit.image.iterations=2 +sweeps.tiny=sphere"
+)
+OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
+
+FITS = {"surfels", "shading", "texture"}
+AFTER_FITS = {"figure", "compose", "pse", "timing", "edit_image", "edit_text", "edit_segment", "edit_metrics"}
+TABLES = {"tables", "sweep", "report"}
+RULES = {"volume", "transfer", "views", "sheet"} | FITS | AFTER_FITS | TABLES
+GROUPS = {"all", "volumes", "sheets", "figures", "fits", "scenes", "edits"}  # rules without a command
+
+
+def changed(project, extra="", **options):
+    """Rules that a dry run would run, without those that only name others."""
+    words = {**OPTIONS, "overrides": f"{SMALL} {extra}", **options}
+    return {job.split()[0] for job in project.planned(**words)} - GROUPS
+
+
+def run(project, extra=""):
+    """Rules that ran, and of these those whose result was there already."""
+    done = project.snakemake(**{**OPTIONS, "overrides": f"{SMALL} {extra}"})
+    assert done.returncode == 0, done.stdout + done.stderr
+    text = done.stdout + done.stderr
+    return set(re.findall(r"^(?:local)?rule (\w+):", text, re.MULTILINE)) - GROUPS, text
+
+
+def metrics(project):
+    """What all jobs say about themselves, their times included: a job that ran again says something else."""
+    results = project.work / "results"
+    return {
+        path.parent.relative_to(results).as_posix(): path.read_text()
+        for path in results.rglob("metrics.json")
+    }
+
+
+def made_again(before, after):
+    return {folder for folder in before | after if before.get(folder) != after.get(folder)}
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory):
+    project = Project(tmp_path_factory.mktemp("every"), native=True)
+    for name, text in EDITS.items():
+        (project.sources / "conf" / "edit" / f"{name}.yaml").write_text(text)
+    (project.sources / "conf" / "sweep" / "tiny.yaml").write_text(SWEEP)
+    rules, _ = run(project)
+    assert rules == RULES
+    return project
+
+
+@pytest.fixture
+def sources(project):
+    """The project, whose sources are put back after the test."""
+    edited = {}
+
+    def edit(name, old, new):
+        path = project.sources / name
+        edited.setdefault(path, path.read_text())
+        project.edit(name, old, new)
+
+    yield edit
+    for path, text in edited.items():
+        path.write_text(text)
+
+
+def test_every_result_is_there_and_recorded(project):
+    results = project.work / "results"
+    assert len(metrics(project)) == 4 + 4 + 3 + 4 + 3 + 2 * 3
+    for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "sweep-tiny"):
+        assert (results / "tables" / f"{name}.csv").stat().st_size > 0
+    assert "red" in (results / "tables" / "looks.md").read_text()
+    assert (results / "report.html").stat().st_size > 10_000
+    shading = json.loads((results / "sphere" / "TF01" / "demo" / "shading" / "metrics.json").read_text())
+    assert {"inputs", "versions", "machine", "code_sha"} <= set(shading)
+    assert set(shading["inputs"]) == {"model", "views"}
+    assert {"torch", "vtk", "opencv-python-headless"} <= set(shading["versions"])
+    assert {"threads", "torch_blas", "texgs_cpu"} <= set(shading["machine"])
+    assert not list(results.rglob(".*.work"))
+    assert not list(results.rglob(".*.old"))
+
+
+def test_a_second_time_there_is_nothing_to_do(project):
+    assert changed(project) == set()
+
+
+def test_a_changed_value_runs_what_reads_it(project):
+    assert changed(project, "fit.texture.sweeps=2") == {"texture"} | AFTER_FITS | TABLES
+    assert changed(project, "metric.views=3") == {"edit_metrics", "tables", "report"}
+
+
+def test_a_changed_line_runs_the_stages_that_import_it(project, sources):
+    sources("texgs/report/fit_figure.py", "import annotations\n", "import annotations\n\nCHANGED = True\n")
+    assert changed(project) == {"figure", "report"}
+    sources("texgs/config/fit.py", '"random numbers', '"seed of the random numbers')
+    assert changed(project) == {"figure", "report"}, "help texts do not count"
+
+
+def test_changed_native_sources_run_what_calls_them_and_want_a_new_library(project, sources):
+    sources("texgs/raster/csrc/maths.h", "// SPDX", "// One more comment. SPDX")
+    assert changed(project) == set()
+    sources("texgs/raster/csrc/maths.h", "#pragma once", "#pragma once\n#define CHANGED 1")
+    planned = changed(project)
+    assert planned >= FITS | AFTER_FITS | TABLES
+    assert not planned & {"volume", "transfer"}
+    before = metrics(project)
+    failed = project.snakemake(**OPTIONS)
+    assert failed.returncode != 0
+    assert "compile them with `make install`" in failed.stdout + failed.stderr
+    assert made_again(before, metrics(project)) <= {"sphere/TF01/views", "sphere/TF01/sheet"}
+
+
+@pytest.mark.parametrize("harm", ["removed", "cut", "one bit"])
+def test_a_damaged_model_is_made_again_and_nothing_else(project, harm):
+    model = project.work / "results" / "sphere" / "TF01" / "demo" / "shading" / "model.safetensors"
+    whole, before = model.read_bytes(), metrics(project)
+    if harm == "removed":
+        model.unlink()
+    else:
+        model.write_bytes(whole[:-100] if harm == "cut" else whole[:-1] + bytes([whole[-1] ^ 1]))
+    run(project)
+    assert model.read_bytes() == whole
+    assert made_again(before, metrics(project)) == {"sphere/TF01/demo/shading"}
+    assert changed(project) == set()
+
+
+def test_a_cut_view_is_rendered_again_and_no_other(project):
+    views = project.work / "results" / "sphere" / "TF01" / "views"
+    image, other = views / "train" / "r_0003.png", views / "train" / "r_0004.png"
+    whole, written, before = image.read_bytes(), other.stat().st_mtime_ns, metrics(project)
+    image.write_bytes(whole[: len(whole) // 2])
+    run(project)
+    assert image.read_bytes() == whole
+    assert other.stat().st_mtime_ns == written
+    assert made_again(before, metrics(project)) == {"sphere/TF01/views"}
+
+
+def test_a_failed_edit_keeps_the_earlier_one(project, sources):
+    folder = project.work / "results" / "sphere" / "scene" / "demo" / "edits" / "gold"
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    sources("texgs/cli/stages/edit_text.py", "guidance = guidance_of(text", "guidance = no_guidance(text")
+    failed = project.snakemake(**OPTIONS)
+    assert failed.returncode != 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert "edit_text" in changed(project), "the earlier result is not taken for the new one"
+
+
+def test_what_was_made_by_hand_is_not_made_again(project):
+    done = project.texgs(
+        "figure", "dataset=sphere", "fit=demo", "tracking=none", "variant=hand", *SMALL.split()
+    )
+    assert done.returncode == 0, done.stderr
+    before = metrics(project)
+    assert "sphere/TF01/demo-hand/figure" in before
+    run(project, "variant=hand edits=[]")
+    assert not made_again(before, metrics(project)) & {folder for folder in before if "demo-hand" in folder}

@@ -1,0 +1,231 @@
+"""The plan of a run: its jobs with their settings, code and files, in plain values that a file can hold.
+
+Snakemake reads the Snakefile again in each job on a cluster. There the plan comes from the file that the run
+wrote before it submitted the job, so that nothing is composed, digested or looked up again.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.config.code import ROOT, code_digest, digest
+from texgs.config.kept import fingerprint, keep, recall
+from texgs.config.project import folders
+from texgs.core.errors import ConfigError, MissingDataError
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.cli.job import Job
+    from texgs.core.checksum import Checksums
+
+GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
+OTHER_CODE = ("texgs.cli.tables", "texgs.cli.report")  # of rules that are no stages
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the rules read."""
+
+    results: str
+    tracking: str | None  # URI of the store
+    experiment: str  # of the store
+    mapper_gpu: int  # GPUs that a job of views takes
+    fit_gpu: int  # and a job of the fits and edits
+    jobs: dict[str, dict[str, Any]]  # stage, settings file, code and input files of each job, by folder
+    sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
+    downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
+    wildcards: dict[str, list[str]]  # values of `dataset`, `views` and `fit`
+    edits: dict[str, list[str]]  # names of edits by their kinds
+    code: dict[str, str] = field(default_factory=dict)  # digests of modules that are no stages
+
+    def done(self, *stages: str, sweep: str = "") -> list[str]:
+        """The metrics files of all jobs of some stages, of a sweep or of none."""
+        folders = self.sweeps.get(sweep, ())
+        return sorted(f"{folder}/metrics.json" for folder in folders if self.jobs[folder]["stage"] in stages)
+
+
+def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
+    """What Snakemake's `--config` says, in Hydra's syntax.
+
+    Raises:
+        ConfigError: for a key that it has not, or a value that cannot be split into words.
+    """
+    if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
+        expected = ", ".join(GROUPS)
+        raise ConfigError(
+            f'--config: expected {expected} or overrides="KEY=VALUE ...", got {", ".join(unknown)}'
+        )
+    lists = [group for group in GROUPS if not isinstance(config.get(group, ""), str)]
+    if lists:
+        raise ConfigError(
+            f"{lists[0]}: expected one name, got {config[lists[0]]}; several data sets go to datasets=[...]"
+        )
+    groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
+    try:
+        return (*groups, *shlex.split(str(config.get("overrides", ""))))
+    except ValueError as error:
+        raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
+
+
+def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
+    """The plan of a run, and a sentence for each thing that is missing for some of its jobs.
+
+    Args:
+        words: overrides of the configuration.
+        is_job: whether this is a job of a run that has left its plan.
+
+    Raises:
+        ConfigError, ArgumentError: for a mistake in the configuration.
+    """
+    path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
+    data = os.environ.get("TEXGS_DATA", "")
+    key = digest("\n".join([*words, data, fingerprint(ROOT / "texgs", *folders())]))
+    if is_job and (kept := recall(path, key)):
+        return Plan(**kept), []
+    plan, missing = make(words)
+    keep(path, key, asdict(plan))
+    return plan, missing
+
+
+def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
+    """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
+    from texgs.config.compose import compose
+    from texgs.config.stage import fit_folder
+    from texgs.core.checksum import Checksums
+
+    config, checksums = compose(words), Checksums.load()
+    by_sweep = experiments(words)
+    configs = [each for some in by_sweep.values() for each in some]
+    found: dict[str, Job] = {}
+    missing: list[str] = []
+    sweeps = {sweep: add_jobs(some, checksums, found, missing) for sweep, some in by_sweep.items()}
+    plan = Plan(
+        config.results,
+        config.tracking.uri,
+        config.tracking.experiment,
+        int(config.device.mapper == "gpu"),
+        int(config.device.name == "cuda"),
+        {folder: plain(job, config.results) for folder, job in found.items()},
+        sweeps,
+        downloads(configs),
+        {
+            "dataset": sorted({each.dataset.name for each in configs}),
+            "views": sorted({each.views.name for each in configs}),
+            "fit": sorted({fit_folder(each) for each in configs}),
+        },
+        {kind: names_of(configs, kind) for kind in ("image", "text", "segment")},
+        {module: code_digest(module) for module in OTHER_CODE},
+    )
+    checksums.save()
+    return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
+
+
+def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
+    """Configurations by the name of their sweep, "" for those of none.
+
+    There is one for each data set, and for each variant of a sweep or edit of it.
+    """
+    from texgs.config.compose import compose
+    from texgs.config.edits import edits
+    from texgs.config.sweep import variants
+
+    base = compose(words)
+    names = [(*words, f"dataset={name}") for name in base.datasets] or [words]
+    repeated = [name for name in base.datasets if base.datasets.count(name) > 1]
+    if repeated:
+        raise ConfigError(f"datasets: expected different names, got {repeated[0]} twice")
+    found: dict[str, list[DictConfig]] = {}
+    for each in names:
+        config = compose(each)
+        name = config.sweep.name if config.sweep.variants else ""
+        found.setdefault(name, []).extend(compose(variant) for variant in variants((*each, "edit=none")))
+        if not name:
+            found[name] += [compose(edit) for edit in edits(each)]
+    for name, dataset in base.sweeps.items():
+        of_sweep = (*words, f"dataset={dataset}", f"sweep={name}", "edit=none")
+        found[name] = [compose(variant) for variant in variants(of_sweep)]
+    return found
+
+
+def add_jobs(
+    configs: Iterable[DictConfig], checksums: Checksums, jobs: dict[str, Job], missing: list[str]
+) -> list[str]:
+    """Add the jobs of some configurations to those by folder, and what is missing for some; their folders.
+
+    Raises:
+        ConfigError: if two different jobs have one folder.
+    """
+    from texgs.cli.job import Job
+    from texgs.cli.stages.tf import check_basic_tfs
+    from texgs.config.locate import tf_names
+    from texgs.config.stage import for_tf
+    from texgs.config.stages import STAGES
+
+    folders = []
+    for config in configs:
+        check_basic_tfs(config.dataset)
+        try:
+            by_tf = [for_tf(config, name) for name in tf_names(config)]
+        except MissingDataError as error:
+            missing.append(str(error))
+            continue
+        for stage in STAGES.values():
+            for each in (by_tf if stage.per_tf else [config]) if stage.applies(config) else ():
+                try:
+                    job = Job.of(stage, each, checksums)
+                except MissingDataError as error:
+                    missing.append(str(error))
+                    job = Job(stage, stage.settings(each), {}, stage.output(each))
+                folders.append(job.output.as_posix())
+                if jobs.setdefault(folders[-1], job) != job:
+                    raise ConfigError(f"{job.output}: two variants go there; give one another name")
+    return list(dict.fromkeys(folders))
+
+
+def plain(job: Job, results: str) -> dict[str, Any]:
+    """A job in plain values; its settings file is written, with a note where its result is not of this job.
+
+    Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the
+    result before it in place, it learns by this: it takes a file for changed where its contents are.
+    """
+    from texgs.cli.result import METRICS
+    from texgs.config.stage import note_result, settings_file
+
+    settings = settings_file(job.settings, results)
+    if (job.output / METRICS).exists() and not job.is_done():
+        note_result(settings, f"{job.output}: not whole, or of another job")
+    inputs = {name: path.as_posix() for name, path in job.inputs.items()}
+    return {"stage": job.stage.name, "settings": settings, "code": job.stage.code, "inputs": inputs}
+
+
+def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:
+    """Address and checksum of the volumes that are not in the data folder, by the files they go to."""
+    from texgs.config.locate import cached_volume
+
+    volumes = [(config.data_folder, config.dataset.volume) for config in configs]
+    absent = [each for folder, each in volumes if each.url and not Path(folder, each.file).exists()]
+    return {cached_volume(each).as_posix(): (each.url, each.sha256) for each in absent}
+
+
+def names_of(configs: Iterable[DictConfig], kind: str) -> list[str]:
+    """Names of the edits of a kind."""
+    return sorted({config.edit.name for config in configs if config.edit.kind == kind})
+
+
+def missing_weights(configs: Iterable[DictConfig]) -> list[str]:
+    """What edits need and this machine has not; mistakes in edits are told first."""
+    edited = [config for config in configs if config.edit.kind != "none"]
+    if not edited:
+        return []
+    from texgs.cli.edits import check_edit  # not at the top: most runs have no edits
+    from texgs.cli.weights import missing
+
+    for config in edited:
+        check_edit(config)
+    return list(dict.fromkeys(line for config in edited for line in missing(config)))

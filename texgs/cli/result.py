@@ -1,0 +1,244 @@
+"""The folder of a job's result: made beside its place, swapped in when it is complete, checked by checksums.
+
+For a job whose folder is `shading` there are:
+
+- `shading`, the last complete result;
+- `shading/.job.json`, the identity of the job that made it;
+- `shading/.files.json`, its files with their checksums, written when it is complete;
+- `.shading.work`, what the running job has so far, or an interrupted one;
+- `.shading.lock`, held by the process that works there.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from filelock import FileLock, Timeout
+
+from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, remove_scratch, write_json
+
+STAMP = ".job.json"
+FILES = ".files.json"
+METRICS = "metrics.json"  # what tables read, and what the workflow looks for
+TIMES = "times.json"  # of single views; like METRICS it differs from one run to the next
+
+
+@contextmanager
+def alone(output: Path) -> Iterator[None]:
+    """Keep other processes out of a job's folder; where one works there, say so and wait for it to end.
+
+    Raises:
+        ArgumentError: if the folder above it cannot be written to.
+    """
+    lock = FileLock(output.parent / f".{output.name}.lock")
+    try:
+        output.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            print(f"{output}: another job works there; waiting for it to end", file=sys.stderr)
+            lock.acquire()
+    except OSError as error:
+        raise ArgumentError(
+            f"{output}: cannot write there ({error.strerror}); choose other results"
+        ) from error
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def run_alone(results: str) -> FileLock:
+    """Hold the results of a workflow as long as the process lives.
+
+    Returns:
+        The lock, to be kept.
+
+    Raises:
+        ArgumentError: if another run works there.
+    """
+    lock = FileLock(Path(results, ".run.lock"))
+    try:
+        lock.acquire(blocking=False)
+    except Timeout as error:
+        raise ArgumentError(
+            f"{results}: another run works there; wait for it to end, or choose other results=FOLDER"
+        ) from error
+    return lock
+
+
+def work_folder(output: Path) -> Path:
+    """Where a job works before its result is complete: beside the result, so that relative paths hold."""
+    return output.with_name(f".{output.name}.work")
+
+
+def claim(output: Path, identity: dict[str, Any]) -> Path:
+    """The folder for a job to work in: empty, or with what an interrupted run of the same job left there.
+
+    A damaged result of the same job is a start, too: its good files are kept.
+
+    Raises:
+        ArgumentError: if the result's folder holds files that are not of texgs, or is no folder.
+    """
+    require_own(output)
+    work = work_folder(output)
+    if stamped(work) != identity:
+        shutil.rmtree(work, ignore_errors=True)
+        if stamped(output) == identity:
+            _take_back(output, work)
+    write_json(work / STAMP, identity)
+    remove_scratch(work)
+    return work
+
+
+def _take_back(output: Path, work: Path) -> None:
+    """Turn a damaged result into work that goes on, without its damaged files."""
+    for name in damaged(output, None):
+        (output / name).unlink(missing_ok=True)
+    for name in (FILES, METRICS):
+        (output / name).unlink(missing_ok=True)
+    output.rename(work)
+
+
+def publish(output: Path) -> None:
+    """Put what a job has made, with the checksums of all its files, in place of the result before it."""
+    work, old = work_folder(output), _old(output)
+    names = sorted(path.relative_to(work).as_posix() for path in work.rglob("*") if path.is_file())
+    write_json(work / FILES, {name: sha256(work / name) for name in names if name != STAMP})
+    if output.exists():
+        output.rename(old)
+    work.rename(output)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def recover(output: Path) -> None:
+    """Finish what a process that was killed while it swapped two results had begun."""
+    work, old = work_folder(output), _old(output)
+    if not output.exists() or not any(output.iterdir()):
+        complete = (folder for folder in (work, old) if (folder / FILES).exists())
+        if (folder := next(complete, None)) is not None:
+            folder.rename(output)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def discard_work(output: Path) -> None:
+    """Forget what an interrupted run has left."""
+    shutil.rmtree(work_folder(output), ignore_errors=True)
+
+
+def stamped(folder: Path) -> Any:
+    """Identity of the job that a folder is of; None where there is none that can be read."""
+    return _content(folder / STAMP)
+
+
+def _content(path: Path) -> Any:
+    """What a JSON file holds; None where it is missing or damaged: then its folder is of no job."""
+    try:
+        return read_json(path)
+    except ArgumentError:
+        return None
+
+
+def damaged(output: Path, checksums: Checksums | None) -> list[str]:
+    """Files of a complete result that are missing or not what they were.
+
+    Args:
+        output: folder of the result; one that is not complete has no files.
+        checksums: what is known of files, or None to read them all.
+    """
+    if not (output / FILES).exists():
+        return []
+    recorded = _content(output / FILES)
+    if not isinstance(recorded, dict):
+        return [FILES]
+    checksum = sha256 if checksums is None else checksums.of
+    return [
+        name
+        for name, expected in recorded.items()
+        if not (output / name).is_file() or checksum(output / name) != expected
+    ]
+
+
+def is_complete(output: Path, checksums: Checksums) -> bool:
+    """Whether a result is there with all its files, as they were made."""
+    return (output / FILES).exists() and (output / METRICS).exists() and not damaged(output, checksums)
+
+
+def require_own(output: Path) -> None:
+    """Require a folder that is of texgs alone, so that nothing else is lost when it is replaced.
+
+    Raises:
+        ArgumentError: naming what else is there.
+    """
+    if output.is_symlink() or (output.exists() and not output.is_dir()):
+        raise ArgumentError(f"{output}: expected a folder, got a link or a file; move it away")
+    if not output.exists() or not any(output.iterdir()):
+        return
+    if not (output / STAMP).exists():
+        raise ArgumentError(
+            f"{output}: expected an empty folder or one of texgs, got other files; move them away"
+        )
+    if (recorded := _content(output / FILES)) is None:
+        return  # not complete
+    own = {*recorded, STAMP, FILES}
+    there = (path.relative_to(output) for path in output.rglob("*") if not path.is_dir())
+    if foreign := sorted(path.as_posix() for path in there if not own & {path.as_posix(), path.parts[0]}):
+        raise ArgumentError(
+            f"{output}: the job is to be done again, but the folder also holds {', '.join(foreign[:3])}; "
+            "move what is yours away"
+        )
+
+
+def fingerprint(path: Path, checksums: Checksums) -> str:
+    """Checksum of an input: of the result that it belongs to, with the identity of the job that made it.
+
+    A file from elsewhere counts with its contents, a folder with those of all its files, and the
+    transforms_train.json of views from elsewhere with all images beside it.
+
+    Raises:
+        ArgumentError: if something cannot be read.
+    """
+    folder = path.parent
+    if (folder / FILES).exists():
+        files = (_content(folder / FILES) or {}).items()
+        made = [(name, checksum) for name, checksum in files if name not in (METRICS, TIMES)]
+        return combined([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
+    if path.name.startswith("transforms_"):
+        members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
+    elif path.is_dir():
+        members = [each for each in path.rglob("*") if each.is_file()]
+    else:
+        return checksums.of(path)
+    return combined((each.relative_to(folder).as_posix(), checksums.of(each)) for each in members)
+
+
+def require_intact(path: Path) -> None:
+    """Require of an input that the result it belongs to is as it was made; reads all of its files.
+
+    Raises:
+        ArgumentError: if a file is missing or damaged; the next run makes it again.
+    """
+    folder = path.parent
+    if not (lost := damaged(folder, None)):
+        return
+    checksums = Checksums.load()  # whoever looks next shall look at the file itself
+    for name in lost:
+        checksums.forget(folder / name)
+    checksums.save()
+    maker = (stamped(folder) or {}).get("stage", "the stage before")
+    raise ArgumentError(
+        f"{folder / lost[0]}: missing or damaged since {maker} made it; "
+        "run the same command again, and it is made anew"
+    )
+
+
+def _old(output: Path) -> Path:
+    return output.with_name(f".{output.name}.old")

@@ -1,0 +1,82 @@
+"""SHA-256 of files, remembered for as long as a file keeps its size and time."""
+
+import contextlib
+import hashlib
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+from texgs.core.errors import ArgumentError
+from texgs.core.folders import cache_folder
+from texgs.core.io import write_bytes
+
+CACHE = "checksums.json"  # in the cache folder
+
+
+def sha256(path: str | Path) -> str:
+    """Checksum of a file's contents as they are now.
+
+    Raises:
+        ArgumentError: if it cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def combined(parts: Iterable[tuple[str, str]]) -> str:
+    """One checksum of several names with their checksums, in any order."""
+    return hashlib.sha256(json.dumps(sorted(parts)).encode()).hexdigest()
+
+
+class Checksums:
+    """Checksums of files that are not read again while their size and time stay the same.
+
+    A file that was changed behind the back of both is noticed only by `sha256`.
+    """
+
+    def __init__(self) -> None:
+        self._known: dict[str, list[int | str]] = {}
+        self._is_new = False
+
+    @classmethod
+    def load(cls) -> "Checksums":
+        """What earlier processes have computed, from the cache folder; a damaged cache is an empty one."""
+        checksums = cls()
+        with contextlib.suppress(OSError, ValueError):
+            known = json.loads((cache_folder() / CACHE).read_text())
+            checksums._known = known if isinstance(known, dict) else {}
+        return checksums
+
+    def save(self) -> None:
+        """Keep them for later processes; where the cache cannot be written, they will compute them again."""
+        if self._is_new:
+            with contextlib.suppress(ArgumentError, OSError):
+                write_bytes(cache_folder() / CACHE, json.dumps(self._known).encode())
+            self._is_new = False
+
+    def of(self, path: Path) -> str:
+        """Checksum of a file.
+
+        Raises:
+            ArgumentError: if it cannot be read.
+        """
+        try:
+            status = path.stat()
+        except OSError as error:
+            raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+        key, state = str(path.absolute()), [status.st_size, status.st_mtime_ns]
+        known = self._known.get(key)
+        if isinstance(known, list) and known[:2] == state and len(known) == 3:
+            return str(known[2])
+        found = sha256(path)
+        self._known[key] = [*state, found]
+        self._is_new = True
+        return found
+
+    def forget(self, path: Path) -> None:
+        """Compute the checksum of a file anew the next time."""
+        if self._known.pop(str(path.absolute()), None) is not None:
+            self._is_new = True

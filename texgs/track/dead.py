@@ -1,0 +1,50 @@
+"""Runs of processes that were killed: MLflow leaves them RUNNING for good, the next process closes them."""
+
+import json
+import os
+import platform
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import psutil
+
+if TYPE_CHECKING:
+    from mlflow import MlflowClient
+    from mlflow.entities import Run
+
+HOST, PROCESS, METRICS = "texgs.host", "texgs.process", "texgs.metrics"  # tags
+
+
+def process_tags(metrics: Path) -> dict[str, str]:
+    """Tags that say which process a run is of, and where the metrics of its job will be."""
+    started = psutil.Process().create_time()
+    return {HOST: platform.node(), PROCESS: f"{os.getpid()} {started}", METRICS: str(metrics.absolute())}
+
+
+def close_dead(client: "MlflowClient", experiment_id: str) -> None:
+    """End the runs of this machine whose process is gone.
+
+    A run whose metrics are in place is FINISHED: its process was killed after its work. Others are KILLED.
+    """
+    words = f"attributes.status = 'RUNNING' AND tags.`{HOST}` = '{platform.node()}'"
+    for run in client.search_runs([experiment_id], words):
+        if not is_alive(run.data.tags.get(PROCESS, "")):
+            client.set_terminated(run.info.run_id, "FINISHED" if is_recorded(run) else "KILLED")
+
+
+def is_alive(process: str) -> bool:
+    """Whether the process of a tag still runs, and is not another one with its number."""
+    number, _, started = process.partition(" ")
+    try:
+        return str(psutil.Process(int(number)).create_time()) == started
+    except (psutil.NoSuchProcess, ValueError):
+        return False
+
+
+def is_recorded(run: "Run") -> bool:
+    """Whether the metrics of a run's job are in place and name this run."""
+    try:
+        metrics = json.loads(Path(run.data.tags.get(METRICS, "")).read_text())
+    except (OSError, ValueError):
+        return False
+    return bool(metrics.get("run") == run.info.run_id)
