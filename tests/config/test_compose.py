@@ -4,8 +4,9 @@ from itertools import product
 
 import pytest
 
-from texgs.config.compose import compose, groups, members
+from texgs.config.compose import compose
 from texgs.config.describe import describe, keys
+from texgs.config.project import groups, members
 from texgs.core.errors import ConfigError
 
 GROUPS = ("dataset", "device", "experiment", "tracking", "views")

@@ -1,7 +1,8 @@
 import pytest
 
-from texgs.config.compose import compose, members
+from texgs.config.compose import compose
 from texgs.config.edits import edits
+from texgs.config.project import members
 from texgs.config.stage import EDITS
 from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError

@@ -18,8 +18,9 @@ class HelpWithKeys(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
         """Print the help and exit."""
-        from texgs.config.compose import compose, groups
+        from texgs.config.compose import compose
         from texgs.config.describe import describe
+        from texgs.config.project import groups
 
         parser.print_help()
         print(f"\ngroups, each a folder of conf/:\n{groups()}")
