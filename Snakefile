@@ -38,13 +38,10 @@ onstart:
 
 
 onsuccess:
-    print(
-        "Done:",
-        *(
-            [f"{RESULTS}/report.html"]
-            if TABLES
-            else [f"{RESULTS}/tables/sweep-{name}.md" for name in SWEEPS]
-        ),
+    made = {str(file) for each in workflow.dag.jobs for file in each.output}
+    ends = (
+        [f"{RESULTS}/report.html"] if TABLES else [f"{RESULTS}/tables/sweep-{name}.md" for name in SWEEPS]
     )
+    print("Done:", *[file for file in ends if file in made] or ["what was asked for"])
     if (PLAN.tracking or "").startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")

@@ -33,8 +33,7 @@ class Comparison:
 def run(settings: Settings) -> Section:
     """Time each function, and the others as ratios to ours."""
     section, cases = Section(), []
-    kornia = _kornia(section)
-    for compared in (*images(settings, kornia), *surfels(settings)):
+    for compared in (*images(settings), *surfels(settings)):
         for writer, function in compared.functions.items():
             where = settings.where(function=compared.name, by=writer)
             cases.append(Case(NAME, where, {NAME: differentiated(function, compared)}))
@@ -60,7 +59,7 @@ def differentiated(function: Callable[..., Tensor], compared: Comparison) -> Cal
     return run
 
 
-def images(settings: Settings, kornia: Callable[..., Tensor] | None) -> Iterator[Comparison]:
+def images(settings: Settings) -> Iterator[Comparison]:
     """Losses on a rendered scene whose target is the same scene, slightly moved."""
     at = (settings.scene, settings.size, settings.n_surfels, settings.device)
     made = workload.plain(*at, channels=4, outputs=("normal", "depth"))
@@ -69,16 +68,14 @@ def images(settings: Settings, kornia: Callable[..., Tensor] | None) -> Iterator
     with torch.no_grad():
         made.arguments["means"] += 0.003
     target = made.image().color[..., :3]
-    l1_dssim = {"texgs": ssim.l1_dssim, "torch": definition.l1_dssim}
-    if kornia is not None:
-        l1_dssim["kornia"] = kornia
+    l1_dssim = {"texgs": ssim.l1_dssim, "kornia": definition.l1_dssim}
     yield Comparison("l1_dssim", l1_dssim, [color], (target, LAMBDA_DSSIM))
     noise = torch.rand(3, *target.shape[:2], generator=torch.Generator().manual_seed(3)).to(settings.device)
     yield Comparison("l1_dssim, no pixel equal", l1_dssim, [color], (noise.permute(1, 2, 0), LAMBDA_DSSIM))
     pair = {"texgs": normals.normal_consistency, "torch": definition.normal_consistency}
     inputs = [render.normal, render.depth]
     yield Comparison("normal_consistency", pair, inputs, (render.alpha, camera.viewmat, camera.K))
-    pair = {"texgs": smoothness.bilateral_smoothness, "torch": definition.bilateral_smoothness}
+    pair = {"texgs": smoothness.bilateral_smoothness, "kornia": definition.bilateral_smoothness}
     yield Comparison("bilateral_smoothness, 4 channels", pair, [attributes], (target, render.alpha))
 
 
@@ -100,18 +97,3 @@ def surfels(settings: Settings) -> Iterator[Comparison]:
         "torch": shading_definition.spherical_harmonics,
     }
     yield Comparison("spherical_harmonics, degree 3", pair, [sh, made["means"]], (position,))
-
-
-def _kornia(section: Section) -> Callable[..., Tensor] | None:
-    """L1 and D-SSIM with kornia's SSIM, which pads by reflection; None where kornia is not installed."""
-    try:
-        from kornia.metrics import ssim as kornia_ssim
-    except ImportError as error:
-        section.skip("kornia", f"{error}; pip install '.[bench]'")
-        return None
-
-    def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float) -> Tensor:
-        similarity = kornia_ssim(image.permute(2, 0, 1)[None], target.permute(2, 0, 1)[None], 11).mean()
-        return (1 - lambda_dssim) * (image - target).abs().mean() + lambda_dssim * (1 - similarity)
-
-    return l1_dssim

@@ -18,11 +18,11 @@ import math
 from dataclasses import dataclass
 
 import torch
+from kornia.geometry.conversions import rotation_matrix_to_quaternion
 from torch import Tensor
 from torch.nn.functional import normalize
 
 from texgs.core.camera import Camera, orbit
-from texgs.core.rotation import matrices_to_quats
 
 SHARES = (
     0.55,
@@ -132,4 +132,5 @@ def facing(normals: Tensor, angle: Tensor) -> Tensor:
     first = normalize(torch.linalg.cross(normals, helper), dim=1)
     second = torch.linalg.cross(normals, first)
     tangent = angle.cos()[:, None] * first + angle.sin()[:, None] * second
-    return matrices_to_quats(torch.stack([tangent, torch.linalg.cross(normals, tangent), normals], 2))
+    axes = torch.stack([tangent, torch.linalg.cross(normals, tangent), normals], 2)
+    return rotation_matrix_to_quaternion(axes)

@@ -1,4 +1,4 @@
-"""Every command of the README runs, on a small volume and few iterations, and so does its Python example."""
+"""Every command of the README and of docs/ runs, on small volumes and with few iterations."""
 
 import os
 import re
@@ -13,86 +13,189 @@ import numpy as np
 import pytest
 import pyvista
 
-from tests.workflow.project import LAUNCHER, Project
+from tests.one_thread import one_thread  # noqa: F401
+from texgs.cli.main import main
 
 ROOT = Path(__file__).parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-SMALL = (
-    "views=small views.width=32 views.height=32 views.train.frequency=1 views.test.count=2 views.turntable=2 "
-    "fit.seeds.count=300 fit.shading.iterations=30 tracking=none"
+PAGES = (
+    "README.md",
+    *(f"docs/{name}.md" for name in ("usage", "data", "fits", "scenes", "looks", "workflow", "rasterizer")),
 )
-FILMS = "--width 32 --height 32 --frames 3"
+OTHERS = {path.relative_to(ROOT).as_posix() for path in [ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]}
+ALL = (*PAGES, *sorted(OTHERS - set(PAGES)))  # later pages use what earlier ones wrote
+
+SMALL = {
+    "views": "small",
+    "views.width": "32",
+    "views.height": "32",
+    "views.train.frequency": "1",
+    "views.test.count": "2",
+    "views.turntable": "2",
+    "fit.seeds.count": "300",
+    "fit.shading.iterations": "30",
+    "edit.image.iterations": "5",
+    "edit.text.size": "64",
+    "tracking": "none",
+}
+FILM = ["--width", "32", "--height", "32"]
+
+# Commands that are not run as they stand: what is run instead (nothing: the command is skipped), and why.
+INSTEAD = (
+    (
+        r"make ",
+        "make --directory {root} --dry-run {words}",
+        "it installs, or runs this test again",
+    ),
+    (r"source ", "", "activates the environment that `make install` makes"),
+    (r"pip install ", "{python} -m pip {words} --help", "it would change the environment of this test"),
+    (r"mlflow ui ", "{python} -m mlflow ui --help", "it starts a server"),
+    (r"texgs weights .", "texgs weights --help", "it downloads"),
+    (r"texgs run dataset=vortex ", "texgs run {words} --dry-run", "its views have to be downloaded"),
+    (
+        r"texgs run dataset=scan ",
+        "texgs run {words} volumes sheets",
+        "the run of dataset=engine goes on to the report",
+    ),
+    (
+        r"snakemake .*/profiles/local ",
+        "{python} -m snakemake --snakefile {root}/Snakefile --dry-run {words}",
+        "texgs run runs the same workflow",
+    ),
+    (
+        r"snakemake .*/profiles/slurm ",
+        "{python} -m snakemake --snakefile {root}/Snakefile --dry-run --executor local --cores 1 {words}",
+        "it needs a cluster; make test-cluster runs the profile on one",
+    ),
+    (r"(ssh|git clone|tmux)( |$)", "", "it needs another machine"),
+)
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+def blocks(page, language):
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL)
 
 
-COMMANDS = [line for block in blocks("sh") for line in block.splitlines() if line.strip()]
+def commands():
+    """Page, folder and command, each of the last two once; a block starts in the project's folder."""
+    found = {}
+    for page in ALL:
+        for block in blocks(page, "sh"):
+            folder = "."
+            for line in filter(str.strip, block.splitlines()):
+                if line.startswith("cd "):
+                    folder = line.removeprefix("cd ")
+                else:
+                    found.setdefault((folder, line.removeprefix(".venv/bin/")), page)
+    return [(page, folder, line) for (folder, line), page in found.items()]
+
+
+COMMANDS = commands()
 
 
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
-    """Copied sources, for `texgs new` writes there, and small volumes with the names that the README has."""
-    found = Project(tmp_path_factory.mktemp("readme"), native=True)
+    """A project folder, with small volumes under the names that the pages have."""
+    folder = tmp_path_factory.mktemp("readme") / "project"
+    assert main(["init", str(folder)]) == 0
     axes = np.meshgrid(*[np.linspace(-1, 1, 24)] * 3, indexing="ij")
     values = (255 * np.clip(1.2 - np.linalg.norm(axes, axis=0), 0, 1)).astype(np.uint8)
     grid = pyvista.ImageData(dimensions=values.shape)
     grid.point_data["ImageScalars"] = values.ravel(order="F")
-    grid.save(found.work / "engine.vti")
-    nibabel.save(nibabel.Nifti1Image(values, np.eye(4)), found.work / "scan.nii.gz")
-    return found
+    grid.save(folder / "engine.vti")
+    nibabel.save(nibabel.Nifti1Image(values, np.eye(4)), folder / "scan.nii.gz")
+    return folder
 
 
-def test_the_two_commands_come_first():
-    assert COMMANDS[:2] == ["make demo", "make test"]
+def instead(command):
+    """What is run instead of a command."""
+    for pattern, replacement, _ in INSTEAD:
+        if re.match(pattern, command):
+            words = command.partition(" ")[2].removeprefix("run ")
+            if command.startswith("snakemake"):
+                words = words.replace("workflow/profiles", f"{ROOT}/workflow/profiles")
+                words = words.replace("experiment=paper", "experiment=demo")  # 26 jobs to plan, not 242
+            return replacement.format(root=ROOT, python=sys.executable, words=words)
+    assert command.startswith("texgs "), f"{command}: add how it is tested, or why not, to INSTEAD"
+    return command
 
 
-def checked(command):
-    """The command as this test runs it: in this Python, small, without server, download or installation."""
-    program, *words = shlex.split(command.removeprefix(".venv/bin/"))
-    python = [sys.executable, "-c", LAUNCHER, "SOURCES"]
-    if program == "make":
-        return ["make", "--directory", str(ROOT), "--dry-run", *words]
-    if program == "texgs":
-        if any(word.startswith("dataset=") for word in words):
-            words += SMALL.split() if words[0] != "views" else SMALL.split()[1:]
-        if words[0] == "render":
-            words = [word for word in words if word not in ("--width", "1200")]
-            words += FILMS.split() if "--path" in words else FILMS.split()[:4]
-        return [*python, "texgs.cli.main", *words]
-    if program == "snakemake":
-        settings = words.index("--config")
-        where = ["--snakefile", "SOURCES/Snakefile", "--dry-run", "--executor", "local", "--cores", "1"]
-        return [*python, "snakemake.cli", *words[:settings], *where, *words[settings:]]
-    if program == "mlflow":
-        return [sys.executable, "-m", "mlflow", words[0], "--help"]
-    assert words[:2] == ["install", "."], f"{command}: not covered by this test"
-    return [sys.executable, "-m", "pip", "install", "--help"]
+def small(words):
+    """The words of a texgs command with small views, fits and films."""
+    verb, *rest = words
+    if any(word.startswith("dataset=") for word in rest) and "--help" not in rest:
+        given = {word.partition("=")[0] for word in rest}
+        return [verb, *(f"{key}={value}" for key, value in SMALL.items() if key not in given), *rest]
+    if verb == "render":
+        rest = [word for word in rest if word not in ("--width", "1200")] + FILM
+        return [verb, *rest, *(("--frames", "3") if "--path" in rest else ())]
+    if verb == "segment":
+        return [*words, "--views", "12", "--size", "64"]
+    return words
 
 
-@pytest.mark.parametrize("command", COMMANDS)
-def test_command_runs(command, project):
+@pytest.mark.parametrize(("page", "folder", "command"), COMMANDS, ids=[f"{p}: {c}" for p, _, c in COMMANDS])
+def test_command_runs(page, folder, command, project, monkeypatch):
     """In their order: later ones use what earlier ones wrote."""
     if command.startswith("make") and shutil.which("make") is None:
         pytest.skip("make is not installed")
     if "--kind mesh" in command:
         pytest.importorskip("open3d")
-    words = [word.replace("SOURCES", str(project.sources)) for word in checked(command)]
-    environment = {**os.environ, "TEXGS_DATA": str(project.work), "OMP_NUM_THREADS": "2"}
-    done = subprocess.run(words, cwd=project.work, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    found = instead(command)
+    if not found:
+        pytest.skip(next(reason for pattern, _, reason in INSTEAD if re.match(pattern, command)))
+    if "profiles/slurm" in command:
+        pytest.importorskip("snakemake_executor_plugin_slurm")
+    place = project / folder
+    monkeypatch.chdir(place if place.is_dir() else project)  # some pages name folders of other machines
+    monkeypatch.setenv("TEXGS_DATA", str(project))
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    code, said = run(shlex.split(os.path.expandvars(found)))
+    assert code == 0, said
 
 
-def test_pictures_exist():
-    pictures = re.findall(r"!\[.*?\]\((.*?)\)", README)
-    assert pictures
-    for picture in pictures:
-        assert (ROOT / picture).is_file(), f"{picture} is missing"
+def run(words):
+    """Exit code, and what was said; a verb other than `run` stays in this process, which saves time."""
+    if words[0] == "texgs":
+        words = ["texgs", *small(words[1:])]
+        if words[1] != "run":
+            try:
+                return main(words[1:]), ""
+            except SystemExit as end:  # of --help
+                return end.code, ""
+        words = [sys.executable, "-P", "-m", "texgs.cli.main", *words[1:]]
+    done = subprocess.run(words, capture_output=True, text=True)
+    return done.returncode, done.stdout + done.stderr
+
+
+def test_the_two_commands_come_first():
+    assert [command for _, _, command in COMMANDS[:2]] == ["make demo", "make test"]
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_what_is_not_run_is_on_a_page():
+    for pattern, _, _ in INSTEAD:
+        assert any(re.match(pattern, command) for _, _, command in COMMANDS), f"no command is {pattern}"
+
+
+@pytest.mark.parametrize("page", ALL)
+def test_links_lead_somewhere(page):
+    """Pictures, pages and files of results."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)#]+)", text):
+        if not target.startswith("http"):
+            assert (ROOT / page).parent.joinpath(target).exists(), f"{target} is missing"
+
+
+def test_every_page_is_in_the_table_of_the_readme():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for page in ALL[1:]:
+        assert f"({page})" in text, f"{page} is not linked"
 
 
 def test_python_example_runs(tmp_path):
-    (example,) = blocks("python")
+    (example,) = [example for page in ALL for example in blocks(page, "python")]
     assert len(example.splitlines()) <= 20
     done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr

@@ -4,6 +4,7 @@ from texgs.cli import probes
 from texgs.cli.doctor import examine, show
 from texgs.cli.main import main
 from texgs.cli.probes import Finding
+from texgs.config.compose import compose
 
 
 def test_report_has_a_line_per_probe_and_all_is_well_here(capsys):
@@ -66,3 +67,17 @@ def test_weights_are_listed(monkeypatch, tmp_path):
     finding = probes.weights()
     assert finding.state == "warning"
     assert "expected the weights of mobile_sam with checksum" in finding.found
+
+
+def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
+    monkeypatch.setattr("texgs.config.compose.FOLDER", tmp_path / "conf")
+    compose.cache_clear()
+    finding = probes.configuration()
+    assert (finding.state, finding.is_required) == ("missing", True)
+    assert "no configuration there" in finding.found
+    monkeypatch.setattr(
+        "importlib.metadata.requires", lambda name: ["no-such-package>=1", "torch>=99", "x; extra=='y'"]
+    )
+    finding = probes.packages()
+    assert (finding.state, finding.is_required) == ("missing", True)
+    assert finding.found.startswith("no no-such-package, torch 2.")

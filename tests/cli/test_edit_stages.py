@@ -16,7 +16,7 @@ from texgs.edit.recipe import preset
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
-CLICK = ("edit=tube", "edit.segment.model=TF01", "edit.segment.points=[[0.5, 0.5]]")
+CLICK = ("edit=lobe", "edit.segment.model=TF01", "edit.segment.points=[[0.5, 0.5]]")
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +29,7 @@ def results(tmp_path_factory):
         patch.setenv("TORCH_HOME", str(folder / "none"))
         patch.setenv("HF_HOME", str(folder / "none"))
         patch.setenv("XDG_CACHE_HOME", str(folder / "none"))
-        part = ("edit.base=tube", "edit.parts=[TF01/tube]")
+        part = ("edit.base=lobe", "edit.parts=[TF01/lobe]")
         for verb, *words in (
             ("edit_image", "edit=glass", "edit.seed=3"),
             ("edit_text", "edit=gold"),
@@ -62,7 +62,7 @@ def test_pictures_show_both(results):
     for edit, files in {
         "glass": ("style.png", "edit.png", "convergence.png"),
         "gold": ("views.png", "edit.png"),
-        "tube": ("edit.png",),
+        "lobe": ("edit.png",),
     }.items():
         for name in files:
             picture = np.asarray(Image.open(results / "edits" / edit / name).convert("RGB"))
@@ -84,7 +84,7 @@ def test_a_part_of_a_model_is_edited_alone(results, edit):
     models = read_scene(results / "edits" / edit / "scene.yaml").models
     before, after = parameters(results, "compose", "TF01"), parameters(results, f"edits/{edit}", "TF01")
     (mask,) = models["TF01"].open()[1]
-    assert 0 < int(mask.sum()) == numbers(results / "edits" / "tube")["surfels"]
+    assert 0 < int(mask.sum()) == numbers(results / "edits" / "lobe")["surfels"]
     counts = before["sizes"].long().prod(1)
     owner = torch.repeat_interleave(counts)
     changed = (before["texels"] != after["texels"]).any(1)
@@ -221,10 +221,10 @@ def refused(name, entry):
 
 def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(results.parents[3])
-    base = f"edit.base={results / 'edits' / 'tube' / 'scene.yaml'}"
-    words = (base, "edit.parts=[TF01/tube]", "edit.name=other")
+    base = f"edit.base={results / 'edits' / 'lobe' / 'scene.yaml'}"
+    words = (base, "edit.parts=[TF01/lobe]", "edit.name=other")
     assert main(["edit_image", *WORDS, *FEW, "edit=glass", *words]) == 0
-    assert read_scene(results / "edits" / "other" / "scene.yaml").models["TF01"].segments["tube"].texture
+    assert read_scene(results / "edits" / "other" / "scene.yaml").models["TF01"].segments["lobe"].texture
     assert main(["edit_image", *WORDS, *FEW, "edit=glass", "edit.base=none.yaml"]) == 2
     assert "edit.base: none.yaml is not there" in capsys.readouterr().err
 

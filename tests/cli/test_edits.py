@@ -2,12 +2,12 @@
 
 import pytest
 
-from texgs.cli.edits import check_edit
+from texgs.cli.edits import check_edit, require_base
 from texgs.config.compose import compose
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 
 
-@pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "tube", "lambda_50"])
+@pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "lobe", "lambda_50"])
 def test_edits_of_the_project_have_none(edit):
     check_edit(compose((f"edit={edit}",)))
 
@@ -19,11 +19,24 @@ def test_edits_of_the_project_have_none(edit):
         ("glass", "edit.image.region=[[2, 0]]", "edit.image.region: expected two shares from 0 to 1"),
         ("text", "edit.text.instruction=", "instruction: expected what to do in words"),
         ("gold", "edit.text.instruction=fur", "which needs the guidance instruct-pix2pix"),
-        ("tube", "edit.segment.name=", "edit.segment.name: expected a name without / . ="),
-        ("tube", "edit.segment.points=[]", "edit.segment.points: expected one at least"),
-        ("tube", "edit.segment.views=40", "views: expected 12, 42, 92"),
+        ("lobe", "edit.segment.name=", "edit.segment.name: expected a name without / . ="),
+        ("lobe", "edit.segment.points=[]", "edit.segment.points: expected one at least"),
+        ("lobe", "edit.segment.views=40", "views: expected 12, 42, 92"),
     ],
 )
 def test_one_sentence_for_each(edit, word, message):
     with pytest.raises(ArgumentError, match=message):
         check_edit(compose((f"edit={edit}", word)))
+
+
+def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
+    words = ("dataset=engine", "edit=crimson", f"results={tmp_path}")
+    with pytest.raises(
+        MissingDataError, match=r"edit\.base: tube is not done yet; run texgs edit_segment edit=tube"
+    ):
+        require_base(words)
+    with pytest.raises(ConfigError, match=r"edit\.base: expected the file of a scene or one of"):
+        require_base((*words, "edit.base=none-such"))
+    with pytest.raises(ConfigError, match=r"edit\.parts: expected some of"):
+        require_base(("dataset=engine", "edit=glass", "edit.parts=[nothing]"))
+    require_base(("dataset=engine", "edit=glass"))

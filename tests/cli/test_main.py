@@ -1,3 +1,5 @@
+import importlib
+import os
 import subprocess
 import sys
 
@@ -5,7 +7,7 @@ import pytest
 
 from texgs import __version__
 from texgs.cli import doctor
-from texgs.cli.main import VERBS, main
+from texgs.cli.main import STAGE_VERBS, VERBS, main
 from texgs.core.errors import ArgumentError
 
 
@@ -36,8 +38,51 @@ def test_the_command_line_starts_without_heavy_imports():
     """Help must answer at once: torch alone takes seconds to import."""
     code = (
         "import sys; import texgs.cli.main as m; m.parser();"
-        "heavy = {'torch', 'numpy', 'PIL', 'tqdm', 'omegaconf', 'mlflow'};"
+        "heavy = {'torch', 'kornia', 'numpy', 'PIL', 'tqdm', 'omegaconf', 'mlflow'};"
         "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == ""
+
+
+@pytest.mark.parametrize(
+    ("verb", "message"),
+    [
+        ("texture", "texgs texture: interrupted; the same command goes on where it stopped\n"),
+        ("doctor", "texgs doctor: interrupted; the same command starts again\n"),
+    ],
+)
+def test_an_interruption_says_how_to_go_on(monkeypatch, capsys, verb, message):
+    def interrupt(_arguments):
+        raise KeyboardInterrupt
+
+    module = importlib.import_module(f"texgs.cli.{'stage' if verb in STAGE_VERBS else verb}")
+    monkeypatch.setattr(module, "run", interrupt)
+    assert main([verb]) == 130
+    assert capsys.readouterr().err == message
+
+
+@pytest.mark.parametrize("words", [["--help"], ["views", "--help"], ["doctor"]])
+def test_a_reader_that_goes_away_is_no_error(words):
+    """As `| head` does: the pipe is closed before anything is written. Help of argparse ends with 0 then."""
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, "-m", "texgs.cli.main", *words]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True)
+    os.close(write)
+    assert done.returncode in (0, 141)
+    assert done.stderr == ""
+
+
+ASCII = {"PYTHONIOENCODING": "ascii", "LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+
+
+@pytest.mark.parametrize(
+    ("words", "code"), [(["volume", "--help"], 0), (["views", "dataset=\u00fc"], 2), (["init", "\u00fc"], 0)]
+)
+def test_a_terminal_without_unicode(tmp_path, words, code):
+    command = [sys.executable, "-m", "texgs.cli.main", *words]
+    done = subprocess.run(command, cwd=tmp_path, env={**os.environ, **ASCII}, capture_output=True)
+    assert done.returncode == code
+    assert b"Traceback" not in done.stderr
+    assert (done.stdout + done.stderr).isascii()

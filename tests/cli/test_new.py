@@ -4,24 +4,21 @@ import numpy as np
 import pytest
 import yaml
 
+from texgs.cli import new
 from texgs.cli.main import main
-from texgs.config import compose as composing
 from texgs.config.compose import compose
+from texgs.config.project import ROOT
 from texgs.volume.tf_files import write_tf
 from texgs.volume.transfer import TransferFunction
+
+DOCUMENT = "name: mine\ntitle: another\nvolume: {file: scan.npy}\n"
 
 
 @pytest.fixture
 def conf(tmp_path, monkeypatch):
-    """A configuration folder to write to, and a working directory."""
-    import shutil
-
-    shutil.copytree(composing.FOLDER, tmp_path / "conf")
-    monkeypatch.setattr(composing, "FOLDER", tmp_path / "conf")
+    """The configurations of a project that has none yet."""
     monkeypatch.chdir(tmp_path)
-    compose.cache_clear()
-    yield tmp_path / "conf"
-    compose.cache_clear()
+    return tmp_path / "conf"
 
 
 @pytest.fixture
@@ -38,7 +35,7 @@ def scan(tmp_path):
 def test_a_data_set_with_suggested_tfs(conf, scan, capsys):
     assert main(["new", str(scan), "--name", "my_scan", "up=+z", "spacing=[1,1,2]"]) == 0
     out = capsys.readouterr().out
-    assert "snakemake --cores all --config dataset=my_scan" in out
+    assert "then: texgs run dataset=my_scan\n" in out
     config = compose(("dataset=my_scan",))
     assert config.dataset.volume.up == "+z"
     assert config.dataset.volume.spacing == [1, 1, 2]
@@ -68,7 +65,7 @@ def test_a_data_set_is_not_overwritten(conf, scan, capsys):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["no.nrrd"], "no.nrrd"),
+        (["missing.nrrd"], "missing.nrrd"),
         (["{scan}", "rreduce=2"], "dataset.volume.rreduce: no such key"),
         (["{scan}", "--name", "a/b"], "--name: expected a letter"),
         (["{scan}", "dims=[1,2,3]"], "leave them out"),
@@ -76,7 +73,69 @@ def test_a_data_set_is_not_overwritten(conf, scan, capsys):
     ],
 )
 def test_mistakes_write_nothing(conf, scan, capsys, words, message):
-    before = sorted(path.name for path in (conf / "dataset").iterdir())
     assert main(["new", *(word.format(scan=scan) for word in words)]) == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
-    assert sorted(path.name for path in (conf / "dataset").iterdir()) == before
+    assert not conf.exists()
+
+
+def test_the_data_set_of_texgs_that_it_replaces_is_left_as_it_is(conf, scan):
+    shipped = (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes()
+    assert main(["new", str(scan), "--name", "engine", "--force"]) == 0
+    assert (ROOT / "conf" / "dataset" / "engine.yaml").read_bytes() == shipped
+    assert compose(("dataset=engine",)).dataset.volume.file == str(scan)
+
+
+@pytest.mark.parametrize("name", ["no", "on", "null", "true", "Off", "nan", "inf", "1e3", "a" * 300])
+def test_names_that_are_no_text_to_yaml_or_no_file_are_refused(conf, scan, capsys, name):
+    assert main(["new", str(scan), "--name", name]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("texgs new: --name: ")
+    assert not conf.exists()
+
+
+@pytest.mark.parametrize(
+    "folder",
+    ["\U0001f52c scans", "x\u200dy", "no: [1, #2]", 'it\'s "quoted"', "tab\tline\nend", "back\\slash $HOME"],
+)
+def test_any_path_is_read_again(conf, scan, tmp_path, folder):
+    file = tmp_path / folder / "scan.npy"
+    file.parent.mkdir()
+    scan.rename(file)
+    assert main(["new", str(file), "--name", "mine"]) == 0
+    assert compose(("dataset=mine",)).dataset.volume.file == str(file)
+
+
+@pytest.mark.parametrize("name", ["${oc.env:HOME}.npy", "${.npy", "a\udcff.npy"])
+def test_a_path_that_no_configuration_can_hold_is_refused(conf, scan, tmp_path, capsys, name):
+    scan.rename(tmp_path / name)
+    assert main(["new", str(tmp_path / name), "--name", "mine"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.endswith("rename it")
+    assert not conf.exists()
+
+
+def test_tfs_of_a_narrow_range_far_from_zero_keep_their_digits(conf, tmp_path):
+    """A field of 1e8 and 1e8 + 8: six digits would make both ends of the TF the same."""
+    values = np.full((8, 8, 8), 1e8, np.float32)
+    values[2:6, 2:6, 2:6] += 8
+    np.save(tmp_path / "far.npy", values)
+    assert main(["new", "far.npy", "--name", "far"]) == 0
+    (tf,) = compose(("dataset=far",)).dataset.basic_tfs.values()
+    first, last = tf.opacity[0][0], tf.opacity[-1][0]
+    assert 1e8 < first < 1e8 + 8 <= last < 1e8 + 9
+    assert tf.color[0][0] == first
+
+
+def test_tfs_from_files_keep_every_digit(conf, scan, tmp_path):
+    value = 100.12345678901234
+    write_tf(tmp_path / "tf.json", TransferFunction(((value, 0), (140, 0.5)), ((100, 1, 0, 0),)))
+    assert main(["new", str(scan), "--name", "mine", "--tf", "tf.json"]) == 0
+    (read,) = compose(("dataset=mine",)).dataset.basic_tfs.values()
+    assert read.opacity[0][0] == value
+
+
+def test_a_document_that_is_read_as_something_else_is_not_written(conf, scan, capsys, monkeypatch):
+    monkeypatch.setattr(new, "document", lambda config, keys: DOCUMENT)
+    assert main(["new", str(scan), "--name", "mine"]) == 2
+    assert "mine: expected to read" in capsys.readouterr().err
+    assert not conf.exists()

@@ -119,6 +119,8 @@ def test_a_cancelled_job_goes_on_in_a_run_to_the_first_fit(slurm, work, start):
     assert len(submitted) == 1 + 2 + 3, (
         f"volume and transfer, views and sheet twice, three phases: {submitted}"
     )
+    cores = slurm.call("squeue", "--noheader", "--states=all", "--format=%C").split()
+    assert max(map(int, cores)) <= 8, "more cores than many nodes have"
     (settings,) = (work / "results" / ".conf").glob("transfer-*.yaml")
     assert "$HOME" in settings.read_text(), "what a shell would make of $HOME is no title"
 

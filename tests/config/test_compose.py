@@ -4,8 +4,9 @@ from itertools import product
 
 import pytest
 
-from texgs.config.compose import compose, groups, members
+from texgs.config.compose import compose
 from texgs.config.describe import describe, keys
+from texgs.config.project import groups, members
 from texgs.core.errors import ConfigError
 
 GROUPS = ("dataset", "device", "experiment", "tracking", "views")
@@ -89,7 +90,7 @@ def test_config_is_light():
     """A Snakefile imports it in every job."""
     code = (
         "import sys; import texgs.config.stage, texgs.config.compose;"
-        "heavy = {'torch', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'};"
+        "heavy = {'torch', 'kornia', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'};"
         "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -1,4 +1,7 @@
-"""Every data set of conf/dataset: its transfer functions, where it comes from, and the paper's numbers."""
+"""Every data set that texgs has: its transfer functions, where it comes from, and the paper's numbers.
+
+A user's own data sets are in conf/dataset too, and need not follow the rules for these.
+"""
 
 import json
 import re
@@ -6,13 +9,13 @@ import re
 import pytest
 
 from tests.real_data import real_data
+from tests.shipped import DATASETS, tracked
 from texgs.cli.stages.tf import check_basic_tfs, in_data_values
-from texgs.config.compose import FOLDER, compose, members
+from texgs.config.compose import compose
 from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.core.errors import ConfigError
 from texgs.volume.sources import open_source
 
-NAMES = members("dataset")
 # The paper's Tables 1 and 8: samples along x, y, z; width of views; basic scenes.
 PAPER = {
     "five_jets": ((256, 256, 256), 800, 2),
@@ -38,7 +41,7 @@ def dataset(name):
 
 
 def with_key(key):
-    return [name for name in NAMES if dataset(name).volume[key] is not None]
+    return [name for name in DATASETS if dataset(name).volume[key] is not None]
 
 
 @pytest.fixture
@@ -47,27 +50,27 @@ def manifest():
     return {entry["file"]: entry for entry in json.loads(real_data("volumes/manifest.json").read_text())}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", DATASETS)
 def test_is_named_like_its_file_and_says_who_made_it(name):
     assert dataset(name).name == name
     assert dataset(name).title
     assert dataset(name).source
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", DATASETS)
 def test_basic_tfs_are_valid_and_disjoint(name):
     check_basic_tfs(dataset(name))
     assert bool(dataset(name).basic_tfs) == (dataset(name).views_folder is None)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if dataset(name).tf_values == "fraction"])
+@pytest.mark.parametrize("name", [name for name in DATASETS if dataset(name).tf_values == "fraction"])
 def test_fractions_of_a_range_map_to_data_values(name):
     for tf, points in dataset(name).basic_tfs.items():
         first, last = in_data_values(tf, points, "fraction", -2.0, 3.0).support
         assert -2.0 <= first < last <= 3.0
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", DATASETS)
 def test_has_one_source(name):
     volume, views = dataset(name).volume, dataset(name).views_folder
     assert [volume.generator, volume.file, views].count(None) == 2
@@ -112,7 +115,7 @@ def test_has_the_numbers_of_the_paper(name):
 
 def test_stand_ins_are_labelled():
     titles = {name.replace("_", " ") for name in PAPER}
-    stand_ins = {name: dataset(name).stand_in for name in NAMES if dataset(name).stand_in}
+    stand_ins = {name: dataset(name).stand_in for name in DATASETS if dataset(name).stand_in}
     assert stand_ins == {"jets": "five jets", "turbulence": "vortex"}
     assert set(stand_ins.values()) <= titles
     assert not set(stand_ins) & set(PAPER)
@@ -143,5 +146,14 @@ def test_the_published_views_are_found():
 
 
 def test_no_file_is_left_out():
-    assert set(PAPER) <= set(NAMES)
-    assert {path.suffix for path in (FOLDER / "dataset").iterdir()} == {".yaml"}
+    assert set(PAPER) <= set(DATASETS)
+    assert tracked("conf/dataset") == sorted(f"{name}.yaml" for name in DATASETS)
+
+
+def test_a_data_set_of_the_user_need_not_follow_these_rules(tmp_path, monkeypatch):
+    """`texgs new` writes neither `source` nor `url`; the lists above must not see it."""
+    (tmp_path / "conf" / "dataset").mkdir(parents=True)
+    (tmp_path / "conf" / "dataset" / "scan.yaml").write_text("name: scan\nvolume: {file: scan.nrrd}\n")
+    monkeypatch.chdir(tmp_path)
+    assert dataset("scan").source == ""
+    assert "scan" not in with_key("file")

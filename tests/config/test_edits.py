@@ -1,7 +1,8 @@
 import pytest
 
-from texgs.config.compose import compose, members
+from texgs.config.compose import compose
 from texgs.config.edits import edits
+from texgs.config.project import members
 from texgs.config.stage import EDITS
 from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
@@ -24,15 +25,15 @@ def test_every_edit_of_conf_composes_and_is_named_after_its_file():
 
 
 def test_what_an_edit_starts_from_comes_before_it():
-    assert names("edit=crimson") == ["tube", "crimson"]
-    assert names("edits=[glass, crimson, tube]") == ["glass", "tube", "crimson"]
+    assert names("edit=crimson") == ["lobe", "crimson"]
+    assert names("edits=[glass, crimson, lobe]") == ["glass", "lobe", "crimson"]
 
 
 def test_a_base_and_parts_can_be_given_as_words():
-    words = ("edit=glass", "edit.base=tube", "edit.parts=[TF02/tube]", "edit.name=part")
-    tube, part = (compose(each).edit for each in edits(words))
-    assert (tube.name, tube.kind, tube.base, list(tube.parts)) == ("tube", "segment", None, [])
-    assert (part.name, part.kind, part.base, list(part.parts)) == ("part", "image", "tube", ["TF02/tube"])
+    words = ("edit=glass", "edit.base=lobe", "edit.parts=[TF02/lobe]", "edit.name=part")
+    lobe, part = (compose(each).edit for each in edits(words))
+    assert (lobe.name, lobe.kind, lobe.base, list(lobe.parts)) == ("lobe", "segment", None, [])
+    assert (part.name, part.kind, part.base, list(part.parts)) == ("part", "image", "lobe", ["TF02/lobe"])
 
 
 def test_a_changed_value_holds_for_the_edit():
@@ -46,6 +47,10 @@ def test_a_changed_value_holds_for_the_edit():
         (("edits=[glass, glass]",), "edits: expected different names, got glass twice"),
         (("edits=[glas]",), "edit: expected one of crimson, glass, "),
         (("edit=glass", "edit.base=glass"), "edit.base: glass starts from itself"),
+        (("edit=glass", "edit.base=tubes"), "edit.base: expected the file of a scene or one of .* mean tube"),
+        (("edit=glass", "edit.parts=[TF09]"), "edit.parts: expected some of TF01, .*, got TF09"),
+        (("edit=glass", "edit.base=tube", "edit.parts=[TF02/tub]"), "got TF02/tub, did you mean TF02/tube"),
+        (("edit=tube", "edit.segment.model=TF09"), "edit.segment.model: expected one of TF01, .*, got TF09"),
         (("edit=glass", "edit.image.lambda_s=1.5"), "edit.image.lambda_s: expected at most 1, got 1.5"),
         (("edit=glass", "edit.image.recipe=patch"), "expected one of default, .* did you mean patches"),
         (("edit=glass", "edit.name=a/b"), "edit.name: expected a letter and then letters"),
@@ -57,7 +62,7 @@ def test_a_mistake_is_one_sentence(words, message):
 
 
 def test_each_kind_has_its_stage_and_the_models_are_those_of_another_configuration():
-    for name, kind in (("glass", "image"), ("gold", "text"), ("tube", "segment")):
+    for name, kind in (("glass", "image"), ("gold", "text"), ("lobe", "segment")):
         config = compose(("dataset=engine", f"edit={name}"))
         applying = [stage for stage in STAGES.values() if stage.applies(config)]
         assert {stage.name for stage in applying} == {key for key, kinds in EDITS.items() if kind in kinds}
@@ -66,7 +71,7 @@ def test_each_kind_has_its_stage_and_the_models_are_those_of_another_configurati
 def test_an_edit_reads_the_scene_of_its_base():
     config = compose(("dataset=engine", "edit=crimson"))
     files = STAGES["edit_text"].inputs(config)
-    assert files["scene"].parts[-3:] == ("edits", "tube", "scene.yaml")
+    assert files["scene"].parts[-3:] == ("edits", "lobe", "scene.yaml")
     assert files["views.TF02"].parts[-3:] == ("TF02", "views", "transforms_train.json")
     assert STAGES["edit_text"].output(config).parts[-2:] == ("edits", "crimson")
     with pytest.raises(ConfigError, match="an edit is of a scene, with all basic TFs"):

@@ -1,6 +1,7 @@
 import pytest
 
-from texgs.config.compose import compose, members
+from texgs.config.compose import compose
+from texgs.config.project import members
 from texgs.config.stage import fit_folder
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants

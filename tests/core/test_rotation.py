@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from texgs.core.errors import ShapeError
-from texgs.core.rotation import matrices_to_quats, quats_to_matrices
+from texgs.core.rotation import quats_to_matrices
 
 
 def random_quats(n, seed=0):
@@ -33,26 +33,19 @@ def test_product_of_matrices_is_hamilton_product():
     torch.testing.assert_close(quats_to_matrices(product), quats_to_matrices(p) @ quats_to_matrices(q))
 
 
-def test_round_trip():
-    quats = torch.nn.functional.normalize(random_quats(1000), dim=-1)
-    quats = torch.where(quats[:, :1] < 0, -quats, quats)
-    torch.testing.assert_close(matrices_to_quats(quats_to_matrices(quats)), quats)
-
-
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_half_turns(axis):
     quat = torch.zeros(4, dtype=torch.float64)
     quat[1 + axis] = 1
-    torch.testing.assert_close(matrices_to_quats(quats_to_matrices(quat)), quat)
+    expected = -torch.ones(3, dtype=torch.float64)
+    expected[axis] = 1
+    torch.testing.assert_close(quats_to_matrices(quat), torch.diag(expected))
 
 
-@pytest.mark.parametrize("function", [quats_to_matrices, lambda q: matrices_to_quats(quats_to_matrices(q))])
-def test_gradients(function):
-    assert torch.autograd.gradcheck(function, random_quats(20).requires_grad_())
+def test_gradients():
+    assert torch.autograd.gradcheck(quats_to_matrices, random_quats(20).requires_grad_())
 
 
 def test_wrong_shapes():
     with pytest.raises(ShapeError, match=r"quats: expected \[\.\.\., 4\], got \[2, 3\]"):
         quats_to_matrices(torch.zeros(2, 3))
-    with pytest.raises(ShapeError, match=r"matrices: expected \[\.\.\., 3, 3\], got \[3, 4\]"):
-        matrices_to_quats(torch.zeros(3, 4))

@@ -1,9 +1,9 @@
 """Composed scenes of two kinds of objects, and which surfels are of which: the truth of a segmentation."""
 
 import torch
+from kornia.geometry.conversions import rotation_matrix_to_quaternion
 from torch.nn.functional import normalize
 
-from texgs.core.rotation import matrices_to_quats
 from texgs.raster import rasterize
 from texgs.scene.model import Model, Optics, geometry, raw_material
 from texgs.volume.cameras import icosphere
@@ -20,7 +20,7 @@ def shell(n, radius, middle, color, opacity, seed=0):
     size = 2.0 * radius / n**0.5
     return {
         "means": radius * normals + torch.tensor(middle),
-        "quats": matrices_to_quats(axes),
+        "quats": rotation_matrix_to_quaternion(axes),
         "scales": torch.full((n, 2), size).log(),
         "opacities": torch.full((n,), opacity).logit(),
         "colors": torch.tensor(color).repeat(n, 1),

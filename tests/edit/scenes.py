@@ -1,9 +1,9 @@
 """A textured ball in memory, seen from around."""
 
 import torch
+from kornia.geometry.conversions import rotation_matrix_to_quaternion
 
 from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
-from texgs.core.rotation import matrices_to_quats
 from texgs.scene.model import Model, Optics, raw_material
 
 
@@ -28,7 +28,7 @@ def ball(count=400, side=5, opacity=4.0):
     return Model(
         {
             "means": RADIUS * normals,
-            "quats": matrices_to_quats(axes),
+            "quats": rotation_matrix_to_quaternion(axes),
             "scales": torch.full((count, 2), sigma).log(),
             "opacities": torch.full((count,), opacity),
             "colors": colors,

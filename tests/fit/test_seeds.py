@@ -194,7 +194,7 @@ def test_mistakes_in_points_are_named(tmp_path):
     with pytest.raises(ArgumentError, match=r"points3d\.ply: no such file; .*visible needs no points"):
         seeds(tmp_path, kind="points")
     path.write_bytes(b"no points at all")
-    with pytest.raises(ArgumentError, match=r"points3d\.ply: expected a PLY file with vertices"):
+    with pytest.raises(ArgumentError, match=r"points3d\.ply: expected a whole PLY file"):
         seeds(tmp_path)
     write_ply(path, {name: column for name, column in xyz().items() if name != "z"})
     with pytest.raises(ArgumentError, match="expected vertices with x, y and z, found no z"):
@@ -207,7 +207,7 @@ def test_mistakes_in_points_are_named(tmp_path):
         seeds(tmp_path)
     write_ply(path, xyz())
     path.write_bytes(path.read_bytes()[:-12])
-    with pytest.raises(ArgumentError, match="expected a PLY file with vertices"):
+    with pytest.raises(ArgumentError, match="expected a whole PLY file"):
         seeds(tmp_path)
 
 

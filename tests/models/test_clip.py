@@ -182,5 +182,5 @@ def test_weights_that_are_missing_or_of_another_model(folder, tmp_path, monkeypa
         Clip.load(tmp_path)
     (tmp_path / "config.json").write_text((folder / "config.json").read_text())
     (tmp_path / "model.safetensors").write_bytes((folder / "model.safetensors").read_bytes()[:99])
-    with pytest.raises(ArgumentError, match="expected a clip model of transformers, got one that cannot be"):
+    with pytest.raises(ArgumentError, match=r"expected a clip model of transformers, got .*; copy"):
         Clip.load(tmp_path)

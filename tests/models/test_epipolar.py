@@ -2,6 +2,7 @@
 
 import pytest
 import torch
+from kornia.geometry.epipolar import essential_from_Rt, fundamental_from_essential
 from torch.testing import assert_close
 
 from tests.models.tiny_diffusion import save_tiny
@@ -35,6 +36,15 @@ def test_points_lie_on_their_lines(angles):
     lines = x @ fundamental(view, key)
     distance = (lines * y).sum(dim=1).abs() / lines[:, :2].norm(dim=1)
     assert float(distance.max()) < 1e-3  # cameras are float32
+
+
+@pytest.mark.parametrize("angles", PAIRS)
+def test_fundamental_matrix_of_kornia(angles):
+    view, key = pair(angles)
+    K, R, t = zip(*((c.K, c.viewmat[:3, :3], c.viewmat[:3, 3:]) for c in (view, key)), strict=True)
+    expected = fundamental_from_essential(essential_from_Rt(R[0], t[0], R[1], t[1]), *K).T
+    found = fundamental(view, key).float()
+    assert_close(found / found.norm(), expected / expected.norm(), atol=1e-5, rtol=0)
 
 
 @pytest.mark.parametrize("angles", PAIRS)

@@ -208,7 +208,7 @@ def packed(path, data):
 def test_files_that_are_no_compact_model_are_named(tmp_path):
     with pytest.raises(ArgumentError, match="none: no such file"):
         read_compact(tmp_path / "none")
-    with pytest.raises(ArgumentError, match="cannot be read"):
+    with pytest.raises(ArgumentError, match="got a folder"):
         read_compact(tmp_path)
     for content in (b"", b"ply\n", b'{"a":1}\n'):
         (tmp_path / "m").write_bytes(content)

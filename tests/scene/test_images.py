@@ -82,7 +82,7 @@ def test_mistakes_are_named(tmp_path):
     view, _ = random_view(tmp_path, cameras(1, size=8)[0])
     with pytest.raises(ArgumentError, match="reduce: expected a divisor of 8 x 8 pixels, got 3"):
         load([view], 3)
-    with pytest.raises(ArgumentError, match=r"gone\.png: expected an image"):
+    with pytest.raises(ArgumentError, match=r"gone\.png: no such file"):
         load([replace(view, path=tmp_path / "gone.png")])
 
 

@@ -74,7 +74,7 @@ def test_grids_are_float_cubes_between_0_and_1(name, plumes):
     grid = (
         plumes
         if name == "jets"
-        else GENERATORS[name](16, **({"duration": 0.02} if name == "turbulence" else {}))
+        else GENERATORS[name](32, **({"duration": 0.02} if name == "turbulence" else {}))
     )
     assert grid.values.dtype == np.float32
     assert len(set(grid.dims)) == 1

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.shipped import DATASETS
+
 ROOT = Path(__file__).parents[2]
 
 # The smallest experiment that has all rules.
@@ -38,6 +40,9 @@ class Project:
                 self.sources / name,
                 ignore=shutil.ignore_patterns("__pycache__", *([] if native else ["csrc", "_native"])),
             )
+        for path in (self.sources / "conf" / "dataset").iterdir():
+            if path.stem not in DATASETS:  # one of the user
+                path.unlink()
         shutil.copy(ROOT / "Snakefile", self.sources)
 
     def texgs(self, *words: str) -> subprocess.CompletedProcess[str]:

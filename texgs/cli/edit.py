@@ -3,7 +3,10 @@
 import argparse
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from texgs.scene.scene_file import Scene
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.errors import ArgumentError
     from texgs.scene.scene_file import read_scene, read_values, scene_of, write_scene
 
-    read_scene(arguments.scene)  # says what is wrong with it before anything is changed
+    before = read_scene(arguments.scene)  # says what is wrong with it before anything is changed
     values = read_values(arguments.scene)
     values["models"] = {str(name): entry for name, entry in values["models"].items()}
     for word in arguments.overrides:
@@ -36,8 +39,26 @@ def run(arguments: argparse.Namespace) -> int:
         except ArgumentError as error:
             raise ArgumentError(f"{word}: {error}") from error
     scene = scene_of(values, arguments.scene.parent)
+    require_openable(scene, before)
     print(write_scene(arguments.output, scene))
     return 0
+
+
+def require_openable(scene: "Scene", before: "Scene") -> None:
+    """Require that the files that edits have brought into a scene are there, whole, and of its models.
+
+    Raises:
+        ArgumentError, ShapeError: naming the model and the file.
+    """
+    from texgs.core.errors import TexgsError
+
+    for name, entry in scene.models.items():
+        if name in before.models and entry.files == before.models[name].files:
+            continue
+        try:
+            entry.open()
+        except TexgsError as error:
+            raise type(error)(f"models.{name}: {error}") from error
 
 
 def apply(values: dict[str, Any], word: str, folder: Path) -> None:
@@ -110,12 +131,13 @@ def plain(text: str) -> Any:
     import yaml
 
     from texgs.core.errors import ArgumentError
+    from texgs.core.plain_yaml import parse_yaml
 
     if text.startswith("#"):
         return text
     try:
-        return yaml.safe_load(f"[{text}]" if "," in text and not text.startswith("[") else text)
-    except yaml.YAMLError as error:
+        return parse_yaml(f"[{text}]" if "," in text and not text.startswith("[") else text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise ArgumentError("expected a number, true, false, r,g,b or #rrggbb") from error
 
 

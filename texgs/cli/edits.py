@@ -9,8 +9,27 @@ from texgs.cli.segments import require_name, voting_views
 from texgs.cli.stages.edit_image import picture_of, recipe_of
 from texgs.cli.stages.edit_segment import DISTANCE, FOV, clicks_of
 from texgs.cli.stages.parts import shares
+from texgs.config.compose import compose
+from texgs.config.edits import lineage
+from texgs.config.inputs import scene_before
+from texgs.core.errors import MissingDataError
 from texgs.models.filters.vocabulary import understand
 from texgs.models.guidance import require_instruction
+
+
+def require_base(words: tuple[str, ...]) -> None:
+    """Require of an edit by hand that what it starts from is there, and has the parts that it changes.
+
+    Raises:
+        ConfigError, MissingDataError: naming what is not.
+    """
+    chain = lineage(words)
+    config = compose(words)
+    if config.edit.base is not None and not scene_before(config).is_file():
+        name, before = chain[-2]
+        raise MissingDataError(
+            f"edit.base: {name} is not done yet; run texgs edit_{compose(before).edit.kind} edit={name} first"
+        )
 
 
 def check_edit(config: DictConfig) -> None:

@@ -2,13 +2,15 @@
 
 import argparse
 import importlib
+import io
+import os
 import signal
 import sys
 from collections.abc import Sequence
 
 from texgs import __version__
 from texgs.core.errors import TexgsError
-from texgs.core.memory import keep_freed_memory
+from texgs.core.memory import keep_freed_memory, told
 
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
 # the verbs of stages share the module texgs.cli.stage.
@@ -30,7 +32,9 @@ STAGE_VERBS = {
     "edit_metrics": "measure an edited scene: CLIP, style, consistency, time, size",
 }
 VERBS = {
+    "init": "start a folder with configurations of your own",
     "new": "start a data set from a volume file of your own, with suggested transfer functions",
+    "run": "run the workflow: from the volume to the report, whatever is not done yet",
     **STAGE_VERBS,
     "edit": "change colours, opacities and lights of a scene",
     "segment": "segment a model of a scene by clicks, to edit a part of it",
@@ -61,9 +65,11 @@ def parser() -> argparse.ArgumentParser:
     return top
 
 
-def parse(argv: Sequence[str] | None) -> argparse.Namespace:
+def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The arguments; KEY=VALUE may stand anywhere, also behind options, where argparse alone gives up."""
     top = parser()
+    if argv[:1] == ["run"] and argv[1:2] not in (["-h"], ["--help"]):
+        argv = ["run", "--", *argv[1:]]  # its options are those of snakemake
     arguments, rest = top.parse_known_args(argv)
     overrides: list[str] | None = getattr(arguments, "overrides", None)
     if rest and (overrides is None or any(word.startswith("-") for word in rest)):
@@ -81,20 +87,44 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Returns:
         Exit code: 0 done, 1 the verb says no, 2 a mistake of the user or a limit of the machine (told in one
-        sentence on stderr), 130 interrupted.
+        sentence on stderr), 130 interrupted, 141 nobody reads the output any more.
     """
-    arguments = parse(argv)
-    if argv is None:  # a process of its own: told to end, it ends as if interrupted, and its run as killed
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        keep_freed_memory()
+    if argv is None:
+        own_process()
+    words = list(sys.argv[1:] if argv is None else argv)
+    verb = next(iter(words), "")
     try:
-        return int(arguments.run(arguments))
+        try:
+            arguments = parse(words)
+            with told():
+                return int(arguments.run(arguments))
+        finally:
+            sys.stdout.flush()
     except TexgsError as error:
-        print(f"texgs {arguments.verb}: {error}", file=sys.stderr)
+        print(f"texgs {verb}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"texgs {arguments.verb}: interrupted", file=sys.stderr)
+        print(f"texgs {verb}: interrupted; {again(verb)}", file=sys.stderr)
         return 130
+    except BrokenPipeError:  # as `| head` leaves it; what is still in the buffer goes nowhere
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+
+
+def own_process() -> None:
+    """Set up what holds for the whole process."""
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # its run ends as killed
+    for stream in (sys.stdout, sys.stderr):  # what a terminal cannot show is no reason to stop
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    keep_freed_memory()
+
+
+def again(verb: str) -> str:
+    """What the same command does after an interruption."""
+    if verb in STAGE_VERBS or verb == "run":
+        return "the same command goes on where it stopped"
+    return "the same command starts again"
 
 
 if __name__ == "__main__":

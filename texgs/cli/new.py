@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import json
+import math
 import re
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -40,36 +41,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
     from texgs.cli.stage import ensure
-    from texgs.config.compose import FOLDER, check_name
+    from texgs.config.compose import check_name
+    from texgs.config.files import shown
+    from texgs.config.project import members, own_folder
     from texgs.config.schema import BasicTF
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
     check_name("--name", name)
-    target = FOLDER / "dataset" / f"{name}.yaml"
-    if target.exists() and not arguments.force:
-        raise ArgumentError(f"{target}: is there already; choose another --name, or replace it with --force")
+    target = own_folder() / "dataset" / f"{name}.yaml"
+    if name in members("dataset") and not arguments.force:
+        raise ArgumentError(f"{name}: is there already; choose another --name, or replace it with --force")
     config = configuration(name, arguments.file, arguments.overrides)
     ensure("volume", config)
     basic = basic_tfs(config, arguments.tf, arguments.count)
     config.dataset.basic_tfs = {key: BasicTF([*tf.opacity], [*tf.color]) for key, tf in basic.items()}
     ensure("transfer", config)
-    keys = {key: config.dataset.volume[key] for key in ("file", *changed(arguments.overrides))}
-    write_bytes(target, document(name, keys, basic).encode())
+    text = document(config, ["file", *changed(arguments.overrides)])
+    check_document(text, config)
+    write_bytes(target, text.encode())
     picture = Path(config.results, name, "transfer", "transfer.png")
-    print(f"{target}: {len(basic)} basic TFs to edit; {picture} shows them")
-    print(f"then: snakemake --cores all --config dataset={name}")
+    print(f"{shown(target)}: {len(basic)} basic TFs to edit; {picture} shows them")
+    print(f"then: texgs run dataset={name}")
     return 0
 
 
 def changed(overrides: list[str]) -> list[str]:
     """Names of the keys that were given."""
-    return [word.partition("=")[0] for word in overrides]
+    return [word.partition("=")[0].lstrip("+") for word in overrides]
 
 
 def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
     """The configuration as it will be with the new data set, but without basic TFs and tracking.
 
     Raises:
+        ArgumentError: if the file has a name that no configuration can hold.
         ConfigError: if a key is unknown or has the wrong type.
     """
     from omegaconf import OmegaConf
@@ -77,11 +82,16 @@ def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
     from texgs.config.compose import compose
     from texgs.config.schema import Dataset
 
+    path = str(file.absolute())
+    if "${" in path:
+        raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")
+    if any("\ud800" <= letter <= "\udfff" for letter in path):
+        raise ArgumentError(f"{path!r}: expected a path in UTF-8; rename it")
     words = [f"dataset.volume.{word}" for word in overrides]
     blank = "dataset.volume.generator=null"
     config = compose(("tracking=none", blank, *words)).copy()
     OmegaConf.set_readonly(config, False)
-    config.dataset.volume.file = str(file.absolute())
+    config.dataset.volume.file = path
     fresh = OmegaConf.merge(
         OmegaConf.structured(Dataset(name=name)), {"title": name, "volume": config.dataset.volume}
     )
@@ -103,36 +113,80 @@ def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -
     from texgs.volume.tf_files import read_tf
 
     summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
-    if files:
-        basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
-        check_disjoint(basic)
-        for path, tf in zip(files, basic.values(), strict=True):
-            low, high = tf.support
-            if high <= 1 < summary["maximum"]:
-                raise ArgumentError(
-                    f"{path}: expected values of the data, which go up to {summary['maximum']:g}, got a TF "
-                    f"on [{low:g}, {high:g}]; rescale it to the data in ParaView first"
-                )
-        return basic
-    return suggest(np.array(summary["histogram"]), summary["minimum"], summary["maximum"], count)
+    low, high = summary["minimum"], summary["maximum"]
+    if not files:
+        found = suggest(np.array(summary["histogram"]), low, high, count)
+        return {name: rounded(tf, low, high) for name, tf in found.items()}
+    basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
+    check_disjoint(basic)
+    for path, tf in zip(files, basic.values(), strict=True):
+        first, last = tf.support
+        if last <= 1 < high:
+            raise ArgumentError(
+                f"{path}: expected values of the data, which go up to {high:g}, got a TF "
+                f"on [{first:g}, {last:g}]; rescale it to the data in ParaView first"
+            )
+    return basic
 
 
-def document(name: str, volume: dict[str, Any], basic: Mapping[str, TransferFunction]) -> str:
-    """The YAML of a data set, a line per list of points."""
-    lines = [f"name: {name}", f"title: {name}", "volume:"]
-    lines += [f"  {key}: {json.dumps(plain(value))}" for key, value in volume.items()]
-    lines += [
-        "# Points [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.",
-        "basic_tfs:",
-    ]
-    for key, tf in basic.items():
-        lines.append(f"  {key}:")
-        for part, points in tf.to_dict().items():
-            rounded = [[float(f"{number:.6g}") for number in point] for point in points]
-            lines.append(f"    {part}: {json.dumps(rounded)}")
-    return "\n".join(lines) + "\n"
+def rounded(tf: TransferFunction, low: float, high: float) -> TransferFunction:
+    """A TF with numbers that are short to read and keep a millionth of the range of the data."""
+    from texgs.volume.transfer import TransferFunction
+
+    digits = 6 + math.ceil(math.log10(max(max(abs(low), abs(high)) / (high - low), 1)))
+
+    def short(points: tuple[tuple[float, ...], ...]) -> tuple[Any, ...]:
+        return tuple(tuple(float(f"{number:.{digits}g}") for number in point) for point in points)
+
+    return TransferFunction(short(tf.opacity), short(tf.color))
 
 
-def plain(value: Any) -> Any:
-    """A value of the configuration as JSON knows it."""
-    return list(value) if hasattr(value, "__iter__") and not isinstance(value, str) else value
+def document(config: DictConfig, keys: list[str]) -> str:
+    """The YAML of a data set, a line per list of points.
+
+    Args:
+        config: with the data set.
+        keys: of its volume that are written.
+    """
+    import yaml
+    from omegaconf import OmegaConf
+
+    class Dumper(yaml.SafeDumper):
+        """Lists on one line each."""
+
+    Dumper.add_representer(
+        list, lambda dumper, items: dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=True)
+    )
+    dataset: Mapping[str, Any] = OmegaConf.to_container(config.dataset, resolve=True)  # type: ignore[assignment]
+    written = {
+        "name": dataset["name"],
+        "title": dataset["title"],
+        "volume": {key: dataset["volume"][key] for key in keys},
+        "basic_tfs": dataset["basic_tfs"],
+    }
+    note = "# Points are [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.\n"
+    return note + yaml.dump(written, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=10**6)
+
+
+def check_document(text: str, config: DictConfig) -> None:
+    """Require that the configuration reads a document as the data set that it was written for.
+
+    Raises:
+        ConfigError: if it does not.
+    """
+    from omegaconf import OmegaConf
+
+    from texgs.cli.stages.tf import check_basic_tfs
+    from texgs.config.compose import compose
+    from texgs.core.errors import ConfigError
+
+    name = config.dataset.name
+    with tempfile.TemporaryDirectory() as folder:
+        write_bytes(Path(folder, "dataset", f"{name}.yaml"), text.encode())
+        read = compose((f"dataset={name}",), first=Path(folder)).dataset
+    check_basic_tfs(read)
+    before, after = (OmegaConf.to_container(each, resolve=True) for each in (config.dataset, read))
+    if before != after:
+        raise ConfigError(
+            f"{name}: expected to read {before} from the new file, got {after}; nothing was written"
+        )

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.code import ROOT, code_digest, digest
-from texgs.config.compose import FOLDER
 from texgs.config.kept import fingerprint, keep, recall
+from texgs.config.project import folders
 from texgs.core.errors import ConfigError, MissingDataError
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
-    key = digest("\n".join([*words, data, fingerprint(ROOT / "texgs"), fingerprint(FOLDER)]))
+    key = digest("\n".join([*words, data, fingerprint(ROOT / "texgs", *folders())]))
     if is_job and (kept := recall(path, key)):
         return Plan(**kept), []
     plan, missing = make(words)

@@ -6,6 +6,7 @@ import shutil
 import sys
 import tempfile
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from texgs.core.errors import TexgsError
@@ -29,6 +30,47 @@ def python() -> Finding:
     if (3, 11) <= sys.version_info[:2] <= (3, 13):
         return Finding("Python", "ok", found)
     return Finding("Python", "missing", found, "install Python 3.11 to 3.13", is_required=True)
+
+
+def packages() -> Finding:
+    """The packages that every stage needs: whether they are there, in the versions that texgs asks for."""
+    from importlib import metadata
+
+    from packaging.requirements import Requirement
+
+    lacking = []
+    for line in metadata.requires("texgs") or ():
+        wanted = Requirement(line)
+        if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
+            continue
+        try:
+            found = metadata.version(wanted.name)
+        except metadata.PackageNotFoundError:
+            lacking.append(f"no {wanted.name}")
+            continue
+        if not wanted.specifier.contains(found, prereleases=True):
+            lacking.append(f"{wanted.name} {found}, expected {wanted.specifier}")
+    if lacking:
+        return Finding("packages", "missing", ", ".join(lacking), "install texgs again", is_required=True)
+    return Finding("packages", "ok", "all that texgs asks for")
+
+
+def configuration() -> Finding:
+    """The configuration, without which no stage runs, and where results go."""
+    from texgs.config.compose import FOLDER, compose
+
+    try:
+        results = Path(compose().results).absolute()
+    except TexgsError as error:
+        what, _, advice = str(error).partition("; ")
+        return Finding("configuration", "missing", what, advice, is_required=True)
+    existing = next(folder for folder in (results, *results.parents) if folder.exists())
+    if not os.access(existing, os.W_OK):
+        advice = "work in a folder that you can write to"
+        return Finding(
+            "configuration", "missing", f"{existing}: cannot write there", advice, is_required=True
+        )
+    return Finding("configuration", "ok", f"{FOLDER}, results go to {results}")
 
 
 def compiler() -> Finding:
@@ -146,4 +188,4 @@ def _sentence(error: BaseException) -> str:
     return (str(error) or type(error).__name__).splitlines()[0]
 
 
-PROBES = (python, compiler, native, threads, torch, cuda, opengl, cache, weights)
+PROBES = (python, packages, configuration, compiler, native, threads, torch, cuda, opengl, cache, weights)

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.volume.view_set import Light
 
+MOST_FRAMES = 100_000  # an hour of film
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
 
 
@@ -58,32 +59,44 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.mode not in get_args(Mode):
         raise ArgumentError(f"--mode: expected one of {', '.join(get_args(Mode))}, got {arguments.mode}")
     scene = read_scene(arguments.scene)
-    shots = list(shots_of(arguments, scene.light))
-    suffix = ".png" if len(shots) == 1 else ".mp4"
+    count = frames_of(arguments)
+    shots = shots_of(arguments, scene.light, count)
+    suffix = ".png" if count == 1 else ".mp4"
     output = arguments.output or Path(f"{arguments.scene.stem}{suffix}")
     composition = scene.open(torch_device(arguments.device))
     frames = (
         frame(composition, camera, light, scene.edits, arguments.mode, scene.background)
-        for camera, light in progress(shots, title=str(output), unit="frame")
+        for camera, light in progress(shots, count, title=str(output), unit="frame")
     )
     print(write_frames(output, frames, arguments.fps))
     return 0
 
 
-def shots_of(arguments: argparse.Namespace, light: "Light") -> "Iterator[tuple[Camera, Light]]":
-    """Camera and light of each frame.
+def frames_of(arguments: argparse.Namespace) -> int:
+    """How many frames to render.
+
+    Raises:
+        ArgumentError: if there is none, or more than a film has.
+    """
+    from texgs.core.errors import ArgumentError
+
+    count = PATHS[arguments.path] if arguments.frames is None else int(arguments.frames)
+    if not 1 <= count <= MOST_FRAMES:
+        bound = "at least 1" if count < 1 else f"at most {MOST_FRAMES}"
+        raise ArgumentError(f"--frames: expected {bound}, got {count}")
+    return count
+
+
+def shots_of(arguments: argparse.Namespace, light: "Light", count: int) -> "Iterator[tuple[Camera, Light]]":
+    """Camera and light of each frame, of so many.
 
     Raises:
         ArgumentError: if a number is out of range.
     """
     from texgs.core.camera import orbit
-    from texgs.core.errors import ArgumentError
     from texgs.volume.cameras import test_path
     from texgs.volume.view_set import Light
 
-    count = PATHS[arguments.path] if arguments.frames is None else arguments.frames
-    if count < 1:
-        raise ArgumentError(f"--frames: expected at least 1, got {count}")
     height = arguments.width if arguments.height is None else arguments.height
     lens = (arguments.radius, arguments.fov, arguments.width, height)
     if arguments.path == "test":

@@ -84,6 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.cli.segments import mask_model, voting_views, with_segment
     from texgs.core.device import torch_device
     from texgs.core.image import write_png
+    from texgs.core.names import part_file
     from texgs.edit.lift import lift
     from texgs.edit.preview import preview
     from texgs.scene.compact import open_model
@@ -110,8 +111,7 @@ def run(arguments: argparse.Namespace) -> int:
     )
     keys = ("view", "point", "other", "masks", "vote", "connected")
     facts = {key: getattr(arguments, key) for key in keys}
-    stem = f"{arguments.output.stem}-{name}-{arguments.name}".replace("/", "-")
-    file = arguments.output.with_name(f"{stem}.safetensors")
+    file = arguments.output.with_name(part_file("--name", arguments.output.stem, name, arguments.name))
     sys.stderr.write(f"{name}/{arguments.name}: {found.basis}\n")
     changed = with_segment(scene, f"{name}/{arguments.name}", model, found.mask, file, facts)
     print(write_scene(arguments.output, changed), file, sep="\n")

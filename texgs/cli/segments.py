@@ -12,6 +12,7 @@ import torch
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.names import label
 from texgs.models.masks import MaskModel
 from texgs.scene.model import Model
 from texgs.scene.scene_file import RESERVED, Scene, SceneSegment
@@ -55,7 +56,7 @@ def require_name(name: str | None, where: str) -> None:
     Raises:
         ArgumentError: naming where it comes from.
     """
-    if not name or any(mark in name for mark in RESERVED):
+    if not name or any(mark in label(where, name) for mark in RESERVED):
         raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
 
 

@@ -18,8 +18,9 @@ class HelpWithKeys(argparse.Action):
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
         """Print the help and exit."""
-        from texgs.config.compose import compose, groups
+        from texgs.config.compose import compose
         from texgs.config.describe import describe
+        from texgs.config.project import groups
 
         parser.print_help()
         print(f"\ngroups, each a folder of conf/:\n{groups()}")
@@ -49,6 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the stage that the verb names."""
     if arguments.settings is not None:
         return run_settings(arguments)
+    from texgs.cli.edits import require_base
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
@@ -59,6 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_basic_tfs(config.dataset)
     if stage.name in EDITS:
         require_edit(stage.name, config)
+        require_base(tuple(arguments.overrides))
     for name in tf_names(config) if stage.per_tf else [None]:
         chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
         ensure(arguments.verb, chosen, force=arguments.force)

@@ -1,24 +1,30 @@
 """Compose conf/ and overrides into one checked configuration; a mistake is a sentence that names the key."""
 
-import difflib
 import re
 from collections.abc import Iterator
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 from hydra import compose as hydra_compose
 from hydra import initialize_config_dir
+from hydra.core.config_search_path import ConfigSearchPath
 from hydra.core.config_store import ConfigStore
-from hydra.errors import HydraException, MissingConfigException, OverrideParseException
+from hydra.core.plugins import Plugins
+from hydra.errors import HydraException
+from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
 
-from texgs.config.describe import keys
+from texgs.config.describe import Key, keys
+from texgs.config.files import origin, shortened
+from texgs.config.keys import numbers
+from texgs.config.project import folders
 from texgs.config.schema import Config
+from texgs.config.slips import close, sentence
 from texgs.core.errors import ConfigError
 
-FOLDER = Path(__file__).parents[2] / "conf"
 RESERVED = (
     "volume",
     "transfer",
@@ -28,29 +34,60 @@ RESERVED = (
     "tables",
     "scene",
 )  # folders below `results`
+LONGEST = 100  # characters of a name: it becomes that of files and folders
+NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
 
 
-@lru_cache(maxsize=256)
-def compose(overrides: tuple[str, ...] = ()) -> DictConfig:
+# What Hydra and OmegaConf raise for values and files that they do not understand.
+MISTAKES = (
+    HydraException,
+    OmegaConfBaseException,
+    YAMLError,
+    ArithmeticError,
+    OSError,
+    RecursionError,
+    TypeError,
+    ValueError,
+)
+
+
+class OwnFolders(SearchPathPlugin):
+    """Tells Hydra of the folders before that of texgs."""
+
+    folders: ClassVar[tuple[Path, ...]] = ()
+
+    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
+        """Put the folders in front."""
+        for folder in reversed(self.folders):
+            search_path.prepend("texgs", f"file://{folder}")
+
+
+def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> DictConfig:
     """The configuration, interpolations resolved; read only. Cached, because composing takes 0.1 s.
 
     Args:
         overrides: words such as ``dataset=engine`` or ``views.width=400``, in Hydra's syntax.
+        first: a folder to look for files in before those of the project.
 
     Raises:
-        ConfigError: for an unknown key, group member or value, or one of the wrong type or out of range.
+        ConfigError: for an unknown key, group member or value, or one of the wrong type or out of range;
+            or a file that cannot be read.
     """
-    if not FOLDER.is_dir():
-        raise ConfigError(
-            f"{FOLDER}: no configuration there; use texgs from a clone, installed with `make install`"
-        )
+    return _compose(overrides, (first, *folders()) if first else folders())
+
+
+@lru_cache(maxsize=256)
+def _compose(overrides: tuple[str, ...], places: tuple[Path, ...]) -> DictConfig:
+    *own, shipped = places
     expected = schema()
+    Plugins.instance().register(OwnFolders)
+    OwnFolders.folders = tuple(own)
     try:
-        with initialize_config_dir(str(FOLDER), version_base="1.3"):
+        with initialize_config_dir(str(shipped), version_base="1.3"):
             composed = hydra_compose("config", overrides=list(overrides))
         resolved = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
         checked = OmegaConf.merge(expected, resolved)  # refuses keys added by +key=value
-    except (HydraException, OmegaConfBaseException, ValueError) as error:
+    except MISTAKES as error:
         raise ConfigError(sentence(error)) from error
     config = cast(DictConfig, checked)
     check(config)
@@ -64,17 +101,6 @@ def schema() -> DictConfig:
     made: DictConfig = OmegaConf.structured(Config)
     ConfigStore.instance().store(name="schema", node=made)
     return made
-
-
-def members(group: str) -> list[str]:
-    """Names of the files of a group, such as all data sets."""
-    return sorted(path.stem for path in (FOLDER / group).glob("*.yaml"))
-
-
-def groups() -> str:
-    """The groups of conf/ with their members, a line each."""
-    folders = sorted(path for path in FOLDER.iterdir() if path.is_dir())
-    return "\n".join(f"  {folder.name}={'|'.join(members(folder.name))}" for folder in folders)
 
 
 def check(config: DictConfig) -> None:
@@ -100,16 +126,22 @@ def check(config: DictConfig) -> None:
         check_name("dataset.basic_tfs", tf)
     for entry in keys():
         for name, value in values(config, entry.name):
-            choices = entry.choices
-            if value is None:
-                continue
-            if choices and value not in choices:
-                raise ConfigError(
-                    f"{name}: expected one of {', '.join(choices)}, got {value}{close(value, choices)}"
-                )
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            if is_number and (expected := entry.bounds.complaint(value)):
-                raise ConfigError(f"{name}: expected {expected}, got {value:g}")
+            if value is not None:
+                check_value(entry, name, value)
+
+
+def check_value(entry: Key, name: str, value: Any) -> None:
+    """Compare one value with the choices and bounds of its key.
+
+    Raises:
+        ConfigError: naming the key, and the file where the value is from one.
+    """
+    if entry.choices and value not in entry.choices:
+        found = f"{', '.join(entry.choices)}, got {shortened(value)}{close(value, entry.choices)}"
+        raise ConfigError(f"{origin(name, value)}{name}: expected one of {found}")
+    for number in numbers(value):
+        if expected := entry.bounds.complaint(number):
+            raise ConfigError(f"{origin(name, number)}{name}: expected {expected}, got {shortened(number)}")
 
 
 def is_scene_file(base: str) -> bool:
@@ -124,7 +156,16 @@ def check_name(key: str, name: str) -> None:
         ConfigError: naming the key.
     """
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", str(name)):
-        raise ConfigError(f"{key}: expected a letter and then letters, digits, _ or -, got {name!r}")
+        got = shortened(repr(name))
+        raise ConfigError(f"{key}: expected a letter and then letters, digits, _ or -, got {got}")
+    if len(name) > LONGEST:
+        raise ConfigError(
+            f"{key}: expected at most {LONGEST} characters, got {len(name)}; choose a shorter one"
+        )
+    if NO_TEXT.fullmatch(name):
+        raise ConfigError(
+            f"{key}: {name} is a word that YAML or Hydra does not read as text; choose another name"
+        )
     if name in RESERVED:
         raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
 
@@ -141,38 +182,3 @@ def values(config: Any, name: str) -> Iterator[tuple[str, Any]]:
             yield from ((f"{at}.{below}", leaf) for below, leaf in values(value, rest))
         else:
             yield str(at), value
-
-
-def sentence(error: Exception) -> str:
-    """What is wrong in one sentence, from an exception of Hydra or OmegaConf."""
-    if isinstance(error, MissingConfigException) and error.missing_cfg_file:
-        group, _, name = error.missing_cfg_file.partition("/")
-        found = members(group)
-        hint = close(name, found) or ("; an address goes to tracking.uri" if group == "tracking" else "")
-        return f"{group}: expected one of {', '.join(found)}, got {name}{hint}"
-    if isinstance(error, OverrideParseException):
-        return (
-            f"{error.override}: expected key=value, with quotes around a value that has commas, spaces or ="
-        )
-    if isinstance(error, ValueError) and "group override" in str(error):
-        return "a group: expected the name of a file of conf/, such as dataset=engine, got something else"
-    cause = error.__cause__ or error
-    lines = [line.strip() for line in str(cause).splitlines() if line.strip()]
-    text = lines[0]
-    name = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("full_key:")), "")
-    if unknown := re.match(r"Key '([^']+)' (?:not in|is not in)", text):
-        return no_such_key(name or unknown[1])
-    if missing := re.match(r"Could not override '([^']+)'", str(error)):
-        return no_such_key(missing[1])
-    return f"{name}: {text[0].lower()}{text[1:]}" if name else text
-
-
-def no_such_key(name: str) -> str:
-    """What to say about a key that the schema does not have."""
-    return f"{name}: no such key{close(name, [entry.name for entry in keys()])}; texgs views --help lists all"
-
-
-def close(word: str, known: list[str] | tuple[str, ...]) -> str:
-    """A hint at the known word that is most like the given one."""
-    found = difflib.get_close_matches(str(word), known, n=1, cutoff=0.6)
-    return f", did you mean {found[0]}?" if found else ""

@@ -1,7 +1,9 @@
 """The edits of an experiment, as more words for `compose`."""
 
-from texgs.config.compose import compose, is_scene_file
-from texgs.core.errors import ConfigError
+from texgs.config.compose import close, compose, is_scene_file, members
+from texgs.config.inputs import scene_before
+from texgs.config.locate import tf_names
+from texgs.core.errors import ConfigError, MissingDataError
 
 OF_ONE = ("edit.name=", "edit.kind=", "edit.base=", "edit.parts=")  # not of what an edit starts from
 
@@ -32,7 +34,7 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     Changed values hold for all of them, but for the name, the kind, the base and the parts.
 
     Raises:
-        ConfigError: if it starts from itself.
+        ConfigError: if it starts from itself or from what is not there, or changes a part that is not there.
     """
     found: list[tuple[str, tuple[str, ...]]] = []
     following: tuple[str, ...] | None = words
@@ -42,5 +44,53 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
             raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
         found.append((edit.name, following))
         rest = [word for word in words if not word.startswith(OF_ONE)]
-        following = None if edit.base is None or is_scene_file(edit.base) else (*rest, f"edit={edit.base}")
+        following = None if edit.base is None or is_made(following) else (*rest, f"edit={edit.base}")
+    require_parts(found[::-1])
     return found[::-1]
+
+
+def is_made(words: tuple[str, ...]) -> bool:
+    """Whether an edit starts from a scene that is there already, and not from another edit of conf/edit.
+
+    Raises:
+        ConfigError: if it starts from neither.
+    """
+    config = compose(words)
+    base, known = config.edit.base, members("edit")
+    if is_scene_file(base):
+        return True
+    if base in known:
+        return False
+    if scene_before(config).is_file():
+        return True
+    raise ConfigError(
+        f"edit.base: expected the file of a scene or one of {', '.join(known)}, got {base}"
+        f"{close(base, known)}"
+    )
+
+
+def require_parts(chain: list[tuple[str, tuple[str, ...]]]) -> None:
+    """Require of edits, each of which starts from the one before it, that the parts they change are there.
+
+    Raises:
+        ConfigError: naming the part that will not be.
+    """
+    first = compose(chain[0][1])
+    if first.edit.base is not None:  # a scene that is there already, and says so at once
+        return
+    try:
+        known = tf_names(first)
+    except MissingDataError:  # which is told elsewhere
+        return
+    models = list(known)
+    for _, words in chain:
+        edit = compose(words).edit
+        for part in edit.parts:
+            if part not in known:
+                hint = close(part, known)
+                raise ConfigError(f"edit.parts: expected some of {', '.join(known)}, got {part}{hint}")
+        if edit.kind == "segment":
+            model = edit.segment.model or models[0]
+            if model not in models:
+                raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model}")
+            known.append(f"{model}/{edit.segment.name}")

@@ -1,8 +1,12 @@
 """How the schema declares a key: default, meaning, unit, and the values that are allowed."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from math import isfinite
 from typing import Any
+
+from texgs.core.numbers import is_number
+
+LARGEST = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -16,7 +20,9 @@ class Bounds:
 
     def complaint(self, value: float) -> str | None:
         """What was expected of a number that is not allowed; None for one that is."""
-        if not isfinite(value):
+        if isinstance(value, int) and abs(value) > LARGEST:
+            return "an integer of 64 bits"
+        if not is_number(value):
             return "a finite number"
         if self.least is not None and value < self.least:
             return f"at least {self.least:g}"
@@ -59,3 +65,12 @@ def key(
     if isinstance(default, list):
         return field(default_factory=lambda: list(default), metadata=metadata)
     return field(default=default, metadata=metadata)
+
+
+def numbers(value: Any) -> Iterator[int | float]:
+    """The numbers in a value: itself, or those of a list of lists, however deep."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        for item in value:
+            yield from numbers(item)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield value

@@ -6,8 +6,10 @@ from typing import Any
 
 from omegaconf import DictConfig
 
+from texgs.config.compose import check_name
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder
+from texgs.core.names import file_name
 
 
 def source_file(config: DictConfig) -> Path | None:
@@ -47,9 +49,12 @@ def cached_volume(volume: Mapping[str, Any]) -> Path:
     Raises:
         ConfigError: if there is no checksum to compare it with.
     """
-    if not volume["sha256"]:
-        raise ConfigError(f"dataset.volume.sha256: expected the checksum of {volume['url']}, got none")
-    return cache_folder() / "volumes" / volume["sha256"][:12] / Path(volume["file"]).name
+    checksum, name = volume["sha256"], file_name("dataset.volume.file", Path(volume["file"]).name)
+    if not checksum or not checksum.isalnum():
+        raise ConfigError(
+            f"dataset.volume.sha256: expected the checksum of {volume['url']}, got {checksum or 'none'}"
+        )
+    return cache_folder() / "volumes" / checksum[:12] / name
 
 
 def views_folder(config: DictConfig) -> Path | None:
@@ -100,6 +105,8 @@ def tf_names(config: DictConfig) -> list[str]:
     if not names and config.dataset.views_folder is not None:
         folder = Path(config.data_folder, config.dataset.views_folder)
         names = sorted(path.parent.name for path in folder.glob("*/transforms_train.json"))
+        for name in names:
+            check_name(f"folder of views in {folder}", name)
         if not names:
             raise MissingDataError(
                 f"data set {config.dataset.name}: no folder of views in {folder}; "

@@ -20,7 +20,9 @@ AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 class Volume:
     """Where the scalar field of a data set comes from: a generator, or a file that is there or downloaded."""
 
-    generator: str | None = key(None, "name of a built-in field", choices=("sphere", "turbulence", "jets"))
+    generator: str | None = key(
+        None, "name of a built-in field", choices=("sphere", "orbital", "turbulence", "jets")
+    )
     size: int = key(128, "samples along each side of a generated field", least=16)
     seed: int = key(0, "random numbers of a generated field")
     file: str | None = key(None, "file, or folder of TIFF slices; relative to data_folder")

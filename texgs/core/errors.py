@@ -1,8 +1,15 @@
 """Errors a user can do something about. Each message is one sentence: what, where, got, what to do."""
 
+LONGEST = 2000  # letters of a message; a damaged file can be quoted at any length
+END = 400  # letters that are kept at the end, where it says what to do
+
 
 class TexgsError(Exception):
     """A user's mistake or a limit of the machine; the command line prints it without a traceback."""
+
+    def __str__(self) -> str:
+        """The message as a terminal can show it."""
+        return printable(super().__str__())
 
 
 class ShapeError(TexgsError, ValueError):
@@ -35,6 +42,25 @@ class MissingDataError(ConfigError):
 
 class FitError(TexgsError, ArithmeticError):
     """A fit cannot go on."""
+
+
+def printable(text: str) -> str:
+    """A text of any origin in one line of bounded length, with control characters written out.
+
+    Names in files can hold sequences that move the cursor, or letters that turn the direction of the text.
+    """
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST - END]} ... {text[-END:]}"
+    if text.isprintable():
+        return text
+    return "".join(
+        letter
+        if letter.isprintable()
+        else " "
+        if letter.isspace()
+        else letter.encode("unicode_escape").decode()
+        for letter in text
+    )
 
 
 def first_line(error: Exception) -> str:

@@ -1,5 +1,7 @@
 """Images as PNG files: straight alpha and 8 bits on disk, premultiplied floats [H, W, C] in memory."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +10,28 @@ from PIL import Image
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ShapeError
 from texgs.core.io import write_atomic
+from texgs.core.memory import require_memory
+from texgs.core.reading import reading
+
+# Pillow opens more: some formats by other programs, which a file should not be able to start.
+FORMATS = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP", "PPM", "JPEG2000", "AVIF", "TGA")
+BYTES = 32  # of memory for a pixel: as it is stored, in RGBA, and as floats
+
+
+@contextmanager
+def open_picture(path: str | Path, what: str = "an image") -> Iterator[Image.Image]:
+    """An image file; its header is read now, its pixels when they are used.
+
+    Raises:
+        ArgumentError: if the file is missing, damaged or no image, or so large that Pillow refuses it.
+        OutOfMemoryError: if its pixels would not fit into memory.
+    """
+    with reading(path, what), Image.open(path, formats=FORMATS) as picture:
+        width, height = picture.size
+        require_memory(BYTES * width * height, f"{path}: {what} of {width} x {height} pixels", "reduce it")
+        yield picture
 
 
 def to_pillow(color: Tensor, alpha: Tensor | None = None) -> Image.Image:
@@ -51,11 +73,8 @@ def read_png(path: str | Path) -> tuple[Tensor, Tensor]:
     Raises:
         ArgumentError: if the file is missing or no image.
     """
-    try:
-        with Image.open(path) as picture:
-            pixels = np.asarray(picture.convert("RGBA"), dtype=np.float32) / 255
-    except OSError as error:
-        raise ArgumentError(f"{path}: expected an image, got {error}") from error
+    with open_picture(path) as picture:
+        pixels = np.asarray(picture.convert("RGBA"), dtype=np.float32) / 255
     image = torch.from_numpy(pixels)
     alpha = image[..., 3]
     return image[..., :3] * alpha[..., None], alpha

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from texgs.core.errors import ArgumentError
+from texgs.core.reading import reading
 
 SCRATCH = re.compile(r"\..+\.[a-z0-9_]{8}")  # files beside a target, as mkstemp names them
 
@@ -28,6 +29,8 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
         ArgumentError: if the folder cannot be created or written to, or the disk is full.
     """
     path = Path(path)
+    if path.exists() and not path.is_file() and not path.is_dir():  # it would be replaced by a file
+        raise ArgumentError(f"{path}: expected the name of a file, got a device or a named pipe")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
@@ -87,14 +90,8 @@ def read_json(path: str | Path) -> Any:
     Raises:
         ArgumentError: if the file is missing or no JSON, with the line.
     """
-    try:
+    with reading(path, "JSON"):
         return json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise ArgumentError(f"{path}: expected JSON, got {error}") from error
 
 
 def _umask() -> int:

@@ -1,12 +1,20 @@
-"""How much memory this process has needed, and what happens to what it no longer needs."""
+"""How much memory this process has needed and may still have, and what happens to what it frees."""
 
 import ctypes
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
+from texgs.core.errors import OutOfMemoryError
+
 STATUS = Path("/proc/self/status")
+CGROUP = Path("/sys/fs/cgroup")
+CONTAINER = ("memory.max", "memory.current", "memory.stat")  # what it may have, what it has, and which kinds
+GIB = 1 << 30
+SMALL = 64 << 20  # bytes that are there without asking
 GLIBC_OPTIONS = {-1: 1 << 30, -3: 32 << 20}  # M_TRIM_THRESHOLD; M_MMAP_THRESHOLD, the most it takes
 
 
@@ -23,6 +31,82 @@ def peak_memory() -> int:
 
     unit = 1 if sys.platform == "darwin" else 1024
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+
+
+def free_memory() -> int:
+    """Bytes that this process may still have: of the machine, of its container, and by its own limits."""
+    import psutil
+
+    limits = [int(psutil.virtual_memory().available)]
+    try:
+        most, used, kinds = ((CGROUP / name).read_text() for name in CONTAINER)
+        cached = re.findall(
+            r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE
+        )  # of files, given back on demand
+        limits.append(int(most) - int(used) + sum(map(int, cached)))
+    except (OSError, ValueError):  # no container, or one without a limit: "max"
+        pass
+    if sys.platform == "linux":
+        import resource
+
+        found = dict(re.findall(r"(VmSize|VmData):\s+(\d+) kB", STATUS.read_text()))
+        for kind, name in ((resource.RLIMIT_AS, "VmSize"), (resource.RLIMIT_DATA, "VmData")):
+            limit = resource.getrlimit(kind)[0]
+            if limit != resource.RLIM_INFINITY:
+                limits.append(limit - 1024 * int(found[name]))
+    return max(0, min(limits))
+
+
+def require_memory(n_bytes: int, what: str, advice: str) -> None:
+    """Require that so many bytes can be had, before they are asked for.
+
+    Linux hands out more memory than there is, and ends a process that uses it.
+
+    Args:
+        n_bytes: that the work needs.
+        what: the work or the thing, for the message.
+        advice: what to do without so much memory.
+
+    Raises:
+        OutOfMemoryError: naming how much is wanted and how much there is.
+    """
+    if n_bytes <= SMALL:
+        return
+    free = free_memory()
+    if n_bytes > free:
+        raise OutOfMemoryError(
+            f"{what}: needs {n_bytes / GIB:.3g} GiB of memory, but {free / GIB:.3g} GiB are free; {advice}"
+        )
+
+
+@contextmanager
+def told() -> Iterator[None]:
+    """Turn what Python, NumPy or torch raise where memory ends into one sentence.
+
+    Raises:
+        OutOfMemoryError: in place of theirs; it says how much was wanted, where they do.
+    """
+    try:
+        yield
+    except OutOfMemoryError:
+        raise
+    except (MemoryError, RuntimeError) as error:
+        if not is_out_of_memory(error):
+            raise
+        wanted = re.search(r"[\d.]+ ?(bytes|[KMGTPE]iB)", str(error))
+        raise OutOfMemoryError(
+            f"the work needs more memory than there is ({wanted[0] if wanted else 'unknown'} wanted at once, "
+            f"{free_memory() / GIB:.3g} GiB are free); choose smaller images, fewer views or another machine"
+        ) from error
+
+
+def is_out_of_memory(error: BaseException) -> bool:
+    """Whether an error says that memory could not be had: Python's, NumPy's, or torch's on any device."""
+    return (
+        isinstance(error, MemoryError)
+        or type(error).__name__ == "OutOfMemoryError"
+        or (isinstance(error, RuntimeError) and "can't allocate memory" in str(error))
+    )
 
 
 def keep_freed_memory() -> bool:

@@ -13,6 +13,7 @@ from PIL import Image
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.memory import require_memory
 
 KINDS = (".png", ".gif", ".mp4")
 MOST_FPS = 240.0
@@ -66,7 +67,12 @@ def _write_png(path: Path, frame: np.ndarray) -> None:
 
 
 def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
-    first, *rest = (Image.fromarray(frame) for frame in frames)
+    kept, n_bytes = [], 0
+    for frame in frames:
+        n_bytes += frame.nbytes
+        require_memory(n_bytes, "GIF: a copy of all frames, which Pillow makes,", "write an MP4 film")
+        kept.append(Image.fromarray(frame))
+    first, *rest = kept
     first.save(
         file, format="GIF", save_all=True, append_images=rest, duration=max(20, round(1000 / fps)), loop=0
     )

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.core import check
 
-SMALLEST, LARGEST = 1e-8, 1e8  # eigenvalues that count
+LEAST = 1e-10  # added to the eigenvalues of covariances
 
 
 def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
@@ -26,21 +26,12 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
     Raises:
         ShapeError: if a shape does not fit.
     """
+    from kornia.enhance import zca_mean
+
     for name, x in (("colors", colors), ("style", style)):
         check.shape(name, x, "N 3")
-    (mean, covariance), (mean_style, covariance_style) = (moments(x) for x in (colors, style))
-    matrix = power(covariance_style, 0.5) @ power(covariance, -0.5)
-    return matrix, mean_style - matrix @ mean
-
-
-def moments(colors: Tensor) -> tuple[Tensor, Tensor]:
-    """Mean [3] and covariance [3, 3] of colours [N, 3], float64."""
-    colors = colors.detach().double()
-    mean = colors.mean(0)
-    return mean, (colors - mean).T @ (colors - mean) / len(colors)
-
-
-def power(covariance: Tensor, exponent: float) -> Tensor:
-    """A symmetric matrix [3, 3] to a power, its eigenvalues kept away from 0."""
-    values, vectors = torch.linalg.eigh(covariance)
-    return (vectors * values.clamp(SMALLEST, LARGEST) ** exponent) @ vectors.T
+    (whiten, mean, _), (whiten_style, mean_style, _) = (
+        zca_mean(x.detach().double(), unbiased=False, eps=LEAST) for x in (colors, style)
+    )
+    matrix = torch.linalg.solve(whiten_style, whiten)
+    return matrix, mean_style[0] - matrix @ mean[0]

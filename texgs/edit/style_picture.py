@@ -14,6 +14,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
+from texgs.core.image import open_picture
 
 SMALLEST = 32  # pixels of the shorter side: less holds no pattern
 LARGEST = 2048  # pixels of the longer side that are kept
@@ -82,7 +83,7 @@ class StylePicture:
 
 
 def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
-    """Read a style picture of any format that Pillow knows; what is transparent in it does not count.
+    """Read a style picture: PNG, JPEG, WebP, GIF, TIFF, BMP and more; what is transparent does not count.
 
     Args:
         path: of the file. A picture of more than 2,048 pixels along its longer side is reduced to that.
@@ -94,15 +95,15 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path) as picture:
+            with open_picture(path, "a picture") as picture:
                 width, height = picture.size
                 small = reduced(picture)
-    except Image.DecompressionBombError as error:
-        raise ArgumentError(
-            f"{path}: expected a picture of at most 178 million pixels; scale it down"
-        ) from error
-    except (OSError, SyntaxError, ValueError) as error:
-        raise ArgumentError(f"{path}: expected a picture, got {error}") from error
+    except ArgumentError as error:
+        if isinstance(error.__cause__, Image.DecompressionBombError):
+            raise ArgumentError(
+                f"{path}: expected a picture of at most 178 million pixels; scale it down"
+            ) from error
+        raise
     pixels = torch.from_numpy(np.asarray(small, dtype=np.float32) / 255).permute(2, 0, 1)
     visible = pixels[3] > 0.5
     if region is not None:

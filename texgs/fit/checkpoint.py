@@ -9,6 +9,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
+from texgs.core.reading import reading
 from texgs.fit.loop import Fit, require_finite
 
 NAME = "checkpoint.safetensors"
@@ -41,20 +42,13 @@ def latest(folder: str | Path) -> dict[str, Tensor] | None:
     Raises:
         ArgumentError: if the file cannot be read or is no checkpoint.
     """
-    from safetensors import SafetensorError
     from safetensors.torch import load
 
     path = Path(folder) / NAME
-    try:
-        state: dict[str, Tensor] = load(path.read_bytes())
-    except FileNotFoundError:
+    if not path.exists():
         return None
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
-    except SafetensorError as error:
-        raise ArgumentError(
-            f"{path}: expected a checkpoint, got {error}; remove it to start from the beginning"
-        ) from error
+    with reading(path, "a checkpoint", "remove it to start from the beginning"):
+        state: dict[str, Tensor] = load(path.read_bytes())
     if "iteration" not in state:
         raise ArgumentError(f"{path}: expected a checkpoint, found no iteration in it; remove it")
     return state

@@ -1,4 +1,4 @@
-"""Adaptive density control: surfels that should move much are cloned or split, invisible ones removed."""
+"""Adaptive density control: surfels with large gradients are cloned or split, invisible ones removed."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class DensityControl:
         self.counts += norms > 0
 
     def step(self, iteration: int, optimizer: Optimizer, generator: torch.Generator) -> None:
-        """Whatever is due after an iteration (from 1)."""
+        """Densify, prune or reset opacities, as the schedule says for an iteration (counted from 1)."""
         s = self.settings
         if iteration > s.stop:
             return
@@ -73,7 +73,7 @@ class DensityControl:
         self._clear(len(optimizer.parameters["means"]), largest.device)
 
     def _chosen(self, alive: Tensor) -> Tensor:
-        """Surfels [N] bool with the largest mean gradients above the threshold, as the cap leaves room."""
+        """Surfels [N] bool with the largest mean gradients above the threshold, as many as the cap allows."""
         mean = self.gradients / self.counts.clamp_min(1)
         mean = torch.where(alive & (mean > self.settings.threshold), mean, 0.0)
         room = max(0, self.settings.cap - int(alive.sum()))

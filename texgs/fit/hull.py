@@ -1,4 +1,4 @@
-"""The visual hull of views: the points that no view sees through."""
+"""The visual hull of views: the points that project onto something visible in every view."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 
 
 def hull_points(images: Images, box: Box, count: int, generator: torch.Generator) -> Tensor:
-    """Random points in the box that no view sees through: each pixel they fall on shows something.
+    """Draw random points of the box that project onto something visible in every view.
 
     Args:
         images: views with alpha.

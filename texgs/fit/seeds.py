@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.ply_file import read_vertices
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
 from texgs.fit.visible import CANDIDATES, most_seen
 from texgs.scene.images import Images
@@ -118,7 +119,7 @@ def box_of(views: ViewSet, half_size: float) -> Box:
         raise ArgumentError(
             f"{views.folder}: aabb: expected two corners of three numbers, got {aabb}"
         ) from error
-    if not bool((low <= high).all()):  # so is NaN
+    if not bool((low <= high).all()):  # NaN ends here too
         raise ArgumentError(f"{views.folder}: aabb: expected the lowest corner, then the highest, got {aabb}")
     margin = MARGIN * (high - low).max()
     return low - margin, high + margin
@@ -130,17 +131,14 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
     Raises:
         ArgumentError: if the file is missing, no PLY file, or has no finite x, y and z.
     """
-    from plyfile import PlyData, PlyParseError
-
-    try:
-        vertices = PlyData.read(path)["vertex"].data
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points") from error
-    except (OSError, KeyError, ValueError, PlyParseError) as error:
-        raise ArgumentError(f"{path}: expected a PLY file with vertices, got {error}") from error
+    if not path.exists():
+        raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
+    vertices = read_vertices(path)
     names = vertices.dtype.names or ()
     if missing := [name for name in "xyz" if name not in names]:
         raise ArgumentError(f"{path}: expected vertices with x, y and z, found no {', '.join(missing)}")
+    if text := [name for name in names if vertices.dtype[name].kind not in "iuf"]:
+        raise ArgumentError(f"{path}: expected vertices with numbers, got lists: {', '.join(text)}")
     points = columns(vertices, ("x", "y", "z"))
     if not bool(points.isfinite().all()):
         raise ArgumentError(f"{path}: expected finite x, y and z, got NaN or infinity; remove those points")
@@ -156,7 +154,7 @@ def columns(vertices: np.ndarray, names: tuple[str, ...]) -> Tensor:
 
 
 def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
-    """Raw geometry of surfels at points: round, as large as their neighbours are far, in random directions.
+    """Raw geometry of round surfels at points: sized by the distance to neighbours, turned at random.
 
     Args:
         points: [N, 3] world units, at least four.

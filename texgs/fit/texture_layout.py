@@ -69,7 +69,7 @@ def look(model: Model, images: Images, title: str) -> Sight:
 
 
 def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:
-    """Texels along u and v [N, 2], int32, of one edge for all surfels, about as many as asked.
+    """Texels along u and v [N, 2], int32, of the same edge for all surfels, about as many as asked in all.
 
     edge = sqrt(36 sum(s_u s_v) / texels), U = ceil(6 s_u / edge), V likewise. Rounding up adds a few, and a
     surfel has one at least.

@@ -63,7 +63,7 @@ def squared_error(image: Tensor, target: Target) -> Tensor:
 
 @torch.no_grad()
 def sampled_error(model: Model, images: Images) -> float:
-    """Squared error of some views, spread over all, as a screen shows them: clamped."""
+    """Squared error of some views, evenly spaced, with colours clamped as on a screen."""
     device = model.parameters["means"].device
     targets = [images.target(i, device) for i in range(0, len(images), max(1, len(images) // CHECKED))]
     errors = [squared_error(render(model, t.camera, t.light).color.clamp(0, 1), t) for t in targets]
@@ -71,7 +71,7 @@ def sampled_error(model: Model, images: Images) -> float:
 
 
 def curvature(sizes: Tensor, of_surfels: Tensor) -> Tensor:
-    """Share [T, 1] of each texel in the curvature of its surfel: that of a Gaussian, as opacity is.
+    """Share [T, 1] of each texel in the curvature of its surfel, which falls off like the Gaussian.
 
     Args:
         sizes: texels along u and v [N, 2], one surfel after the other.

@@ -52,7 +52,7 @@ def most_seen(
 
 @torch.no_grad()
 def shown(model: Model, images: Images) -> Tensor:
-    """How much of all views together each surfel makes up [N]: its blending weights, summed."""
+    """Sum [N] of the blending weights of each surfel over all pixels of all views."""
     total = torch.zeros(len(model))
     for camera, light in zip(images.cameras, images.lights, strict=True):
         statistics = render(model, camera, light, outputs=("statistics",)).statistics
@@ -61,7 +61,7 @@ def shown(model: Model, images: Images) -> Tensor:
 
 
 def shrunk(images: Images, factor: int) -> Images:
-    """Images of averages of factor x factor pixels; what is left at the right and the bottom is cut."""
+    """Images of averages of factor x factor pixels; incomplete blocks at the right and bottom are cut off."""
     if factor <= 1:
         return images
     planes = torch.stack([avg_pool2d(view.float(), factor).round().to(torch.uint8) for view in images.planes])

@@ -9,7 +9,6 @@ from statistics import fmean
 
 import torch
 from torch import Tensor
-from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.camera import Camera
@@ -125,6 +124,8 @@ def warp(source: Frame, target: Frame, tolerance: float = TOLERANCE) -> tuple[Te
     Raises:
         ShapeError: if images, depths and cameras do not fit each other.
     """
+    from kornia.geometry import remap
+
     for frame in (source, target):
         size = {"H": frame.camera.height, "W": frame.camera.width}
         check.shape("image", frame.image, "H W 3", **size)
@@ -132,26 +133,26 @@ def warp(source: Frame, target: Frame, tolerance: float = TOLERANCE) -> tuple[Te
         check.shape("alpha", frame.alpha, "H W", **size)
     pixels, z = reprojected(target, source.camera)
     height, width = source.depth.shape
-    grid = 2 * pixels / pixels.new_tensor([width, height]) - 1
-    found = F.grid_sample(source.image.permute(2, 0, 1)[None], grid[None], align_corners=False)
+    x, y = (pixels - 0.5).unbind(-1)
+    found = remap(source.image.permute(2, 0, 1)[None], x[None], y[None], align_corners=True)
     inside = ((pixels >= 0.5) & (pixels <= pixels.new_tensor([width - 0.5, height - 0.5]))).all(-1)
     same = (target.alpha >= OPAQUE) & inside & (z > 0)
-    column, row = ((pixels[..., axis] - 0.5).nan_to_num(0, 0, 0).floor().long() for axis in (0, 1))
-    for y in (row, row + 1):
-        for x in (column, column + 1):
-            at = (y.clamp(0, height - 1), x.clamp(0, width - 1))
+    column, row = (at.nan_to_num(0, 0, 0).floor().long() for at in (x, y))
+    for down in (row, row + 1):
+        for right in (column, column + 1):
+            at = (down.clamp(0, height - 1), right.clamp(0, width - 1))
             same &= (source.alpha[at] >= OPAQUE) & ((source.depth[at] - z).abs() <= tolerance * z)
     return found[0].permute(1, 2, 0), same
 
 
 def reprojected(frame: Frame, camera: Camera) -> tuple[Tensor, Tensor]:
     """Where another camera sees the points of a view's pixels: pixels [H, W, 2] and camera z [H, W]."""
-    here, depth = frame.camera, frame.depth
-    rows, columns = (torch.arange(size, device=depth.device) + 0.5 for size in depth.shape)
-    y, x = torch.meshgrid(rows, columns, indexing="ij")
-    rays = torch.stack([x, y, torch.ones_like(x)], dim=-1).to(depth) @ torch.linalg.inv(here.K).T
-    R_cw, t_cw = here.viewmat[:3, :3], here.viewmat[:3, 3]
-    places = (rays * depth[..., None] - t_cw) @ R_cw  # [H, W, 3] world
-    moved = places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
-    seen = moved @ camera.K.T
-    return seen[..., :2] / seen[..., 2:], moved[..., 2]
+    from kornia.geometry import depth_to_3d_v2, project_points, transform_points
+
+    here = frame.camera
+    K = here.K.clone()
+    K[:2, 2] -= 0.5  # kornia counts from the centres of pixels
+    points = depth_to_3d_v2(frame.depth[None], K[None]).flatten(1, 2)  # [1, H * W, 3] in the view's axes
+    relative = camera.viewmat @ torch.linalg.inv(here.viewmat)
+    moved = transform_points(relative[None], points).reshape(*frame.depth.shape, 3)
+    return project_points(moved, camera.K), moved[..., 2]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import torch
 from torch import Tensor
 
 from texgs.raster.ssim import ssim as structural_similarity
@@ -17,8 +16,9 @@ def psnr(image: Tensor, target: Tensor) -> float:
         image: [H, W, C], clamped to [0, 1].
         target: the same shape.
     """
-    error = torch.mean((image.clamp(0, 1) - target) ** 2).item()
-    return BEST if error == 0 else min(BEST, -10 * torch.log10(torch.tensor(error)).item())
+    from kornia.metrics import psnr as of_unit_range
+
+    return min(BEST, of_unit_range(image.clamp(0, 1), target, 1.0).item())
 
 
 def ssim(image: Tensor, target: Tensor) -> float:

@@ -60,11 +60,13 @@ class Clip:
         Args:
             images: [B, H, W, 3] in [0, 1].
         """
+        from kornia.enhance import normalize
+
         check.shape("images", images, "B H W 3")
         planes = images.permute(0, 3, 1, 2)
         planes = F.interpolate(planes, (self.size, self.size), mode="bicubic", align_corners=False)
-        mean, deviation = (planes.new_tensor(x)[:, None, None] for x in (MEAN, DEVIATION))
-        return (planes - mean) / deviation
+        prepared: Tensor = normalize(planes, torch.tensor(MEAN), torch.tensor(DEVIATION))
+        return prepared
 
     def images(self, images: Tensor) -> Tensor:
         """Features [B, D] of images [B, H, W, 3] in [0, 1]; differentiable in the images."""

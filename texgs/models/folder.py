@@ -7,10 +7,9 @@ from typing import Any
 
 import torch
 
-from texgs.core.errors import ArgumentError, first_line
+from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-
-DAMAGE = (OSError, RuntimeError, ValueError, TypeError, KeyError)
+from texgs.core.reading import reading_as
 
 
 def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[Any]:
@@ -32,19 +31,13 @@ def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[A
         raise ArgumentError(
             f"{folder}: expected transformers, which is not installed; pip install '.[models]'"
         ) from error
-    from safetensors import SafetensorError
-
     folder = Path(folder)
-    found = read_json(folder / "config.json").get("model_type")
+    settings = read_json(folder / "config.json")
+    found = settings.get("model_type") if isinstance(settings, dict) else None
     if found != kind:
         raise ArgumentError(f"{folder}: expected a model of type {kind}, got {found}")
-    try:
+    with reading_as(f"a {kind} model of transformers", "copy or download it again", f"{folder}: "):
         read = [getattr(transformers, name).from_pretrained(folder, local_files_only=True) for name in names]
-    except (*DAMAGE, SafetensorError) as error:
-        raise ArgumentError(
-            f"{folder}: expected a {kind} model of transformers, got one that cannot be read "
-            f"({first_line(error)}); copy or download it again"
-        ) from error
     for part in read:
         if isinstance(part, torch.nn.Module):
             part.float().eval().requires_grad_(False)

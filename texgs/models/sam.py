@@ -49,11 +49,13 @@ class Sam:
 
     def prepared(self, image: Tensor) -> Tensor:
         """An image [H, W, 3] as the encoder takes it [1, 3, S, S], with zeros below or at the right."""
+        from kornia.enhance import normalize
+
         planes = image.to(self.device).float().permute(2, 0, 1)[None]
         height, width = self.fitted(image.shape[0], image.shape[1])
         planes = F.interpolate(planes, (height, width), mode="bilinear", antialias=True)
-        mean, deviation = (planes.new_tensor(x)[:, None, None] for x in (MEAN, DEVIATION))
-        return F.pad((planes - mean) / deviation, (0, self.size - width, 0, self.size - height))
+        planes = normalize(planes, torch.tensor(MEAN), torch.tensor(DEVIATION))
+        return F.pad(planes, (0, self.size - width, 0, self.size - height))
 
     def fitted(self, height: int, width: int) -> tuple[int, int]:
         """Size of an image whose longer side fills the encoder's square."""
@@ -92,15 +94,11 @@ def mobile_sam(
         dtype: of the encoder, which takes nearly all of the time; by default `fast_dtype`.
 
     Raises:
-        ArgumentError, MissingDataError: if kornia is missing, or there is no such file, or it is another one.
+        ArgumentError, MissingDataError: if there is no such file, or it is another one.
     """
-    try:
-        from kornia.models.sam import Sam as Network
-        from kornia.models.sam import SamConfig
-    except ImportError as error:
-        raise ArgumentError(
-            "mobile_sam: expected kornia, which is not installed; pip install '.[models]'"
-        ) from error
+    from kornia.models.sam import Sam as Network
+    from kornia.models.sam import SamConfig
+
     path = locate("mobile_sam") if path is None else path
     dtype = fast_dtype(device) if dtype is None else dtype
     network = Network.from_config(SamConfig("mobile_sam")).eval().requires_grad_(False)

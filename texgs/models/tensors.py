@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from pickle import UnpicklingError
-from zipfile import BadZipFile, is_zipfile
 
-import torch
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError, first_line
-
-DAMAGE = (OSError, EOFError, BadZipFile, RuntimeError, UnpicklingError, TypeError, ValueError)
+from texgs.core.errors import ArgumentError
+from texgs.core.reading import reading
+from texgs.core.torch_file import load_torch
 
 
 def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[str, Tensor]:
@@ -25,25 +22,22 @@ def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[s
     Raises:
         ArgumentError: if the file is missing, damaged, of another format, or lacks a name.
     """
-    from safetensors import SafetensorError, safe_open
+    from safetensors import safe_open
 
-    path = Path(path)
-    try:
+    with reading(path, "a file of weights", "copy or download it again") as path:
         if path.suffix == ".safetensors":
             with safe_open(path, framework="pt") as file:
                 found = _chosen(path, file.keys(), names)
                 return {name: file.get_tensor(name) for name in found}
-        stored = torch.load(path, map_location="cpu", weights_only=True, mmap=is_zipfile(path))
-        return {name: stored[name] for name in _chosen(path, stored, names)}
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file; see texgs.models.weights.locate") from error
-    except ArgumentError:
-        raise
-    except (*DAMAGE, SafetensorError) as error:
-        raise ArgumentError(
-            f"{path}: expected a file of weights, got one that is damaged or of another format "
-            f"({first_line(error)}); copy or download it again"
-        ) from error
+        stored = load_torch(path)
+        return {name: _whole(path, name, stored[name]) for name in _chosen(path, stored, names)}
+
+
+def _whole(path: Path, name: str, found: object) -> Tensor:
+    """A tensor of which every number is in the file: few can be told to be read again and again."""
+    if not isinstance(found, Tensor) or found.nbytes > found.untyped_storage().nbytes():
+        raise ArgumentError(f"{path}: {name}: expected a tensor, got something else; download it again")
+    return found
 
 
 def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> list[str]:

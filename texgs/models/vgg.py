@@ -77,9 +77,11 @@ class Vgg:
         Args:
             image: [3, H, W], red, green and blue in [0, 1].
         """
+        from kornia.enhance import normalize
+
         check.shape("image", image, "3 H W")
-        mean, deviation = (image.new_tensor(x)[:, None, None] for x in (MEAN, DEVIATION))
-        x = ((image - mean) / deviation)[None].to(self.dtype, memory_format=torch.channels_last)
+        x = normalize(image[None], torch.tensor(MEAN), torch.tensor(DEVIATION))
+        x = x.to(self.dtype, memory_format=torch.channels_last)
         found = []
         for name, weight, bias in zip(self.names, self.weights, self.biases, strict=True):
             if name.endswith("_1") and name != "relu1_1":

@@ -19,6 +19,7 @@ import torch
 from torch import Tensor
 
 from texgs.config.code import SUFFIX, built_from, library_sources
+from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 
 ABI_VERSION = 2
@@ -226,6 +227,8 @@ def require_memory(n_bytes: int, device: torch.device) -> None:
     with torch.cuda.device(device) if device.type == "cuda" else nullcontext():
         status = lib.texgs_require_memory(n_bytes)
     _require_success(status, lib, device)
+    if device.type == "cpu":  # the C library hands out more than there is
+        memory.require_memory(n_bytes, "texgs.raster: the images", "choose smaller ones")
 
 
 def _require_success(status: int, lib: ctypes.CDLL, device: torch.device) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from texgs.core.io import write_atomic
+from texgs.core.plots import words
 
 
 def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Path:
@@ -26,7 +27,7 @@ def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequen
     axes = figure.subplots()
     for name, terms in curves.items():
         for term, values in terms.items():
-            axes.plot(range(1, len(values) + 1), values, label=f"{name}: {term}", linewidth=1)
+            axes.plot(range(1, len(values) + 1), values, label=words(f"{name}: {term}"), linewidth=1)
     axes.set_xlabel("iterations, one view each")
     axes.set_ylabel("loss of one view")
     if axes.lines:

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.plots import words
 from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
@@ -83,7 +84,7 @@ class Row:
 def write_fit_figure(
     path: str | Path, models: Mapping[str, Model], views: Mapping[str, View], reduce: int = 1, title: str = ""
 ) -> Path:
-    """Draw what a fit is worth as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
+    """Draw a fit beside its views as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
 
     A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
     that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first
@@ -214,7 +215,7 @@ def draw(path: str | Path, rows: list[Row], title: str) -> Path:
         axes.spines[:].set(color="0.8", linewidth=0.5)
         return axes
 
-    figure.text(LEFT / WIDTH, 1 - 0.5 * TOP / page, title, fontsize=LARGE, va="center")
+    figure.text(LEFT / WIDTH, 1 - 0.5 * TOP / page, words(title), fontsize=LARGE, va="center")
     top = TOP
     for row, tall in zip(rows, heights, strict=True):
         top, wide = top + HEAD, row.panel_width
@@ -224,7 +225,9 @@ def draw(path: str | Path, rows: list[Row], title: str) -> Path:
             if panel.scale is not None:
                 bar = axes_at(left + 0.33 * wide, top + tall + 0.07, 0.34 * wide, 0.1)
                 fill_bar(bar, panel.scale)
-        figure.text(0.5 * LEFT / WIDTH, 1 - (top + 0.5 * tall) / page, row.name, rotation=90, **CENTERED)
+        figure.text(
+            0.5 * LEFT / WIDTH, 1 - (top + 0.5 * tall) / page, words(row.name), rotation=90, **CENTERED
+        )
         top += tall + FOOT
     return write_atomic(path, lambda file: figure.savefig(file, format="png"))
 

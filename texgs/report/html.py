@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.core.io import write_bytes
+from texgs.core.plots import words as plot_words
 from texgs.report.fitting import fitting
 from texgs.report.looks import looks
 from texgs.report.metrics_files import PHASES, read
@@ -117,9 +118,8 @@ def curves(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> bytes:
     for metrics in found:
         losses, total = metrics["numbers"]["losses"], metrics["numbers"]["iterations"]
         steps = [total * (i + 1) / len(losses) for i in range(len(losses))]
-        axes.semilogy(
-            steps, losses, label=f"{metrics['dataset']}/{metrics['tf']} {label(metrics)} {metrics['stage']}"
-        )
+        name = f"{metrics['dataset']}/{metrics['tf']} {label(metrics)} {metrics['stage']}"
+        axes.semilogy(steps, losses, label=plot_words(name))
     axes.set_xlabel("iterations")
     axes.set_ylabel("loss of one view")
     axes.legend(fontsize=7)

@@ -9,6 +9,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.plots import words
 
 INCHES = 2.4  # of a picture
 DPI = 150
@@ -50,9 +51,9 @@ def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titl
             at.set_xticks([])
             at.set_yticks([])
             if row == 0:
-                at.set_title(titles[column], fontsize=8)
+                at.set_title(words(titles[column]), fontsize=8)
             if column == 0:
-                at.set_ylabel(name, fontsize=9)
+                at.set_ylabel(words(name), fontsize=9)
     return write_atomic(path, lambda file: figure.savefig(file, format="png", metadata={"Software": None}))
 
 

@@ -1,4 +1,4 @@
-"""The table of a sweep: what became of each variant, over all seeds, beside the paper's numbers."""
+"""The table of a sweep: means of each variant over all seeds, beside the paper's numbers."""
 
 from __future__ import annotations
 

@@ -18,6 +18,8 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
+from texgs.core.memory import require_memory
+from texgs.core.reading import reading
 from texgs.scene.model import Model
 from texgs.scene.model_file import describe, model_of, read_model
 from texgs.scene.render import render
@@ -30,7 +32,8 @@ STEP = 1 / 128  # of texels: none is off by more than 1/256, a level of an 8-bit
 MOST_STEPS = 2**23  # of a texel; float32 holds so many exactly
 LISTS = ("texels", "sizes", "offsets")
 EXACT = ("means", "palette")  # half precision would move surfels by up to a tenth of a pixel at 800x800
-WRONG = (KeyError, RuntimeError, TypeError, ValueError)  # what tensors of a wrong name, type or shape raise
+LONGEST_HEADER = 2**20  # bytes, of the tensors' names and shapes
+COPIES = 6  # of what is unpacked, in memory at a time: texels are bytes in the file and floats in a model
 MEMORY = 2**28  # bytes that unpacking may use besides its result; these files need 9 MiB
 
 
@@ -75,24 +78,14 @@ def read_compact(path: str | Path) -> Model:
     Raises:
         ArgumentError, ShapeError: if the file is missing, damaged, of another format or a newer version.
     """
-    from safetensors import SafetensorError
     from safetensors.numpy import load
 
-    path = Path(path)
-    try:
+    with reading(
+        path, f"a whole {FORMAT} file", "it is cut short or damaged: copy or write it again"
+    ) as path:
         line, _, packed = path.read_bytes().partition(b"\n")
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
-    header = _header(path, line)
-    try:
-        stored = load(lzma.decompress(packed, lzma.FORMAT_XZ, MEMORY))
-        parameters = _parameters(stored, float(header["step"]))
-    except (lzma.LZMAError, SafetensorError, *WRONG) as error:
-        raise ArgumentError(
-            f"{path}: expected a whole {FORMAT} file, got one cut short or damaged; copy or write it again"
-        ) from error
+        header = _header(path, line)
+        parameters = _parameters(load(_unpacked(path, packed)), float(header["step"]))
     return model_of(path, header["model"], parameters)
 
 
@@ -194,7 +187,7 @@ def _header(path: Path, line: bytes) -> dict[str, Any]:
         header: dict[str, Any] = json.loads(line)
         version = int(str(header[FORMAT]))
         known = version > VERSION or 0 < float(header["step"]) < 1
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, RecursionError, TypeError, ValueError):
         version, known = 0, False
     if version > VERSION:
         raise ArgumentError(
@@ -205,8 +198,36 @@ def _header(path: Path, line: bytes) -> dict[str, Any]:
     return header
 
 
+def _unpacked(path: Path, packed: bytes) -> bytes:
+    """The safetensors file in an xz stream; its header says how long it is, and nothing more is unpacked.
+
+    Raises:
+        OutOfMemoryError: if it does not fit into memory.
+    """
+    stream = lzma.LZMADecompressor(lzma.FORMAT_XZ, MEMORY)
+    start = _taken(stream, 8, packed)
+    header = _taken(stream, min(int.from_bytes(start, "little"), LONGEST_HEADER))
+    ends = [each["data_offsets"][1] for name, each in json.loads(header).items() if name != "__metadata__"]
+    n_bytes = max(ends, default=0)
+    what = f"{path}: a model of {n_bytes} bytes, as its header says,"
+    require_memory(COPIES * n_bytes, what, "is it damaged?")
+    tensors = _taken(stream, n_bytes)
+    is_whole = len(tensors) == n_bytes and not _taken(stream, 1) and stream.eof  # where its checksum is
+    if not is_whole or stream.unused_data:
+        raise ValueError(f"{len(tensors)} bytes of tensors, expected {n_bytes}")
+    return start + header + tensors
+
+
+def _taken(stream: lzma.LZMADecompressor, count: int, packed: bytes = b"") -> bytes:
+    """The next bytes of a stream, fewer where it ends."""
+    found = b"" if stream.eof else stream.decompress(packed, count)
+    while len(found) < count and not stream.eof and not stream.needs_input:
+        found += stream.decompress(b"", count - len(found))
+    return found
+
+
 def _parameters(stored: dict[str, np.ndarray], step: float) -> dict[str, Tensor]:
-    """Tensors of a model, float32, as `write_compact` has stored them; raises one of WRONG."""
+    """Tensors of a model, float32, as `write_compact` has stored them."""
     codes = stored.pop("codes", None)
     parameters = {name: torch.from_numpy(x.copy()) for name, x in stored.items()}
     if codes is not None:

@@ -55,7 +55,7 @@ def content_box(planes: np.ndarray) -> Box:
 
 @torch.no_grad()
 def surfel_box(parameters: Mapping[str, Tensor], optics: Optics, camera: Camera) -> Box:
-    """A box around all that surfels can draw: their bounding spheres, projected. A GPU is waited for once.
+    """A box around the projected bounding spheres of all surfels. Waits for a GPU once.
 
     The whole image where a sphere reaches behind the camera, or a value is not finite.
     """

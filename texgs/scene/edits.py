@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from math import isfinite
 
 from texgs.core.errors import ArgumentError
+from texgs.core.numbers import is_number
 
 MOST = 1000.0  # of a factor: what is larger is a typing error
 
@@ -54,8 +54,3 @@ def color(name: str, value: object) -> tuple[float, float, float]:
         raise ArgumentError(f"{name}: expected three numbers from 0 to 1 or #rrggbb, got {value!r}")
     red, green, blue = (float(x) for x in numbers)
     return red, green, blue
-
-
-def is_number(value: object) -> bool:
-    """Whether it is a finite number; true and false are none."""
-    return isinstance(value, int | float) and not isinstance(value, bool) and isfinite(value)

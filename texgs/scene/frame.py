@@ -11,6 +11,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.memory import require_memory
 from texgs.raster import Render
 from texgs.scene.composition import Composition, Look
 from texgs.scene.edits import Edit
@@ -20,6 +21,7 @@ Mode = Literal[
     "shaded", "unshaded", "normal", "depth", "alpha", "ambient", "diffuse", "specular", "shininess"
 ]
 SHININESS = 100.0  # shown as white
+BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded
 
 
 def frame(
@@ -46,9 +48,12 @@ def frame(
 
     Raises:
         ArgumentError: if the mode is unknown.
+        OutOfMemoryError: if the frame needs more memory than there is.
     """
     if mode not in get_args(Mode):
         raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode}")
+    what = f"a frame of {camera.width} x {camera.height} pixels"
+    require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
     camera = camera.to(scene.means.device)
     behind = scene.means.new_tensor(background)
     look: Look = mode if mode in get_args(Look) else "unshaded"  # type: ignore[assignment]

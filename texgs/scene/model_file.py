@@ -15,6 +15,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
+from texgs.core.reading import reading
 from texgs.raster import Texture
 from texgs.raster.atlas import check_texture
 from texgs.scene.model import GEOMETRY, MATERIAL, SHAPES, TEXTURE, Model, Optics
@@ -51,7 +52,7 @@ def write_model(path: str | Path, model: Model) -> Path:
 
 
 def describe(path: str | Path, model: Model) -> dict[str, Any]:
-    """What a file at `path` says about a model besides its tensors, in JSON, once these can be written.
+    """Describe a model for the JSON of a file at `path`, and check that its tensors can be written.
 
     Raises:
         ArgumentError, ShapeError: as `write_model`.
@@ -82,7 +83,7 @@ def read_model(path: str | Path) -> Model:
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Model:
-    """The model that the tensors of a file and what `describe` says about them make.
+    """Make a model of the tensors of a file and its description (see `describe`).
 
     Raises:
         ArgumentError, ShapeError: as `read_model`.
@@ -105,21 +106,18 @@ def _open(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
     """Description and tensors; the description is judged before any tensor is looked at."""
     from safetensors import SafetensorError, safe_open
 
-    try:
-        with safe_open(path, framework="pt") as file:
-            description = _description(path, file.metadata() or {})
-            # A copy is aligned in memory and does not depend on the file any more.
-            return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot be read ({error})") from error
-    except SafetensorError as error:
-        raise ArgumentError(f"{path}: {_damage(path)}") from error
+    with reading(path, "a model file", "write it again"):
+        try:
+            with safe_open(path, framework="pt") as file:
+                description = _description(path, file.metadata() or {})
+                # A copy is aligned in memory and does not depend on the file any more.
+                return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+        except SafetensorError as error:
+            raise ArgumentError(f"{path}: {_damage(path)}") from error
 
 
 def _damage(path: Path) -> str:
-    """What is wrong with a file that safetensors cannot open: it would begin with a length and then JSON."""
+    """What is wrong with a file that safetensors cannot open; a good one begins with a length and JSON."""
     with path.open("rb") as file:
         start = file.read(9)
     if start[8:] == b"{":
@@ -133,7 +131,7 @@ def _description(path: Path, header: dict[str, str]) -> dict[str, Any]:
     try:
         description: dict[str, Any] = json.loads(header[FORMAT])
         version = int(str(description["version"]))
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, RecursionError, TypeError, ValueError) as error:
         raise ArgumentError(
             f"{path}: expected JSON with a version in the header, got {_short(header[FORMAT])}; "
             "write the file again"

@@ -13,6 +13,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_atomic
+from texgs.core.ply_file import read_vertices
 from texgs.core.rotation import quats_to_matrices
 from texgs.raster.spherical_harmonics import DEGREES
 from texgs.scene.model import Model, Optics, material
@@ -89,7 +90,7 @@ def read_ply(path: str | Path) -> Model:
         ArgumentError: if the file is missing, no PLY, cut short or without surfels, or values are not finite.
     """
     path = Path(path)
-    vertices = _vertices(path)
+    vertices = read_vertices(path)
     try:
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
@@ -155,23 +156,6 @@ def _release_material(model: Model) -> dict[str, Tensor]:
 
 
 # -- reading ---
-
-
-def _vertices(path: Path) -> np.ndarray:
-    """Vertices of a PLY file as a structured array [N]."""
-    from plyfile import PlyData, PlyParseError
-
-    try:
-        data = PlyData.read(path)
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except OSError as error:
-        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
-    except (PlyParseError, ValueError) as error:
-        raise ArgumentError(f"{path}: expected a whole PLY file, got {error}") from error
-    if "vertex" not in data:
-        raise ArgumentError(f"{path}: expected vertices, got {', '.join(e.name for e in data) or 'nothing'}")
-    return data["vertex"].data
 
 
 def _take(vertices: np.ndarray, *names: str) -> Tensor:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pickle
 import zipfile
 from pathlib import Path
 
@@ -11,15 +10,13 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError
+from texgs.core.memory import require_memory
+from texgs.core.reading import reading
+from texgs.core.torch_file import load_torch
 from texgs.raster import Texture
 from texgs.raster.atlas import check_texture
 
-# What torch.load and taking its result apart raise for a file of another kind.
-UNREADABLE = (
-    *(OSError, RuntimeError, pickle.UnpicklingError, EOFError),
-    *(AttributeError, LookupError, TypeError, ValueError),
-)
+RELEASE = "the release writes it beside the surfels"
 
 
 def read_texture(folder: Path, n: int) -> dict[str, Tensor]:
@@ -60,27 +57,19 @@ def _transposed(sizes: Tensor, starts: Tensor, offsets: Tensor, counts: Tensor) 
 
 def _arrays(path: Path) -> tuple[Tensor, Tensor]:
     """Texels [T, 3] float32, and of each surfel texels along u, along v and its first [N, 3]."""
-    try:
+    with reading(path, "texture_dc and texture_dims as npz", RELEASE):
+        with zipfile.ZipFile(path) as archive:
+            n_bytes = sum(entry.file_size for entry in archive.infolist())
+            require_memory(2 * n_bytes, f"{path}: arrays of {n_bytes} bytes", RELEASE)
         with np.load(path, allow_pickle=False) as arrays:
             texels, dims = arrays["texture_dc"], arrays["texture_dims"]
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file; the release writes it beside the surfels") from error
-    except (OSError, KeyError, TypeError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ArgumentError(f"{path}: expected texture_dc and texture_dims as npz, got {error}") from error
-    return torch.from_numpy(texels.astype(np.float32)), torch.from_numpy(dims.astype(np.int64))
+        return torch.from_numpy(texels.astype(np.float32)), torch.from_numpy(dims.astype(np.int64))
 
 
 def _palette(path: Path) -> Tensor:
     """[3], clamped as the release does when it reads it."""
-    try:
-        captured, _ = torch.load(path, map_location="cpu", weights_only=True)
-        palette = captured[0].detach().float()
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file; the release writes it beside the surfels") from error
-    except UNREADABLE as error:
-        raise ArgumentError(
-            f"{path}: expected a palette as the release saves it, a list of one tensor and a number, "
-            "got another kind of file"
-        ) from error
-    check.shape("palette", palette, "3")
-    return palette.clamp(0, 1)
+    with reading(path, "a palette as the release saves it, a list of one tensor and a number", RELEASE):
+        captured, _ = load_torch(path)
+        palette = captured[0].detach()
+        check.shape("palette", palette, "3")
+        return palette.float().clamp(0, 1)

@@ -15,9 +15,13 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
+from texgs.core.names import label, named_file
+from texgs.core.numbers import is_number
+from texgs.core.plain_yaml import parse_yaml
+from texgs.core.reading import reading, reading_as
 from texgs.scene.compact import open_model
 from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit, color, is_number
+from texgs.scene.edits import Edit, color
 from texgs.scene.model import Model
 from texgs.scene.segment import labels_of, with_variants
 from texgs.scene.segment_file import read_segment
@@ -25,6 +29,7 @@ from texgs.scene.texture_file import with_texture
 from texgs.volume.view_set import Light
 
 VERSION = 1
+LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
 KEYS = ("texgs-scene", "light", "background", "models")
 EDITS = tuple(each.name for each in fields(Edit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
@@ -53,6 +58,14 @@ class SceneModel:
     edit: Edit = field(default_factory=Edit)  # of what no segment holds
     texture: Path | None = None  # variant in place of the model's own texels
     segments: Mapping[str, SceneSegment] = field(default_factory=dict)
+
+    @property
+    def files(self) -> list[Path | None]:
+        """All that `open` reads."""
+        found = [self.file, self.texture]
+        for segment in self.segments.values():
+            found += [segment.file, segment.texture]
+        return found
 
     def open(self) -> tuple[Model, list[Tensor]]:
         """The model with the texels of all variants, and the masks [N] of its segments.
@@ -121,7 +134,8 @@ def read_scene(path: str | Path) -> Scene:
     path = Path(path)
     values = read_values(path)
     try:
-        return scene_of(values, path.parent)
+        with reading_as("a scene", "correct it"):
+            return scene_of(values, path.parent)
     except ArgumentError as error:
         raise ArgumentError(f"{path}: {error}") from error
 
@@ -132,12 +146,15 @@ def read_values(path: Path) -> Any:
     Raises:
         ArgumentError: if it is missing or no YAML.
     """
-    try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file; texgs compose writes one") from error
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ArgumentError(f"{path}: expected a scene in YAML, got {one_line(error)}") from error
+    if not path.exists():
+        raise ArgumentError(f"{path}: no such file; texgs compose writes one")
+    with reading(path, "a scene in YAML", "correct it"):
+        if path.stat().st_size > LARGEST:
+            raise ArgumentError(f"{path}: expected a scene of at most {LARGEST} bytes; is it another file?")
+        try:
+            return parse_yaml(path.read_text(encoding="utf-8"))
+        except ArgumentError as error:
+            raise ArgumentError(f"{path}: {error}") from error
 
 
 def scene_of(values: Any, folder: Path) -> Scene:
@@ -154,7 +171,9 @@ def scene_of(values: Any, folder: Path) -> Scene:
     if values.get("texgs-scene") != VERSION:
         raise ArgumentError(f"texgs-scene: expected {VERSION}, got {values.get('texgs-scene')!r}")
     known(values.get("models"), None, "models")
-    models = {str(name): _model(f"models.{name}", x, folder) for name, x in values["models"].items()}
+    models = {
+        label("models", name): _model(f"models.{name}", x, folder) for name, x in values["models"].items()
+    }
     background = color("background", values.get("background", WHITE))
     return Scene(models, _light(values.get("light", "headlight")), background)
 
@@ -198,7 +217,7 @@ def _model(where: str, values: Any, folder: Path) -> SceneModel:
     known(entries, None, f"{where}.segments")
     segments = {}
     for name, entry in entries.items():
-        if not str(name) or any(mark in str(name) for mark in RESERVED):
+        if any(mark in label(f"{where}.segments", name) for mark in RESERVED):
             raise ArgumentError(
                 f"{where}.segments: expected names without {' '.join(RESERVED)}, got {name!r}"
             )
@@ -208,16 +227,14 @@ def _model(where: str, values: Any, folder: Path) -> SceneModel:
 
 
 def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Edit, Path | None]:
-    if not isinstance(values.get("file"), str):
-        raise ArgumentError(f"{where}.file: expected the path of {kind}, got {values.get('file')!r}")
-    texture = values.get("texture")
-    if texture is not None and not isinstance(texture, str):
-        raise ArgumentError(f"{where}.texture: expected the path of a texture variant, got {texture!r}")
+    file, texture = named_file(f"{where}.file", folder, values.get("file"), kind), values.get("texture")
+    if texture is not None:
+        texture = named_file(f"{where}.texture", folder, texture, "a texture variant")
     try:
         edit = Edit(**{key: value for key, value in values.items() if key in EDITS})
     except ArgumentError as error:
         raise ArgumentError(f"{where}.{error}") from error
-    return folder / values["file"], edit, None if texture is None else folder / texture
+    return file, edit, texture
 
 
 def _light(value: Any) -> Light:
@@ -241,8 +258,3 @@ def known(values: Any, keys: Collection[str] | None, where: str) -> None:
             like = difflib.get_close_matches(str(key), list(keys or ()), n=1)
             hint = f", did you mean {like[0]}?" if like else f"; expected {', '.join(keys or ())}"
             raise ArgumentError(f"{where}: no such key {key!r}{hint}")
-
-
-def one_line(error: Exception) -> str:
-    """An error's message in one line."""
-    return " ".join(str(error).split())

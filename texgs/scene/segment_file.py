@@ -61,7 +61,8 @@ def read_segment(path: str | Path, model: Model) -> Tensor:
     # A model without surfels has no places; segments of it are empty, and refused when they are written.
     extent = float((expected.amax(0) - expected.amin(0)).max()) if len(expected) else 0.0
     belongs = len(mask) == len(model) and anchors.shape == expected.shape
-    if not belongs or bool(((anchors - expected).abs() > TOLERANCE * extent).any()):
+    # Written so that places that are NaN are elsewhere.
+    if not belongs or not bool(((anchors - expected).abs() <= TOLERANCE * extent).all()):
         raise ArgumentError(
             f"{path}: expected a segment of this model, got one of another with {len(mask)} surfels; "
             "segment this model again"
@@ -78,6 +79,7 @@ def _anchors(model: Model) -> Tensor:
 def _read(path: Path) -> dict[str, Tensor]:
     found = read_tensor_file(path, FORMAT)
     mask, anchors = found.get("mask"), found.get("anchors")
-    if mask is None or anchors is None or mask.dtype != torch.bool or mask.ndim != 1:
+    is_whole = mask is not None and anchors is not None and mask.dtype == torch.bool and mask.ndim == 1
+    if not is_whole or bool((mask.view(torch.uint8) > 1).any()):  # type: ignore[union-attr]
         raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(found)}; make it again")
     return found

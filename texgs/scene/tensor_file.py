@@ -7,6 +7,7 @@ from pathlib import Path
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.reading import reading
 
 
 def read_tensor_file(path: Path, kind: str) -> dict[str, Tensor]:
@@ -19,14 +20,9 @@ def read_tensor_file(path: Path, kind: str) -> dict[str, Tensor]:
     Raises:
         ArgumentError: if the file is missing, damaged or of another kind.
     """
-    from safetensors import SafetensorError, safe_open
+    from safetensors import safe_open
 
-    try:
-        with safe_open(path, framework="pt") as file:
-            if kind not in (file.metadata() or {}):
-                raise ArgumentError(f"{path}: expected a {kind} file, got safetensors of another kind")
-            return {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-    except FileNotFoundError as error:
-        raise ArgumentError(f"{path}: no such file") from error
-    except (OSError, SafetensorError) as error:
-        raise ArgumentError(f"{path}: expected a {kind} file, got {error}") from error
+    with reading(path, f"a {kind} file"), safe_open(path, framework="pt") as file:
+        if kind not in (file.metadata() or {}):
+            raise ArgumentError(f"{path}: expected a {kind} file, got safetensors of another kind")
+        return {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118

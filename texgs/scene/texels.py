@@ -1,4 +1,4 @@
-"""The list that holds the texels of all surfels: whose each is, and the colours that they stand for."""
+"""The list of the texels of all surfels: the surfel that each belongs to, and the colours without light."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from texgs.scene.model import Model
 
 
 def owners(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-    """Place in the list [T] and surfel [T] of all texels, surfel after surfel, whatever order they are in."""
+    """Place in the list [T] and surfel [T] of all texels, sorted by surfel."""
     counts = parameters["sizes"].long().prod(1)  # [N]
     surfel = torch.repeat_interleave(counts)
     first = counts.cumsum(0) - counts  # [N] in the new order
@@ -38,7 +38,7 @@ def bare_colors(model: Model) -> Tensor:
 
 
 def recolored(model: Model, colors: Tensor, surfels: Tensor | None = None) -> Model:
-    """The model with other bare colours: offsets of surfels become their means, texels what is left.
+    """Return the model with other colours without light: offsets are their means, texels the differences.
 
     Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in
     that colour, or highlights would take on the hue that the surfel had before.

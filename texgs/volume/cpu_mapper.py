@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
 from texgs.core.errors import NativeError
+from texgs.core.memory import require_memory
 from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.geometry import march
 from texgs.volume.grid import Grid
@@ -28,6 +29,7 @@ from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import Light
 from texgs.volume.vtk_camera import aim, point_light
 
+BYTES = 200  # of memory for a pixel: VTK's image, the picture, and directions of rays in double precision
 FULL = 32767  # 1.0 in the mapper's fixed-point numbers
 OPAQUE = 0.99  # nothing behind shows
 MARGIN = 2  # pixels; the mapper may leave out the last row and column of a view that the volume fills
@@ -73,7 +75,13 @@ class CpuMapper:
         self._window.AddRenderer(self._renderer)
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
-        """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""
+        """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values.
+
+        Raises:
+            OutOfMemoryError: if the view needs more memory than there is.
+        """
+        what = f"a view of {camera.width} x {camera.height} pixels"
+        require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
         picture = self._cast(tf, _with_margin(camera), light)[MARGIN:-MARGIN, MARGIN:-MARGIN]
         cut = _shortened(self._grid, camera, self._appearance.step) & (picture[..., 3] < OPAQUE)
         if cut.any():

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of
-from texgs.volume.slabs import ArraySource, RawSource, Source, reading_as
+from texgs.core.reading import reading_as
+from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of, require_room
+from texgs.volume.slabs import ArraySource, RawSource, Source
 
 ONES = (1.0, 1.0, 1.0)
 ZEROS = (0.0, 0.0, 0.0)
@@ -95,6 +96,7 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> Arr
         turn = nibabel.io_orientation(image.affine)
         if np.isnan(turn).any():
             raise ArgumentError("expected three independent axes, got a singular affine matrix")
+        require_room(dims_of(shape[::-1]), stored)
         proxy: Any = image.dataobj
         is_scaled = (proxy.slope, proxy.inter) != (1, 0)
         samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)

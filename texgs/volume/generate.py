@@ -1,4 +1,4 @@
-"""Volumes made here, for examples and tests: a sphere, decaying turbulence, and jets.
+"""Volumes made here, for examples and tests: a sphere, an orbital, decaying turbulence, and jets.
 
 All are cubes of float32 in [0, 1] with spacing 1, and the same everywhere for the same arguments up to
 rounding. Turbulence and jets are one flow for each seed, whatever the size they are sampled at.
@@ -25,6 +25,7 @@ from texgs.volume.navier_stokes import (
     to_spectrum,
     wavevectors,
 )
+from texgs.volume.orbital import orbital_cube
 
 SMALLEST = 16  # samples along each side
 TURBULENCE_RESOLUTION, JETS_RESOLUTION = 64, 48  # cells of the simulation along each side; even
@@ -47,6 +48,24 @@ def sphere(size: int) -> Grid:
     axis = torch.linspace(-1, 1, size)
     distance = (axis[:, None, None] ** 2 + axis[:, None] ** 2 + axis**2).sqrt()
     return _grid(0.5 + 0.5 * torch.cos(pi * distance.clamp_max(1)))
+
+
+def orbital(size: int, n: int = 4, degree: int = 3, order: int = 0) -> Grid:
+    """Wave function of the electron of a hydrogen atom: 0.5 where it is 0, on either side where it is not.
+
+    By default 4f z^3: along +y a lobe and a ring, both positive, and their mirror image, negative.
+
+    Args:
+        size: samples along each side, at least 16.
+        n: principal quantum number.
+        degree: quantum number l.
+        order: quantum number m.
+
+    Raises:
+        ArgumentError: if `size` is too small, or there is no such orbital.
+    """
+    _check_size(size)
+    return _grid(torch.from_numpy(0.5 + 0.5 * orbital_cube(size, n, degree, order)))
 
 
 def turbulence(size: int, seed: int = 0, duration: float = 1.5, viscosity: float = 0.01) -> Grid:
@@ -157,4 +176,10 @@ def _grid(values: Tensor) -> Grid:
     return Grid(values.float().clamp(0, 1).numpy())
 
 
-GENERATORS: dict[str, Callable[..., Grid]] = {"sphere": sphere, "turbulence": turbulence, "jets": jets}
+GENERATORS: dict[str, Callable[..., Grid]] = {
+    "sphere": sphere,
+    "orbital": orbital,
+    "turbulence": turbulence,
+    "jets": jets,
+}
+RANDOM = ("turbulence", "jets")  # those that a seed changes

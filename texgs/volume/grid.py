@@ -8,6 +8,7 @@ from math import isfinite, prod
 import numpy as np
 
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.memory import require_memory
 
 Triple = tuple[float, float, float]
 Dims = tuple[int, int, int]
@@ -82,6 +83,18 @@ def check_lattice(dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) 
 def byte_count(dims: Dims, dtype: np.dtype) -> int:
     """Size of the samples in bytes."""
     return prod(dims) * dtype.itemsize
+
+
+def require_room(dims: Dims, dtype: np.dtype) -> None:
+    """Require that all samples fit into memory, for formats that are read as a whole.
+
+    Raises:
+        OutOfMemoryError: naming the size that the header claims.
+    """
+    what = f"{' x '.join(map(str, dims))} samples of {dtype.name}"
+    require_memory(
+        byte_count(dims, dtype), what, "is the header damaged? Else store it as .nrrd, not compressed"
+    )
 
 
 def _sides(dims: Dims, spacing: Triple) -> list[float]:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import zlib
-from math import prod
 from pathlib import Path
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import Dims, Grid, Triple, byte_count, check_lattice
-from texgs.volume.slabs import ArraySource, RawSource, Source, reading_as
+from texgs.core.names import named_file
+from texgs.core.reading import reading_as
+from texgs.volume.grid import Grid, Triple, byte_count, check_lattice
+from texgs.volume.packed import unpacked
+from texgs.volume.slabs import ArraySource, RawSource, Source
 
 TYPES = {
     "MET_CHAR": "i1",
@@ -26,7 +27,7 @@ TYPES = {
 }
 # A header is short; a foreign file may hold no line break for gigabytes.
 LONGEST_LINE = 4096
-ZLIB_OR_GZIP = 47  # window bits: the largest window, header found by zlib
+MOST_FIELDS = 1000
 
 
 def open_metaimage(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
@@ -53,7 +54,7 @@ def open_metaimage(path: Path, spacing: Triple | None, origin: Triple | None) ->
         check_lattice(dims, stored, spacing, origin)
         data, offset = _data_file(path, fields, header_size, byte_count(dims, stored))
         if fields.get("CompressedData", "False").lower() == "true":
-            values = _decompress(data, offset, dims, stored)
+            values = unpacked(data, offset, dims, stored)
             return ArraySource(Grid(values, spacing, origin), path.name)
     return RawSource(data, dims, stored, offset, spacing, origin)
 
@@ -65,7 +66,7 @@ def _read_fields(path: Path) -> tuple[dict[str, str], int]:
         while "ElementDataFile" not in fields:
             line = file.readline(LONGEST_LINE)
             key, equals, value = line.decode("ascii").partition("=")
-            if not line or (not equals and key.strip()):
+            if not line or (not equals and key.strip()) or len(fields) == MOST_FIELDS:
                 raise ArgumentError("expected a MetaImage file, found no ElementDataFile in its header")
             fields[key.strip()] = value.strip()
         return fields, file.tell()
@@ -94,22 +95,8 @@ def _data_file(path: Path, fields: dict[str, str], header_size: int, n_bytes: in
         return path, header_size
     if name.startswith("LIST") or "%" in name:
         raise ArgumentError("expected one file of samples, got one per slice; convert it to .mha")
-    data = path.parent / name
+    data = named_file("ElementDataFile", path.parent, name)
     if not data.is_file():
         raise ArgumentError(f"no such file with samples: {data}")
     skip = int(fields.get("HeaderSize", "0"))
     return data, skip if skip >= 0 else data.stat().st_size - n_bytes  # -1: samples end the file
-
-
-def _decompress(data: Path, offset: int, dims: Dims, stored: np.dtype) -> np.ndarray:
-    """Samples [Z, Y, X] of a zlib or gzip stream."""
-    n_bytes = byte_count(dims, stored)
-    with data.open("rb") as file:
-        file.seek(offset)
-        stream = zlib.decompressobj(ZLIB_OR_GZIP)
-        # The header's CompressedDataSize is wrong in files in use. The stream knows its end: one byte more
-        # than there should be makes zlib go there, and compare its checksum.
-        samples = stream.decompress(file.read(), n_bytes + 1)
-    if len(samples) < n_bytes:
-        raise ArgumentError(f"the file is cut off: expected {n_bytes} bytes of samples, found {len(samples)}")
-    return np.frombuffer(samples, stored, prod(dims)).reshape(dims[::-1])

@@ -3,16 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isnan
+from io import BytesIO
+from math import isnan, prod
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.names import named_file
+from texgs.core.reading import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, byte_count, check_lattice
-from texgs.volume.slabs import ArraySource, RawSource, Source, reading_as
+from texgs.volume.packed import bzip2, deflated, unpacked
+from texgs.volume.slabs import ArraySource, RawSource, Source
 
+LONGEST_HEADER = 1 << 20  # bytes
+# Encodings by the words that NRRD has for them.
+UNPACK = {"gzip": deflated, "gz": deflated, "bzip2": bzip2, "bz2": bzip2}
+TEXT = ("ascii", "ASCII", "text", "txt")
 ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
 # NRRD has many words for a type; sizes and signs are what they are in C on every machine of today.
 TYPES = {
@@ -58,19 +66,13 @@ def open_nrrd(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
     Raises:
         ArgumentError: if the file is damaged or no scalar volume.
     """
-    import nrrd
-
     header = _read_header(path)
     lattice = (spacing or header.spacing, origin or header.origin)
     if header.fields["encoding"] == "raw":
         return RawSource(header.data, header.dims, header.stored, header.offset, *lattice)
     check_lattice(header.dims, header.stored, *lattice)
-    with reading_as("an NRRD file"), header.data.open("rb") as file:
-        if header.data == path:
-            nrrd.read_header(file)
-        fields = {key: value for key, value in header.fields.items() if key not in ("data file", "datafile")}
-        values = nrrd.read_data(fields, file, str(header.data), index_order="C")
-    return ArraySource(Grid(values, *lattice), path.name)
+    with reading_as("an NRRD file"):
+        return ArraySource(Grid(_decoded(header), *lattice), path.name)
 
 
 def open_grid(path: str | Path) -> Grid:
@@ -149,12 +151,30 @@ def _read_header(path: Path) -> Header:
         if file.read(4) != b"NRRD":  # a foreign file may hold no line break for gigabytes
             raise ArgumentError("expected an NRRD file, but it does not start with NRRD")
         file.seek(0)
-        fields = nrrd.read_header(file)
-        end = file.tell()
+        head = BytesIO(file.read(LONGEST_HEADER))
+        fields = nrrd.read_header(head)
+        end = head.tell()
+        if end == LONGEST_HEADER:
+            raise ArgumentError(f"expected a header of at most {LONGEST_HEADER} bytes, got a longer one")
         dims = _dims(fields)
         stored = _stored_type(fields)
         data, offset = _data_file(path, fields, end, byte_count(dims, stored))
         return Header(fields, data, offset, dims, stored, _spacing(fields), _origin(fields))
+
+
+def _decoded(header: Header) -> np.ndarray:
+    """Samples [Z, Y, X] of a file that is compressed or text; NRRD skips bytes after decompression."""
+    encoding, skip = header.fields["encoding"], _number(header.fields, "byte skip")
+    if encoding in UNPACK:
+        return unpacked(header.data, header.offset, header.dims, header.stored, UNPACK[encoding], skip)
+    if encoding not in TEXT:
+        raise ArgumentError(f"encoding: expected raw, gzip, bzip2 or ascii, got {encoding}")
+    with header.data.open("rb") as file:
+        file.seek(header.offset + max(0, skip))
+        values = np.fromfile(file, header.stored, sep=" ")
+    if values.size != prod(header.dims):
+        raise ArgumentError(f"expected {prod(header.dims)} samples, found {values.size}; is it cut off?")
+    return values.reshape(header.dims[::-1])
 
 
 def _dims(fields: dict[str, Any]) -> Dims:
@@ -180,25 +200,29 @@ def _stored_type(fields: dict[str, Any]) -> np.dtype:
 def _data_file(path: Path, fields: dict[str, Any], end: int, n_bytes: int) -> tuple[Path, int]:
     """File with the samples and where they start in it."""
     name = fields.get("data file", fields.get("datafile"))
-    line_skip = int(fields.get("line skip", fields.get("lineskip", 0)))
-    byte_skip = int(fields.get("byte skip", fields.get("byteskip", 0)))
+    byte_skip = _number(fields, "byte skip")
     if name is None:
         data, start = path, end
     elif name.startswith("LIST") or "%" in name:
         raise ArgumentError("expected one file of samples, got several; join them with `unu join`")
     else:
-        data, start = path.parent / name, 0
+        data, start = named_file("data file", path.parent, name), 0
     if not data.is_file():
         raise ArgumentError(f"no such file with samples: {data}")
-    if fields["encoding"] != "raw":
-        return data, start  # pynrrd skips
-    if byte_skip == -1:
+    is_raw = fields["encoding"] == "raw"
+    if is_raw and byte_skip == -1:
         return data, data.stat().st_size - n_bytes  # the samples end the file
     with data.open("rb") as file:
         file.seek(start)
-        for _ in range(line_skip):
-            file.readline()
-        return data, file.tell() + byte_skip
+        for _ in range(_number(fields, "line skip")):
+            if not file.readline():
+                raise ArgumentError("line skip: expected no more lines than the file has")
+        return data, file.tell() + (byte_skip if is_raw else 0)
+
+
+def _number(fields: dict[str, Any], key: str) -> int:
+    """How much to skip; both keys are also written without the space."""
+    return int(fields.get(key, fields.get(key.replace(" ", ""), 0)))
 
 
 def _spacing(fields: dict[str, Any]) -> Triple:

@@ -1,4 +1,4 @@
-"""Render many views of one volume into files; those already there are kept, so a killed run goes on."""
+"""Render many views of one volume into files; those already there are kept, so a killed run continues."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Mapper(Protocol):
 
 
 class Times:
-    """How long each view took, in a file that is written anew with each: a killed run loses none.
+    """Times of all views, in a file that is written after each view, so that a killed run keeps them.
 
     Args:
         path: of the JSON file, in a folder above the views; what it says of earlier runs is kept.
@@ -76,6 +76,6 @@ def render_views(
         picture = mapper.render(tf, view.camera, view.light)
         seconds = time.perf_counter() - start
         if times is not None:
-            times.add(view, 1e3 * seconds)  # before the image: an image without a time would stay so
+            times.add(view, 1e3 * seconds)  # before the image, which is not rendered again once it is there
         image = torch.from_numpy(np.ascontiguousarray(picture))
         write_png(view.path, image[..., :3], image[..., 3])

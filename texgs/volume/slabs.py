@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, Grid, Triple, byte_count, check_lattice
 
 SLAB_BYTES = 1 << 23  # reads of this size run at the disk's speed, and memory stays small
@@ -142,26 +140,3 @@ def slab_bounds(source: Source, start: int, stop: int, multiple: int = 1) -> lis
     x, y, _ = source.dims
     step = max(1, SLAB_BYTES // (x * y * source.dtype.itemsize * multiple)) * multiple
     return [(low, min(low + step, stop)) for low in range(start, stop, step)]
-
-
-@contextmanager
-def reading_as(what: str) -> Iterator[None]:
-    """Report whatever a reader raises as one sentence: the file is not `what`.
-
-    Readers of foreign formats raise what they happen to trip over in a damaged file, of any class.
-
-    Args:
-        what: such as "a NIfTI file".
-
-    Raises:
-        ArgumentError: in place of the reader's error; this project's own errors pass.
-    """
-    try:
-        yield
-    except TexgsError:
-        raise
-    except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
-        if isinstance(error, KeyError):
-            reason = f"a header without {reason}"
-        raise ArgumentError(f"expected {what}, got {reason}; is the file damaged or cut off?") from error

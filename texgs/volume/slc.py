@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import Dims, Grid, Triple
-from texgs.volume.slabs import ArraySource, reading_as
+from texgs.core.reading import reading_as
+from texgs.volume.grid import Dims, Grid, Triple, require_room
+from texgs.volume.slabs import ArraySource
 
 MAGIC = 11111
 # After the magic number: dims, bits, spacing, unit, origin, modification, compression, icon; X ends it.
@@ -33,17 +34,20 @@ def open_slc(path: Path, spacing: Triple | None, origin: Triple | None) -> Array
         x, y, z, bits, *_, compression, icon_width, icon_height = (
             int(word) for word in words[:4] + words[7:]
         )
+        sx, sy, sz = (float(word) for word in words[4:7])
         if bits != 8 or compression not in (0, 1):
             raise ArgumentError(
                 f"expected 8 bits and compression 0 or 1, got {bits} bits and compression {compression}"
             )
+        if min(x, y, z) < 1 or min(icon_width, icon_height) < 0:
+            raise ArgumentError(f"expected samples along x, y and z, got {x} x {y} x {z}; is it damaged?")
+        require_room((x, y, z), np.dtype(np.uint8))
         samples = content[header.end() + 3 * icon_width * icon_height :]
         if compression:
             samples = _decoded(samples, (x, y, z))
         if len(samples) < x * y * z:
             raise ArgumentError(f"the file is cut off: expected {x * y * z} samples, found {len(samples)}")
         values = np.frombuffer(samples, np.uint8, x * y * z).reshape(z, y, x)
-    sx, sy, sz = (float(word) for word in words[4:7])
     return ArraySource(Grid(values, spacing or (sx, sy, sz), origin or (0.0, 0.0, 0.0)), path.name)
 
 

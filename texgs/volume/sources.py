@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.volume.formats import open_nifti, open_npy, open_raw
 from texgs.volume.grid import Dims, Triple
 from texgs.volume.metaimage import open_metaimage
@@ -65,6 +65,7 @@ def open_source(
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
             volume.
+        OutOfMemoryError: if the format is one that is read as a whole, and the samples do not fit.
     """
     path = Path(path)
     try:
@@ -77,7 +78,7 @@ def open_source(
                 "format has a header; leave them out"
             )
         return _opener(path)(path, spacing, origin)
-    except (ArgumentError, ShapeError) as error:
+    except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     except FileNotFoundError as error:
         path = Path(error.filename or path)
@@ -88,9 +89,11 @@ def open_source(
 
 
 def _try_to_read(path: Path) -> None:
-    """Raise OSError where that is not possible; the readers of the formats say it each in other words."""
+    """Raise where that is not possible; the readers of the formats say it each in other words."""
     if path.is_dir():
         next(path.iterdir(), None)
+    elif path.exists() and not path.is_file():
+        raise ArgumentError("expected a file or a folder, got a named pipe, a device or a socket")
     else:
         path.open("rb").close()
 

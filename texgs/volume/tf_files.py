@@ -3,7 +3,6 @@
 import difflib
 from collections.abc import Sequence
 from itertools import pairwise
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +10,8 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
+from texgs.core.numbers import is_number
+from texgs.core.reading import reading_as
 from texgs.volume.transfer import TransferFunction
 
 Point = tuple[float, float, float, float]
@@ -42,13 +43,14 @@ def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
     """
     data = read_json(path)
     try:
-        if isinstance(data, dict) and data.get("format") == FORMAT:
-            return _from_ours(data)
-        presets = data if isinstance(data, list) else [data]
-        if presets and all(
-            isinstance(p, dict) and p.keys() & {"RGBPoints", "IndexedColors"} for p in presets
-        ):
-            return _from_preset(_chosen(presets, preset))
+        with reading_as("a transfer function"):
+            if isinstance(data, dict) and data.get("format") == FORMAT:
+                return _from_ours(data)
+            presets = data if isinstance(data, list) else [data]
+            if presets and all(
+                isinstance(p, dict) and p.keys() & {"RGBPoints", "IndexedColors"} for p in presets
+            ):
+                return _from_preset(_chosen(presets, preset))
     except ArgumentError as error:
         raise ArgumentError(f"{path}: {error}") from error
     raise ArgumentError(
@@ -148,6 +150,8 @@ def _from_preset(preset: dict[str, Any]) -> TransferFunction:
     color = _fours(preset, "RGBPoints")
     ramp = [(color[0][0], 0.0, 0.5, 0.0), (color[-1][0], 1.0, 0.5, 0.0)]
     nodes = _fours(preset, "Points") if preset.get("Points") else ramp
+    if not all(0 <= x <= 1 for _, _, *shape in nodes for x in shape):
+        raise ArgumentError("Points: expected midpoints and sharpnesses from 0 to 1, got others")
     space = preset.get("ColorSpace", "RGB")
     if space not in SPACES:
         raise ArgumentError(f"ColorSpace: expected one of {', '.join(SPACES)}, got {space!r}")
@@ -162,7 +166,7 @@ def _from_preset(preset: dict[str, Any]) -> TransferFunction:
 def _fours(preset: dict[str, Any], key: str) -> list[Point]:
     """A flat list as points of four numbers, sorted by value as ParaView does."""
     numbers = preset[key]
-    if not isinstance(numbers, list) or not all(isinstance(x, Real) for x in numbers):
+    if not isinstance(numbers, list) or not all(map(is_number, numbers)):
         raise ArgumentError(f"{key}: expected a list of numbers, got {numbers!r:.60}")
     if len(numbers) % 4 or not numbers:
         raise ArgumentError(f"{key}: expected four numbers per point, got {len(numbers)} numbers")

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.plots import words
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def plot(
     for name, tf in basic.items():
         _draw(opacity, name, tf)
     low, high = _extent([(minimum, maximum), *(tf.support for tf in basic.values())])
-    opacity.set(xlim=(low, high), xlabel="value", title=title)
+    opacity.set(xlim=(low, high), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
     return write_atomic(path, lambda file: figure.savefig(file, format="png"))
 
@@ -82,7 +83,7 @@ def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:
     colors = tf(np.linspace(low, high, SAMPLES)[None])[..., :3]  # [1, SAMPLES, 3]
     axes.imshow(colors, extent=(low, high, 0, 1), aspect="auto", alpha=0.85, zorder=2).set_clip_path(outline)
     center = values[alpha >= alpha.max() - 1e-9].mean()
-    axes.text(center, alpha.max() + 0.015, name, ha="center", va="bottom", zorder=4)
+    axes.text(center, alpha.max() + 0.015, words(name), ha="center", va="bottom", zorder=4)
 
 
 def _extent(ranges: list[tuple[float, float]]) -> tuple[float, float]:

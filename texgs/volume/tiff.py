@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of
-from texgs.volume.slabs import ArraySource, RawSource, Source, reading_as
+from texgs.core.reading import reading_as
+from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of, require_room
+from texgs.volume.slabs import ArraySource, RawSource, Source
 
 SUFFIXES = (".tif", ".tiff")
+PAGES = 2  # in memory at a time: one as it is decoded, and its place in the slab
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +109,7 @@ def _open_file(path: Path, spacing: Triple, origin: Triple) -> Source:
                 stored = dtype.newbyteorder(tiff.byteorder)
                 return RawSource(path, dims, stored, series.dataoffset, spacing, origin)
             if len(tiff.pages) != dims[2]:
+                require_room(dims, dtype)
                 return ArraySource(Grid(series.asarray(), spacing, origin), path.name)
         pages = tuple((path, page) for page in range(len(tiff.pages)))
     return PageSource(path, pages, shape, dtype, spacing, origin)
@@ -117,6 +120,7 @@ def _page_type(tiff: Any) -> tuple[tuple[int, int], np.dtype]:
     page = tiff.pages[0]
     if page.samplesperpixel != 1:
         raise ArgumentError(f"expected a scalar volume, got {page.samplesperpixel} components per sample")
+    require_room((page.imagewidth, page.imagelength, PAGES), np.dtype(page.dtype))
     return (page.imagelength, page.imagewidth), np.dtype(page.dtype)
 
 

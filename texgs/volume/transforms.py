@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import atan, isfinite, pi, tan
+from math import atan, pi, tan
 from typing import Any
 
 import torch
@@ -11,6 +11,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.numbers import is_number
 
 LENS_KEYS = ("camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy")
 OPENCV_FROM_OPENGL = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # its own inverse
@@ -98,6 +99,6 @@ def number(where: str, values: Mapping[str, Any], key: str, default: float | Non
     value = values.get(key, default)
     if value is None:
         raise ArgumentError(f"{where}: expected the key {key}, found {', '.join(values) or 'no keys'}")
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not isfinite(value):
-        raise ArgumentError(f"{where}: {key}: expected a finite number, got {value!r}")
+    if not is_number(value):
+        raise ArgumentError(f"{where}: {key}: expected a finite number, got {value!r:.100}")
     return value

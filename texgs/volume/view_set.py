@@ -9,13 +9,14 @@ from typing import Any, Literal
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import Tensor
 
 from texgs.core.camera import Camera, orbit_direction
 from texgs.core.errors import ArgumentError
-from texgs.core.image import read_png
+from texgs.core.image import open_picture, read_png
 from texgs.core.io import read_json, write_json
+from texgs.core.names import named_file
+from texgs.core.reading import reading_as
 from texgs.volume.transforms import (
     LENS_KEYS,
     camera_to_world,
@@ -64,11 +65,8 @@ class View:
         Raises:
             ArgumentError: if the file is missing or no image.
         """
-        try:
-            with Image.open(self.path) as picture:
-                return torch.from_numpy(np.array(picture.convert("RGBA")))
-        except OSError as error:
-            raise ArgumentError(f"{self.path}: expected an image, got {error}") from error
+        with open_picture(self.path) as picture:
+            return torch.from_numpy(np.array(picture.convert("RGBA")))
 
     def image(self) -> tuple[Tensor, Tensor]:
         """Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; see `read_png`."""
@@ -156,7 +154,12 @@ def _frame(folder: Path, view: View) -> dict[str, Any]:
 
 def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
     """Views and metadata of one transforms_*.json."""
-    values = read_json(path)
+    with reading_as("cameras of views", where=f"{path}: "):
+        return _split_of(path, read_json(path))
+
+
+def _split_of(path: Path, values: Any) -> tuple[list[View], dict[str, Any]]:
+    """The same, from the values of the file."""
     frames = values.pop("frames", None) if isinstance(values, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
         raise ArgumentError(f"{path}: expected an object with a list of frames, at least one; found none")
@@ -178,10 +181,8 @@ def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
 
 def _image_path(path: Path, index: int, frame: Mapping[str, Any]) -> Path:
     """Image of a frame; the layout leaves out the extension."""
-    name = frame.get("file_path")
-    if not isinstance(name, str) or not name:
-        raise ArgumentError(f"{path}: frame {index}: expected file_path, the image's path; got {name!r}")
-    return path.parent / (name if name.endswith(".png") else f"{name}.png")
+    found = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"), "an image")
+    return found if found.suffix == ".png" else found.with_name(f"{found.name}.png")
 
 
 def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tuple[int, int]:
@@ -200,11 +201,8 @@ def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tupl
 
 def _png_size(image: Path) -> tuple[int, int]:
     """Width and height from the file's header."""
-    try:
-        with Image.open(image) as picture:
-            return picture.size
-    except OSError as error:
-        raise ArgumentError(f"{image}: expected an image, got {error}") from error
+    with open_picture(image) as picture:
+        return picture.size
 
 
 def _light(where: str, frame: Mapping[str, Any]) -> Light:

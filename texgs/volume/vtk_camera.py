@@ -1,4 +1,4 @@
-"""Cameras and lights of ours for VTK."""
+"""Cameras and lights of texgs for VTK."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def aim(target: vtkCamera, camera: Camera) -> None:
-    """Give a VTK camera the place, direction and lens of ours.
+    """Give a VTK camera the place, direction and lens of a `Camera`.
 
     Raises:
         ArgumentError: if the pixels are not square or the principal point is not in the middle.
@@ -46,7 +46,7 @@ def directions(camera: Camera, light: Light) -> tuple[NDArray[np.float64], NDArr
 
 
 def point_light(target: vtkLight, camera: Camera, light: Light) -> None:
-    """Let a VTK light shine from the direction of ours."""
+    """Let a VTK light shine from the direction of a `Light`."""
     target.SetLightTypeToSceneLight()
     target.SetFocalPoint(0, 0, 0)
     target.SetPosition(*directions(camera, light)[1])

@@ -1,17 +1,27 @@
-"""VTK's own formats as sources, read as a whole by VTK."""
+"""VTK's own formats as sources, read as a whole by VTK in a process of its own.
+
+VTK ends its process where a damaged header claims more memory than there is.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import json
+import subprocess
+import sys
 from pathlib import Path
-from typing import Any
+from threading import Timer
+from typing import IO, Any
 
-from texgs.core.errors import ArgumentError
-from texgs.volume.grid import Grid, Triple
-from texgs.volume.slabs import ArraySource, reading_as
+import numpy as np
+
+from texgs.core.errors import ArgumentError, OutOfMemoryError
+from texgs.core.reading import reading_as
+from texgs.volume.grid import Grid, Triple, require_room
+from texgs.volume.slabs import ArraySource
 
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
+SECONDS, RATE = 60.0, 1e6  # how long VTK may take: at least, and bytes per second of a large file
+LONGEST_LINE = 1 << 16  # bytes of what the process says before the samples
 
 
 def open_vtk(path: Path, spacing: Triple | None, origin: Triple | None) -> ArraySource:
@@ -19,37 +29,46 @@ def open_vtk(path: Path, spacing: Triple | None, origin: Triple | None) -> Array
 
     Raises:
         ArgumentError: if the file is damaged, or holds another kind of data set or no scalar field.
+        OutOfMemoryError: if its samples do not fit into memory.
     """
-    from vtkmodules.util.numpy_support import vtk_to_numpy
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-
     _check_end(path)
-    reader = _reader(path.suffix.lower())
-    reader.SetFileName(str(path))
-    with _vtk_messages() as messages:
-        reader.Update()
-        image = reader.GetOutputDataObject(0)
-    if messages:
+    command = [sys.executable, "-P", "-m", "texgs.volume.vtk_reader", str(path.absolute())]
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    with subprocess.Popen(command, **pipes) as child:  # type: ignore[call-overload]
+        watchdog = Timer(SECONDS + path.stat().st_size / RATE, child.kill)
+        watchdog.start()
+        try:
+            with reading_as(f"a {path.suffix} file"):
+                said, values = _received(child.stdout)
+        finally:
+            watchdog.cancel()
+            child.kill()
+    if said is None:
         raise ArgumentError(
-            f"expected a {path.suffix} file, VTK says: {messages[0]}; is it damaged or cut off?"
+            f"expected a {path.suffix} file, but VTK broke off; it is damaged, or claims more memory than "
+            "there is"
         )
-    if not isinstance(image, vtkImageData):
-        kind = image.GetClassName().removeprefix("vtk") if image else "nothing"
-        raise ArgumentError(f"expected image data (structured points), got {kind}; resample it to an image")
-    points = image.GetPointData()
-    array = points.GetScalars() or points.GetArray(0)
-    if array is None:
-        raise ArgumentError("expected point data, found none; convert cell data to point data")
-    if array.GetNumberOfComponents() != 1:
-        n_components = array.GetNumberOfComponents()
-        raise ArgumentError(f"expected a scalar volume, got {n_components} components per sample")
-    with reading_as("image data"):
-        values = vtk_to_numpy(array).reshape(image.GetDimensions()[::-1])
-    first = [0.0, 0.0, 0.0]
-    image.TransformIndexToPhysicalPoint(image.GetExtent()[::2], first)
-    return ArraySource(
-        Grid(values, spacing or image.GetSpacing(), origin or (first[0], first[1], first[2])), path.name
-    )
+    if "error" in said:
+        raise (OutOfMemoryError if said["is_memory"] else ArgumentError)(said["error"])
+    (dx, dy, dz), (x, y, z) = said["spacing"], said["origin"]
+    return ArraySource(Grid(values, spacing or (dx, dy, dz), origin or (x, y, z)), path.name)
+
+
+def _received(stream: IO[bytes]) -> tuple[dict[str, Any] | None, np.ndarray]:
+    """What the process says about a volume, None if it died, and the samples [Z, Y, X]."""
+    said, values = json.loads(stream.readline(LONGEST_LINE) or "null"), np.empty(0)
+    if said is None or "error" in said:
+        return said, values
+    dims, dtype = said["dims"], np.dtype(said["dtype"])
+    require_room(dims, dtype)
+    values = np.empty(dims[::-1], dtype)
+    rest = memoryview(values.data).cast("B")
+    while len(rest):
+        count = stream.readinto(rest)  # type: ignore[attr-defined]
+        if not count:
+            return None, values
+        rest = rest[count:]
+    return said, values
 
 
 def _check_end(path: Path) -> None:
@@ -60,47 +79,3 @@ def _check_end(path: Path) -> None:
         file.seek(max(0, path.stat().st_size - TAIL))
         if b"</VTKFile>" not in file.read():
             raise ArgumentError("the file is cut off or no .vti file: expected </VTKFile> at its end")
-
-
-def _reader(suffix: str) -> Any:
-    """VTK reader of a format."""
-    if suffix == ".vti":
-        from vtkmodules.vtkIOXML import vtkXMLImageDataReader
-
-        return vtkXMLImageDataReader()
-    from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
-
-    return vtkGenericDataObjectReader()
-
-
-@contextmanager
-def _vtk_messages() -> Iterator[list[str]]:
-    """Collect VTK's errors and warnings, which it prints instead of raising them.
-
-    Both its output window and its logger write to the terminal; both are as before afterwards.
-    """
-    from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
-
-    messages: list[str] = []
-    window, before = vtkStringOutputWindow(), vtkOutputWindow.GetInstance()
-    verbosity = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkOutputWindow.SetInstance(window)
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
-    try:
-        yield messages
-    finally:
-        vtkLogger.SetStderrVerbosity(verbosity)
-        vtkOutputWindow.SetInstance(before)
-        output = window.GetOutput()  # bytes where a damaged file is quoted that is no text
-        text = output.decode(errors="replace") if isinstance(output, bytes) else output
-        messages += [_sentence(message) for message in text.split("\n\n") if message.strip()]
-
-
-def _sentence(text: str) -> str:
-    """A message without the place in VTK's source and the address of the object."""
-    lines = [
-        line
-        for line in text.strip().splitlines()
-        if not line.startswith(("ERROR: In", "Warning: In", "Generic Warning: In"))
-    ]
-    return " ".join(lines).split("): ", 1)[-1].strip(" .!")

@@ -13,6 +13,7 @@ from texgs.cli.stages.parts import shares
 from texgs.core.camera import Camera, orbit
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
+from texgs.core.names import part_file
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import Lifted, lift
 from texgs.edit.preview import overlay
@@ -53,7 +54,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         title=f"{settings['dataset']}: edit {edit['name']}",
     )
     seconds = time.monotonic() - start
-    file = output / f"{name}-{wanted['name']}.safetensors"
+    file = output / part_file("edit.segment.name", name, wanted["name"])
     sys.stderr.write(f"{part}: {found.basis}\n")
     after = with_segment(scene, part, model, found.mask, file, wanted)
     write_scene(output / "scene.yaml", after)

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.names import part_file
 from texgs.scene.model import Model
 from texgs.scene.scene_file import Scene, SceneModel
 from texgs.scene.segment import labels_of
@@ -35,7 +36,7 @@ class Part:
     @property
     def file(self) -> str:
         """Name of the file of its texture."""
-        return f"{self.name.replace('/', '-')}.safetensors"
+        return part_file("edit.parts", self.name)
 
 
 def parts_of(scene: Scene, names: Sequence[str]) -> list[Part]:

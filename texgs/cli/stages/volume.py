@@ -10,7 +10,7 @@ from texgs.config.locate import cached_volume
 from texgs.core.io import write_json
 from texgs.core.progress import progress
 from texgs.volume.download import require_whole
-from texgs.volume.generate import GENERATORS
+from texgs.volume.generate import GENERATORS, RANDOM
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource, Source
 from texgs.volume.sources import open_source
@@ -47,7 +47,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 
 def generated(volume: dict[str, Any]) -> Source:
     """The field of a generator."""
-    options = {"seed": volume["seed"]} if volume["generator"] != "sphere" else {}
+    options = {"seed": volume["seed"]} if volume["generator"] in RANDOM else {}
     return ArraySource(GENERATORS[volume["generator"]](volume["size"], **options), volume["generator"])
 
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
-from texgs.models.filters.surface import LUMA, Surface
+from texgs.models.filters.surface import Surface, luminance
 
 GOLD = ((0.30, 0.16, 0.03), (0.93, 0.66, 0.20), (1.00, 0.92, 0.60))  # dark, middle, light
 SILVER = ((0.22, 0.23, 0.26), (0.70, 0.72, 0.75), (0.97, 0.98, 1.00))
@@ -73,7 +73,7 @@ def mosaic(surface: Surface) -> Tensor:
 
 def tint(surface: Surface, color: tuple[float, float, float]) -> Tensor:
     """One colour [P, 3], as much lighter or darker as the scene was than its mean."""
-    luma = surface.color @ surface.color.new_tensor(LUMA)
+    luma = luminance(surface.color)
     ratio = (luma / luma.mean().clamp_min(1e-3))[:, None]
     wanted = _color(surface, color)
     lighter = torch.lerp(wanted, torch.ones_like(wanted), (ratio - 1).clamp(0, 1) * 0.5)

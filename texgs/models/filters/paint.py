@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
-from texgs.models.filters.surface import LUMA, Surface
+from texgs.models.filters.surface import Surface
 
 
 def oil(surface: Surface) -> Tensor:
@@ -68,7 +68,9 @@ def cartoon(surface: Surface) -> Tensor:
     return torch.lerp(flat, flat.new_tensor((0.05, 0.04, 0.08)).expand_as(flat), ink[:, None])
 
 
-def _saturated(color: Tensor, factor: float) -> Tensor:
+def _saturated(colors: Tensor, factor: float) -> Tensor:
     """Colours [P, 3] farther from the grey of their luminance."""
-    grey = (color @ color.new_tensor(LUMA))[:, None]
-    return (grey + factor * (color - grey)).clamp(0, 1)
+    from kornia.enhance import adjust_saturation_with_gray_subtraction
+
+    found: Tensor = adjust_saturation_with_gray_subtraction(colors.T[..., None], factor)[..., 0].T
+    return found

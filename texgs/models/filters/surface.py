@@ -11,7 +11,6 @@ from texgs.models.guidance import Views
 
 CELLS = 26.0  # patterns along the longest side of the scene, for scale 1
 KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light that a drawing's tone is made by, fixed in the world
-LUMA = (0.299, 0.587, 0.114)
 SOLID = 0.02  # alpha from which a pixel shows enough of the scene to be painted
 LOUD = 0.95  # quantile of luminance that counts as white
 
@@ -48,11 +47,19 @@ def surface_of(views: Views, scale: float, seed: int) -> tuple[Surface, Tensor]:
     normals = normals / normals.norm(dim=1, keepdim=True).clamp_min(1e-6)
     unit = scale * _side(points) / CELLS
     shade = 0.5 + 0.5 * (normals @ normals.new_tensor(KEY_LIGHT))
-    luma = color @ color.new_tensor(LUMA)
+    luma = luminance(color)
     white = luma.quantile(LOUD).clamp_min(1e-3) if 0 < len(luma) < 2**24 else luma.new_ones(())
     tone = shade * (luma / white).clamp(0, 1)
     pixel = _pixel(views, points) / unit
     return Surface(color, tone, shade.clamp(0, 1), points / unit, normals, pixel, seed), where
+
+
+def luminance(colors: Tensor) -> Tensor:
+    """Luminance [P] of colours [P, 3]."""
+    from kornia.color import rgb_to_grayscale
+
+    found: Tensor = rgb_to_grayscale(colors.T[..., None])[0, :, 0]
+    return found
 
 
 def _side(points: Tensor) -> float:

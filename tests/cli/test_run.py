@@ -1,0 +1,118 @@
+"""`texgs run`: which words are of the configuration and which of snakemake, exit codes, Ctrl-C."""
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+from snakemake.cli import parse_config
+
+from tests.workflow.project import TINY
+from texgs.cli.run import WORD, overrides
+from texgs.core.errors import ArgumentError
+
+TEXGS = [sys.executable, "-m", "texgs.cli.main"]
+
+
+@pytest.mark.parametrize(
+    "word", ["dataset=engine", "views.width=4", "+a.b=1", "++a=1", "~a.b", "edits=[x,y]"]
+)
+def test_words_of_the_configuration(word):
+    assert WORD.fullmatch(word)
+
+
+@pytest.mark.parametrize("word", ["volumes", "results/report.html", "results/a=b/c.png", "/tmp/x=y", "2=3"])
+def test_targets(word):
+    assert not WORD.fullmatch(word)
+
+
+def test_any_value_reaches_the_snakefile():
+    words = [
+        "a=$HOME `x` $(y)",
+        "b=[1, {c: 'd'}]",
+        'c="quoted"',
+        "d='",
+        'e="',
+        "f=#: -",
+        "g=é \U0001f600",
+        "h=\n\\",
+    ]
+    (entry,) = overrides(words, ())
+    assert shlex.split(parse_config([entry])["overrides"]) == words
+    assert overrides([], ()) == []
+
+
+def test_overrides_are_given_once():
+    with pytest.raises(ArgumentError, match="give its words to texgs run itself"):
+        overrides(["dataset=engine"], ["overrides=views=small"])
+
+
+@pytest.mark.parametrize(
+    ("words", "profile"),
+    [
+        (["-n"], "profiles/local for"),
+        (["-n", "--workflow-profile", "slurm"], "profiles/slurm for"),
+        (["-n", "--workflow-profile=none"], ""),
+    ],
+)
+def test_the_local_profile_unless_another_is_given(tmp_path, words, profile):
+    done = texgs(tmp_path, "run", *words, "nonsense=1")
+    assert done.returncode == 2
+    assert profile in done.stderr
+    assert ("Using" in done.stderr) == bool(profile)
+
+
+def texgs(folder, *words, **options):
+    return subprocess.run(
+        [*TEXGS, *words], cwd=folder, capture_output=True, text=True, timeout=300, **options
+    )
+
+
+def test_a_dry_run_with_words_anywhere(tmp_path):
+    done = texgs(tmp_path, "run", "-n", "tracking=none", "--cores", "1", *TINY.split(), "volumes", "tf=TF01")
+    assert done.returncode == 0, done.stderr
+    assert "rule transfer" in done.stdout + done.stderr
+    assert "rule views" not in done.stdout + done.stderr
+    assert not list(tmp_path.glob("results/turbulence"))
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["nonsense=1"], 2, "texgs: nonsense: no such key"),
+        (["--bogus"], 2, "unrecognized arguments: --bogus"),
+        (["nosuchtarget"], 1, "nosuchtarget"),
+    ],
+)
+def test_exit_codes(tmp_path, words, code, message):
+    done = texgs(tmp_path, "run", "-n", *words)
+    assert done.returncode == code
+    assert message in done.stderr + done.stdout
+    assert "Traceback" not in done.stderr
+
+
+def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
+    long = "views.train.frequency=3 views.width=300 views.height=300 views.step=0.1"
+    words = ["run", "--cores", "1", "tracking=none", *TINY.split(), *long.split(), "sheets"]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    process = subprocess.Popen([*TEXGS, *words], cwd=tmp_path, text=True, start_new_session=True, **pipes)
+    deadline = time.monotonic() + 200
+    while not list(tmp_path.glob("results/turbulence/*/views/train/*.png")) and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does for Ctrl-C
+    _, err = process.communicate(timeout=100)
+    assert process.returncode == 130
+    assert err.splitlines()[-1] == "texgs run: interrupted; the same command goes on where it stopped"
+    assert "Traceback" not in err
+
+
+def test_a_run_for_one_target_names_no_report(tmp_path):
+    words = ["run", "--cores", "1", "tracking=none", *TINY.split(), "volumes"]
+    done = texgs(tmp_path, *words)
+    assert done.returncode == 0, done.stderr
+    assert "Done: what was asked for" in done.stdout
+    assert "report.html" not in done.stdout

@@ -1,0 +1,97 @@
+"""Slips in the files of conf/: one sentence with the file and the line."""
+
+import pytest
+
+from texgs.config.compose import compose
+from texgs.core.errors import ConfigError
+
+MANY = "9" * 400
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """Where the user's data set is."""
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "conf" / "dataset" / "mine.yaml"
+    path.parent.mkdir(parents=True)
+    return path
+
+
+def told(*words):
+    with pytest.raises(ConfigError) as error:
+        compose(words)
+    text = str(error.value)
+    assert "\n" not in text
+    assert len(text) < 500
+    return text
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "message"),
+    [
+        ("name: x\ntitle: [1, 2\nvolume:\n", 3, "expected ',' or ']'"),
+        ("name: x\n\ttitle: y\n", 2, "cannot start any token"),
+        ("name: x\nsource: !!timestamp 2026-11-20\n", 2, "'date' is not a supported"),
+        ("name: x\nimage: 2026-11-20\n", 2, "dataset.image: value '2026-11-20'"),
+        ("- name: x\n", 1, "dataset: expected keys with values, got a list"),
+        ("hello\n", 1, "dataset: expected keys with values, got a single value"),
+        ("12\n", 1, "dataset: expected keys with values, got a single value"),
+        ("name: x\nvolume: [1, 2]\n", 2, "dataset.volume: expected keys with values, got a list"),
+        ("name: x\nbasic_tfs:\n  - a\n", 3, "dataset.basic_tfs: expected keys with values, got a list"),
+        ("name: x\nbasic_tfs:\n  A: [1]\n", 3, "dataset.basic_tfs.A: expected keys with values, got a list"),
+        ("name: x\nname: y\n", 2, "found duplicate key name"),
+        ("name: x\ntitle: für\n".encode("latin1"), 2, "expected UTF-8, got byte 0xfc; save it as UTF-8"),
+        ("name: x\ntitle: a\0b\n", 2, "expected text, got the character #x0000"),
+        (f"name: x\nimage: {MANY}\n", 2, "dataset.image: expected an integer of 64 bits, got 9999"),
+        (f"name: x\nimage: {'9' * 5000}\n", 2, "Exceeds the limit (4300 digits)"),
+        (f"name: x\nbasic_tfs:\n  A:\n    opacity: [[1, 0], [{MANY}, 1]]\n", 4, "an integer of 64 bits"),
+        ("name: x\nimage: -1\n", 2, "dataset.image: expected at least 1, got -1"),
+        ("name: x\nvolume:\n  spacing: [1, .nan, 1]\n", 3, "expected a finite number, got nan"),
+        ("name: x\nvolum: 3\n", 2, "dataset.volum: no such key"),
+        ("name: x\ntitle: ${\n", 2, "no viable alternative"),
+        ("name: x\ntitle: *nowhere\n", 2, "found undefined alias"),
+        ("name: x\ntitle: !!python/object:os.system y\n", 2, "could not determine a constructor"),
+    ],
+)
+def test_names_the_file_and_the_line(mine, text, line, message):
+    mine.write_bytes(text if isinstance(text, bytes) else text.encode())
+    found = told("dataset=mine")
+    assert found.startswith(f"conf/dataset/mine.yaml:{line}: ")
+    assert message in found
+
+
+def test_brackets_without_end_name_the_file(mine):
+    mine.write_text(f"name: x\ntitle: {'[' * 3000}{']' * 3000}\n")
+    assert (
+        told("dataset=mine") == "conf/dataset/mine.yaml: expected fewer brackets, got more than can be read"
+    )
+
+
+def test_a_file_that_is_not_chosen_does_no_harm(mine):
+    mine.write_text("name: [\n")
+    assert compose(("dataset=engine",)).dataset.name == "engine"
+    assert told("dataset=engine", "views.widht=3").startswith("views.widht: no such key")
+
+
+def test_a_name_that_yaml_does_not_read_as_text(mine):
+    mine.write_text("name: no\n")
+    assert "dataset.name: False is a word that YAML or Hydra does not read as text" in told("dataset=mine")
+
+
+@pytest.mark.parametrize(
+    ("word", "message"),
+    [
+        (f"views.width={MANY}", "views.width: expected an integer of 64 bits, got 9999"),
+        (f"views.fov_y={MANY}", "views.fov_y: expected a finite number, got one that is too large"),
+        (f"dataset.volume.spacing=[{MANY},1,1]", "spacing[0]: expected a finite number"),
+        ("dataset.volume.spacing=[nan,1,inf]", "dataset.volume.spacing: expected a finite number, got nan"),
+        (f"views.width={'9' * 5000}", "Exceeds the limit (4300 digits)"),
+        (f"dataset.title={'[' * 3000}", "expected key=value"),
+        (f"dataset.title={'[' * 3000}{']' * 3000}", "expected fewer brackets"),
+        ("views=[1,2]", "a group: expected the name of a file of conf/"),
+        ("dataset.name=" + "a" * 300, "dataset.name: expected at most 100 characters, got 300"),
+        ("dataset.name=inf", "dataset.name: inf is a word that YAML or Hydra"),
+    ],
+)
+def test_odd_overrides(word, message):
+    assert message in told(word)

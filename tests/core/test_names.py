@@ -1,0 +1,43 @@
+from pathlib import Path
+
+import pytest
+
+from texgs.core.errors import ArgumentError
+from texgs.core.names import file_name, label, named_file, part_file
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", ".hidden", "a/b", "a\\b", "/etc", "a\0b", "a\nb", "é" * 126])
+def test_what_is_no_name_of_a_file(name):
+    with pytest.raises(ArgumentError, match="where: expected a name that a file can have"):
+        file_name("where", name)
+
+
+def test_names_that_files_can_have():
+    for name in ("TF01.safetensors", "ein Teil", "体积", "a..b", "-x"):
+        assert file_name("where", name) == name
+
+
+@pytest.mark.parametrize(
+    ("names", "file"),
+    [(("run/balls", "red"), "run-balls-red.safetensors"), (("x", "../../y"), "x-..-..-y.safetensors")],
+)
+def test_a_part_has_one_file_in_its_folder(names, file):
+    assert part_file("where", *names) == file
+    with pytest.raises(ArgumentError, match="dot at its start"):
+        part_file("where", "../../x", "y")
+
+
+@pytest.mark.parametrize("name", ["", " ", "a\x1b[2J", "\u202eb", "x" * 101])
+def test_what_cannot_be_shown_is_no_label(name):
+    with pytest.raises(ArgumentError, match="where: expected a name of 1 to 100 printable letters") as caught:
+        label("where", name)
+    assert str(caught.value).isprintable()
+
+
+def test_labels_and_paths():
+    assert label("where", 42) == "42"
+    assert named_file("where", Path("a"), "../b c.png") == Path("a/../b c.png")
+    for path in (None, 3, "", "a\0", "x" * 1001, ["a"] * 10**6):
+        with pytest.raises(ArgumentError, match="where: expected the path of a model, got") as caught:
+            named_file("where", Path("a"), path, "a model")
+        assert len(str(caught.value)) < 200

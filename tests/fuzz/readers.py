@@ -1,0 +1,256 @@
+"""Every reader of files that others have made, with a small whole file of its kind to damage."""
+
+from __future__ import annotations
+
+import gzip
+import lzma
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from PIL import Image
+
+from tests.scene.samples import sample
+from tests.volume.volume_files import WRITERS, sample_values
+from texgs.core.camera import orbit
+from texgs.core.io import read_json, write_json
+from texgs.edit.style_picture import read_style
+from texgs.fit.checkpoint import latest
+from texgs.models.tensors import read_tensors
+from texgs.scene.compact import open_model, write_compact
+from texgs.scene.model_file import read_model, write_model
+from texgs.scene.ply import read_ply, write_ply
+from texgs.scene.scene_file import Scene, SceneModel, SceneSegment, read_scene, write_scene
+from texgs.scene.segment_file import read_segment, write_segment
+from texgs.scene.texture_file import with_texture, write_texture
+from texgs.volume.prepare import prepare
+from texgs.volume.sources import open_source
+from texgs.volume.tf_files import read_tf
+from texgs.volume.view_set import Light, View, read_views, write_transforms
+
+Pack = Callable[[bytes], bytes]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One way into the program."""
+
+    make: Callable[[Path], Path]  # writes into a folder; returns the file to open
+    read: Callable[[Path], object]  # as the program does it
+    victim: str | None = None  # the file that is damaged, where it is not the one that is opened
+    unpack: Pack | None = None  # what is packed in the file can be damaged before it is packed
+    pack: Pack | None = None
+
+
+def volume(name: str) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        WRITERS[name](folder / name, sample_values())
+        return folder / name
+
+    return make
+
+
+def read_volume(path: Path) -> None:
+    """All of it, as `texgs volume` does."""
+    prepare(open_source(path), path.parent / "out.nrrd", nan_value=0.0)
+
+
+def slc(compression: int) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        values = sample_values("uint8")
+        text = f"11111 13 12 11 8 1.0 1.0 2.0 1 0 0 {compression} 2 2 X".encode() + bytes(12)
+        for plane in values:
+            runs = b"".join(bytes([0x80 | len(row)]) + row.tobytes() for row in plane) + b"\x00"
+            text += f"{len(runs)} X".encode() + runs if compression else plane.tobytes()
+        (folder / "v.slc").write_bytes(text)
+        return folder / "v.slc"
+
+    return make
+
+
+def slices(folder: Path) -> Path:
+    (folder / "slices").mkdir()
+    for index, plane in enumerate(sample_values()[:3]):
+        WRITERS["packed.tif"](folder / "packed.tif", plane)
+        (folder / "packed.tif").rename(folder / "slices" / f"{index}.tif")
+    return folder / "slices"
+
+
+def tf_ours(folder: Path) -> Path:
+    points = {"opacity": [[0, 0.0], [50, 1.0], [99, 0.0]], "color": [[0, 1.0, 0.5, 0.25], [99, 0, 0, 0]]}
+    return write_json(folder / "tf.json", {"format": "texgs-tf", "version": 1, **points})
+
+
+def tf_paraview(folder: Path) -> Path:
+    preset = {
+        "Name": "a",
+        "ColorSpace": "Diverging",
+        "RGBPoints": [0, 1, 0.5, 0.2, 0.5, 0.1, 0.1, 0.9, 1, 0, 0, 1],
+        "Points": [0, 0, 0.5, 0, 0.4, 1, 0.3, 0.6, 1, 0, 0.5, 0],
+    }
+    return write_json(folder / "tf.json", [preset])
+
+
+def read_function(path: Path) -> None:
+    read_tf(path)(np.linspace(0, 99, 50))
+
+
+def views(folder: Path) -> Path:
+    pictures = []
+    for index in range(2):
+        Image.fromarray(np.full((16, 20, 4), 40 * index, np.uint8)).save(folder / f"r_{index}.png")
+        pictures.append(
+            View(orbit(40 * index, 10, 4, 30, 20, 16), folder / f"r_{index}.png", Light("headlight"))
+        )
+    write_transforms(folder, "train", pictures, {"volume": "v", "tf": "TF01"})
+    return folder
+
+
+def read_view_set(folder: Path) -> None:
+    for view in read_views(folder).train:
+        view.load()
+        view.image()
+
+
+def model(folder: Path) -> Path:
+    return write_model(folder / "model.safetensors", sample())
+
+
+def compact(folder: Path) -> Path:
+    return write_compact(folder / "model.texgs", sample())
+
+
+def unpacked_compact(data: bytes) -> bytes:
+    line, _, packed = data.partition(b"\n")
+    return line + b"\n" + lzma.decompress(packed)
+
+
+def packed_compact(data: bytes) -> bytes:
+    line, _, stored = data.partition(b"\n")
+    return line + b"\n" + lzma.compress(stored)
+
+
+def ply(flavour: str, text: bool = False) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        from plyfile import PlyData
+
+        path = write_ply(folder / "m.ply", sample("shading", material="paper"), flavour)
+        if not text:
+            return path
+        PlyData(PlyData.read(path).elements, text=True).write(folder / "text.ply")
+        return folder / "text.ply"
+
+    return make
+
+
+def scene(folder: Path) -> Path:
+    file = model(folder)
+    mask = write_segment(folder / "s.safetensors", sample(), torch.arange(7) < 3)
+    texture = write_texture(folder / "t.safetensors", sample())
+    entry = SceneModel(file, texture=texture, segments={"part": SceneSegment(mask)})
+    return write_scene(folder / "scene.yaml", Scene({"TF01": entry, "TF02": SceneModel(file)}))
+
+
+def read_whole_scene(path: Path) -> None:
+    opened = read_scene(path)
+    opened.open()
+    write_scene(path.with_name("again.yaml"), opened)
+
+
+def weights(old: bool) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        tensors = {"a.weight": torch.rand(4, 3), "b.bias": torch.arange(5)}
+        torch.save(tensors, folder / "w.pth", _use_new_zipfile_serialization=not old)
+        return folder / "w.pth"
+
+    return make
+
+
+def release(folder: Path) -> Path:
+    """Surfels of the release with textures: two files beside the PLY."""
+    from plyfile import PlyData, PlyElement
+
+    surfels, p = sample("shading", material="paper"), sample().parameters
+    found = PlyData.read(write_ply(folder / "m.ply", surfels, "release"))["vertex"].data
+    names = [(name, "<f4") for name in found.dtype.names if not name.startswith("f_rest_")]
+    vertices = np.zeros(len(found), [*names, ("mappings_0", "<f4")])
+    for name, _ in names:
+        vertices[name] = found[name]
+    PlyData([PlyElement.describe(vertices, "vertex")]).write(folder / "point_cloud.ply")
+    dims = torch.cat([p["sizes"].long(), p["offsets"][:, None]], dim=1)
+    np.savez_compressed(folder / "texture.npz", texture_dc=p["texels"].numpy(), texture_dims=dims.numpy())
+    torch.save(([torch.rand(3)], 7), folder / "palette_colors_chkpnt.pth")
+    return folder / "point_cloud.ply"
+
+
+def picture(name: str, **options: Any) -> Callable[[Path], Path]:
+    def make(folder: Path) -> Path:
+        pixels = np.random.default_rng(0).integers(0, 255, (48, 40, 3), np.uint8)
+        Image.fromarray(pixels).save(folder / name, **options)
+        return folder / name
+
+    return make
+
+
+def checkpoint(folder: Path) -> Path:
+    from safetensors.torch import save_file
+
+    save_file({"iteration": torch.tensor(3), "means": torch.rand(4, 3)}, folder / "checkpoint.safetensors")
+    return folder
+
+
+def metrics(folder: Path) -> Path:
+    return write_json(
+        folder / "metrics.json", {"stage": "views", "numbers": {"a": [1, 2.5, None], "b": {"c": "d"}}}
+    )
+
+
+def read_segment_file(path: Path) -> None:
+    read_segment(path, sample())
+
+
+def read_texture_file(path: Path) -> None:
+    with_texture(sample(), path)
+
+
+READERS: dict[str, Reader] = {
+    **{name: Reader(volume(name), read_volume) for name in WRITERS if not name.endswith((".vti", ".vtk"))},
+    "plain.mhd samples": Reader(volume("compressed.mhd"), read_volume, "compressed.zraw"),
+    "nii.gz inside": Reader(volume("packed.nii.gz"), read_volume, None, gzip.decompress, gzip.compress),
+    "plain.slc": Reader(slc(0), read_volume),
+    "packed.slc": Reader(slc(1), read_volume),
+    "slices": Reader(slices, read_volume, "slices/0.tif"),
+    "tf ours": Reader(tf_ours, read_function),
+    "tf ParaView": Reader(tf_paraview, read_function),
+    "views json": Reader(views, read_view_set, "transforms_train.json"),
+    "views png": Reader(views, read_view_set, "r_1.png"),
+    "model": Reader(model, read_model),
+    "compact": Reader(compact, open_model),
+    "compact inside": Reader(compact, open_model, None, unpacked_compact, packed_compact),
+    "texture": Reader(lambda folder: write_texture(folder / "t", sample()), read_texture_file),
+    "segment": Reader(
+        lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3), read_segment_file
+    ),
+    "scene": Reader(scene, read_whole_scene),
+    "2dgs.ply": Reader(ply("2dgs"), read_ply),
+    "3dgs.ply text": Reader(ply("3dgs", text=True), read_ply),
+    "release.ply": Reader(ply("release"), read_ply),
+    "release texture": Reader(release, read_ply, "texture.npz"),
+    "release palette": Reader(release, read_ply, "palette_colors_chkpnt.pth"),
+    "weights": Reader(weights(old=False), read_tensors),
+    "weights old": Reader(weights(old=True), read_tensors),
+    "style.png": Reader(picture("s.png"), read_style),
+    "style.jpg": Reader(picture("s.jpg"), read_style),
+    "style.gif": Reader(picture("s.gif"), read_style),
+    "style.webp": Reader(picture("s.webp"), read_style),
+    "style.tif": Reader(picture("s.tif", compression="tiff_lzw"), read_style),
+    "checkpoint": Reader(checkpoint, latest, "checkpoint.safetensors"),
+    "json": Reader(metrics, read_json),
+    "packed.vti": Reader(volume("packed.vti"), read_volume),
+    "plain.vti": Reader(volume("plain.vti"), read_volume),
+    "text.vtk": Reader(volume("text.vtk"), read_volume),
+    "binary.vtk": Reader(volume("binary.vtk"), read_volume),
+}

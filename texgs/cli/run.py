@@ -1,0 +1,114 @@
+"""Run the workflow for a configuration: from the volume to the report, whatever is not done yet.
+
+Words with = choose the configuration, such as dataset=engine fit=quick views.width=400; all other words are
+options and targets of snakemake, such as --dry-run or results/report.html.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import shlex
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+
+from texgs.core.errors import ArgumentError
+
+# Hydra's words: key=value, +key=value to add a key, ~key to take one away. Paths of targets have a slash.
+WORD = re.compile(r"(\+{0,2}[A-Za-z_][\w.@-]*=.*|~[A-Za-z_][\w.@-]*(=.*)?)", re.DOTALL)
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Whatever snakemake takes."""
+    parser.add_argument(
+        "words",
+        nargs="*",
+        metavar="KEY=VALUE, OPTION or TARGET",
+        help="see snakemake --help; the profile is `local` unless --workflow-profile says otherwise",
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Call snakemake in this process; its exit code.
+
+    Raises:
+        KeyboardInterrupt: if the user ended it, after snakemake has cleaned up.
+    """
+    interruptions = []
+
+    def note(_signal: int, _frame: FrameType | None) -> None:
+        interruptions.append(True)
+        raise KeyboardInterrupt  # snakemake ends its jobs, and then itself as if one had failed
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        is_done = snakemake(arguments.words)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if interruptions:
+        raise KeyboardInterrupt
+    return 0 if is_done else 1
+
+
+def snakemake(words: Sequence[str]) -> bool:
+    """Run the workflow of texgs in this process; whether it ended well.
+
+    Raises:
+        SystemExit: for a mistake that snakemake or the Snakefile has told.
+    """
+    from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
+
+    given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
+    chosen = [word for word in given.targets if WORD.fullmatch(word)]
+    rest = [word for word in words if word not in chosen]
+    sys.argv = ["snakemake", *rest]  # the Snakefile looks there
+    try:
+        parser, options = parse_args([*defaults(given), *located(rest)])
+    except Exception as error:  # as the main of snakemake does
+        print_exception(error)
+        return False
+    options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
+    if options.cores is None and options.jobs is None:
+        options.cores = parse_cores("all")
+    return bool(args_to_api(options, parser))
+
+
+def defaults(given: argparse.Namespace) -> list[str]:
+    """Options that hold where the user says nothing else: the Snakefile of texgs and the local profile."""
+    from texgs.config.project import PROFILES, SNAKEFILE
+
+    options = ["--snakefile", str(SNAKEFILE)]
+    if given.profile is None and given.workflow_profile is None:
+        options += ["--workflow-profile", str(PROFILES / "local")]
+    return options
+
+
+def located(words: Sequence[str]) -> list[str]:
+    """The words, with the path of a profile of texgs where only its name is given."""
+    from texgs.config.project import PROFILES
+
+    return [
+        str(PROFILES / word)
+        if before == "--workflow-profile" and (PROFILES / word).is_dir() and not Path(word).exists()
+        else word
+        for before, word in zip(("", *words), words, strict=False)
+    ]
+
+
+def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
+    """The words as one entry of snakemake's `--config`, which reads values as YAML.
+
+    Raises:
+        ArgumentError: if the user has such an entry as well.
+    """
+    import yaml
+
+    if not words:
+        return []
+    if any(entry.startswith("overrides=") for entry in config):
+        raise ArgumentError('--config overrides="...": give its words to texgs run itself')
+    text = yaml.safe_dump(shlex.join(words), default_style='"', allow_unicode=True, width=10**9)
+    return [f"overrides= {text.strip()} "]  # in spaces: snakemake strips quotes from the ends

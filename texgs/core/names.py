@@ -1,0 +1,76 @@
+"""Names that come from files or from a user, before they are shown or become a part of a path."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from texgs.core.errors import ArgumentError
+
+LONGEST = 100  # letters of a name
+LONGEST_PATH = 1000  # letters of a path in a file
+LONGEST_FILE = 250  # bytes of a file's name; file systems take 255, and we put a few before it
+SEPARATORS = frozenset("/\\")  # of folders, on one system or another
+
+
+def label(where: str, name: object) -> str:
+    """A name of something in a scene or a data set: short, and of letters that a terminal can show.
+
+    Args:
+        where: the name comes from, for the message.
+        name: text, or a number that YAML has read in its place.
+
+    Raises:
+        ArgumentError: if it is empty, too long, or has control characters.
+    """
+    text = str(name)
+    if not text.strip() or len(text) > LONGEST or not text.isprintable():
+        raise ArgumentError(
+            f"{where}: expected a name of 1 to {LONGEST} printable letters, got {text[: LONGEST + 1]!r}"
+        )
+    return text
+
+
+def file_name(where: str, name: str) -> str:
+    """A name that is one file or folder, and no way to another folder. Every name that is written goes here.
+
+    Args:
+        where: the name comes from, for the message.
+        name: of the file, with its ending.
+
+    Raises:
+        ArgumentError: if it has a separator or a control character, begins with a dot, or is empty or too
+            long.
+    """
+    is_plain = name.isprintable() and not SEPARATORS & set(name) and not name.startswith(".")
+    if not is_plain or not name or len(name.encode()) > LONGEST_FILE:
+        raise ArgumentError(
+            f"{where}: expected a name that a file can have, without / and \\, control characters and a dot "
+            f"at its start, of at most {LONGEST_FILE} bytes; got {name[: LONGEST + 1]!r}"
+        )
+    return name
+
+
+def part_file(where: str, *names: str) -> str:
+    """Name of the safetensors file of a part of a scene, whose names may have slashes.
+
+    Raises:
+        ArgumentError: as `file_name`.
+    """
+    return file_name(where, f"{'-'.join(names)}.safetensors".replace("/", "-"))
+
+
+def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> Path:
+    """The file that another file names, in its folder or elsewhere; it is only read.
+
+    Args:
+        where: the path comes from, for the message.
+        folder: that the path is relative to.
+        path: text.
+        kind: of file, such as "a model".
+
+    Raises:
+        ArgumentError: if it is no text, empty, too long, or has control characters.
+    """
+    if not isinstance(path, str) or not path or len(path) > LONGEST_PATH or not path.isprintable():
+        raise ArgumentError(f"{where}: expected the path of {kind}, got {path!r:.100}")
+    return folder / path

@@ -1,0 +1,50 @@
+"""YAML that people write: plain values, numbers as everywhere else, and nothing that grows when read."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import yaml
+
+from texgs.core.errors import ArgumentError
+
+DEEPEST = 20  # tables and lists in one another
+# YAML 1.1 takes 5e-1 and 1e3 for text, because they have no point or no sign.
+NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?|\.\d+)[eE][-+]?\d+$")
+
+
+class PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
+    """The safe loader without aliases: few of them can stand for more values than fit into memory."""
+
+    depth = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """A node of the text.
+
+        Raises:
+            ArgumentError: if it is an alias, or too deep below others.
+        """
+        if self.check_event(yaml.AliasEvent):
+            line = self.peek_event().start_mark.line + 1
+            raise ArgumentError(f"expected values, got an alias (*name) in line {line}; write them out")
+        self.depth += 1
+        if self.depth > DEEPEST:
+            raise ArgumentError(f"expected at most {DEEPEST} tables and lists in one another, got more")
+        node = super().compose_node(parent, index)
+        self.depth -= 1
+        return node
+
+
+PlainLoader.add_implicit_resolver("tag:yaml.org,2002:float", NUMBER, list("-+.0123456789"))
+
+
+def parse_yaml(text: str) -> Any:
+    """The values of a text.
+
+    Raises:
+        ArgumentError: if it has aliases, or values in one another without end.
+        yaml.YAMLError: if it is no YAML.
+        ValueError: if a value is none, such as the date 2001-99-99.
+    """
+    return yaml.load(text, PlainLoader)

@@ -1,0 +1,45 @@
+"""Vertices of PLY files, whose headers are checked before anything is read."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.core.reading import reading
+
+LONGEST_HEADER = 1 << 16  # bytes
+ELEMENT = re.compile(rb"^element[ \t]+\S+[ \t]+(\d+)", re.MULTILINE)
+
+
+def read_vertices(path: str | Path) -> np.ndarray:
+    """Vertices of a PLY file as a structured array [N].
+
+    Raises:
+        ArgumentError: if the file is missing, damaged, no PLY file, or has no vertices.
+    """
+    from plyfile import PlyData
+
+    with reading(path, "a whole PLY file") as path:
+        _check_counts(path)
+        data = PlyData.read(path)
+        if "vertex" not in data:
+            found = ", ".join(element.name for element in data) or "nothing"
+            raise ArgumentError(f"{path}: expected vertices, got {found}")
+        vertices: np.ndarray = data["vertex"].data
+        return vertices
+
+
+def _check_counts(path: Path) -> None:
+    """Refuse a header that claims more elements than the file has bytes: they would have memory first."""
+    with path.open("rb") as file:
+        header = file.read(LONGEST_HEADER).partition(b"end_header")[0]
+    size = path.stat().st_size
+    for count in ELEMENT.findall(header):
+        if len(count) > 18 or int(count) > size:
+            raise ArgumentError(
+                f"{path}: expected a whole PLY file, got a header of {count[:18].decode()} elements and "
+                f"{size} bytes in all; is it cut off?"
+            )
