@@ -63,6 +63,7 @@ def test_images_that_cannot_fit(device, size):
     assert needed >= 4 * 4 * size[0] * size[1]  # colour and alpha alone
 
 
+@pytest.mark.large
 @pytest.mark.parametrize("axis", [0, 1], ids=["widest", "highest"])
 def test_the_longest_image(device, axis):
     """Its tiles are the most that the library can count: one more, and the surfel would be nowhere."""

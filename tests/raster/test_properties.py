@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import torch
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from tests.raster.agreement import gradients, images, random_cotangents
@@ -18,7 +18,12 @@ scenes = st.builds(
     width=st.integers(1, 70),
     height=st.integers(1, 50),
 )
-examples = settings(max_examples=25, deadline=None, derandomize=True)
+examples = settings(
+    max_examples=25,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],  # one device serves all examples of a test
+)
 CLOSE = {"rtol": 0, "atol": 2e-5}  # float32 sums in another order
 UNENDED = Options(transmittance_min=0.0)
 
