@@ -17,6 +17,7 @@ from unittest.mock import patch
 import torch
 from filelock import FileLock
 
+from texgs.config.code import library_sources
 from texgs.raster import losses_abi, native
 
 SOURCE = Path(__file__).parent
@@ -44,7 +45,8 @@ def build() -> Path:
     BUILD.mkdir(parents=True, exist_ok=True)
     cmake, ninja = _program("cmake"), _program("ninja")
     generator = ["-G", "Ninja", f"-DCMAKE_MAKE_PROGRAM={ninja}"] if ninja else []
-    configure = [cmake, "-S", SOURCE, "-B", BUILD, "-DCMAKE_CXX_COMPILER=g++", *generator]
+    options = ["-DCMAKE_CXX_COMPILER=g++", f"-DTEXGS_SOURCES={library_sources()}", *generator]
+    configure = [cmake, "-S", SOURCE, "-B", BUILD, *options]
     with FileLock(BUILD / "lock"):
         for command in (configure, [cmake, "--build", BUILD, "--parallel", "2"]):
             done = subprocess.run(command, capture_output=True, text=True, check=False)

@@ -25,7 +25,7 @@ namespace emulation {
 namespace {
 
 constexpr uintptr_t kWord = 4;
-constexpr size_t kPageWords = 1024, kCached = 4096, kMostPages = 1 << 14;
+constexpr size_t kPageWords = 1024, kCached = 4096, kMostPages = 1 << 12;
 constexpr size_t kArena = size_t(1) << 37;  // addresses, not memory
 
 struct Access {

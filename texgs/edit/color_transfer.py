@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import torch
 from torch import Tensor
 
 from texgs.core import check
@@ -29,8 +30,8 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
 
     for name, x in (("colors", colors), ("style", style)):
         check.shape(name, x, "N 3")
-    (whiten, mean, _), (_, mean_style, color) = (
-        zca_mean(x.detach().double(), unbiased=False, eps=LEAST, return_inverse=True) for x in (colors, style)
+    (whiten, mean, _), (whiten_style, mean_style, _) = (
+        zca_mean(x.detach().double(), unbiased=False, eps=LEAST) for x in (colors, style)
     )
-    matrix = color @ whiten
+    matrix = torch.linalg.solve(whiten_style, whiten)
     return matrix, mean_style[0] - matrix @ mean[0]

@@ -13,9 +13,8 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
     """Mean structural similarity of [H, W, C] images; see `texgs.raster.ssim`."""
     from kornia.metrics import ssim as similarities
 
-    planes = (pad(x.permute(2, 0, 1)[None], (WINDOW // 2,) * 4) for x in (image, target))
-    mean: Tensor = similarities(*planes, WINDOW, eps=0.0, padding="valid").mean()
-    return mean
+    x, y = (pad(each.permute(2, 0, 1)[None], (WINDOW // 2,) * 4) for each in (image, target))
+    return similarities(x, y, WINDOW, eps=0.0, padding="valid").mean()
 
 
 def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor:
