@@ -57,7 +57,8 @@ def packages() -> Finding:
 
 def configuration() -> Finding:
     """The configuration, without which no stage runs, and where results go."""
-    from texgs.config.compose import FOLDER, compose
+    from texgs.config.compose import compose
+    from texgs.config.project import folders
 
     try:
         results = Path(compose().results).absolute()
@@ -70,7 +71,8 @@ def configuration() -> Finding:
         return Finding(
             "configuration", "missing", f"{existing}: cannot write there", advice, is_required=True
         )
-    return Finding("configuration", "ok", f"{FOLDER}, results go to {results}")
+    places = ", then ".join(map(str, folders()))
+    return Finding("configuration", "ok", f"{places}, results go to {results}")
 
 
 def compiler() -> Finding:
