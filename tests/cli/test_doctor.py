@@ -4,7 +4,6 @@ from texgs.cli import probes
 from texgs.cli.doctor import examine, show
 from texgs.cli.main import main
 from texgs.cli.probes import Finding
-from texgs.config.compose import compose
 
 
 def test_report_has_a_line_per_probe_and_all_is_well_here(capsys):
@@ -70,8 +69,7 @@ def test_weights_are_listed(monkeypatch, tmp_path):
 
 
 def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
-    monkeypatch.setattr("texgs.config.compose.FOLDER", tmp_path / "conf")
-    compose.cache_clear()
+    monkeypatch.setattr("texgs.config.project.ROOT", tmp_path)
     finding = probes.configuration()
     assert (finding.state, finding.is_required) == ("missing", True)
     assert "no configuration there" in finding.found
@@ -81,3 +79,9 @@ def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
     finding = probes.packages()
     assert (finding.state, finding.is_required) == ("missing", True)
     assert finding.found.startswith("no no-such-package, torch 2.")
+
+
+def test_the_configurations_of_a_project_are_named(monkeypatch, tmp_path):
+    (tmp_path / "conf").mkdir()
+    monkeypatch.chdir(tmp_path)
+    assert probes.configuration().found.startswith(f"{tmp_path / 'conf'}, then ")

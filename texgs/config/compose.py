@@ -79,6 +79,8 @@ def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> DictC
 @lru_cache(maxsize=256)
 def _compose(overrides: tuple[str, ...], places: tuple[Path, ...]) -> DictConfig:
     *own, shipped = places
+    if not shipped.is_dir():
+        raise ConfigError(f"{shipped}: no configuration there; install texgs again")
     expected = schema()
     Plugins.instance().register(OwnFolders)
     OwnFolders.folders = tuple(own)

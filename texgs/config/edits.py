@@ -1,9 +1,10 @@
 """The edits of an experiment, as more words for `compose`."""
 
-from texgs.config.compose import close, compose, is_scene_file
+from texgs.config.compose import compose, is_scene_file
 from texgs.config.inputs import scene_before
 from texgs.config.locate import tf_names
 from texgs.config.project import members
+from texgs.config.slips import close
 from texgs.core.errors import ConfigError, MissingDataError
 
 OF_ONE = ("edit.name=", "edit.kind=", "edit.base=", "edit.parts=")  # not of what an edit starts from
