@@ -32,7 +32,7 @@ def test_one_sentence_for_each(edit, word, message):
 def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
     words = ("dataset=engine", "edit=crimson", f"results={tmp_path}")
     with pytest.raises(
-        MissingDataError, match=r"edit\.base: tube is not done yet; run texgs edit_segment edit=tube"
+        MissingDataError, match=r"edit\.base: lobe is not done yet; run texgs edit_segment edit=lobe"
     ):
         require_base(words)
     with pytest.raises(ConfigError, match=r"edit\.base: expected the file of a scene or one of"):

@@ -17,14 +17,10 @@ TINY = (
     "views.test.count=3 views.turntable=2 views.step=0.5"
 )
 
-# Runs a module's main with the copied sources. An editable installation finds texgs in the original sources,
-# whatever the path: leave that out.
-LAUNCHER = """
-import importlib
+# Python runs this at its start. Else an editable installation finds texgs in the original sources.
+ONLY_COPIED_SOURCES = """
 import sys
 sys.meta_path[:] = [finder for finder in sys.meta_path if "ScikitBuild" not in type(finder).__name__]
-sys.path.insert(0, sys.argv.pop(1))
-sys.exit(importlib.import_module(sys.argv.pop(1)).main())
 """
 
 
@@ -44,11 +40,14 @@ class Project:
             if path.stem not in DATASETS:  # one of the user
                 path.unlink()
         shutil.copy(ROOT / "Snakefile", self.sources)
+        (self.sources / "sitecustomize.py").write_text(ONLY_COPIED_SOURCES)
+        self.environment = {**os.environ, "PYTHONPATH": str(self.sources)}
 
     def texgs(self, *words: str) -> subprocess.CompletedProcess[str]:
         """A verb of the command line, on the volume and views of TINY where it takes KEY=VALUE."""
-        command = [sys.executable, "-c", LAUNCHER, str(self.sources), "texgs.cli.main", *words, *TINY.split()]
-        return subprocess.run(command, cwd=self.work, text=True, capture_output=True, check=False)
+        command = [sys.executable, "-P", "-m", "texgs.cli.main", *words, *TINY.split()]
+        run = {"cwd": self.work, "env": self.environment, "text": True, "capture_output": True}
+        return subprocess.run(command, check=False, **run)
 
     def start(
         self,
@@ -58,20 +57,11 @@ class Project:
         config: tuple[str, ...] = ("tracking=none",),
     ) -> subprocess.Popen[str]:
         """Snakemake in a process group of its own; `targets` are rules, by default those before the fits."""
-        command = [
-            sys.executable,
-            "-c",
-            LAUNCHER,
-            str(self.sources),
-            "snakemake.cli",
-            "-s",
-            str(self.sources / "Snakefile"),
-        ]
+        command = [sys.executable, "-P", "-m", "snakemake", "-s", str(self.sources / "Snakefile")]
         command += ["-d", str(self.work), "--cores", "2", "--rerun-incomplete", *targets, *words]
         command += ["--config", *config, f"overrides={TINY} {overrides}"]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        return subprocess.Popen(command, text=True, env=environment, start_new_session=True, **pipes)
+        return subprocess.Popen(command, text=True, env=self.environment, start_new_session=True, **pipes)
 
     def snakemake(self, *words: str, **options) -> subprocess.CompletedProcess[str]:
         """Snakemake to its end; arguments as for `start`."""

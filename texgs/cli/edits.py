@@ -12,6 +12,7 @@ from texgs.cli.stages.parts import shares
 from texgs.config.compose import compose
 from texgs.config.edits import lineage
 from texgs.config.inputs import scene_before
+from texgs.config.project import members
 from texgs.core.errors import MissingDataError
 from texgs.models.filters.vocabulary import understand
 from texgs.models.guidance import require_instruction
@@ -23,8 +24,10 @@ def require_base(words: tuple[str, ...]) -> None:
     Raises:
         ConfigError, MissingDataError: naming what is not.
     """
-    chain = lineage(words)
     config = compose(words)
+    if config.edit.base in members("edit") and scene_before(config).is_file():
+        return  # it may have been made with other words than those of conf/edit: the parts it has count
+    chain = lineage(words)
     if config.edit.base is not None and not scene_before(config).is_file():
         name, before = chain[-2]
         raise MissingDataError(

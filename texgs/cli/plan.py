@@ -198,8 +198,8 @@ def plain(job: Job, results: str) -> dict[str, Any]:
     from texgs.config.stage import note_result, settings_file
 
     settings = settings_file(job.settings, results)
-    if (job.output / METRICS).exists() and not job.is_done():
-        note_result(settings, f"{job.output}: not whole, or of another job")
+    if (job.output / METRICS).exists():
+        note_result(settings, None if job.is_done() else f"{job.output}: not whole, or of another job")
     inputs = {name: path.as_posix() for name, path in job.inputs.items()}
     return {"stage": job.stage.name, "settings": settings, "code": job.stage.code, "inputs": inputs}
 

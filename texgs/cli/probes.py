@@ -71,8 +71,7 @@ def configuration() -> Finding:
         return Finding(
             "configuration", "missing", f"{existing}: cannot write there", advice, is_required=True
         )
-    places = ", then ".join(map(str, folders()))
-    return Finding("configuration", "ok", f"{places}, results go to {results}")
+    return Finding("configuration", "ok", f"{' and '.join(map(str, folders()))}; results go to {results}")
 
 
 def compiler() -> Finding:
@@ -178,7 +177,7 @@ def weights() -> Finding:
         what, _, advice = str(error).partition("; ")
         return Finding("weights", "warning", what, advice)
     lacking = [name for name in CATALOGUE if name not in there]
-    where = f"optional: put them into {weights_folder()}, or set TEXGS_WEIGHTS; edits download what they can"
+    where = f"optional: `texgs weights NAME`, or put them into {weights_folder()}, or set TEXGS_WEIGHTS"
     if not there:
         return Finding("weights", "missing", f"none of {', '.join(lacking)}", where)
     found = f"{', '.join(there)}" + (f"; not {', '.join(lacking)}" if lacking else "")

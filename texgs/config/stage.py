@@ -111,12 +111,15 @@ def settings_file(settings: dict[str, Any], results: str) -> str:
     return path.as_posix()
 
 
-def note_result(settings: str, note: str) -> None:
-    """Write a note on the results of a job, with the time, under its settings, in place of the one before."""
+def note_result(settings: str, note: str | None) -> None:
+    """Write a note on the result of a job, with the time, under its settings, in place of the one before."""
     path = Path(settings)
-    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    lines.append(f"# {datetime.now().isoformat(timespec='microseconds')} {note}")
-    write_atomic(path, lambda file: file.write("\n".join([*lines, ""]).encode()))
+    text = path.read_text(encoding="utf-8")
+    kept = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("#"))
+    if note is not None:
+        kept += f"# {datetime.now().isoformat(timespec='microseconds')} {note}\n"
+    if kept != text:
+        write_atomic(path, lambda file: file.write(kept.encode()))
 
 
 def settings_digest(settings: dict[str, Any]) -> str:

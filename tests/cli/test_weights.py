@@ -1,0 +1,79 @@
+"""Weights belong to the settings of the jobs that use them; the verb lists and downloads them."""
+
+import pytest
+
+from texgs.cli.main import main
+from texgs.cli.weights import missing, require_same, weights_of
+from texgs.config.compose import compose
+from texgs.config.stage import settings_digest
+from texgs.config.stages import STAGES
+from texgs.core.checksum import Checksums
+from texgs.core.errors import MissingDataError
+from texgs.models import weights
+
+CLIP = "clip-vit-base-patch32"
+
+
+@pytest.fixture
+def there(monkeypatch, tmp_path):
+    """Checksums of weights by name, as if they were on this machine."""
+    for name in ("TEXGS_WEIGHTS", "TORCH_HOME", "HF_HOME", "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, str(tmp_path / "none"))
+    found = {}
+    monkeypatch.setattr(weights, "checksum", lambda name, _checksums: found.get(name))
+    return found
+
+
+def settings(stage, *words):
+    """Digest of the settings of an edit's job, as the workflow plans it."""
+    config = compose(("dataset=orbital", *words))
+    used = weights_of(stage, config, Checksums())
+    return settings_digest({**STAGES[stage].settings(config), "weights": used}), used
+
+
+def test_measures_change_when_weights_arrive_or_change(there):
+    before, used = settings("edit_metrics", "edit=gold")
+    assert used == {"vgg16": None, "lpips_vgg": None, CLIP: None}
+    there[CLIP] = "0123456789abcdef"
+    arrived, used = settings("edit_metrics", "edit=gold")
+    assert used[CLIP] == "0123456789ab"
+    there[CLIP] = "fedcba9876543210"
+    assert len({before, arrived, settings("edit_metrics", "edit=gold")[0]}) == 3
+
+
+def test_an_edit_changes_with_the_weights_that_it_uses_and_no_others(there):
+    plain, used = settings("edit_image", "edit=glass")
+    assert used == {}, "patches need no weights"
+    there[CLIP] = there["vgg16"] = "0123456789abcdef"
+    assert settings("edit_image", "edit=glass")[0] == plain
+    _, used = settings("edit_image", "edit=style_paper")
+    assert set(used) == {"vgg16", CLIP}, "without lambda_s CLIP is used where it is there"
+    _, used = settings("edit_segment", "edit=lobe", "edit.segment.masks=mobile_sam")
+    assert used == {"mobile_sam": None}
+    assert weights_of("shading", compose(("dataset=orbital",)), Checksums()) == {}
+
+
+def test_a_job_works_with_the_weights_it_was_planned_with(there):
+    there["vgg16"] = "0123456789abcdef"
+    require_same({"vgg16": "0123456789ab", CLIP: None})
+    there[CLIP] = "0123456789abcdef"
+    with pytest.raises(MissingDataError, match=f"weights of {CLIP}: expected none, as when the job was pl"):
+        require_same({"vgg16": "0123456789ab", CLIP: None})
+
+
+def test_missing_weights_name_the_command_and_are_not_downloaded(there, monkeypatch):
+    monkeypatch.setattr(weights, "_download_file", lambda *_: pytest.fail("downloaded"))
+    (line,) = missing(compose(("dataset=orbital", "edit=style")))
+    assert line == (
+        "edit style: the weights of vgg16 are not on this machine; "
+        "`texgs weights vgg16` downloads them or says how to get them"
+    )
+
+
+def test_the_verb_lists_all_and_refuses_unknown_names(there, capsys):
+    assert main(["weights"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(weights.CATALOGUE)
+    assert all("not here; http" in line for line in lines)
+    assert main(["weights", "resnet"]) == 2
+    assert "weights: expected one of vgg16," in capsys.readouterr().err
