@@ -25,6 +25,7 @@ DATASETS = (
     "mantle",
     "mni152",
     "neghip",
+    "orbital",
     "rotstrat",
     "sphere",
     "supernova",

@@ -84,4 +84,4 @@ def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
 def test_the_configurations_of_a_project_are_named(monkeypatch, tmp_path):
     (tmp_path / "conf").mkdir()
     monkeypatch.chdir(tmp_path)
-    assert probes.configuration().found.startswith(f"{tmp_path / 'conf'}, then ")
+    assert probes.configuration().found.startswith(f"{tmp_path / 'conf'} and ")

@@ -71,8 +71,7 @@ def configuration() -> Finding:
         return Finding(
             "configuration", "missing", f"{existing}: cannot write there", advice, is_required=True
         )
-    places = ", then ".join(map(str, folders()))
-    return Finding("configuration", "ok", f"{places}, results go to {results}")
+    return Finding("configuration", "ok", f"{' and '.join(map(str, folders()))}; results go to {results}")
 
 
 def compiler() -> Finding:
