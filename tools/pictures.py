@@ -29,7 +29,6 @@ LOOKS = {  # title: scene file below SCENES
 }
 HERO = list(LOOKS)[:6]
 COLUMNS, PANEL, LABEL = 3, 533, 34  # panels side by side, pixels of a panel and of its label
-COLORS = 255  # of the palette that keeps files small
 
 
 def shown(title: str, camera: Camera) -> np.ndarray:
@@ -63,13 +62,19 @@ def write_looks(path: Path) -> None:
 
 def write_views(path: Path) -> None:
     """The contact sheets of both basic transfer functions, one below the other."""
-    sheets = [np.asarray(Image.open(RESULTS / tf / "sheet" / "sheet.png")) for tf in ("TF01", "TF02")]
-    small(Image.fromarray(np.concatenate(sheets)), path)
+    sheets = [Image.open(RESULTS / tf / "sheet" / "sheet.png") for tf in ("TF01", "TF02")]
+    size = max(sheet.width for sheet in sheets), sum(sheet.height for sheet in sheets)
+    both = Image.new("RGB", size, "white")
+    for index, sheet in enumerate(sheets):
+        both.paste(sheet, ((size[0] - sheet.width) // 2, index * sheets[0].height))
+    small(both, path)
 
 
 def small(picture: Image.Image, path: Path) -> None:
-    """Write a PNG with a palette."""
-    picture.convert("RGB").quantize(COLORS, dither=Image.Dither.NONE).save(path, optimize=True)
+    """Write a PNG with values rounded to multiples of 4, which halves the file."""
+    pixels = np.asarray(picture.convert("RGB")).astype(int)
+    rounded = ((pixels + 2) // 4 * 4).clip(0, 255).astype(np.uint8)
+    Image.fromarray(rounded).save(path, optimize=True)
     print(f"{path}: {picture.width} x {picture.height}, {path.stat().st_size / 1024:.0f} KiB")
 
 
