@@ -14,8 +14,11 @@ def test_a_scene_that_is_nowhere_opaque_has_no_consistency(tmp_path):
     model = ball(1)
     faint = torch.full_like(model.parameters["opacities"], -6.0)
     scene, cameras = Scene({"ball": SceneModel(tmp_path)}), path(12, 4.0, 30.0, 32, 32)
+    missing = {"vgg16": None, "lpips_vgg": None}
     seen, unseen = (
-        agreement(Composition([Model({**model.parameters, **change}, model.optics)]), scene, cameras, 4)
+        agreement(
+            Composition([Model({**model.parameters, **change}, model.optics)]), scene, cameras, 4, missing
+        )
         for change in ({}, {"opacities": faint})
     )
     assert 0 < seen["short_rmse"] < 0.5
