@@ -97,7 +97,7 @@ def _nearest(means: Tensor, known: Tensor) -> Tensor:
     index = torch.arange(len(means), device=means.device)
     if bool(known.all()):
         return index
-    ids, points = known.nonzero()[:, 0], means.detach().cpu().numpy()
-    _, nearest = cKDTree(points[ids.cpu()]).query(points[(~known).cpu()])
+    ids, points, is_known = known.nonzero()[:, 0], means.detach().cpu().numpy(), known.cpu().numpy()
+    _, nearest = cKDTree(points[is_known]).query(points[~is_known])
     index[~known] = ids[torch.as_tensor(nearest, device=ids.device)]
     return index
