@@ -47,12 +47,13 @@ def reads(stage):
 
 
 def words(stage):
-    """The command line of a job after the name of its stage, as a function of wildcards."""
+    """The words of a job's command, first its stage, as a function of wildcards."""
 
     def of(wildcards):
         folder, made = job(stage, wildcards)
         inputs = [f"{name}={path}" for name, path in made["inputs"].items()]
-        return ["--settings", made["settings"], *(["--input", *inputs] if inputs else []), "--output", folder]
+        files = ["--input", *inputs] if inputs else []
+        return [stage, "--settings", made["settings"], *files, "--output", folder]
 
     return of
 
@@ -91,8 +92,8 @@ shell.prefix(
     "set -euo pipefail; "
     f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -P -m texgs.cli.main "$@"; }}}}; '
 )
-# One command for all stages: a rule has the name of its stage. A second attempt adds to the log of the first.
-RUN = "texgs {rule} {params.words:q} 2>&1 | tee --append {log:q}"
+# One command for all stages. A second attempt adds to the log of the first.
+RUN = "texgs {params.words:q} 2>&1 | tee --append {log:q}"
 
 
 # What is there stays until the job has made something better: it swaps its files in at the end.
