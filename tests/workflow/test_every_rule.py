@@ -124,6 +124,11 @@ def test_changed_native_sources_run_what_calls_them_and_want_a_new_library(proje
     assert made_again(before, metrics(project)) <= {"sphere/TF01/views", "sphere/TF01/sheet"}
 
 
+def test_sources_that_are_put_back_want_the_results_of_before(project):
+    run(project)  # views were rendered by the other sources before a fit wanted a new library
+    assert changed(project) == set()
+
+
 @pytest.mark.parametrize("harm", ["removed", "cut", "one bit"])
 def test_a_damaged_model_is_made_again_and_nothing_else(project, harm):
     model = project.work / "results" / "sphere" / "TF01" / "demo" / "shading" / "model.safetensors"
