@@ -4,6 +4,7 @@ A job's settings are written once to a file named after their contents. That fil
 the digest of the code a parameter, so a changed value or line of code reruns what depends on it.
 """
 
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
@@ -14,6 +15,8 @@ from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.code import code_digest, digest
 from texgs.core.io import write_atomic
+
+LONG_AGO = 946684800  # the year 2000, in seconds
 
 FOLDERS = {  # of their files, below `results`
     "volume": "{dataset}/volume",
@@ -112,7 +115,10 @@ def settings_file(settings: dict[str, Any], results: str) -> str:
 
 
 def note_result(settings: str, note: str | None) -> None:
-    """Write a note on the result of a job, with the time, under its settings, in place of the one before."""
+    """Write a note on the result of a job, with the time, under its settings, in place of the one before.
+
+    Without a note the file is made older than any result: the job that read it with one needs no second run.
+    """
     path = Path(settings)
     text = path.read_text(encoding="utf-8")
     kept = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("#"))
@@ -120,6 +126,8 @@ def note_result(settings: str, note: str | None) -> None:
         kept += f"# {datetime.now().isoformat(timespec='microseconds')} {note}\n"
     if kept != text:
         write_atomic(path, lambda file: file.write(kept.encode()))
+        if note is None:
+            os.utime(path, (LONG_AGO, LONG_AGO))
 
 
 def settings_digest(settings: dict[str, Any]) -> str:
