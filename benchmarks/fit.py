@@ -13,12 +13,12 @@ from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
+from texgs.core.light import Light
 from texgs.core.memory import keep_freed_memory
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.render import render
 from texgs.fit.loop import Fit
-from texgs.scene.images import Images
-from texgs.scene.model import Model, Optics, raw_material
-from texgs.scene.render import render
-from texgs.volume.view_set import Light
+from texgs.volume.images import Images
 
 SURFELS = {400: 15_000, 800: 40_000}  # by image size; for other sizes those of the settings
 VIEWS = 8
@@ -66,11 +66,11 @@ def training(size: int, n: int, device: torch.device) -> Fit:
     }
     phase = Phase(10**9, losses=LOSSES, rates=RATES, densify=Densify(start=10**9, stop=10**9))
     moved = raw | {"means": raw["means"] + 0.003}
-    return Fit(moved, Optics(), views(Model(raw), size), phase, seed=0)
+    return Fit(moved, ShadingModel(), views(Surfels(raw), size), phase, seed=0)
 
 
 @torch.no_grad()
-def views(model: Model, size: int) -> Images:
+def views(model: Surfels, size: int) -> Images:
     """Views around a model, as 8-bit images."""
     cameras = [orbit(-60.0 + 360 / VIEWS * i, 25.0, DISTANCE, 30.0, size, size) for i in range(VIEWS)]
     shown = [render(model, camera.to(model.parameters["means"].device)) for camera in cameras]

@@ -10,10 +10,10 @@ from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.camera import orbit
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
-from texgs.scene.model import Model, Optics, raw_material
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
 
 MODELS, SURFELS, SIDE = 4, 30_000, 4  # models, surfels in each, texels along each side of a texture
 EDITS = [Edit(palette=(0.2, 0.6, 0.4)), Edit(opacity=0.5), Edit(diffuse=1.5), Edit(visible=False)]
@@ -34,13 +34,13 @@ def run(settings: Settings) -> Section:
     return section
 
 
-def model(seed: int, device: torch.device) -> Model:
+def model(seed: int, device: torch.device) -> Surfels:
     """A textured model of the generated scenes."""
     made = {name: x.to(device) for name, x in scenes.surfels("opaque", SURFELS, seed).items()}
     generator = torch.Generator().manual_seed(seed)
     count = SIDE * SIDE
     material = raw_material(0.3, 0.7, 0.3, 20.0, "bounded")
-    return Model(
+    return Surfels(
         {
             "means": made["means"],
             "quats": made["quats"],
@@ -53,5 +53,5 @@ def model(seed: int, device: torch.device) -> Model:
             "sizes": torch.full((SURFELS, 2), SIDE, dtype=torch.int32, device=device),
             "offsets": count * torch.arange(SURFELS, device=device),
         },
-        Optics(),
+        ShadingModel(),
     )

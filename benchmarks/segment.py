@@ -16,10 +16,10 @@ from texgs.core.camera import Camera, orbit
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import HEADLIGHT, Views
 from texgs.edit.votes import CentreVotes, ContributionVotes
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
 from texgs.models.grabcut import GrabCut
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
-from texgs.scene.model import Model
 from texgs.volume.cameras import icosphere
 
 MOST = 512  # pixels of a view that votes
@@ -57,7 +57,7 @@ def run(settings: Settings) -> Section:
     return section
 
 
-def truths(whole: Model, half: Tensor, cameras: Sequence[Camera]) -> list[Tensor]:
+def truths(whole: Surfels, half: Tensor, cameras: Sequence[Camera]) -> list[Tensor]:
     """Masks [H, W] of where a part of the surfels makes up most of a view."""
     shown = [ContributionVotes(whole).shown(camera, half.float()[:, None]) for camera in cameras]
     return [(x.color[..., 0] > 0.5 * x.alpha) & (x.alpha > 0.1) for x in shown]
@@ -72,7 +72,7 @@ def counted(
     return votes.selected()
 
 
-def mask_case(whole: Model, device: torch.device, size: int) -> Case:
+def mask_case(whole: Surfels, device: torch.device, size: int) -> Case:
     """A preview by GrabCut from one click in the middle of a view."""
     camera = orbit(-60.0, 25.0, DISTANCE, 30.0, size, size).to(device)
     middle = torch.full((1, 2), size / 2, device=device)
@@ -81,7 +81,7 @@ def mask_case(whole: Model, device: torch.device, size: int) -> Case:
     return Case("GrabCut of a view", {"size": size}, {"mask": lambda: views.mask(clicks)})
 
 
-def frame_cases(whole: Model, half: Tensor, settings: Settings) -> list[Case]:
+def frame_cases(whole: Surfels, half: Tensor, settings: Settings) -> list[Case]:
     """Frames without a segment, with one that is not edited, and with one that is."""
     camera = orbit(-60.0, 25.0, DISTANCE, 30.0, settings.size, settings.size).to(settings.device)
     plain, split = Composition([whole]), Composition([whole], [[half]])

@@ -11,15 +11,15 @@ from benchmarks.report import Measurement, Section
 from benchmarks.scene import model
 from benchmarks.settings import Settings
 from texgs.core.camera import Camera, orbit
+from texgs.core.light import Light
 from texgs.core.memory import keep_freed_memory
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import History, stylize
+from texgs.fields.surfels.model import Surfels
 from texgs.models.precision import fast_dtype
 from texgs.models.vgg import CHANNELS, STYLE_LAYERS, Vgg
-from texgs.scene.model import Model
-from texgs.volume.view_set import Light
 
 ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick
 LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)
@@ -45,7 +45,7 @@ def run(settings: Settings) -> Section:
 
 
 def edited(
-    scene: Model, cameras: list[Camera], style: StylePicture, recipe: Recipe, vgg: Vgg | None
+    scene: Surfels, cameras: list[Camera], style: StylePicture, recipe: Recipe, vgg: Vgg | None
 ) -> History:
     """How an edit went."""
     lights = [Light("headlight")] * len(cameras)

@@ -19,6 +19,7 @@ from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.errors import DeviceError
+from texgs.core.light import Light
 from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.cameras import icosphere
 from texgs.volume.cpu_mapper import CpuMapper
@@ -27,7 +28,7 @@ from texgs.volume.grid import Grid
 from texgs.volume.opengl import offscreen_opengl
 from texgs.volume.render import render_views
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light, View
+from texgs.volume.view_set import View
 from texgs.volume.vtk_camera import aim
 
 LIGHT = Light("headlight")

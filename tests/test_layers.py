@@ -11,16 +11,16 @@ ROOT = Path(__file__).parents[1]
 LEFT = {
     "core": set(),
     "config": {"core"},
-    "volume": {"config", "core"},
-    "raster": {"config", "core"},
-    "scene": {"config", "core", "volume", "raster"},
-    "models": {"config", "core", "volume", "raster"},
+    **{name: {"config", "core"} for name in ("volume", "raster", "track")},
+    **{name: {"config", "core", "volume", "raster"} for name in ("fields", "models")},
 }
+LEFT["scene"] = LEFT["fields"] | {"fields"}
 for name in ("fit", "edit", "metrics"):
-    LEFT[name] = {"config", "core", "volume", "raster", "scene", "models"}
-for name in ("report", "track", "viewer"):
-    LEFT[name] = LEFT["fit"] | {"fit", "edit", "metrics"}
-LEFT["cli"] = LEFT["report"] | {"report", "track", "viewer"}
+    LEFT[name] = LEFT["scene"] | {"scene", "models"}
+LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
+for name in ("methods", "viewer"):
+    LEFT[name] = LEFT["report"] | {"report"}
+LEFT["cli"] = LEFT["methods"] | {"methods", "track", "viewer"}
 
 
 def package_of(path: Path) -> str:

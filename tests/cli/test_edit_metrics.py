@@ -2,10 +2,10 @@
 
 import torch
 
-from tests.scene.test_composition import ball
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.edit_metrics import agreement
-from texgs.scene.composition import Composition
-from texgs.scene.model import Model
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
 from texgs.scene.scene_file import Scene, SceneModel
 from texgs.volume.cameras import test_path as path
 
@@ -17,7 +17,11 @@ def test_a_scene_that_is_nowhere_opaque_has_no_consistency(tmp_path):
     missing = {"vgg16": None, "lpips_vgg": None}
     seen, unseen = (
         agreement(
-            Composition([Model({**model.parameters, **change}, model.optics)]), scene, cameras, 4, missing
+            Composition([Surfels({**model.parameters, **change}, model.shading)]),
+            scene,
+            cameras,
+            4,
+            missing,
         )
         for change in ({}, {"opacities": faint})
     )

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tests.scene.test_composition import ball
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.parts import Part, surfels_of
 from texgs.core.errors import ArgumentError
 from texgs.scene.scene_file import SceneModel, SceneSegment

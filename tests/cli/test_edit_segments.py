@@ -4,9 +4,9 @@ import pytest
 import torch
 import yaml
 
-from tests.scene.test_composition import ball
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
-from texgs.scene.model_file import write_model
+from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 import torch
 
-from tests.scene.ply_files import vertices
-from tests.scene.samples import sample
-from tests.scene.test_composition import ball
+from tests.fields.surfels.ply_files import vertices
+from tests.fields.surfels.samples import sample
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
-from texgs.scene.compact import read_compact
-from texgs.scene.edits import Edit
-from texgs.scene.model_file import write_model
-from texgs.scene.ply import read_ply
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.compact import read_compact
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.ply import read_ply
+from texgs.fields.surfels.texels import bare_colors
+from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.scene_file import Scene, SceneModel, write_scene
-from texgs.scene.texels import bare_colors
-from texgs.scene.texture_file import write_texture
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_the_ending_chooses(model, tmp_path):
 def test_a_model_of_a_scene_has_its_texture_there(model, tmp_path, kind, capsys):
     own = ball(1)
     p = own.parameters
-    other = type(own)({**p, "texels": torch.full_like(p["texels"], 0.25)}, own.optics)
+    other = type(own)({**p, "texels": torch.full_like(p["texels"], 0.25)}, own.shading)
     texture = write_texture(tmp_path / "style.safetensors", other)
     scene = write_scene(tmp_path / "styled.yaml", Scene({"A": SceneModel(model, texture=texture)}))
     target = tmp_path / ("a.texgs" if kind == "compact" else "a.ply")
@@ -79,7 +79,7 @@ def test_textures_of_surfels_that_nobody_sees_are_dropped(tmp_path):
     p = dict(hidden.parameters)
     p["opacities"] = p["opacities"].clone()
     p["opacities"][:50] = -20.0
-    source = write_model(tmp_path / "m.safetensors", type(hidden)(p, hidden.optics))
+    source = write_model(tmp_path / "m.safetensors", type(hidden)(p, hidden.shading))
     assert export(source, tmp_path / "m.texgs", "--drop-unseen", "--views", "12", "--size", "64") == 0
     sizes = read_compact(tmp_path / "m.texgs").parameters["sizes"]
     assert bool((sizes[:50] == 1).all())

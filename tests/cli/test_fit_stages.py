@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from texgs.cli.main import main
-from texgs.scene.model_file import read_model
+from texgs.fields.surfels.model_file import read_model
 from texgs.volume.view_set import read_views
 
 TINY = [
@@ -80,7 +80,7 @@ def test_texture_makes_what_it_needs_first(folder):
     }
     assert {phase: model.stage for phase, model in models.items()} == {phase: phase for phase in models}
     assert models["texture"].metadata["dataset"] == "sphere"
-    assert models["texture"].optics.local_viewer is False, "the CPU's volume mapper has a distant viewer"
+    assert models["texture"].shading.local_viewer is False, "the CPU's volume mapper has a distant viewer"
     shading, texture = numbers(folder, "shading"), numbers(folder, "texture")
     assert shading["psnr"] > 25
     assert texture["psnr"] >= shading["psnr"] - 0.1

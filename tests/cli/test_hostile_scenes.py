@@ -10,13 +10,13 @@ import yaml
 from PIL import Image
 from safetensors.torch import save, save_file
 
-from tests.scene.samples import sample
-from tests.scene.test_composition import ball
+from tests.fields.surfels.samples import sample
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
 from texgs.cli.stages.parts import edit_parts
 from texgs.core.errors import ArgumentError, OutOfMemoryError
-from texgs.scene.compact import read_compact, write_compact
-from texgs.scene.model_file import write_model
+from texgs.fields.surfels.compact import read_compact, write_compact
+from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.volume.tf_plot import plot

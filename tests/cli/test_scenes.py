@@ -8,11 +8,11 @@ import pytest
 import yaml
 from PIL import Image
 
-from tests.scene.test_composition import ball
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
-from texgs.scene.model_file import write_model
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
-from texgs.scene.texture_file import write_texture
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from tests.edit.lift_scenes import two_balls
 from tests.edit.test_lift import pixel_of
 from texgs.cli.main import main
 from texgs.core.camera import orbit
-from texgs.scene.model_file import write_model
+from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 

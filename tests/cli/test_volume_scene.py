@@ -2,19 +2,19 @@ import numpy as np
 import pytest
 import torch
 
-from tests.scene.test_composition import ball
+from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.pse import Step, compared
 from texgs.cli.stages.volume_scene import VolumeScene, edited
 from texgs.core.camera import orbit
 from texgs.core.io import write_json
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
+from texgs.core.light import Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
 from texgs.scene.scene_file import Scene, SceneModel
 from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 
 TF = TransferFunction(((0, 0), (1, 0.5), (2, 0.9)), ((0, 0.2, 0.4, 0.6), (2, 0.4, 0.6, 0.8)))
 LOW = {"opacity": [[0.2, 0.0], [0.3, 0.4], [0.4, 0.0]], "color": [[0.2, 0.2, 0.3, 0.8]]}

@@ -4,8 +4,8 @@ import torch
 from kornia.geometry.conversions import rotation_matrix_to_quaternion
 from torch.nn.functional import normalize
 
+from texgs.fields.surfels.model import ShadingModel, Surfels, geometry, raw_material
 from texgs.raster import rasterize
-from texgs.scene.model import Model, Optics, geometry, raw_material
 from texgs.volume.cameras import icosphere
 
 RED, BLUE = (0.9, 0.1, 0.1), (0.1, 0.2, 0.9)
@@ -31,7 +31,7 @@ def joined(*parts):
     """One model of stage shading with the surfels of all, and the number [N] of the part of each."""
     together = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
     numbers = torch.cat([torch.full((len(part["means"]),), i) for i, part in enumerate(parts)])
-    return Model({**together, **raw_material(0.6, 0.4, 0.05, 20.0, "bounded")}, Optics()), numbers
+    return Surfels({**together, **raw_material(0.6, 0.4, 0.05, 20.0, "bounded")}, ShadingModel()), numbers
 
 
 def two_balls(opacity=0.95, n=1500):
@@ -60,7 +60,7 @@ def truth(model, of_class, camera):
         *lens,
         features=of_class.float()[:, None],
         outputs=("statistics",),
-        options=model.optics.options,
+        options=model.shading.options,
     )
     mask = (shown.color[..., 0] > 0.5 * shown.alpha) & (shown.alpha > 0.1)
     return mask, shown.statistics.weight_sum

@@ -4,7 +4,7 @@ import torch
 from kornia.geometry.conversions import rotation_matrix_to_quaternion
 
 from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
-from texgs.scene.model import Model, Optics, raw_material
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
 
 
 def sphere_points(count):
@@ -25,7 +25,7 @@ def ball(count=400, side=5, opacity=4.0):
     sigma = 1.6 * RADIUS / count**0.5
     order = torch.randperm(count, generator=torch.Generator().manual_seed(1))
     colors = torch.tensor([0.3, -0.2, 0.4]).expand(count, 3) + 0.05 * normals
-    return Model(
+    return Surfels(
         {
             "means": RADIUS * normals,
             "quats": rotation_matrix_to_quaternion(axes),
@@ -38,7 +38,7 @@ def ball(count=400, side=5, opacity=4.0):
             "sizes": torch.full((count, 2), side, dtype=torch.int32),
             "offsets": order * side**2,
         },
-        Optics(),
+        ShadingModel(),
     )
 
 

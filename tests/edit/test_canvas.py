@@ -3,9 +3,9 @@ import torch
 
 from tests.edit.scenes import ball, views
 from texgs.edit.canvas import extent, paint, visible_part
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
-from texgs.scene.model import Model
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
 
 
 @pytest.fixture
@@ -13,7 +13,7 @@ def scene():
     """A ball with random texels, beside the middle of the first view."""
     p = ball().parameters
     texels = torch.rand(p["texels"].shape, generator=torch.Generator().manual_seed(0))
-    return Model({**p, "texels": texels, "means": p["means"] + torch.tensor([0.0, 0.1, 0.15])})
+    return Surfels({**p, "texels": texels, "means": p["means"] + torch.tensor([0.0, 0.1, 0.15])})
 
 
 def pasted(canvas, full):

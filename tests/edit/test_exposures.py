@@ -5,10 +5,10 @@ import torch
 from torch.testing import assert_close
 
 from tests.edit.textured import around, shell
+from texgs.core.light import Light
 from texgs.edit.exposures import content, expose, straight_colors
 from texgs.edit.target_views import render_views
-from texgs.scene.texels import bare_colors
-from texgs.volume.view_set import Light
+from texgs.fields.surfels.texels import bare_colors
 
 HEADLIGHT = Light("headlight")
 

@@ -9,8 +9,8 @@ from texgs.core.errors import ArgumentError, ShapeError
 from texgs.edit.clicks import Clicks, is_visible, projected, prompts_at
 from texgs.edit.lift import HEADLIGHT, Views, lift, middle_of
 from texgs.edit.preview import preview
+from texgs.fields.surfels.render import render
 from texgs.models.grabcut import GrabCut
-from texgs.scene.render import render
 
 SIZE = 120
 FRONT = orbit(-90, 0, 4.0, 22.0, SIZE, SIZE)  # on +z

@@ -11,12 +11,12 @@ from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side
 from texgs.edit.stylize import stylize
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import GEOMETRY, MATERIAL, Surfels
+from texgs.fields.surfels.render import render
+from texgs.fields.surfels.texels import owners
 from texgs.models.vgg import Vgg
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
-from texgs.scene.model import GEOMETRY, MATERIAL, Model
-from texgs.scene.render import render
-from texgs.scene.texels import owners
 
 CHANGED = {"texels", "colors"}
 
@@ -74,7 +74,7 @@ def test_a_plain_style_becomes_the_colour_of_the_surface():
     done = stylize(model, cameras, lights, style, preset("preview"))
     for look in ("shaded", "unshaded"):
         found, expected = (
-            Composition([x]).render(cameras[0], look=look).color for x in (done.model, Model(plain))
+            Composition([x]).render(cameras[0], look=look).color for x in (done.model, Surfels(plain))
         )
         torch.testing.assert_close(found, expected, atol=1e-5, rtol=0)
 
@@ -220,7 +220,7 @@ def test_mistakes_are_named_before_any_work(vgg, style):
         k: x for k, x in ball().parameters.items() if k not in ("texels", "sizes", "offsets", "palette")
     }
     cases = [
-        ({"model": Model(shading)}, ArgumentError, "model: expected stage texture, got shading"),
+        ({"model": Surfels(shading)}, ArgumentError, "model: expected stage texture, got shading"),
         ({"lights": lights[:2]}, ArgumentError, "expected one for each of some cameras, got 2 for 6"),
         ({"cameras": [], "lights": []}, ArgumentError, "got 0 for 0"),
         (

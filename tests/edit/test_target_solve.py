@@ -5,15 +5,15 @@ import torch
 from torch.testing import assert_close
 
 from tests.edit.textured import around, shell
+from texgs.core.light import Light
 from texgs.edit.back_projection import BackProjection, back_project, fill_unseen, seen_texels
 from texgs.edit.exposures import expose
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
 from texgs.edit.target_views import render_views
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.raster.ssim import l1_dssim
-from texgs.scene.model import Model
-from texgs.scene.texels import bare_colors, owners
-from texgs.volume.view_set import Light
 
 STRIPES = 9.0  # for each world unit
 
@@ -174,7 +174,7 @@ def test_hidden_surfels_take_the_colour_of_the_nearest_seen_one(glimpse):
     model = shell(count=10, texels=2)
     means = torch.zeros(10, 3)
     means[:, 0] = torch.arange(10.0) ** 1.1
-    model = Model({**model.parameters, "means": means}, model.optics)
+    model = Surfels({**model.parameters, "means": means}, model.shading)
     place, surfel = owners(model.parameters)
     colors = torch.ones(40, 3)
     weights = torch.full((40,), glimpse)

@@ -6,15 +6,15 @@ from torch.testing import assert_close
 
 from tests.edit.guidances import Identity, NoisyStripes, NoisyTint, Returns, Tint, Watching
 from tests.edit.textured import around, shell
-from tests.scene.samples import sample
+from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import Light
 from texgs.edit.axis_views import axis_cameras
 from texgs.edit.target_update import Policy, update
 from texgs.edit.target_views import render_views
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
-from texgs.scene.texels import bare_colors, owners, recolored
-from texgs.volume.view_set import Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.texels import bare_colors, owners, recolored
 
 BLUE = (0.2, 0.3, 0.8)
 QUICK = Policy(opacities=(1.0, 0.5), sweeps=2)
@@ -120,7 +120,7 @@ def test_highlights_keep_their_colour():
     bright = shell(opacity=6.0)
     p = {**bright.parameters, "specular": torch.tensor([3.0])}
     bright = recolored(
-        type(bright)(p, bright.optics), torch.tensor([[1.0, 1.0, 0.1]]).expand(len(p["texels"]), 3)
+        type(bright)(p, bright.shading), torch.tensor([[1.0, 1.0, 0.1]]).expand(len(p["texels"]), 3)
     )
     done = update(bright, around(6), Tint((0.1, 0.1, 0.1)), "x", QUICK)
     shown = Composition([done.model]).render(around(6)[3]).color[20:28, 20:28]

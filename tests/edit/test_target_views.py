@@ -7,13 +7,13 @@ import torch
 from torch.testing import assert_close
 
 from tests.edit.textured import RADIUS, around, shell
-from tests.scene.samples import sample
+from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import Light
 from texgs.edit.target_views import render_views, require_texture, unproject
-from texgs.scene.composition import Composition
-from texgs.scene.model import Model
-from texgs.scene.texels import bare_colors, owners
-from texgs.volume.view_set import Light
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors, owners
 
 
 def in_another_order(model):
@@ -22,7 +22,7 @@ def in_another_order(model):
     counts = p["sizes"].long().prod(1)
     offsets = ((counts + 2).flip(0).cumsum(0) - (counts + 2).flip(0)).flip(0)
     texels = torch.full((int((counts + 2).sum()), 3), 9.0)
-    moved = Model({**p, "texels": texels, "offsets": offsets}, model.optics, model.metadata)
+    moved = Surfels({**p, "texels": texels, "offsets": offsets}, model.shading, model.metadata)
     texels[owners(moved.parameters)[0]] = p["texels"][owners(p)[0]]
     return moved
 

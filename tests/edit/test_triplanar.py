@@ -5,7 +5,7 @@ import torch
 from tests.edit.scenes import ball
 from texgs.core.errors import ShapeError
 from texgs.edit.triplanar import project
-from texgs.scene.texels import owners
+from texgs.fields.surfels.texels import owners
 
 
 def wall(normal_quat, sizes=((4, 3), (2, 5)), offsets=(10, 0)):

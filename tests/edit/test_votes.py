@@ -6,9 +6,9 @@ from torch.nn.functional import interpolate
 
 from tests.edit.lift_scenes import cameras, nested, overlap, truth, two_balls
 from texgs.edit.votes import CentreVotes, ContributionVotes
+from texgs.fields.surfels.model import geometry
 from texgs.raster import Options
 from texgs.raster.reference import rasterize as reference
-from texgs.scene.model import geometry
 
 
 def noisy(mask, seed):
@@ -72,7 +72,7 @@ def test_surfels_that_no_view_shows_follow_their_neighbours():
     hidden = torch.zeros(len(model), dtype=torch.bool)
     hidden[[3, 700, 1600, 2900]] = True
     opacities = torch.where(hidden, -20.0, model.parameters["opacities"])
-    unseen = type(model)({**model.parameters, "opacities": opacities}, model.optics)
+    unseen = type(model)({**model.parameters, "opacities": opacities}, model.shading)
     found, _ = counted(ContributionVotes(unseen), unseen, numbers == 0)
     assert found[hidden].tolist() == [True, True, False, False]
 

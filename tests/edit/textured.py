@@ -3,8 +3,8 @@
 import torch
 
 from texgs.core.camera import orbit
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
 from texgs.fit.texels import textured
-from texgs.scene.model import Model, Optics, raw_material
 
 RADIUS = 0.4
 
@@ -28,9 +28,9 @@ def shell(count=160, texels=5, opacity=3.0, seed=0):
         **raw_material(0.4, 0.6, 0.2, 20, "bounded"),
     }
     sizes = torch.full((count, 2), texels, dtype=torch.int32)
-    model = textured(Model(p, Optics(low_pass=6.0)), torch.tensor([0.5, 0.5, 0.3]), sizes)
+    model = textured(Surfels(p, ShadingModel(low_pass=6.0)), torch.tensor([0.5, 0.5, 0.3]), sizes)
     noise = torch.randn(model.parameters["texels"].shape, generator=torch.Generator().manual_seed(seed))
-    return Model({**model.parameters, "texels": 0.03 * noise}, model.optics, {"dataset": "shell"})
+    return Surfels({**model.parameters, "texels": 0.03 * noise}, model.shading, {"dataset": "shell"})
 
 
 def around(count=12, size=48):

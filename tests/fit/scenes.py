@@ -6,11 +6,11 @@ import torch
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
+from texgs.core.light import Light
+from texgs.fields.surfels.model import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.fit.seeds import surfels_at
-from texgs.scene.images import Images
-from texgs.scene.model import Optics, raw_material
-from texgs.volume.view_set import Light
+from texgs.volume.images import Images
 
 SIZE = 32
 RADIUS = 0.3  # of the ball, world units
@@ -79,7 +79,7 @@ def phase(iterations=60, densify=None, losses=None, rates=None, **options):
 
 def new_fit(images=None, parameters=None, seed=0, **options):
     """A fit of the ball."""
-    return Fit(parameters or ball_seeds(), Optics(), images or ball_images(), phase(**options), seed)
+    return Fit(parameters or ball_seeds(), ShadingModel(), images or ball_images(), phase(**options), seed)
 
 
 def run(fit, iterations=None):

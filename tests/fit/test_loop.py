@@ -5,13 +5,13 @@ from texgs.config.fit import Densify, Losses, Rates
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
+from texgs.fields.surfels.model import MATERIAL, Surfels, raw_material
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import split, zeroth
 from texgs.fit.loop import CHECKED_EVERY, extent
 from texgs.fit.seeds import seed_surfels
 from texgs.metrics.quality import evaluate, mean
-from texgs.scene.images import load
-from texgs.scene.model import MATERIAL, Model, raw_material
+from texgs.volume.images import load
 from texgs.volume.view_set import View, ViewSet, read_views, write_transforms
 
 from .scenes import (
@@ -44,7 +44,7 @@ def psnr_of(fit, folder):
         target = fit.images.target(index)
         path = write_png(folder / f"{index}.png", target.color)
         views.append(View(camera, path, fit.images.lights[index]))
-    model = Model({name: x.detach() for name, x in fit.parameters.items()}, fit.optics)
+    model = Surfels({name: x.detach() for name, x in fit.parameters.items()}, fit.shading)
     return mean(evaluate(model, views))["psnr"]
 
 

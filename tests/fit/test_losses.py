@@ -6,12 +6,13 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
 from texgs.config.fit import Losses
+from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.surfels.model import ShadingModel, Surfels, material
+from texgs.fields.surfels.render import render
 from texgs.fit.losses import view_loss
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
-from texgs.scene.model import Model, Optics, material
-from texgs.scene.render import render
 
-OPTICS = Optics()
+OPTICS = ShadingModel()
 ALL = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 
 
@@ -46,7 +47,7 @@ def loss(parameters, target, **weights):
 
 def test_color_and_alpha(target):
     parameters = per_surfel()
-    seen = render(Model(parameters, OPTICS), target.camera, target.light)
+    seen = render(Surfels(parameters, OPTICS), target.camera, target.light)
     color = photometric(seen.color, target.color, 0.2)
     alpha = photometric(seen.alpha[..., None], target.alpha[..., None], 0.2)
     assert loss(parameters, target, alpha=0.0) == pytest.approx(float(color), rel=1e-4)
@@ -63,7 +64,7 @@ def test_smoothness_of_each_map_of_the_material(target):
         unlit |= {"specular": torch.full((1,), -40.0), "shininess": torch.zeros(1)}
         scale = float(values.max())
         unlit["colors"] = unlit["colors"] / scale  # colours are clamped to 1
-        plane = scale * render(Model(unlit, OPTICS), target.camera, background=torch.zeros(3)).color[..., 0]
+        plane = scale * render(Surfels(unlit, OPTICS), target.camera, background=torch.zeros(3)).color[..., 0]
         expected += float(bilateral_smoothness(plane.double(), target.color.double(), target.alpha.double()))
     without, with_it = loss(parameters, target), loss(parameters, target, smoothness=0.01)
     assert with_it - without == pytest.approx(0.01 * expected, rel=1e-3)
@@ -91,7 +92,7 @@ def gradients(parameters, target, turns_normals=True, **weights):
 
 def test_alpha_without_l1_is_its_dissimilarity_at_the_same_weight(target):
     parameters = per_surfel()
-    alpha = render(Model(parameters, OPTICS), target.camera, target.light).alpha[..., None].double()
+    alpha = render(Surfels(parameters, OPTICS), target.camera, target.light).alpha[..., None].double()
     expected = 0.5 * 0.2 * (1 - ssim(alpha, target.alpha[..., None].double()))
     found = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
     assert found == pytest.approx(float(expected), rel=1e-3)
@@ -124,13 +125,13 @@ def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
     planes[3] = 0
     planes[:, 40:52, 70:80] = 0.5
     images = images_of([planes], [camera])
-    part, whole = images.visible(0, p, Optics()), images.target(0)
+    part, whole = visible_part(images, 0, p, ShadingModel()), images.target(0)
     assert part.share < 0.6
     found = []
     for target in (part, whole):
         leaves = {name: x.clone().requires_grad_() for name, x in p.items()}
-        view_loss(leaves, Optics(), target, ALL, None, iteration=1).backward()
-        without_normals = view_loss(p, Optics(), target, replace(ALL, normal=0.0), None, iteration=1)
+        view_loss(leaves, ShadingModel(), target, ALL, None, iteration=1).backward()
+        without_normals = view_loss(p, ShadingModel(), target, replace(ALL, normal=0.0), None, iteration=1)
         found.append((without_normals, {name: x.grad for name, x in leaves.items()}))
     assert_close(found[0][0], found[1][0], rtol=1e-5, atol=0)
     for name, gradient in found[0][1].items():

@@ -10,8 +10,8 @@ from texgs.core.errors import ArgumentError
 from texgs.fit.hull import hull_points, mean_colors, project
 from texgs.fit.seeds import box_of, read_points, seed_surfels, surfels_at
 from texgs.fit.visible import shrunk
-from texgs.scene.images import load
 from texgs.volume.grid import Grid
+from texgs.volume.images import load
 from texgs.volume.view_set import ViewSet, read_views
 
 from .scenes import RADIUS, ball_images, cameras, images_of

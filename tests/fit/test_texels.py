@@ -8,12 +8,12 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import HEADLIGHT, ball_images, ball_seeds, cameras, images_of, new_fit, run
 from texgs.core.errors import ArgumentError
+from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.surfels.render import render
 from texgs.fit.texels import mean_color, textured, texturize
 from texgs.fit.texture_layout import Sight, look, offsets_of, sizes_for_budget, sizes_where_seen
 from texgs.raster.atlas import check_texture
 from texgs.raster.types import Texture
-from texgs.scene.model import Model, Optics
-from texgs.scene.render import render
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def images():
 @pytest.fixture(scope="module")
 def ball(images):
     fit = run(new_fit(images, iterations=60))
-    return Model({name: x.detach() for name, x in fit.parameters.items()}, fit.optics)
+    return Surfels({name: x.detach() for name, x in fit.parameters.items()}, fit.shading)
 
 
 def total(sizes):
@@ -75,7 +75,9 @@ def test_look_sees_the_size_of_pixels_and_what_is_hidden():
     p["means"][0] = torch.tensor([0.0, 50.0, 0.0])  # in no view
     views = cameras()
     found = look(
-        textured(Model(p, Optics()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)), ball_images(), ""
+        textured(Surfels(p, ShadingModel()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)),
+        ball_images(),
+        "",
     )
     assert found.largest[0] == 0
     assert found.pixel[0] == math.inf
@@ -100,7 +102,7 @@ def test_mean_color_of_nothing_is_finite():
 
 def test_an_empty_texture_renders_as_before(ball, images):
     p = {**ball.parameters, "colors": ball.parameters["colors"] * 1.5 - 0.2}
-    plain = Model(p, ball.optics)
+    plain = Surfels(p, ball.shading)
     with_texels = texturize(plain, images, sweeps=0)
     assert with_texels.stage == "texture"
     for view in cameras():
@@ -133,7 +135,7 @@ def test_same_seed_same_texels(ball, images):
 def test_a_model_of_another_stage_is_refused(ball, images):
     p = {name: ball.parameters[name] for name in ("means", "quats", "scales", "opacities")}
     with pytest.raises(ArgumentError, match="expected stage shading, got surfels"):
-        texturize(Model({**p, "sh": torch.zeros(len(ball), 1, 3)}), images)
+        texturize(Surfels({**p, "sh": torch.zeros(len(ball), 1, 3)}), images)
     with pytest.raises(ArgumentError, match="expected stage shading, got texture"):
         texturize(texturize(ball, images, sweeps=0), images)
 

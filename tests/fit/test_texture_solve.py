@@ -9,13 +9,13 @@ from torch.testing import assert_close
 from tests.fit.scenes import HEADLIGHT, ball_images, ball_planes, ball_seeds, cameras, images_of, new_fit, run
 from texgs.config.fit import Densify
 from texgs.core.errors import FitError
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.render import render, shaded
 from texgs.fit.texels import textured
 from texgs.fit.texture_adam import refine, without_texture
 from texgs.fit.texture_layout import look, sizes_for_budget
 from texgs.fit.texture_solve import curvature, sampled_error, solve
-from texgs.scene.images import Images
-from texgs.scene.model import Model, Optics, raw_material
-from texgs.scene.render import render, shaded
+from texgs.volume.images import Images
 
 
 def striped():
@@ -38,7 +38,7 @@ def start(images):
     rest = Densify(start=10, stop=80, every=10, threshold=1e-5, cap=150)
     fit = run(new_fit(images, ball_seeds(opacity=0.5), iterations=150, densify=rest))
     p = {name: x.detach() for name, x in fit.parameters.items()}
-    return textured(Model(p, fit.optics), torch.full((3,), 0.5), sizes_for_budget(p["scales"].exp(), 3000))
+    return textured(Surfels(p, fit.shading), torch.full((3,), 0.5), sizes_for_budget(p["scales"].exp(), 3000))
 
 
 def squared(model, images):
@@ -52,10 +52,12 @@ def one_surfel():
     p = {name: x[:1] for name, x in p.items()}
     p |= {"means": torch.zeros(1, 3), "quats": torch.tensor([[0.7, 0.0, 0.7, 0.0]])}
     p |= {"scales": torch.full((1, 2), 0.15).log(), "opacities": torch.tensor([4.0])}
-    model = textured(Model(p, Optics()), torch.full((3,), 0.5), torch.tensor([[4, 4]], dtype=torch.int32))
+    model = textured(
+        Surfels(p, ShadingModel()), torch.full((3,), 0.5), torch.tensor([[4, 4]], dtype=torch.int32)
+    )
     texels = torch.rand(16, 3, generator=torch.Generator().manual_seed(3)) * 0.4 - 0.2
     views = [camera for camera in cameras(8, 32) if abs(float(camera.position[0])) > 0.7]
-    known = Model({**model.parameters, "texels": texels}, model.optics)
+    known = Surfels({**model.parameters, "texels": texels}, model.shading)
     planes = [
         torch.cat([render(known, c, HEADLIGHT).color.permute(2, 0, 1), torch.ones(1, 32, 32)]) for c in views
     ]
@@ -69,7 +71,7 @@ def dense(model, images):
     for texel in range(len(model.parameters["texels"])):
         unit = torch.zeros_like(model.parameters["texels"])
         unit[texel] = 1
-        lit = Model({**model.parameters, "texels": unit}, model.optics)
+        lit = Surfels({**model.parameters, "texels": unit}, model.shading)
         shown = [render(lit, c, HEADLIGHT).color - b for c, b in zip(images.cameras, base, strict=True)]
         columns.append(torch.stack(shown)[..., 0].flatten())
     return torch.stack(columns, dim=1).double()
@@ -94,7 +96,7 @@ def test_solve_agrees_with_dense_least_squares():
 def test_curvature_is_that_of_the_dense_matrix_among_other_surfels():
     model, _, images = one_surfel()
     A = dense(model, images).reshape(len(images), -1, 16)
-    gains = [shaded(model.parameters, model.optics, c, HEADLIGHT).gain.item() for c in images.cameras]
+    gains = [shaded(model.parameters, model.shading, c, HEADLIGHT).gain.item() for c in images.cameras]
     exact = torch.stack([a.sum(dim=0) * gain for a, gain in zip(A, gains, strict=True)])  # [V, T]
     typical = exact.square().sum(dim=0) / exact.sum(dim=0)
     found = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
@@ -161,8 +163,8 @@ def test_sparsity_makes_rendered_texels_small(start, images):
 
 def test_without_texture_is_the_model_with_texels_of_zero(start, images):
     texels = start.parameters["texels"]
-    zero = Model({**start.parameters, "texels": torch.zeros_like(texels)}, start.optics)
-    some = Model({**start.parameters, "texels": texels + 0.25}, start.optics)
+    zero = Surfels({**start.parameters, "texels": torch.zeros_like(texels)}, start.shading)
+    some = Surfels({**start.parameters, "texels": texels + 0.25}, start.shading)
     assert without_texture(some).stage == "shading"
     assert_close(shown(without_texture(some), images), shown(zero, images), atol=1e-6, rtol=0)
 
@@ -176,6 +178,6 @@ def shown(model, images):
 def test_numbers_that_are_not_finite_are_reported(start):
     one = ball_images(1)
     broken = Images(one.planes, one.cameras, one.lights)
-    model = Model({**start.parameters, "colors": start.parameters["colors"] * torch.nan}, start.optics)
+    model = Surfels({**start.parameters, "colors": start.parameters["colors"] * torch.nan}, start.shading)
     with pytest.raises(FitError, match="texels are not finite after Adam"):
         refine(model, broken, iterations=2, rate=0.0025, sparsity=0.0, seed=0, title="")

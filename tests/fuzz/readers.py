@@ -13,23 +13,24 @@ import numpy as np
 import torch
 from PIL import Image
 
-from tests.scene.samples import sample
+from tests.fields.surfels.samples import sample
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
+from texgs.core.light import Light
 from texgs.edit.style_picture import read_style
+from texgs.fields.surfels.compact import open_model, write_compact
+from texgs.fields.surfels.model_file import read_model, write_model
+from texgs.fields.surfels.ply import read_ply, write_ply
+from texgs.fields.surfels.texture_file import with_texture, write_texture
 from texgs.fit.checkpoint import latest
 from texgs.models.tensors import read_tensors
-from texgs.scene.compact import open_model, write_compact
-from texgs.scene.model_file import read_model, write_model
-from texgs.scene.ply import read_ply, write_ply
 from texgs.scene.scene_file import Scene, SceneModel, SceneSegment, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
-from texgs.scene.texture_file import with_texture, write_texture
 from texgs.volume.prepare import prepare
 from texgs.volume.sources import open_source
 from texgs.volume.tf_files import read_tf
-from texgs.volume.view_set import Light, View, read_views, write_transforms
+from texgs.volume.view_set import View, read_views, write_transforms
 
 Pack = Callable[[bytes], bytes]
 

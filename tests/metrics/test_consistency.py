@@ -10,9 +10,9 @@ from tests.edit.lift_scenes import two_balls
 from tests.raster.scenes import random_scene
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import Light
+from texgs.fields.surfels.composition import Composition
 from texgs.metrics.consistency import Frame, consistency, frames_of, warp
-from texgs.scene.composition import Composition
-from texgs.volume.view_set import Light
 
 SIZE = 64
 

@@ -5,16 +5,17 @@ import torch
 
 from texgs.core.camera import orbit
 from texgs.core.image import write_png
+from texgs.core.light import Light
+from texgs.fields.surfels.model import Surfels, raw_material
+from texgs.fields.surfels.render import render
 from texgs.metrics.quality import evaluate, mean
-from texgs.scene.model import Model, raw_material
-from texgs.scene.render import render
-from texgs.volume.view_set import Light, View
+from texgs.volume.view_set import View
 
 
 def ball():
     generator = torch.Generator().manual_seed(1)
     means = 0.3 * torch.nn.functional.normalize(torch.randn(200, 3, generator=generator), dim=1)
-    return Model(
+    return Surfels(
         {
             "means": means,
             "quats": torch.randn(200, 4, generator=generator),

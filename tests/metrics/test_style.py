@@ -5,10 +5,10 @@ import torch
 
 from tests.edit.scenes import ball, views
 from tests.models.networks import random_weights
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
 from texgs.metrics.style import gram, likeness
 from texgs.models.vgg import Vgg
-from texgs.scene.composition import Composition
-from texgs.scene.model import Model
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_colours_are_those_of_opaque_pixels(vgg):
     cameras, lights = views(2)
     color = torch.tensor([0.1, 0.5, 0.9])
     p = ball().parameters
-    plain = Model({**p, "palette": color, "colors": torch.zeros_like(p["colors"])})
+    plain = Surfels({**p, "palette": color, "colors": torch.zeros_like(p["colors"])})
     found = likeness(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
     pixels = []
     for camera, light in zip(cameras, lights, strict=True):

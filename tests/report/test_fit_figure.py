@@ -11,6 +11,8 @@ from PIL import Image
 from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
+from texgs.fields.surfels.model import GEOMETRY, Surfels, material
+from texgs.fields.surfels.render import render
 from texgs.report.fit_figure import (
     Scale,
     compare,
@@ -20,8 +22,6 @@ from texgs.report.fit_figure import (
     signed_error,
     write_fit_figure,
 )
-from texgs.scene.model import GEOMETRY, Model, material
-from texgs.scene.render import render
 from texgs.volume.view_set import View
 
 
@@ -33,7 +33,7 @@ def shading(kind="shared"):
         parameters |= {
             name: parameters[name] + spread for name in ("ambient", "diffuse", "specular", "shininess")
         }
-    return Model(parameters)
+    return Surfels(parameters)
 
 
 def texture(kind="shared"):
@@ -42,12 +42,12 @@ def texture(kind="shared"):
     n = len(parameters["means"])
     parameters |= {"palette": torch.zeros(3), "texels": torch.zeros(n, 3)}
     parameters |= {"sizes": torch.ones(n, 2, dtype=torch.int32), "offsets": torch.arange(n)}
-    return Model(parameters)
+    return Surfels(parameters)
 
 
 def surfels():
     parameters = {name: x for name, x in shading().parameters.items() if name in GEOMETRY}
-    return Model({**parameters, "sh": torch.zeros(len(parameters["means"]), 1, 3)})
+    return Surfels({**parameters, "sh": torch.zeros(len(parameters["means"]), 1, 3)})
 
 
 MODELS = {"surfels": surfels(), "shading": shading(), "texture": texture()}

@@ -3,17 +3,17 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.scene.ply_files import vertices
-from tests.scene.samples import sample
-from tests.scene.test_composition import CAMERA, ball
+from tests.fields.surfels.ply_files import vertices
+from tests.fields.surfels.samples import sample
+from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.errors import ArgumentError
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.ply import read_ply, write_ply
+from texgs.fields.surfels.render import render
+from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.scene.export import joined, write_points
-from texgs.scene.model import Model
-from texgs.scene.ply import read_ply, write_ply
-from texgs.scene.render import render
-from texgs.scene.texels import mean_texels, owners
 
 EDITS = [Edit(palette=(0.9, 0.1, 0.4), opacity=0.6), Edit(visible=False), Edit(opacity=3.0)]
 
@@ -23,7 +23,7 @@ def plain(seed):
     p = dict(ball(seed).parameters)
     first = p["texels"][p["offsets"]]
     p["texels"] = first.repeat_interleave(p["sizes"].long().prod(1), dim=0)
-    return Model(p, ball(seed).optics)
+    return Surfels(p, ball(seed).shading)
 
 
 def test_owners_and_means_by_brute_force():

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 import torch
 
-from tests.scene.test_composition import CAMERA, SIDE, ball
+from tests.fields.surfels.test_composition import CAMERA, SIDE, ball
 from texgs.core.errors import ArgumentError
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels, raw_material
 from texgs.scene.frame import frame
-from texgs.scene.model import Model, raw_material
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def test_alpha_is_white_on_black_and_depth_grows_away_from_the_camera(scene):
 def test_normals_of_a_flat_scene_are_one_colour():
     model = ball(1, n=400)
     p = {**model.parameters, "quats": torch.tensor([1.0, 0, 0, 0]).expand(400, 4)}
-    scene = Composition([Model({**p, "opacities": torch.full((400,), 5.0)})])
+    scene = Composition([Surfels({**p, "opacities": torch.full((400,), 5.0)})])
     found = shot(scene, "normal")
     seen = scene.render(CAMERA, SIDE).alpha.numpy() > 0.99
     facing = 1 if CAMERA.position[2] > 0 else -1
@@ -53,7 +53,7 @@ def test_normals_of_a_flat_scene_are_one_colour():
 def test_factors_are_grey_over_black():
     model = ball(1, n=1500)
     p = {**model.parameters, **raw_material(0.4, 0.5, 0.2, 20.0, "bounded")}
-    scene = Composition([Model(p)])
+    scene = Composition([Surfels(p)])
     seen = scene.render(CAMERA, SIDE).alpha.numpy() > 0.995
     for mode, value in {"ambient": 0.4, "diffuse": 0.5, "specular": 0.2, "shininess": 0.2}.items():
         found = shot(scene, mode)

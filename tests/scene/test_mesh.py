@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 import torch
 
-from tests.scene.ply_files import vertices
-from tests.scene.samples import sample
+from tests.fields.surfels.ply_files import vertices
+from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError
+from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.surfels.render import render
 from texgs.raster import Render
 from texgs.scene.mesh import Mesh, fuse, write_mesh
-from texgs.scene.model import Model, Optics
-from texgs.scene.render import render
 from texgs.volume.cameras import geodesic_vertices, icosphere
 
 RADIUS, VOXEL = 0.4, 1 / 128
@@ -29,7 +29,7 @@ def ball(opacity=8.0):
     # The quaternion that turns z to the normal: (1 + z, z x normal).
     quats = torch.stack([1 + normals[:, 2], -normals[:, 1], normals[:, 0], torch.zeros(n)], dim=1)
     quats[normals[:, 2] < -0.9999] = torch.tensor([0.0, 1.0, 0.0, 0.0])
-    return Model(
+    return Surfels(
         {
             "means": RADIUS * normals,
             "quats": quats,
@@ -37,7 +37,7 @@ def ball(opacity=8.0):
             "opacities": torch.full((n,), opacity),
             "sh": ((RED - 0.5) / 0.28209479).expand(n, 1, 3).clone(),
         },
-        Optics(),
+        ShadingModel(),
     )
 
 

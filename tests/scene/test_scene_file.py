@@ -5,14 +5,14 @@ import torch
 import yaml
 from safetensors.torch import load_file, save_file
 
-from tests.scene.samples import sample
-from tests.scene.test_composition import CAMERA, ball
+from tests.fields.surfels.samples import sample
+from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.errors import ArgumentError
-from texgs.scene.edits import Edit
-from texgs.scene.model_file import write_model
+from texgs.core.light import Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
-from texgs.scene.texture_file import write_texture
-from texgs.volume.view_set import Light
 
 
 @pytest.fixture

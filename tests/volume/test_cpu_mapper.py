@@ -11,11 +11,11 @@ from tests.real_data import real_data
 from tests.volume.scenes import SHELLS, ball, constant, lattice, over_white, psnr
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import NativeError
+from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
 from texgs.volume.cpu_mapper import CpuMapper
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 
 HEADLIGHT = Light("headlight")
 QUANTUM = 1 / 32767  # of the mapper's numbers
@@ -220,7 +220,7 @@ from texgs.volume.appearance import Appearance
 from texgs.volume.cpu_mapper import CpuMapper
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
 
 size = 192
 values = np.zeros((size, size, size), sys.argv[1])

@@ -6,12 +6,12 @@ from torch.nn.functional import normalize
 from tests.volume.scenes import SHELLS, ball, constant, lattice, over_white, psnr
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
 from texgs.volume.cpu_mapper import CpuMapper
 from texgs.volume.geometry import geometry, march, shade
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 
 SOLID = TransferFunction(((0.3, 1.0), (2, 1.0)), ((0, 0.5, 0.5, 0.5),))  # of `ball`: radius 0.35 in the world
 

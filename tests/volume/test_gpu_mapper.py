@@ -8,6 +8,7 @@ from tests.real_data import real_data
 from tests.volume.scenes import SHELLS, ball, over_white, psnr
 from texgs.core.camera import orbit
 from texgs.core.errors import DeviceError
+from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
 from texgs.volume.cpu_mapper import CpuMapper
 from texgs.volume.geometry import march
@@ -15,7 +16,6 @@ from texgs.volume.gpu_mapper import GpuMapper
 from texgs.volume.grid import Grid
 from texgs.volume.opengl import offscreen_opengl
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 
 LIGHTS = [Light("headlight"), Light("directional", 30, 40), Light("directional", -130, -20)]
 
@@ -89,7 +89,7 @@ from texgs.core.camera import orbit
 from texgs.volume.appearance import Appearance
 from texgs.volume.gpu_mapper import GpuMapper
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
 assert "pyvista" not in sys.modules
 tf = TransferFunction(((0.5, 0.3), (0.7, 0.3), (0.7, 0.9), (1, 0.9)), ((0.5, 1, 0, 0), (0.7, 0, 1, 0)))
 picture = GpuMapper(ball(24), Appearance(step=1)).render(tf, orbit(0, 0, 3, 30, 32, 32), Light("headlight"))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from texgs.core.camera import orbit
+from texgs.core.light import Light
 from texgs.volume import render
 from texgs.volume.render import Times, render_views
-from texgs.volume.view_set import Light, View
+from texgs.volume.view_set import View
 
 
 class Grey:

@@ -9,7 +9,8 @@ from PIL import Image
 from tests.real_data import real_data
 from texgs.core.camera import Camera, intrinsics, orbit, orbit_direction
 from texgs.core.errors import ArgumentError
-from texgs.volume.view_set import Light, View, read_views, write_transforms
+from texgs.core.light import Light
+from texgs.volume.view_set import View, read_views, write_transforms
 
 SIZE = (12, 8)  # pixels, width and height
 LIGHTS = [Light("headlight"), Light("directional", 30.0, -60.0), Light("headlight")]

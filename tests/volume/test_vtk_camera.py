@@ -6,7 +6,7 @@ import torch
 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
 from texgs.volume.vtk_camera import aim, directions, point_light
 
 vtk = pytest.importorskip("vtkmodules.vtkRenderingCore")

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
+    from texgs.fields.part_edit import Edit
+    from texgs.fields.surfels.composition import Composition
+    from texgs.fields.surfels.model import Surfels
     from texgs.raster import Render
-    from texgs.scene.composition import Composition
-    from texgs.scene.edits import Edit
-    from texgs.scene.model import Model
     from texgs.scene.scene_file import Scene, SceneModel
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
-    from texgs.scene.compact import open_model
+    from texgs.fields.surfels.compact import open_model
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
@@ -104,8 +104,8 @@ def kind_of(arguments: argparse.Namespace) -> str:
 
 def of_scene(arguments: argparse.Namespace, scene: "Composition", edits: "Sequence[Edit]", kind: str) -> Path:
     """Export the visible models of a scene as one."""
+    from texgs.fields.surfels.ply import write_ply
     from texgs.scene.export import joined, write_points
-    from texgs.scene.ply import write_ply
 
     if kind == "mesh":
         black = scene.means.new_zeros(3)
@@ -121,14 +121,14 @@ def of_scene(arguments: argparse.Namespace, scene: "Composition", edits: "Sequen
     return write_ply(arguments.to, surfels, kind)
 
 
-def of_model(arguments: argparse.Namespace, model: "Model", kind: str) -> Path:
+def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path:
     """Export one model; Gaussians with all that they can hold of it."""
-    from texgs.scene.compact import seen_surfels, write_compact
-    from texgs.scene.composition import Composition
-    from texgs.scene.edits import Edit
+    from texgs.fields.part_edit import Edit
+    from texgs.fields.surfels.compact import seen_surfels, write_compact
+    from texgs.fields.surfels.composition import Composition
+    from texgs.fields.surfels.ply import write_ply
+    from texgs.fields.surfels.render import render
     from texgs.scene.export import write_points
-    from texgs.scene.ply import write_ply
-    from texgs.scene.render import render
 
     if kind == "compact":
         seen = seen_surfels(model, cameras(arguments)) if arguments.drop_unseen else None

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, get_args
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
-    from texgs.volume.view_set import Light
+    from texgs.core.light import Light
 
 MOST_FRAMES = 100_000  # an hour of film
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
@@ -94,8 +94,8 @@ def shots_of(arguments: argparse.Namespace, light: "Light", count: int) -> "Iter
         ArgumentError: if a number is out of range.
     """
     from texgs.core.camera import orbit
+    from texgs.core.light import Light
     from texgs.volume.cameras import test_path
-    from texgs.volume.view_set import Light
 
     height = arguments.width if arguments.height is None else arguments.height
     lens = (arguments.radius, arguments.fov, arguments.width, height)

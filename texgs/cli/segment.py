@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.names import part_file
     from texgs.edit.lift import lift
     from texgs.edit.preview import preview
-    from texgs.scene.compact import open_model
+    from texgs.fields.surfels.compact import open_model
     from texgs.scene.scene_file import read_scene, write_scene
 
     scene = read_scene(arguments.scene)

@@ -13,8 +13,8 @@ import torch
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.names import label
+from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
-from texgs.scene.model import Model
 from texgs.scene.scene_file import RESERVED, Scene, SceneSegment
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.volume.cameras import icosphere
@@ -74,7 +74,7 @@ def require_new(scene: Scene, part: str) -> None:
 
 
 def with_segment(
-    scene: Scene, part: str, model: Model, mask: torch.Tensor, file: Path, facts: dict[str, Any]
+    scene: Scene, part: str, model: Surfels, mask: torch.Tensor, file: Path, facts: dict[str, Any]
 ) -> Scene:
     """Write the file of a new segment; the scene that has it, and looks as before.
 

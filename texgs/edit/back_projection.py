@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from texgs.edit.exposures import Exposure
-from texgs.scene.model import Model
-from texgs.scene.texels import owners
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import owners
 
 FAINT = 1e-4  # gain times alpha below which a pixel says nothing
 HARDLY = 0.01  # of the mean weight: what is seen less than that is hardly seen
@@ -25,7 +25,7 @@ class BackProjection:
     curvature: Tensor  # [T] row sum of the Hessian in a typical exposure
 
 
-def back_project(exposures: Sequence[Exposure], model: Model) -> BackProjection:
+def back_project(exposures: Sequence[Exposure], model: Surfels) -> BackProjection:
     """Average what exposures want over the pixels that show a texel.
 
     The curvature is the row sum A'A 1 of one exposure, A being the weights of texels in pixels; divided by
@@ -62,7 +62,7 @@ def seen_texels(weights: Tensor) -> Tensor:
     return weights > HARDLY * weights.mean()
 
 
-def fill_unseen(sums: BackProjection, model: Model) -> Tensor:
+def fill_unseen(sums: BackProjection, model: Surfels) -> Tensor:
     """Mean colours [T, 3] of texels, with those that views hardly show drawn to what is seen nearest to them.
 
     That is the mean of the texels of the same surfel, weighted by how much they are seen; where the whole

@@ -8,11 +8,11 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.light import Light
+from texgs.fields.surfels.bounds import surfel_box
+from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.render import shaded
 from texgs.raster import Render, Texture, rasterize
-from texgs.scene.crop import surfel_box
-from texgs.scene.model import Model, geometry
-from texgs.scene.render import shaded
-from texgs.volume.view_set import Light
 
 SEEN = 0.02  # of alpha: less is not looked at
 MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
@@ -28,7 +28,7 @@ class Canvas:
 
 
 def paint(
-    model: Model,
+    model: Surfels,
     texels: Tensor,
     camera: Camera,
     light: Light,
@@ -53,7 +53,7 @@ def paint(
     p = {**model.parameters, "texels": texels}
     part = around(model, camera) if cropped else camera
     if is_lit:
-        texture = shaded(p, model.optics, part, light)
+        texture = shaded(p, model.shading, part, light)
     else:
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
@@ -64,15 +64,15 @@ def paint(
     return Canvas(found.color.permute(2, 0, 1), found.alpha, share)
 
 
-def around(model: Model, camera: Camera) -> Camera:
+def around(model: Surfels, camera: Camera) -> Camera:
     """The camera of the part of a view that surfels can be seen in; one pixel of it at least."""
-    box = surfel_box(model.parameters, model.optics, camera)
+    box = surfel_box(model.parameters, model.shading, camera)
     left, top = min(max(box.left, 0), camera.width - 1), min(max(box.top, 0), camera.height - 1)
     right, bottom = min(box.right, camera.width), min(box.bottom, camera.height)
     return camera.crop(left, top, max(right, left + 1), max(bottom, top + 1))
 
 
-def splatted(model: Model, camera: Camera, opacity: float, **colored: object) -> Render:
+def splatted(model: Surfels, camera: Camera, opacity: float, **colored: object) -> Render:
     """Rasterize a model with a factor on its opacities."""
     means, quats, scales, opacities = geometry(model.parameters)
     opacities = (opacity * opacities).clamp_max(1)
@@ -85,7 +85,7 @@ def splatted(model: Model, camera: Camera, opacity: float, **colored: object) ->
         camera.K,
         camera.width,
         camera.height,
-        options=model.optics.options,
+        options=model.shading.options,
         **colored,  # type: ignore[arg-type]
     )
 

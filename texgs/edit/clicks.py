@@ -11,9 +11,9 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.rotation import quats_to_matrices
+from texgs.fields.surfels.bounds import REACH
+from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import rasterize
-from texgs.scene.crop import REACH
-from texgs.scene.model import Model, geometry
 
 FAINT = 0.05  # alpha below which a click is on the background
 TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what hides it: surfaces are thick
@@ -47,7 +47,7 @@ class Prompts:
 
 
 @torch.no_grad()
-def prompts_at(model: Model, clicks: Clicks) -> Prompts:
+def prompts_at(model: Surfels, clicks: Clicks) -> Prompts:
     """Lift clicks to the surface that they are on: the layer of surfels that makes up most of the pixel.
 
     Behind a layer that lets through more than it shows, a click is on what shows through.
@@ -64,7 +64,7 @@ def prompts_at(model: Model, clicks: Clicks) -> Prompts:
     return Prompts(torch.stack(places), clicks.positive)
 
 
-def _place(model: Model, camera: Camera, x: float, y: float, thickness: float) -> Tensor:
+def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float) -> Tensor:
     """Where the ray through a pixel meets the layer that makes up most of it, [3]."""
     if not (0 <= x < camera.width and 0 <= y < camera.height):
         raise ArgumentError(
@@ -85,7 +85,7 @@ def _place(model: Model, camera: Camera, x: float, y: float, thickness: float) -
     return hits[layer.argmax()]
 
 
-def weights_at(model: Model, camera: Camera, column: int, row: int) -> Tensor:
+def weights_at(model: Surfels, camera: Camera, column: int, row: int) -> Tensor:
     """How much of a pixel each surfel makes up, [N]."""
     pixel = camera.crop(column, row, column + 1, row + 1)
     opacities = model.parameters["opacities"]
@@ -94,12 +94,12 @@ def weights_at(model: Model, camera: Camera, column: int, row: int) -> Tensor:
         *(pixel.viewmat, pixel.K, 1, 1),
         features=torch.zeros_like(opacities)[:, None],
         outputs=("statistics",),
-        options=model.optics.options,
+        options=model.shading.options,
     ).statistics
     return seen.weight_sum  # type: ignore[union-attr]
 
 
-def met(model: Model, camera: Camera, x: float, y: float, surfels: Tensor) -> tuple[Tensor, Tensor]:
+def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> tuple[Tensor, Tensor]:
     """Where the ray through a place of the image meets surfels, [K, 3], and the camera z there [K].
 
     Edge on, a surfel is drawn by the filter, beside where the ray meets its plane: then it is its middle.
@@ -138,7 +138,7 @@ def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float)
     return inside & ((limit == 0) | (depths <= limit + tolerance))
 
 
-def extent(model: Model) -> float:
+def extent(model: Surfels) -> float:
     """Longest side of the box around the surfels' means, world units."""
     means = model.parameters["means"]
     return float((means.amax(0) - means.amin(0)).max()) if len(means) else 0.0

@@ -10,11 +10,11 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from texgs.core.camera import Camera
+from texgs.core.light import Light
 from texgs.edit.target_views import light_on
+from texgs.fields.surfels.model import Surfels, geometry
 from texgs.models.guidance import Views
 from texgs.raster import Options, Texture, rasterize
-from texgs.scene.model import Model, geometry
-from texgs.volume.view_set import Light
 
 MARGIN = 11  # pixels around content: a window of SSIM
 SOFT = 0.05  # alpha below which colours are rather those of the neighbourhood
@@ -63,7 +63,7 @@ class Exposure:
 
 
 def expose(
-    model: Model,
+    model: Surfels,
     views: Views,
     edited: Tensor,
     light: Light | None,
@@ -96,7 +96,7 @@ def expose(
         for camera, color in zip(views.cameras, straight, strict=True):
             highlight, gain = light_on(model, camera, light)
             lit = (highlight * changing[:, None], gain * changing)
-            row.append(_exposure(own[:3], scaled, lit, changing, camera, color, model.optics.options))
+            row.append(_exposure(own[:3], scaled, lit, changing, camera, color, model.shading.options))
         found.append(row)
     return found
 

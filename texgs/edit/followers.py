@@ -12,8 +12,8 @@ from texgs.edit.back_projection import back_project, fill_unseen
 from texgs.edit.exposures import Exposure
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
-from texgs.scene.model import Model
-from texgs.scene.texels import bare_colors
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors
 
 
 class Follower(Protocol):
@@ -29,7 +29,7 @@ class Follower(Protocol):
 class SolveFollower:
     """Texels that are the solution of a linear problem in every round."""
 
-    def __init__(self, model: Model, sweeps: int, generator: torch.Generator) -> None:
+    def __init__(self, model: Surfels, sweeps: int, generator: torch.Generator) -> None:
         self.model, self.sweeps, self.generator = model, sweeps, generator
 
     def follow(self, rows: list[list[Exposure]], title: str) -> Tensor:
@@ -52,7 +52,7 @@ class AdamFollower:
     """Texels on their way, from round to round."""
 
     def __init__(
-        self, model: Model, iterations: int, rounds: int, rate: float, generator: torch.Generator
+        self, model: Surfels, iterations: int, rounds: int, rate: float, generator: torch.Generator
     ) -> None:
         self.model, self.count, self.generator = model, iterations, generator
         start = bare_colors(model).clamp(0, 1)

@@ -10,15 +10,15 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, projected, prompts_at
 from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
+from texgs.fields.surfels.bounds import surfel_box
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.render import render
 from texgs.models.masks import MaskModel
-from texgs.scene.crop import surfel_box
-from texgs.scene.model import Model
-from texgs.scene.render import render
-from texgs.volume.view_set import Light
 
 CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
 AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
@@ -42,7 +42,7 @@ class Lifted:
 
 @torch.no_grad()
 def lift(
-    model: Model,
+    model: Surfels,
     clicks: Clicks,
     cameras: Sequence[Camera],
     masks: MaskModel,
@@ -103,14 +103,16 @@ def lift(
 class Views:
     """Images of a model as the mask model sees them: cut out around what they show, which then is larger."""
 
-    def __init__(self, model: Model, light: Light, masks: MaskModel) -> None:
+    def __init__(self, model: Surfels, light: Light, masks: MaskModel) -> None:
         self.model, self.light, self.masks = model, light, masks
 
     @torch.no_grad()
     def mask(self, clicks: Clicks) -> Tensor:
         """The mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
         camera = clicks.camera
-        box = surfel_box(self.model.parameters, self.model.optics, camera).within(camera.width, camera.height)
+        box = surfel_box(self.model.parameters, self.model.shading, camera).within(
+            camera.width, camera.height
+        )
         cut = camera.crop(*box)
         image = render(self.model, cut, self.light).color.clamp(0, 1)
         moved = clicks.points.to(image) - image.new_tensor(box[:2])

@@ -6,13 +6,13 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from texgs.scene.model import Model
+from texgs.fields.surfels.model import Surfels
 
 REACH = 2.0  # standard deviations of both surfels, within which they touch
 NEIGHBOURS = 16  # surfels that one is compared with
 
 
-def pieces_at(model: Model, mask: Tensor, places: Tensor) -> Tensor:
+def pieces_at(model: Surfels, mask: Tensor, places: Tensor) -> Tensor:
     """The pieces of a segment [N] bool that hold a place.
 
     Two surfels of it touch if their means are within 2 standard deviations (the larger ones) of both

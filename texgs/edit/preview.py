@@ -5,12 +5,12 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from texgs.core.light import Light
 from texgs.edit.clicks import Clicks, prompts_at
 from texgs.edit.lift import HEADLIGHT, Views
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.render import render
 from texgs.models.masks import MaskModel
-from texgs.scene.model import Model
-from texgs.scene.render import render
-from texgs.volume.view_set import Light
 
 MASKED, COVER = (1.0, 0.1, 0.1), 0.6  # colour over what is masked, and its opacity
 POSITIVE, NEGATIVE = (0.0, 0.7, 0.0), (0.0, 0.0, 0.9)  # of clicks
@@ -19,7 +19,7 @@ RADIUS = 0.008  # of clicks, of the longer side
 
 @torch.no_grad()
 def preview(
-    model: Model, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT
+    model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT
 ) -> tuple[Tensor, Tensor]:
     """The mask [H, W] bool of a view from clicks on it, and a picture [H, W, 3] of both.
 

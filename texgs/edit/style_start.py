@@ -12,11 +12,11 @@ from texgs.edit.color_transfer import color_map
 from texgs.edit.recipe import Start
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.triplanar import project
-from texgs.scene.model import Model
-from texgs.scene.texels import bare_colors
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors
 
 
-def start_colors(kind: Start, model: Model, style: StylePicture, pixel: float, seed: int) -> Tensor:
+def start_colors(kind: Start, model: Surfels, style: StylePicture, pixel: float, seed: int) -> Tensor:
     """Colours of all texels [T, 3] in [0, 1], without light.
 
     Args:
@@ -41,7 +41,7 @@ def start_colors(kind: Start, model: Model, style: StylePicture, pixel: float, s
     return (own @ matrix.T.to(own) + shift.to(own)).clamp(0, 1)
 
 
-def pixel_side(model: Model, cameras: Sequence[Camera]) -> float:
+def pixel_side(model: Surfels, cameras: Sequence[Camera]) -> float:
     """Side of a pixel at the model's middle, mean over cameras, world units."""
     middle = model.parameters["means"].mean(0)
     sides = []

@@ -14,15 +14,15 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import FitError
+from texgs.core.light import Light
 from texgs.edit.canvas import paint, visible_part
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import mean_texels, owners, recolored
 from texgs.models.vgg import Vgg
-from texgs.scene.model import Model
-from texgs.scene.texels import mean_texels, owners, recolored
-from texgs.volume.view_set import Light
 
 LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
 
@@ -48,7 +48,7 @@ class Stopwatch:
 class StyleSteps:
     """What an edit knows from one step to the next."""
 
-    model: Model  # with the colours of its surfels taken out where they change
+    model: Surfels  # with the colours of its surfels taken out where they change
     recipe: Recipe
     style: StylePicture  # at the size at which it is behind the object
     objective: Objective
@@ -62,7 +62,7 @@ class StyleSteps:
     @classmethod
     def prepare(
         cls,
-        model: Model,
+        model: Surfels,
         cameras: Sequence[Camera],
         style: StylePicture,
         recipe: Recipe,
@@ -85,7 +85,7 @@ class StyleSteps:
             colors = torch.where(surfels[:, None], colors, p["colors"])
             fixed = (~surfels[owner]).nonzero()[:, 0]
             texels[fixed] = p["texels"][fixed]
-        bare = Model({**p, "colors": colors.contiguous()}, model.optics, model.metadata)
+        bare = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
         texels.requires_grad_()
         adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
         generator = torch.Generator().manual_seed(recipe.seed)
@@ -148,6 +148,6 @@ class StyleSteps:
         if self.fixed is not None:
             self.texels[self.fixed] = self.model.parameters["texels"][self.fixed]
 
-    def result(self) -> Model:
+    def result(self) -> Surfels:
         """The model with the texels as they are now."""
         return recolored(self.model, self.texels.detach(), self.surfels)

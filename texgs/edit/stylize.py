@@ -12,14 +12,14 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.edit.objective import FeatureTerm
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_steps import Stopwatch, StyleSteps
+from texgs.fields.surfels.model import Surfels
 from texgs.models.vgg import Vgg
-from texgs.scene.model import Model
-from texgs.volume.view_set import Light
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +34,12 @@ class History:
 class Stylized:
     """A model in a style, and how it came to be."""
 
-    model: Model
+    model: Surfels
     history: History
 
 
 def stylize(
-    model: Model,
+    model: Surfels,
     cameras: Sequence[Camera],
     lights: Sequence[Light],
     style: StylePicture,
@@ -94,7 +94,9 @@ def _order(views: int, recipe: Recipe) -> list[int]:
     return found[: recipe.iterations]
 
 
-def _check(model: Model, cameras: Sequence[Camera], lights: Sequence[Light], surfels: Tensor | None) -> None:
+def _check(
+    model: Surfels, cameras: Sequence[Camera], lights: Sequence[Light], surfels: Tensor | None
+) -> None:
     if model.stage != "texture":
         raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
     if not cameras or len(lights) != len(cameras):

@@ -9,8 +9,8 @@ from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.edit.exposures import Exposure
+from texgs.fields.surfels.model import Surfels
 from texgs.raster.ssim import l1_dssim
-from texgs.scene.model import Model
 
 DSSIM = 0.2
 FINAL = 0.1  # rate at the end, relative to the start
@@ -38,7 +38,7 @@ class Reconstruction:
     def run(
         self,
         exposures: Sequence[Sequence[Exposure]],
-        model: Model,
+        model: Surfels,
         count: int,
         generator: torch.Generator,
         title: str,

@@ -10,7 +10,7 @@ from torch import Tensor
 from texgs.core.progress import progress
 from texgs.edit.back_projection import BackProjection
 from texgs.edit.exposures import Exposure
-from texgs.scene.model import Model
+from texgs.fields.surfels.model import Surfels
 
 STEP = 1.5  # of a Newton step in a typical exposure: 2 is the limit of stability
 LAST_STEP = 0.1  # what single exposures disagree about averages out as steps fall
@@ -19,7 +19,7 @@ RIDGE = 0.02  # added to curvatures, relative to their median: texels that are h
 
 def solve(
     exposures: Sequence[Exposure],
-    model: Model,
+    model: Surfels,
     seen: BackProjection,
     start: Tensor,
     *,

@@ -11,14 +11,14 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
 from texgs.edit.back_projection import seen_texels
 from texgs.edit.exposures import Exposure, expose
 from texgs.edit.followers import AdamFollower, Follower, SolveFollower
 from texgs.edit.target_views import render_views, require_texture
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors, owners, recolored
 from texgs.models.guidance import Guidance, Views, require_edited, require_instruction
-from texgs.scene.model import Model
-from texgs.scene.texels import bare_colors, owners, recolored
-from texgs.volume.view_set import Light
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Policy:
 class Edited:
     """What an edit gives."""
 
-    model: Model
+    model: Surfels
     """With new texels and offsets of surfels; the rest is that of the model edited, bit for bit."""
     views: Views
     """As the guidance saw them, the last time each."""
@@ -64,13 +64,13 @@ class Edited:
 
 
 def update(
-    model: Model,
+    model: Surfels,
     cameras: Sequence[Camera],
     guidance: Guidance,
     instruction: str,
     policy: Policy = Policy(),
     *,
-    light: Light = Light("headlight"),  # noqa: B008, it is frozen
+    light: Light = HEADLIGHT,
     lit: bool | None = None,
     surfels: Tensor | None = None,
     seed: int = 0,
@@ -157,7 +157,7 @@ class _Targets:
         return [[found[k] for found in self.exposures.values()] for k in range(self.opacities)]
 
 
-def changing_texels(model: Model, surfels: Tensor) -> Tensor:
+def changing_texels(model: Surfels, surfels: Tensor) -> Tensor:
     """Which texels [T] belong to some surfels [N], in their places in the list."""
     place, surfel = owners(model.parameters)
     mine = torch.zeros(len(model.parameters["texels"]), dtype=torch.bool, device=place.device)
@@ -165,7 +165,7 @@ def changing_texels(model: Model, surfels: Tensor) -> Tensor:
     return mine
 
 
-def _follower(model: Model, policy: Policy, generator: torch.Generator) -> Follower:
+def _follower(model: Surfels, policy: Policy, generator: torch.Generator) -> Follower:
     """What makes texels follow."""
     if policy.iterations:
         return AdamFollower(model, policy.iterations, policy.rounds, policy.rate, generator)
@@ -179,7 +179,7 @@ def _group(round_: int, size: int | None, count: int) -> list[int]:
     return [(round_ * size + k) % count for k in range(size)]
 
 
-def _changing(model: Model, surfels: Tensor | None) -> Tensor:
+def _changing(model: Surfels, surfels: Tensor | None) -> Tensor:
     """Which surfels may change [N], bool.
 
     Raises:
@@ -197,6 +197,6 @@ def _changing(model: Model, surfels: Tensor | None) -> Tensor:
     return surfels.to(model.parameters["means"].device)
 
 
-def _share(weights: Tensor, model: Model, changing: Tensor) -> float:
+def _share(weights: Tensor, model: Surfels, changing: Tensor) -> float:
     """Share of the texels that may change that are seen."""
     return float(seen_texels(weights)[changing_texels(model, changing)].double().mean())

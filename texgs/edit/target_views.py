@@ -9,15 +9,15 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
+from texgs.fields.surfels.model import Surfels, geometry, material
+from texgs.fields.surfels.render import light_direction, viewer
 from texgs.models.guidance import Views
 from texgs.raster import Texture, rasterize
 from texgs.raster.shading import blinn_phong_texture
-from texgs.scene.model import Model, geometry, material
-from texgs.scene.render import light_direction, viewer
-from texgs.volume.view_set import Light
 
 
-def require_texture(model: Model) -> None:
+def require_texture(model: Surfels) -> None:
     """Require a textured model.
 
     Raises:
@@ -27,7 +27,7 @@ def require_texture(model: Model) -> None:
         raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
 
 
-def light_on(model: Model, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:
+def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:
     """Highlight [N, 3] and gain [N]: a fragment of bare colour c looks like highlight + gain * c.
 
     Args:
@@ -35,11 +35,11 @@ def light_on(model: Model, camera: Camera, light: Light | None) -> tuple[Tensor,
         camera: of the view.
         light: that shines on the surfels; without one, colours look as they are.
     """
-    p, optics = model.parameters, model.optics
+    p, shading = model.parameters, model.shading
     black = torch.zeros_like(p["means"])
     if light is None:
         return black, torch.ones_like(p["opacities"])
-    a, d, s, b = material(p, optics.material).values()
+    a, d, s, b = material(p, shading.material).values()
     return blinn_phong_texture(
         black,
         a,
@@ -48,15 +48,15 @@ def light_on(model: Model, camera: Camera, light: Light | None) -> tuple[Tensor,
         b,
         p["means"],
         p["quats"],
-        viewer(camera, optics),
+        viewer(camera, shading),
         light_direction(light, camera),
-        facing=optics.facing,
+        facing=shading.facing,
     )
 
 
 @torch.no_grad()
 def render_views(
-    model: Model,
+    model: Surfels,
     colors: Tensor,
     cameras: Sequence[Camera],
     light: Light | None,
@@ -90,7 +90,7 @@ def render_views(
             texture=Texture(highlight, gain, colors, p["sizes"], p["offsets"]),
             background=torch.ones_like(colors[0]),
             outputs=("depth", "normal"),
-            options=model.optics.options,
+            options=model.shading.options,
         )
         images.append(seen.color.clamp(0, 1))
         alphas.append(seen.alpha)

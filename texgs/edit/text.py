@@ -8,12 +8,12 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
 from texgs.edit.axis_views import axis_cameras
 from texgs.edit.target_update import Edited, Policy, update
 from texgs.edit.target_views import require_texture
+from texgs.fields.surfels.model import Surfels
 from texgs.models.guidance import Guidance
-from texgs.scene.model import Model
-from texgs.volume.view_set import Light
 
 SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
 
@@ -28,13 +28,13 @@ RECIPES = {
 
 
 def edit_by_text(
-    model: Model,
+    model: Surfels,
     cameras: Sequence[Camera],
     guidance: Guidance,
     instruction: str,
     recipe: str = "default",
     *,
-    light: Light = Light("headlight"),  # noqa: B008, it is frozen
+    light: Light = HEADLIGHT,
     lit: bool | None = None,
     surfels: Tensor | None = None,
     size: int = SIZE,

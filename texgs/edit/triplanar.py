@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.rotation import quats_to_matrices
-from texgs.scene.texels import owners
+from texgs.fields.surfels.texels import owners
 
 EXTENT = 6.0  # standard deviations that a texture spans along each tangent
 SHARPNESS = 8  # power of the normal's components that weighs the projections

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.edit.clicks import projected
+from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import Render, rasterize, splat
-from texgs.scene.model import Model, geometry
 
 Vote = Literal["contribution", "centre"]
 SEEN = 0.01  # pixels in all views together that a surfel must make up to have a vote
@@ -50,9 +50,9 @@ class ContributionVotes:
         rounds: of votes on what is left; 0 for plain votes.
     """
 
-    def __init__(self, model: Model, threshold: float = 0.5, rounds: int = ROUNDS) -> None:
+    def __init__(self, model: Surfels, threshold: float = 0.5, rounds: int = ROUNDS) -> None:
         self.model, self.threshold, self.rounds = model, threshold, rounds
-        self.geometry, self.options = geometry(model.parameters), model.optics.options
+        self.geometry, self.options = geometry(model.parameters), model.shading.options
         self.sums, self.weights = model.parameters["means"].new_zeros(2, len(model))
         self.views: list[tuple[Camera, Tensor]] = []
 
@@ -126,7 +126,7 @@ class CentreVotes:
         threshold: share of all views that must say 1, exceeded.
     """
 
-    def __init__(self, model: Model, threshold: float = 0.7) -> None:
+    def __init__(self, model: Surfels, threshold: float = 0.7) -> None:
         self.means, self.threshold, self.views = model.parameters["means"], threshold, 0
         self.inside, self.outside = self.means.new_zeros(2, len(model))
 
@@ -148,7 +148,7 @@ class CentreVotes:
         return is_mode & (self.inside > self.threshold * self.views)
 
 
-def votes_of(kind: Vote, model: Model, threshold: float | None = None) -> ContributionVotes | CentreVotes:
+def votes_of(kind: Vote, model: Surfels, threshold: float | None = None) -> ContributionVotes | CentreVotes:
     """Votes of a kind, with its own threshold unless one is given."""
     make = ContributionVotes if kind == "contribution" else CentreVotes
     return make(model) if threshold is None else make(model, threshold)

@@ -7,8 +7,8 @@ from torch import Tensor
 
 from texgs.config.fit import Densify
 from texgs.core.rotation import quats_to_matrices
+from texgs.fields.surfels.model import MATERIAL
 from texgs.fit.optimizer import Optimizer
-from texgs.scene.model import MATERIAL
 
 CHILDREN = 2  # of a split
 SHRINK = 1.6  # by which children are smaller

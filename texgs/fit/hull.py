@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.scene.images import Images
+from texgs.volume.images import Images
 
 TRIED = 200_000  # points at a time
 ROUNDS = 20

@@ -11,12 +11,13 @@ from torch import Tensor
 from texgs.config.fit import Phase, Rates
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
+from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.surfels.model import MATERIAL, ShadingModel
 from texgs.fit.densify import DensityControl
 from texgs.fit.harmonics import join
 from texgs.fit.losses import view_loss
 from texgs.fit.optimizer import Optimizer, Rate
-from texgs.scene.images import Images
-from texgs.scene.model import MATERIAL, Optics
+from texgs.volume.images import Images
 
 USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
 SMALLEST = 1e-3  # distance, world units
@@ -62,16 +63,21 @@ class Fit:
 
     Args:
         parameters: raw, where the phase starts.
-        optics: of the model.
+        shading: of the model.
         images: training views.
         phase: what to do.
         seed: of the order of views and of splits; with the same one, machine and versions results are equal.
     """
 
     def __init__(
-        self, parameters: Mapping[str, Tensor], optics: Optics, images: Images, phase: Phase, seed: int
+        self,
+        parameters: Mapping[str, Tensor],
+        shading: ShadingModel,
+        images: Images,
+        phase: Phase,
+        seed: int,
     ) -> None:
-        self.optics, self.images, self.phase, self.seed = optics, images, phase, seed
+        self.shading, self.images, self.phase, self.seed = shading, images, phase, seed
         self.iteration = 0
         self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
         self.losses: list[float] = []  # that were looked at, every CHECKED_EVERY iterations and at the end
@@ -104,14 +110,14 @@ class Fit:
         """One view: loss, gradients, a step of Adam, density control."""
         self.iteration += 1
         p = self.parameters
-        target = self.images.visible(self.view_of(self.iteration), p, self.optics)
+        target = visible_part(self.images, self.view_of(self.iteration), p, self.shading)
         is_observed = self.iteration <= self.phase.densify.stop
         shift = torch.zeros_like(p["scales"]).requires_grad_() if is_observed else None
         degrees = min(self.phase.sh_degree, self.iteration // self.phase.sh_every)
         visible = join(p, degrees)
         loss = view_loss(
             visible,
-            self.optics,
+            self.shading,
             target,
             self.phase.losses,
             shift,

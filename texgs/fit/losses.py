@@ -9,20 +9,20 @@ import torch
 from torch import Tensor
 
 from texgs.config.fit import Losses
+from texgs.fields.surfels.model import MATERIAL, ShadingModel, geometry, material
+from texgs.fields.surfels.render import shaded
 from texgs.raster import Render, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.ssim import l1_dssim, ssim
-from texgs.scene.images import Target
-from texgs.scene.model import MATERIAL, Optics, geometry, material
-from texgs.scene.render import shaded
+from texgs.volume.images import Target
 
 SMOOTHED = len(MATERIAL)
 
 
 def view_loss(
     parameters: Mapping[str, Tensor],
-    optics: Optics,
+    shading: ShadingModel,
     target: Target,
     weights: Losses,
     shift: Tensor | None,
@@ -33,7 +33,7 @@ def view_loss(
 
     Args:
         parameters: raw, of the surfels.
-        optics: of the model.
+        shading: of the model.
         target: the view.
         weights: of the losses.
         shift: [N, 2] zeros that receive the screen-space gradient, or None.
@@ -43,9 +43,9 @@ def view_loss(
     camera = target.camera
     fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
     colors = cast(
-        Tensor, shaded({**parameters, **fixed}, optics, camera, target.light)
+        Tensor, shaded({**parameters, **fixed}, shading, camera, target.light)
     )  # surfels have no texture yet
-    maps = material_maps(parameters, optics) if weights.smoothness > 0 else None
+    maps = material_maps(parameters, shading) if weights.smoothness > 0 else None
     has_normals = weights.normal > 0 and iteration > weights.normal_from
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
     render = rasterize(
@@ -58,7 +58,7 @@ def view_loss(
         background=white(features),
         shift=shift,
         outputs=("normal", "depth") if has_normals else (),
-        options=optics.options,
+        options=shading.options,
     )
     # Split as planes, as they lie in memory: the gradient of a slice would be a whole image of zeros.
     channels = [3] if maps is None else [3, SMOOTHED]
@@ -81,11 +81,11 @@ def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:
     return weights.dssim * (1 - ssim(alpha, target))
 
 
-def material_maps(parameters: Mapping[str, Tensor], optics: Optics) -> Tensor | None:
+def material_maps(parameters: Mapping[str, Tensor], shading: ShadingModel) -> Tensor | None:
     """The material of each surfel as features [N, 4]; None where all share one, or there is none."""
     if "ambient" not in parameters or len(parameters["ambient"]) == 1:
         return None
-    return torch.stack(list(material(parameters, optics.material).values()), dim=1)
+    return torch.stack(list(material(parameters, shading.material).values()), dim=1)
 
 
 def white(features: Tensor) -> Tensor:

@@ -12,8 +12,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.ply_file import read_vertices
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
 from texgs.fit.visible import CANDIDATES, most_seen
-from texgs.scene.images import Images
 from texgs.volume.grid import Grid
+from texgs.volume.images import Images
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
 from texgs.volume.voxels import visible_voxels

@@ -6,15 +6,15 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.fields.surfels.model import Surfels
 from texgs.fit.texture_adam import refine
 from texgs.fit.texture_layout import look, offsets_of, sizes_for_budget, sizes_where_seen
 from texgs.fit.texture_solve import solve
-from texgs.scene.images import Images
-from texgs.scene.model import Model
+from texgs.volume.images import Images
 
 
 def texturize(
-    model: Model,
+    model: Surfels,
     images: Images,
     *,
     texels: int | None = None,
@@ -26,7 +26,7 @@ def texturize(
     has_offset: bool = True,
     seed: int = 0,
     title: str = "texture",
-) -> Model:
+) -> Surfels:
     """Give the surfels of a relightable model textures (the paper's section Textured Gaussian Primitives).
 
     Args:
@@ -74,7 +74,7 @@ def texturize(
     return result
 
 
-def textured(model: Model, palette: Tensor, sizes: Tensor) -> Model:
+def textured(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
     """The model with texels 0 and its colours as offsets from the palette: it looks as before.
 
     Args:
@@ -85,15 +85,15 @@ def textured(model: Model, palette: Tensor, sizes: Tensor) -> Model:
     p = model.parameters
     texels = palette.new_zeros(int(sizes.long().prod(dim=1).sum()), 3)
     texture = {"palette": palette, "texels": texels, "sizes": sizes, "offsets": offsets_of(sizes)}
-    return Model({**p, "colors": p["colors"] - palette, **texture}, model.optics, model.metadata)
+    return Surfels({**p, "colors": p["colors"] - palette, **texture}, model.shading, model.metadata)
 
 
-def without_offset(model: Model) -> Model:
+def without_offset(model: Surfels) -> Surfels:
     """The model with the offsets of its surfels added to their texels, one surfel after the other."""
     p = model.parameters
     owners = torch.repeat_interleave(p["sizes"].long().prod(dim=1))
     moved = {"texels": p["texels"] + p["colors"][owners], "colors": torch.zeros_like(p["colors"])}
-    return Model({**p, **moved}, model.optics, model.metadata)
+    return Surfels({**p, **moved}, model.shading, model.metadata)
 
 
 def mean_color(images: Images) -> Tensor:

@@ -6,18 +6,19 @@ import torch
 
 from texgs.core.errors import FitError
 from texgs.core.progress import progress
+from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.surfels.model import TEXTURE, Surfels
+from texgs.fields.surfels.render import render
 from texgs.raster.ssim import l1_dssim
-from texgs.scene.images import Images
-from texgs.scene.model import TEXTURE, Model
-from texgs.scene.render import render
+from texgs.volume.images import Images
 
 FINAL = 0.1  # rate at the end, relative to the start
 DSSIM = 0.2
 
 
 def refine(
-    model: Model, images: Images, *, iterations: int, rate: float, sparsity: float, seed: int, title: str
-) -> Model:
+    model: Surfels, images: Images, *, iterations: int, rate: float, sparsity: float, seed: int, title: str
+) -> Surfels:
     """Fit the texels to one view after the other by L1 + D-SSIM.
 
     Args:
@@ -33,7 +34,7 @@ def refine(
         FitError: if texels are no longer finite.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
-    moving = Model({**model.parameters, "texels": texels}, model.optics, model.metadata)
+    moving = Surfels({**model.parameters, "texels": texels}, model.shading, model.metadata)
     plain = without_texture(model)
     adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
     generator = torch.Generator().manual_seed(seed)
@@ -41,7 +42,7 @@ def refine(
     for iteration in progress(range(iterations), title=title, unit="iteration"):
         if not order:
             order = torch.randperm(len(images), generator=generator).tolist()
-        target = images.visible(order.pop(), model.parameters, model.optics)
+        target = visible_part(images, order.pop(), model.parameters, model.shading)
         image = render(moving, target.camera, target.light).color
         loss = l1_dssim(image, target.color, DSSIM)
         if sparsity > 0:
@@ -56,11 +57,11 @@ def refine(
         raise FitError(
             "texture: texels are not finite after Adam; look for values that are not in the model before"
         )
-    return Model({**model.parameters, "texels": texels.detach()}, model.optics, model.metadata)
+    return Surfels({**model.parameters, "texels": texels.detach()}, model.shading, model.metadata)
 
 
-def without_texture(model: Model) -> Model:
+def without_texture(model: Surfels) -> Surfels:
     """The same model with all texels 0, of stage shading: what texels add to an image is the difference."""
     p = {name: x for name, x in model.parameters.items() if name not in TEXTURE}
     p["colors"] = p["colors"] + model.parameters["palette"]
-    return Model(p, model.optics, model.metadata)
+    return Surfels(p, model.shading, model.metadata)

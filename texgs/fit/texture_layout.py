@@ -9,11 +9,12 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
+from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.render import shaded
 from texgs.raster import Texture, rasterize
 from texgs.raster.atlas import MOST_TEXELS
-from texgs.scene.images import Images
-from texgs.scene.model import Model, geometry
-from texgs.scene.render import shaded
+from texgs.volume.images import Images
 
 EXTENT = 6.0  # standard deviations that a texture spans along each tangent
 
@@ -32,7 +33,7 @@ class Sight:
 
 
 @torch.no_grad()
-def look(model: Model, images: Images, title: str) -> Sight:
+def look(model: Surfels, images: Images, title: str) -> Sight:
     """Gather what all views show of a textured model, whatever its texels.
 
     A surfel seen by few views has a small mean curvature and still a large one where it is seen;
@@ -43,9 +44,9 @@ def look(model: Model, images: Images, title: str) -> Sight:
     largest, total, squares = means.new_zeros(3, n)
     pixel = means.new_full((n,), torch.inf)
     for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
-        target = images.visible(index, model.parameters, model.optics)
+        target = visible_part(images, index, model.parameters, model.shading)
         camera = target.camera
-        texture = shaded(model.parameters, model.optics, camera, target.light)
+        texture = shaded(model.parameters, model.shading, camera, target.light)
         if not isinstance(texture, Texture):
             raise ArgumentError(f"model: expected a texture, got stage {model.stage}; lay one out first")
         seen = rasterize(
@@ -56,7 +57,7 @@ def look(model: Model, images: Images, title: str) -> Sight:
             camera.height,
             features=texture.gain[:, None],  # any: only the statistics count
             outputs=("statistics",),
-            options=model.optics.options,
+            options=model.shading.options,
         ).statistics
         curvature = seen.weight_sum * texture.gain.square()  # type: ignore[union-attr]
         total += curvature

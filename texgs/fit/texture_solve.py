@@ -6,11 +6,12 @@ import torch
 from torch import Tensor
 
 from texgs.core.progress import progress
+from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.render import render
 from texgs.fit.texture_layout import EXTENT, Sight
 from texgs.raster.ssim import l1_dssim
-from texgs.scene.images import Images, Target
-from texgs.scene.model import Model
-from texgs.scene.render import render
+from texgs.volume.images import Images, Target
 
 STEP = 0.6  # of a Newton step in a typical view: 2 is the limit of stability, and views differ
 LAST_STEP = 0.06  # noise of single views averages out as steps fall
@@ -19,8 +20,8 @@ STRUCTURE = 1e-3  # weight of D-SSIM against half the mean squared error
 
 
 def solve(
-    model: Model, images: Images, sight: Sight, *, sweeps: int, ridge: float, seed: int, title: str
-) -> Model:
+    model: Surfels, images: Images, sight: Sight, *, sweeps: int, ridge: float, seed: int, title: str
+) -> Surfels:
     """Fit the texels to all views: least squares, with a little D-SSIM, one view per step.
 
     A step divides the gradient by an estimate of the row sums A'A 1 of the Hessian in one view, A being the
@@ -39,12 +40,12 @@ def solve(
         The model with new texels; the one given, if these would not lower the squared error.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
-    moving = Model({**model.parameters, "texels": texels}, model.optics, model.metadata)
+    moving = Surfels({**model.parameters, "texels": texels}, model.shading, model.metadata)
     scale = _inverse(curvature(model.parameters["sizes"], sight.curvature), ridge)
     generator = torch.Generator().manual_seed(seed)
     order = [i for _ in range(sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
-        target = images.visible(index, model.parameters, model.optics)
+        target = visible_part(images, index, model.parameters, model.shading)
         image = render(moving, target.camera, target.light).color
         structure = STRUCTURE * image.numel() * l1_dssim(image, target.color, 1.0)
         loss = 0.5 * squared_error(image, target) + structure
@@ -52,7 +53,7 @@ def solve(
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
             texels.addcmul_(gradient, scale, value=-rate)
-    solved = Model({**model.parameters, "texels": texels.detach()}, model.optics, model.metadata)
+    solved = Surfels({**model.parameters, "texels": texels.detach()}, model.shading, model.metadata)
     return solved if sampled_error(solved, images) <= sampled_error(model, images) else model
 
 
@@ -62,7 +63,7 @@ def squared_error(image: Tensor, target: Target) -> Tensor:
 
 
 @torch.no_grad()
-def sampled_error(model: Model, images: Images) -> float:
+def sampled_error(model: Surfels, images: Images) -> float:
     """Squared error of some views, evenly spaced, with colours clamped as on a screen."""
     device = model.parameters["means"].device
     targets = [images.target(i, device) for i in range(0, len(images), max(1, len(images) // CHECKED))]

@@ -9,10 +9,10 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.render import render
 from texgs.fit.loop import Fit
-from texgs.scene.images import Images
-from texgs.scene.model import Model, Optics, raw_material
-from texgs.scene.render import render
+from texgs.volume.images import Images
 from texgs.volume.reduced import smaller
 
 PIXELS = 200  # of the longer side of the small images, about
@@ -42,16 +42,16 @@ def most_seen(
     """
     small = shrunk(images, max(images.planes.shape[2:]) // PIXELS)
     start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}
-    fit = Fit(start, Optics(), small, PHASE, seed)
+    fit = Fit(start, ShadingModel(), small, PHASE, seed)
     for _ in fit.run():
         pass
     fitted = {name: x.detach() for name, x in fit.parameters.items()}
-    best = shown(Model(fitted), small).topk(min(count, len(colors))).indices
+    best = shown(Surfels(fitted), small).topk(min(count, len(colors))).indices
     return {name: fitted[name][best] for name in surfels}, fitted["colors"][best].clamp(0, 1)
 
 
 @torch.no_grad()
-def shown(model: Model, images: Images) -> Tensor:
+def shown(model: Surfels, images: Images) -> Tensor:
     """Sum [N] of the blending weights of each surfel over all pixels of all views."""
     total = torch.zeros(len(model))
     for camera, light in zip(images.cameras, images.lights, strict=True):

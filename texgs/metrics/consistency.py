@@ -13,9 +13,9 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.scene.composition import Composition, Look
-from texgs.scene.edits import Edit
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition, Look
 
 SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
 OPAQUE = 0.5  # least alpha of a pixel that has a depth

@@ -8,16 +8,16 @@ from statistics import fmean
 import torch
 
 from texgs.core.progress import progress
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.render import render
 from texgs.metrics.image import psnr, ssim
-from texgs.scene.model import Model
-from texgs.scene.render import render
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
 
 
 @torch.no_grad()
 def evaluate(
-    model: Model, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
+    model: Surfels, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
 ) -> dict[str, list[float]]:
     """PSNR in dB and SSIM of each view over white, full frame, against the exact image.
 

@@ -10,12 +10,12 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.camera import Camera
+from texgs.core.light import Light
 from texgs.core.progress import progress
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.render import render
 from texgs.models.nnfm import StyleFeatures, nnfm
 from texgs.models.vgg import Vgg
-from texgs.scene.model import Model
-from texgs.scene.render import render
-from texgs.volume.view_set import Light
 
 STRIDE = 4  # pixels between the positions of VGG's features
 ON_OBJECT = 0.5  # of alpha, from which a feature counts
@@ -33,7 +33,7 @@ class Likeness:
 
 @torch.no_grad()
 def likeness(
-    model: Model,
+    model: Surfels,
     cameras: Sequence[Camera],
     lights: Sequence[Light],
     style: Tensor,

@@ -14,12 +14,12 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.core.plots import words
+from texgs.fields.surfels.model import MATERIAL, Surfels, geometry, material
+from texgs.fields.surfels.render import render
 from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
 from texgs.report.fitting import PHASES
-from texgs.scene.model import MATERIAL, Model, geometry, material
-from texgs.scene.render import render
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
 
@@ -82,7 +82,11 @@ class Row:
 
 @torch.no_grad()
 def write_fit_figure(
-    path: str | Path, models: Mapping[str, Model], views: Mapping[str, View], reduce: int = 1, title: str = ""
+    path: str | Path,
+    models: Mapping[str, Surfels],
+    views: Mapping[str, View],
+    reduce: int = 1,
+    title: str = "",
 ) -> Path:
     """Draw a fit beside its views as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
 
@@ -117,7 +121,7 @@ def write_fit_figure(
     return draw(path, [Row(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
 
 
-def compare(models: Mapping[str, Model], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
+def compare(models: Mapping[str, Surfels], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
     """Panels of one view, and where it or one of its renderings shows something, [H, W]."""
     planes = over_white(view, reduce)
     truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
@@ -143,7 +147,7 @@ def signed_error(image: Tensor, target: Tensor) -> Tensor:
     return error.gather(2, error.abs().argmax(dim=2, keepdim=True))[..., 0]
 
 
-def maps(model: Model, view: View, reduce: int) -> list[Panel]:
+def maps(model: Surfels, view: View, reduce: int) -> list[Panel]:
     """Panels of normals, depth, alpha and material of a model with shading in one view."""
     camera = smaller(view.camera, reduce).to(model.parameters["means"].device)
     image = render(model, camera, view.light, outputs=("normal", "depth"))
@@ -155,9 +159,9 @@ def maps(model: Model, view: View, reduce: int) -> list[Panel]:
         map_panel("depth, world units", depth, alpha),
         Panel("alpha", grey(alpha), scale=grey),
     ]
-    features = material_maps(model.parameters, model.optics)
+    features = material_maps(model.parameters, model.shading)
     if features is None:
-        factors = material(model.parameters, model.optics.material)
+        factors = material(model.parameters, model.shading.material)
         lines = [f"{name:9} {value.item():6.3f}" for name, value in factors.items()]
         return [*panels, Panel("material of all surfels", words="\n".join(lines))]
     size = (camera.width, camera.height)
@@ -167,7 +171,7 @@ def maps(model: Model, view: View, reduce: int) -> list[Panel]:
         camera.K,
         *size,
         features=features,
-        options=model.optics.options,
+        options=model.shading.options,
     ).color.cpu()
     means = (blended / cover.clamp_min(1e-6)).unbind(dim=2)  # of the surfels that a pixel shows
     return [*panels, *(map_panel(name, mean, alpha) for name, mean in zip(MATERIAL, means, strict=True))]

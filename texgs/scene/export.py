@@ -11,16 +11,16 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.scene.composition import Part, by_part
-from texgs.scene.edits import Edit
-from texgs.scene.model import Model, geometry
-from texgs.scene.ply import Y00
-from texgs.scene.texels import mean_texels
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Part, by_part
+from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.ply import Y00
+from texgs.fields.surfels.texels import mean_texels
 
 MOST_OPAQUE = 1 - 1e-6  # has a logit
 
 
-def joined(parts: Sequence[Part], edits: Sequence[Edit]) -> Model:
+def joined(parts: Sequence[Part], edits: Sequence[Edit]) -> Surfels:
     """The visible surfels of a scene as one model of stage surfels, whatever light shone on them.
 
     Args:
@@ -37,10 +37,10 @@ def joined(parts: Sequence[Part], edits: Sequence[Edit]) -> Model:
     together = {name: torch.cat([each[name] for each in found]) for name in found[0]}
     if not len(together["means"]):
         raise ArgumentError("models: expected at least one visible surfel, got none; show a model")
-    return Model(together, parts[0].model.optics)
+    return Surfels(together, parts[0].model.shading)
 
 
-def write_points(path: str | Path, model: Model, least_opacity: float = 0.5) -> Path:
+def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -> Path:
     """Create or replace a PLY point cloud in one step: means, and colours without light as 8-bit numbers.
 
     Args:

@@ -11,11 +11,11 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
 from texgs.core.memory import require_memory
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition, Look
 from texgs.raster import Render
-from texgs.scene.composition import Composition, Look
-from texgs.scene.edits import Edit
-from texgs.volume.view_set import Light
 
 Mode = Literal[
     "shaded", "unshaded", "normal", "depth", "alpha", "ambient", "diffuse", "specular", "shininess"

@@ -15,18 +15,18 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
+from texgs.core.light import Light
 from texgs.core.names import label, named_file
 from texgs.core.numbers import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.reading import reading, reading_as
-from texgs.scene.compact import open_model
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit, color
-from texgs.scene.model import Model
-from texgs.scene.segment import labels_of, with_variants
+from texgs.fields.part_edit import Edit, color
+from texgs.fields.surfels.compact import open_model
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.segment import labels_of, with_variants
+from texgs.fields.surfels.texture_file import with_texture
 from texgs.scene.segment_file import read_segment
-from texgs.scene.texture_file import with_texture
-from texgs.volume.view_set import Light
 
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
@@ -67,7 +67,7 @@ class SceneModel:
             found += [segment.file, segment.texture]
         return found
 
-    def open(self) -> tuple[Model, list[Tensor]]:
+    def open(self) -> tuple[Surfels, list[Tensor]]:
         """The model with the texels of all variants, and the masks [N] of its segments.
 
         Raises:

@@ -13,8 +13,8 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
-from texgs.scene.model import Model
-from texgs.scene.tensor_file import read_tensor_file
+from texgs.core.tensor_file import read_tensor_file
+from texgs.fields.surfels.model import Surfels
 
 FORMAT = "texgs-segment"
 VERSION = 1
@@ -23,7 +23,7 @@ TOLERANCE = 1e-3  # of the model's extent: places survive exchange in other form
 
 
 def write_segment(
-    path: str | Path, model: Model, mask: Tensor, metadata: Mapping[str, Any] | None = None
+    path: str | Path, model: Surfels, mask: Tensor, metadata: Mapping[str, Any] | None = None
 ) -> Path:
     """Write a segment in one step: a safetensors file with `mask` [N] and `anchors`, places of some surfels.
 
@@ -50,7 +50,7 @@ def write_segment(
     return write_bytes(path, save(tensors, header))
 
 
-def read_segment(path: str | Path, model: Model) -> Tensor:
+def read_segment(path: str | Path, model: Surfels) -> Tensor:
     """The mask [N] bool of a segment, on the model's device.
 
     Raises:
@@ -70,7 +70,7 @@ def read_segment(path: str | Path, model: Model) -> Tensor:
     return mask.to(model.parameters["means"].device)
 
 
-def _anchors(model: Model) -> Tensor:
+def _anchors(model: Surfels) -> Tensor:
     """Means [A, 3] of surfels spread over the list."""
     means = model.parameters["means"].detach().cpu()
     return means[torch.linspace(0, max(len(means) - 1, 0), min(ANCHORS, len(means))).long()].contiguous()

@@ -21,12 +21,12 @@ from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
 from texgs.core.errors import NativeError
+from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.geometry import march
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 from texgs.volume.vtk_camera import aim, point_light
 
 BYTES = 200  # of memory for a pixel: VTK's image, the picture, and directions of rays in double precision

@@ -14,11 +14,11 @@ from torch.nn.functional import normalize
 
 from texgs.core import check
 from texgs.core.camera import Camera
+from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
 from texgs.volume.field import BLOCK, Field
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 from texgs.volume.vtk_camera import directions
 
 RAYS = 8192  # marched at a time; bounds the memory

@@ -14,11 +14,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
+from texgs.core.light import Light
 from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.grid import Grid
 from texgs.volume.opengl import offscreen_opengl
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 from texgs.volume.vtk_camera import aim, directions
 
 if TYPE_CHECKING:

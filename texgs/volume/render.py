@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from texgs.core.camera import Camera
 from texgs.core.image import write_png
 from texgs.core.io import read_json, write_json
+from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light, View
+from texgs.volume.view_set import View
 
 
 class Mapper(Protocol):

@@ -11,10 +11,11 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from texgs.core.camera import Camera, orbit_direction
+from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.image import open_picture, read_png
 from texgs.core.io import read_json, write_json
+from texgs.core.light import Light
 from texgs.core.names import named_file
 from texgs.core.reading import reading_as
 from texgs.volume.transforms import (
@@ -25,30 +26,6 @@ from texgs.volume.transforms import (
     number,
     world_to_camera,
 )
-
-
-@dataclass(frozen=True)
-class Light:
-    """White light from one direction: from the camera, or fixed in the world.
-
-    Raises:
-        ArgumentError: if the kind is unknown.
-    """
-
-    kind: Literal["headlight", "directional"]
-    azimuth: float = 0.0  # degrees, of a directional light; see texgs.core.camera.orbit_direction
-    polar: float = 0.0  # degrees above the horizon
-
-    def __post_init__(self) -> None:
-        if self.kind not in ("headlight", "directional"):
-            raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
-
-    def direction(self, camera: Camera) -> Tensor:
-        """Unit vector [3], float64, from the origin to the light; for a headlight, to the camera."""
-        if self.kind == "directional":
-            return orbit_direction(self.azimuth, self.polar)
-        position = camera.position.double().cpu()
-        return position / position.norm()
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
 
 if TYPE_CHECKING:
     from vtkmodules.vtkRenderingCore import vtkCamera, vtkLight

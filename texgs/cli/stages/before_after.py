@@ -8,13 +8,13 @@ import numpy as np
 import torch
 
 from texgs.core.camera import Camera
+from texgs.core.light import Light
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.report.strip import write_strip
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import Scene
 from texgs.volume.cameras import orbit_path
-from texgs.volume.view_set import Light
 
 POLAR, DISTANCE, FOV = 20.0, 4.0311, 30.0
 SHOWN = 3  # views around the object

@@ -22,10 +22,10 @@ from texgs.edit.pictures import PICTURES, picture
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture, read_style
 from texgs.edit.stylize import stylize
+from texgs.fields.surfels.model import Surfels
 from texgs.models.clip import Clip
 from texgs.models.vgg import Vgg
 from texgs.report.convergence import write_convergence
-from texgs.scene.model import Model
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.reduced import smaller
 
@@ -47,7 +47,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     clip = ClipLoss(Clip.load(settings["clip"], device), pixels.to(device)) if recipe.needs_clip else None
     curves: dict[str, dict[str, list[float]]] = {}
 
-    def one(name: str, model: Model, surfels: Tensor | None) -> tuple[Model, dict[str, Any]]:
+    def one(name: str, model: Surfels, surfels: Tensor | None) -> tuple[Surfels, dict[str, Any]]:
         views = views_of(inputs, name)
         start = time.monotonic()
         result = stylize(

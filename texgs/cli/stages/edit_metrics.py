@@ -15,15 +15,15 @@ from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.size import sizes
 from texgs.metrics.clip import clip_scores
 from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
 from texgs.metrics.style import likeness
 from texgs.models.clip import Clip
 from texgs.models.lpips import Lpips
 from texgs.models.vgg import Vgg
-from texgs.scene.composition import Composition
 from texgs.scene.scene_file import Scene, read_scene
-from texgs.scene.size import sizes
 from texgs.volume.cameras import test_path
 
 

@@ -17,9 +17,9 @@ from texgs.core.names import part_file
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import Lifted, lift
 from texgs.edit.preview import overlay
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.render import render
 from texgs.report.strip import write_strip
-from texgs.scene.model import Model
-from texgs.scene.render import render
 from texgs.scene.scene_file import Scene, read_scene, write_scene
 from texgs.volume.cameras import orbit_path
 
@@ -101,13 +101,13 @@ def clicks_of(wanted: dict[str, Any], device: torch.device) -> Clicks:
 
 
 @torch.no_grad()
-def picture(model: Model, clicks: Clicks, found: Lifted, scene: Scene, path: Path) -> Path:
+def picture(model: Surfels, clicks: Clicks, found: Lifted, scene: Scene, path: Path) -> Path:
     """The view clicked on with its mask, and the segment in it and around the object, the rest faint."""
     faint = found.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~found.mask, DIMMED)
     opacities = (model.parameters["opacities"].sigmoid() * faint).clamp(1e-6, 1 - 1e-6).logit()
-    dimmed = Model({**model.parameters, "opacities": opacities}, model.optics, model.metadata)
+    dimmed = Surfels({**model.parameters, "opacities": opacities}, model.shading, model.metadata)
 
-    def shown(of: Model, camera: Camera) -> torch.Tensor:
+    def shown(of: Surfels, camera: Camera) -> torch.Tensor:
         return render(of, camera.to(opacities.device), scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), found.reference, clicks.points, clicks.positive)

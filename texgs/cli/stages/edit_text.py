@@ -13,12 +13,12 @@ from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.parts import edit_parts, views_of
 from texgs.core.device import torch_device
 from texgs.edit.text import edit_by_text
+from texgs.fields.surfels.model import Surfels
 from texgs.models.filters import ProceduralFilters
 from texgs.models.guidance import Guidance
 from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
 from texgs.models.weights import locate
 from texgs.report.strip import write_strip
-from texgs.scene.model import Model
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.reduced import smaller
 
@@ -38,7 +38,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     guidance = guidance_of(text, device)
     rows: dict[str, list[np.ndarray]] = {}
 
-    def one(name: str, model: Model, surfels: Tensor | None) -> tuple[Model, dict[str, Any]]:
+    def one(name: str, model: Surfels, surfels: Tensor | None) -> tuple[Surfels, dict[str, Any]]:
         views = views_of(inputs, name)
         start = time.monotonic()
         result = edit_by_text(

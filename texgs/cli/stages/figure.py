@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.fields.surfels.model_file import read_model
 from texgs.report.fit_figure import write_fit_figure
 from texgs.report.fitting import PHASES
-from texgs.scene.model_file import read_model
 from texgs.volume.view_set import read_views
 
 

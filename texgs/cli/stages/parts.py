@@ -12,13 +12,13 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import part_file
-from texgs.scene.model import Model
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.segment import labels_of
+from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.scene_file import Scene, SceneModel
-from texgs.scene.segment import labels_of
-from texgs.scene.texture_file import write_texture
 from texgs.volume.view_set import View, read_views
 
-Editor = Callable[[str, Model, Tensor | None], tuple[Model, dict[str, Any]]]
+Editor = Callable[[str, Surfels, Tensor | None], tuple[Surfels, dict[str, Any]]]
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def edit_parts(
     return scene, found
 
 
-def surfels_of(part: Part, entry: SceneModel, masks: Sequence[Tensor], model: Model) -> Tensor | None:
+def surfels_of(part: Part, entry: SceneModel, masks: Sequence[Tensor], model: Surfels) -> Tensor | None:
     """Surfels [N] bool of a part, those of no segment for a model that has some; None for all of them.
 
     Raises:

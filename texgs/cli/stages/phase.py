@@ -10,11 +10,11 @@ from torch import Tensor
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.progress import progress
+from texgs.fields.surfels.model import ShadingModel, Surfels
 from texgs.fit import checkpoint
 from texgs.fit.loop import Fit
 from texgs.metrics.quality import evaluate, mean
-from texgs.scene.images import Images
-from texgs.scene.model import Model, Optics
+from texgs.volume.images import Images
 from texgs.volume.view_set import ViewSet
 
 SAVED_EVERY = 30.0  # seconds between checkpoints
@@ -36,19 +36,19 @@ def gpu_memory(device: torch.device) -> dict[str, float]:
 
 def run_phase(
     parameters: Mapping[str, Tensor],
-    optics: Optics,
+    shading: ShadingModel,
     images: Images,
     phase: Phase,
     seed: int,
     output: Path,
     title: str,
-) -> tuple[Model, float, list[float]]:
+) -> tuple[Surfels, float, list[float]]:
     """Run the loop from the last checkpoint in the folder, if there is one.
 
     Returns:
         The model, the seconds of all runs together, and the losses that they looked at.
     """
-    fit = Fit(parameters, optics, images, phase, seed)
+    fit = Fit(parameters, shading, images, phase, seed)
     folder = output / CHECKPOINT
     if (state := checkpoint.latest(folder)) is not None:
         fit.restore(state)
@@ -61,15 +61,19 @@ def run_phase(
             checkpoint.save(folder, fit)
             saved = time.monotonic()
     seconds = time.monotonic() - start
-    return Model({name: x.detach() for name, x in fit.parameters.items()}, optics), seconds, fit.losses
+    return (
+        Surfels({name: x.detach() for name, x in fit.parameters.items()}, shading),
+        seconds,
+        fit.losses,
+    )
 
 
-def quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
+def quality(model: Surfels, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """PSNR and SSIM on the test views; none where there are none."""
     return mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {}
 
 
-def training_quality(model: Model, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
+def training_quality(model: Surfels, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """The same on the views that the model was fitted to."""
     found = mean(evaluate(model, views.train, reduce, f"{title}: training views"))
     return {f"train_{name}": value for name, value in found.items()}

@@ -13,14 +13,14 @@ from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.volume_scene import VolumeScene
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
+from texgs.core.light import Light
 from texgs.core.progress import progress
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
 from texgs.metrics.image import psnr, ssim
 from texgs.report.strip import write_strip
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
 from texgs.scene.scene_file import Scene, read_scene, write_scene
 from texgs.volume.cameras import orbit_path
-from texgs.volume.view_set import Light
 
 COMPARED = 6  # views around the object, one of which is shown
 POLAR = 20.0  # of these views, degrees

@@ -6,11 +6,11 @@ from typing import Any
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
 from texgs.core.device import torch_device
+from texgs.fields.surfels.model import Surfels, material, raw_material
+from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import base_color
-from texgs.scene.images import load
-from texgs.scene.model import Model, material, raw_material
-from texgs.scene.model_file import read_model, write_model
+from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
 HARMONICS = ("sh", "sh_rest")
@@ -34,10 +34,10 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     rows = 1 if fit["material"] == "shared" else len(before)
     start |= {name: value.to(device).repeat(rows) for name, value in first.items()}
     phase = phase_from(settings["phase"])
-    model, seconds, losses = run_phase(start, before.optics, images, phase, fit["seed"], output, title)
-    model = Model(model.parameters, before.optics, before.metadata)
+    model, seconds, losses = run_phase(start, before.shading, images, phase, fit["seed"], output, title)
+    model = Surfels(model.parameters, before.shading, before.metadata)
     write_model(output / "model.safetensors", model)
-    factors = material(model.parameters, before.optics.material)
+    factors = material(model.parameters, before.shading.material)
     numbers = {
         "fit_seconds": seconds,
         "surfels": len(model),

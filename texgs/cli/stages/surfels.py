@@ -8,12 +8,12 @@ import torch
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
 from texgs.core.device import torch_device
+from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.surfels.model_file import write_model
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import join, split, zeroth
 from texgs.fit.seeds import seed_surfels
-from texgs.scene.images import load
-from texgs.scene.model import Model, Optics
-from texgs.scene.model_file import write_model
+from texgs.volume.images import load
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.view_set import read_views
 
@@ -29,9 +29,9 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: surfels"
     views = read_views(inputs["views"].parent)
     images = load(views.train, fit["reduce"])
-    shading = views.metadata.get("shading") or {}
-    local_viewer = bool(shading.get("local_viewer", True))
-    optics = Optics(fit["low_pass"], fit["activation"], local_viewer, fit["facing"])
+    rendered = views.metadata.get("shading") or {}
+    local_viewer = bool(rendered.get("local_viewer", True))
+    shading = ShadingModel(fit["low_pass"], fit["activation"], local_viewer, fit["facing"])
     phase = phase_from(settings["phase"])
     volume = open_grid(inputs["volume"]) if "volume" in inputs else None
     parameters, colors = seed_surfels(images, views, **fit["seeds"], seed=fit["seed"], volume=volume)
@@ -40,8 +40,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
     device = torch_device(fit["device"])
     start = {name: x.to(device) for name, x in {**parameters, **split(sh)}.items()}
-    model, seconds, losses = run_phase(start, optics, images, phase, fit["seed"], output, title)
-    model = Model(join(model.parameters), optics, {"dataset": settings["dataset"], "tf": settings["tf"]})
+    model, seconds, losses = run_phase(start, shading, images, phase, fit["seed"], output, title)
+    model = Surfels(join(model.parameters), shading, {"dataset": settings["dataset"], "tf": settings["tf"]})
     write_model(output / "model.safetensors", model)
     numbers = {
         "fit_seconds": seconds,

@@ -7,10 +7,10 @@ from typing import Any
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.phase import gpu_memory, quality, training_quality
 from texgs.core.device import torch_device
+from texgs.fields.surfels.model_file import read_model, write_model
+from texgs.fields.surfels.size import sizes
 from texgs.fit.texels import texturize
-from texgs.scene.images import load
-from texgs.scene.model_file import read_model, write_model
-from texgs.scene.size import sizes
+from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
 

@@ -16,6 +16,7 @@ from texgs.cli.stages.tf import in_data_values
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_atomic
+from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.volume.appearance import Appearance
 from texgs.volume.cameras import icosphere, orbit_path, test_path
@@ -27,7 +28,7 @@ from texgs.volume.nrrd_file import open_grid
 from texgs.volume.render import Mapper, Times, render_views
 from texgs.volume.sheet import write_animation
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light, View, write_transforms
+from texgs.volume.view_set import View, write_transforms
 
 SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
 TURNTABLE = 320  # pixels of its longer side

@@ -11,13 +11,13 @@ from texgs.cli.stages.tf import in_data_values
 from texgs.cli.stages.views import mapper_for
 from texgs.core.camera import Camera
 from texgs.core.io import read_json
-from texgs.scene.edits import Edit
+from texgs.core.light import Light
+from texgs.fields.part_edit import Edit
 from texgs.volume.appearance import Appearance
 from texgs.volume.basic_tfs import combine
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.render import Mapper
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import Light
 
 
 class VolumeScene:

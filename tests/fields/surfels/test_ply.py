@@ -5,11 +5,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from plyfile import PlyData
 
-from tests.scene.ply_files import numbered, vertices
-from tests.scene.samples import same, sample
+from tests.fields.surfels.ply_files import numbered, vertices
+from tests.fields.surfels.samples import same, sample
 from texgs.core.rotation import quats_to_matrices
-from texgs.scene.model import Model, Optics, material, raw_material
-from texgs.scene.ply import read_ply, write_ply
+from texgs.fields.surfels.model import ShadingModel, Surfels, material, raw_material
+from texgs.fields.surfels.ply import read_ply, write_ply
 
 RELEASED = ["diffuse_factor", "shininess", "ambient_factor", "specular_factor"]
 
@@ -67,7 +67,7 @@ def test_a_texture_becomes_its_mean(tmp_path, flavour):
     # In any order with gaps, as an atlas may be.
     p["sizes"] = torch.tensor([[1, 1], [2, 3], [4, 1], [3, 3], [1, 5]], dtype=torch.int32)
     p["offsets"] = torch.tensor([99, 50, 0, 60, 10])
-    model = Model(p, Optics(material="paper"))
+    model = Surfels(p, ShadingModel(material="paper"))
     found = vertices(write_ply(tmp_path / "m.ply", model, flavour))
     for n, (size, start) in enumerate(zip(p["sizes"].tolist(), p["offsets"].tolist(), strict=True)):
         mean = p["texels"][start : start + size[0] * size[1]].mean(0)
@@ -93,7 +93,7 @@ def test_the_release_finds_the_same_factors(tmp_path):
     model = sample("shading")
     wanted = raw_material(0.3, 0.6, 0.2, 33.0, "bounded")
     found = vertices(
-        write_ply(tmp_path / "m.ply", Model({**model.parameters, **wanted}, model.optics), "release")
+        write_ply(tmp_path / "m.ply", Surfels({**model.parameters, **wanted}, model.shading), "release")
     )
 
     def sigmoid(x):
@@ -119,13 +119,13 @@ def test_surfels_come_back_exactly(tmp_path_factory, seed, n, degree, flavour):
     model = sample("surfels", n, degree=degree, seed=seed)
     found = read_ply(write_ply(tmp_path_factory.mktemp("p") / "m.ply", model, flavour))
     assert same(found, model)
-    assert found.optics == Optics(low_pass=2.0)
+    assert found.shading == ShadingModel(low_pass=2.0)
 
 
 def test_tiny_surfels_come_back_from_3dgs(tmp_path):
     """Below the third scale that stands for flat."""
     model = sample("surfels")
-    tiny = Model({**model.parameters, "scales": torch.full((7, 2), -20.0)})
+    tiny = Surfels({**model.parameters, "scales": torch.full((7, 2), -20.0)})
     assert same(read_ply(write_ply(tmp_path / "m.ply", tiny, "3dgs")), tiny)
 
 
@@ -133,17 +133,17 @@ def test_tiny_surfels_come_back_from_3dgs(tmp_path):
 @given(color=st.lists(st.floats(0.25, 1, exclude_min=True, width=32), min_size=3, max_size=3))
 def test_relightable_surfels_come_back_from_the_release(tmp_path_factory, color):
     model = sample("shading", n=1, material="paper", low_pass=2.0, facing=False)
-    model = Model({**model.parameters, "colors": torch.tensor([color])}, model.optics)
+    model = Surfels({**model.parameters, "colors": torch.tensor([color])}, model.shading)
     found = read_ply(write_ply(tmp_path_factory.mktemp("p") / "m.ply", model, "release"))
     assert same(found, model)
-    assert found.optics == model.optics
+    assert found.shading == model.shading
 
 
 @settings(max_examples=100, deadline=None)
 @given(color=st.floats(0, 0.25, width=32))
 def test_dark_colours_come_back_to_a_rounding_of_a_half(tmp_path_factory, color):
     model = sample("shading", n=1)
-    model = Model({**model.parameters, "colors": torch.full((1, 3), color)}, Optics(material="paper"))
+    model = Surfels({**model.parameters, "colors": torch.full((1, 3), color)}, ShadingModel(material="paper"))
     found = read_ply(write_ply(tmp_path_factory.mktemp("p") / "m.ply", model, "release"))
     assert float((found.parameters["colors"] - color).abs().max()) <= 2**-25
 
@@ -151,10 +151,10 @@ def test_dark_colours_come_back_to_a_rounding_of_a_half(tmp_path_factory, color)
 def test_a_shared_material_goes_to_every_surfel(tmp_path):
     shared = raw_material(0.3, 0.6, 0.2, 33.0, "bounded")
     model = sample("shading")
-    model = Model({**model.parameters, **shared}, model.optics)
+    model = Surfels({**model.parameters, **shared}, model.shading)
     found = read_ply(write_ply(tmp_path / "m.ply", model, "release"))
     expected = material(model.parameters, "bounded")
-    for name, factor in material(found.parameters, found.optics.material).items():
+    for name, factor in material(found.parameters, found.shading.material).items():
         assert factor.shape == (7,)
         torch.testing.assert_close(factor, expected[name].expand(7), rtol=1e-5, atol=0)
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 import torch
 
-from tests.scene.ply_files import columns_of, numbered, write_vertices
-from tests.scene.samples import sample
+from tests.fields.surfels.ply_files import columns_of, numbered, write_vertices
+from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.scene.ply import read_ply, write_ply
+from texgs.fields.surfels.ply import read_ply, write_ply
 
 
 def release_run(folder):
@@ -33,7 +33,7 @@ def release_run(folder):
 def test_textures_of_the_release(tmp_path):
     path, relightable, pictures = release_run(tmp_path)
     found = read_ply(path)
-    assert (found.stage, found.optics) == ("texture", relightable.optics)
+    assert (found.stage, found.shading) == ("texture", relightable.shading)
     p = found.parameters
     for name in ("means", "quats", "scales", "opacities", "ambient", "shininess"):
         assert torch.equal(p[name], relightable.parameters[name])

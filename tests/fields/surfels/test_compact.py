@@ -9,15 +9,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.numpy import load, save
 
-from tests.scene.samples import STAGES, same, sample
-from tests.scene.test_composition import CAMERA, ball
+from tests.fields.surfels.samples import STAGES, same, sample
+from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
 from texgs.core.rotation import quats_to_matrices
+from texgs.fields.surfels.compact import STEP, open_model, read_compact, seen_surfels, write_compact
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.render import render
 from texgs.metrics.image import psnr
-from texgs.scene.compact import STEP, open_model, read_compact, seen_surfels, write_compact
-from texgs.scene.model_file import write_model
-from texgs.scene.render import render
 from texgs.scene.scene_file import Scene, SceneModel
 
 
@@ -39,7 +39,7 @@ def rewritten(path, **header):
 def test_every_tensor_comes_back_within_its_bound(tmp_path, stage, shared):
     model = sample(stage, shared=shared, low_pass=2.5, material="paper", local_viewer=False)
     found = read_compact(write_compact(tmp_path / "new" / "model.texgs", model))
-    assert (found.stage, found.optics, found.metadata) == (stage, model.optics, model.metadata)
+    assert (found.stage, found.shading, found.metadata) == (stage, model.shading, model.metadata)
     given, got = dict(model.parameters), dict(found.parameters)
     assert given.keys() == got.keys()
     for name in {"means", "palette", "sizes", "offsets"} & given.keys():

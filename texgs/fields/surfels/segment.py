@@ -10,8 +10,8 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.scene.model import Model
-from texgs.scene.texels import owners
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import owners
 
 
 def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
@@ -35,7 +35,7 @@ def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
     return labels
 
 
-def with_variants(model: Model, labels: Tensor, variants: Sequence[Model]) -> Model:
+def with_variants(model: Surfels, labels: Tensor, variants: Sequence[Surfels]) -> Surfels:
     """The model with the texture of each segment taken from its own variant of the model.
 
     Args:

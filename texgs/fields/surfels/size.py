@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from texgs.scene.model import GEOMETRY, MATERIAL, TEXTURE, Model
+from texgs.fields.surfels.model import GEOMETRY, MATERIAL, TEXTURE, Surfels
 
 MIB = 2**20
 # What the paper counts, and what we store; every tensor of a model is in one group.
@@ -12,7 +12,7 @@ COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
 STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", *MATERIAL), "texture": TEXTURE}
 
 
-def sizes(model: Model) -> dict[str, float]:
+def sizes(model: Surfels) -> dict[str, float]:
     """Size of a model in MiB, of its geometry, shading, texture and in total.
 
     `geometry_mib`, `shading_mib`, `texture_mib` and `total_mib` count what the paper's breakdown counts: 10
@@ -24,7 +24,7 @@ def sizes(model: Model) -> dict[str, float]:
     return counted | {f"stored_{name}": value for name, value in stored.items()}
 
 
-def _mebibytes(model: Model, groups: Mapping[str, Collection[str]]) -> dict[str, float]:
+def _mebibytes(model: Surfels, groups: Mapping[str, Collection[str]]) -> dict[str, float]:
     found = {
         f"{group}_mib": sum(x.nbytes for name, x in model.parameters.items() if name in names) / MIB
         for group, names in groups.items()

@@ -8,9 +8,10 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import cameras, images_of, random_surfels
 from texgs.core.camera import orbit
-from texgs.scene.crop import MARGIN, Box, content_box, surfel_box
-from texgs.scene.model import Model, Optics
-from texgs.scene.render import render
+from texgs.fields.surfels.bounds import surfel_box
+from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.surfels.render import render
+from texgs.volume.boxes import MARGIN, Box, content_box
 
 
 def box_of(seen):
@@ -35,16 +36,16 @@ def is_inside(box, other):
 def test_nothing_is_drawn_outside_the_box_of_the_surfels(seed, count, spread, size, distance, low_pass):
     p = random_surfels(seed, count, spread, size)
     camera = orbit(seed % 360, 20, distance, 50, 48, 40)
-    optics = Optics(low_pass)
-    alpha = render(Model(p, optics), camera).alpha
+    shading = ShadingModel(low_pass)
+    alpha = render(Surfels(p, shading), camera).alpha
     if (alpha > 0).any():
-        assert is_inside(box_of(alpha > 0), surfel_box(p, optics, camera))
+        assert is_inside(box_of(alpha > 0), surfel_box(p, shading, camera))
 
 
 def test_the_box_is_not_much_larger_than_what_is_drawn():
     p = random_surfels(3, 200, 0.05, 0.02)
     camera = orbit(30, 20, 2, 50, 200, 200)
-    drawn, box = box_of(render(Model(p), camera).alpha > 0), surfel_box(p, Optics(), camera)
+    drawn, box = box_of(render(Surfels(p), camera).alpha > 0), surfel_box(p, ShadingModel(), camera)
     assert max(abs(a - b) for a, b in zip(drawn, box, strict=True)) <= 10
 
 
@@ -53,12 +54,12 @@ def test_a_surfel_around_the_camera_or_nowhere_needs_the_whole_image(mean):
     p = random_surfels(0, 4, 0.0, 0.1)
     camera = cameras(1)[0]
     p["means"][0] = camera.position if mean[2] == 1 else torch.tensor(mean)
-    assert surfel_box(p, Optics(), camera) == Box(0, 0, camera.width, camera.height)
+    assert surfel_box(p, ShadingModel(), camera) == Box(0, 0, camera.width, camera.height)
 
 
 def test_no_surfels_need_one_place():
     p = {"means": torch.zeros(0, 3), "scales": torch.zeros(0, 2)}
-    assert surfel_box(p, Optics(), cameras(1)[0]) == Box(16, 16, 16, 16)
+    assert surfel_box(p, ShadingModel(), cameras(1)[0]) == Box(16, 16, 16, 16)
 
 
 def test_content_is_what_is_not_white():
@@ -82,8 +83,8 @@ def test_a_box_gets_a_margin_but_stays_in_the_image_with_a_pixel_at_least():
 
 def test_the_camera_of_a_part_sees_that_part():
     p, camera = random_surfels(5, 40, 0.2, 0.1), orbit(30, 20, 1.5, 50, 48, 40)
-    whole = render(Model(p), camera).color
-    part = render(Model(p), camera.crop(7, 3, 40, 31)).color
+    whole = render(Surfels(p), camera).color
+    part = render(Surfels(p), camera.crop(7, 3, 40, 31)).color
     assert_close(part, whole[3:31, 7:40], atol=2e-5, rtol=0)
 
 

@@ -14,14 +14,14 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
-from texgs.scene.model import Model
-from texgs.scene.tensor_file import read_tensor_file
+from texgs.core.tensor_file import read_tensor_file
+from texgs.fields.surfels.model import Surfels
 
 FORMAT = "texgs-texture"
 VERSION = 1
 
 
-def write_texture(path: str | Path, model: Model, metadata: Mapping[str, Any] | None = None) -> Path:
+def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] | None = None) -> Path:
     """Write texels and colours of a model, with the sizes of its textures to know it by, in one step.
 
     Args:
@@ -43,7 +43,7 @@ def write_texture(path: str | Path, model: Model, metadata: Mapping[str, Any] | 
     return write_bytes(path, save(tensors, header))
 
 
-def with_texture(model: Model, path: str | Path) -> Model:
+def with_texture(model: Surfels, path: str | Path) -> Surfels:
     """The model with the texels and colours of a variant; a file without colours keeps those of the model.
 
     Raises:

@@ -2,13 +2,19 @@
 
 import torch
 
-from texgs.scene.model import Model, Optics
+from texgs.fields.surfels.model import ShadingModel, Surfels
 
 STAGES = ("surfels", "shading", "texture")
 
 
 def sample(
-    stage: str = "texture", n: int = 7, *, degree: int = 3, shared: bool = False, seed: int = 0, **optics
+    stage: str = "texture",
+    n: int = 7,
+    *,
+    degree: int = 3,
+    shared: bool = False,
+    seed: int = 0,
+    **shading,
 ):
     """A model of a stage; `shared` gives all surfels one material."""
     generator = torch.Generator().manual_seed(seed)
@@ -27,10 +33,12 @@ def sample(
         counts = sizes.long().prod(1)
         p |= {"palette": torch.rand(3, generator=generator), "texels": normal(int(counts.sum()), 3)}
         p |= {"sizes": sizes, "offsets": counts.cumsum(0) - counts}
-    return Model(p, Optics(**optics), {"light": {"kind": "headlight"}, "bounds": [[-0.5, 0.1], [1e-7, 2]]})
+    return Surfels(
+        p, ShadingModel(**shading), {"light": {"kind": "headlight"}, "bounds": [[-0.5, 0.1], [1e-7, 2]]}
+    )
 
 
-def same(one: Model, other: Model) -> bool:
+def same(one: Surfels, other: Surfels) -> bool:
     """Whether all tensors have the same names, types and bits."""
     return one.parameters.keys() == other.parameters.keys() and all(
         x.dtype == other.parameters[name].dtype

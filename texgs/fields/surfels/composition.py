@@ -12,13 +12,13 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.model import MATERIAL, Surfels, geometry, material
+from texgs.fields.surfels.render import light_direction, viewer
+from texgs.fields.surfels.segment import labels_of
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import blinn_phong_texture
-from texgs.scene.edits import Edit
-from texgs.scene.model import MATERIAL, Model, geometry, material
-from texgs.scene.render import light_direction, viewer
-from texgs.scene.segment import labels_of
-from texgs.volume.view_set import Light
 
 Look = Literal["shaded", "unshaded", "ambient", "diffuse", "specular", "shininess"]
 
@@ -30,7 +30,7 @@ class Part:
     Its methods take the edit of what no segment holds, and one for each segment behind it.
     """
 
-    model: Model
+    model: Surfels
     colors: Tensor  # [N, 3] offsets from the palette
     palette: Tensor | None  # [3]; None without texture
     material: Mapping[str, Tensor]  # factors, [N] or [1]
@@ -39,7 +39,7 @@ class Part:
     labels: Tensor | None = None  # [N] number of the segment, 0 for none; None without segments
 
     @classmethod
-    def of(cls, model: Model, masks: Sequence[Tensor] = ()) -> Part:
+    def of(cls, model: Surfels, masks: Sequence[Tensor] = ()) -> Part:
         """The part of a relightable model.
 
         Args:
@@ -54,7 +54,7 @@ class Part:
                 "model: expected stage shading or texture, got surfels; fit its shading first"
             )
         p = model.parameters
-        factors = material(p, model.optics.material)
+        factors = material(p, model.shading.material)
         labels = labels_of(masks, len(model)) if masks else None
         return cls(
             model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid(), len(masks), labels
@@ -92,16 +92,16 @@ class Part:
 
     def look(self, edits: Sequence[Edit], camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Base [N, 3] and gain [N]: colour of a fragment is base + gain * texel."""
-        p, optics, n = self.model.parameters, self.model.optics, len(self.model)
+        p, shading, n = self.model.parameters, self.model.shading, len(self.model)
         colors, (a, d, s, b) = self.colored(edits), self.factors(edits)
         if look == "unshaded":
             return colors, torch.ones_like(self.opacities)
         if look != "shaded":
             value = (a, d, s, b)[MATERIAL.index(look)].expand(n)
             return value[:, None].expand(n, 3), torch.zeros_like(self.opacities)
-        seen_from, direction = viewer(camera, optics), light_direction(light, camera)
+        seen_from, direction = viewer(camera, shading), light_direction(light, camera)
         base, gain = blinn_phong_texture(
-            colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=optics.facing
+            colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=shading.facing
         )
         return base.clamp(0, 1), gain
 
@@ -123,17 +123,17 @@ class Composition:
             is not one of its model.
     """
 
-    def __init__(self, models: Sequence[Model], segments: Sequence[Sequence[Tensor]] | None = None) -> None:
+    def __init__(self, models: Sequence[Surfels], segments: Sequence[Sequence[Tensor]] | None = None) -> None:
         if not models:
             raise ArgumentError("models: expected at least one, got none")
-        passes = sorted({model.optics.low_pass for model in models})
+        passes = sorted({model.shading.low_pass for model in models})
         if len(passes) > 1:
             raise ArgumentError(
                 f"models: expected one low_pass, got {' and '.join(map(str, passes))}; fit them by one recipe"
             )
         masks = [()] * len(models) if segments is None else segments
         self.parts = [Part.of(model, own) for model, own in zip(models, masks, strict=True)]
-        self.options = models[0].optics.options
+        self.options = models[0].shading.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
         self.texels, self.sizes, self.offsets = joined_textures(models)
@@ -145,7 +145,7 @@ class Composition:
     def render(
         self,
         camera: Camera,
-        light: Light = Light("headlight"),  # noqa: B008, it is frozen
+        light: Light = HEADLIGHT,
         edits: Sequence[Edit] | None = None,
         *,
         look: Look = "shaded",
@@ -204,7 +204,7 @@ def by_part(parts: Sequence[Part], edits: Sequence[Edit] | None) -> list[Sequenc
     return [edits[end - count : end] for count, end in zip(counts, accumulate(counts), strict=True)]
 
 
-def joined_textures(models: Sequence[Model]) -> tuple[Tensor, Tensor, Tensor]:
+def joined_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
     """Texels [T, 3], sizes [N, 2] and offsets [N] of all models; surfels without any get one texel of 0."""
     texels, sizes, offsets, count = [], [], [], 0
     for model in models:

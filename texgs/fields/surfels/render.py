@@ -8,18 +8,18 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.surfels.model import ShadingModel, Surfels, geometry, material
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import blinn_phong, blinn_phong_texture
 from texgs.raster.spherical_harmonics import spherical_harmonics
-from texgs.scene.model import Model, Optics, geometry, material
-from texgs.volume.view_set import Light
 
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
 
 
-def viewer(camera: Camera, optics: Optics) -> Tensor:
+def viewer(camera: Camera, shading: ShadingModel) -> Tensor:
     """Place [3] that directions to the viewer lead to: the camera, or far behind it for a distant viewer."""
-    if optics.local_viewer:
+    if shading.local_viewer:
         return camera.position
     return -FAR * camera.viewmat[2, :3]
 
@@ -32,24 +32,26 @@ def light_direction(light: Light, camera: Camera) -> Tensor | None:
 
 
 def shaded(
-    parameters: Mapping[str, Tensor], optics: Optics, camera: Camera, light: Light
+    parameters: Mapping[str, Tensor], shading: ShadingModel, camera: Camera, light: Light
 ) -> Tensor | Texture:
     """Colours [N, 3] of the surfels in a view, or their texture with base and gain; differentiable."""
     p = parameters
     if "ambient" not in p:
         return spherical_harmonics(p["sh"], p["means"], camera.position)
-    a, d, s, b = material(p, optics.material).values()
-    rest = (a, d, s, b, p["means"], p["quats"], viewer(camera, optics), light_direction(light, camera))
+    a, d, s, b = material(p, shading.material).values()
+    rest = (a, d, s, b, p["means"], p["quats"], viewer(camera, shading), light_direction(light, camera))
     if "texels" not in p:
-        return blinn_phong(p["colors"], *rest, facing=optics.facing).clamp(0, 1)  # as renderers of volumes do
-    base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest, facing=optics.facing)
+        return blinn_phong(p["colors"], *rest, facing=shading.facing).clamp(
+            0, 1
+        )  # as renderers of volumes do
+    base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest, facing=shading.facing)
     return Texture(base.clamp(0, 1), gain, p["texels"], p["sizes"], p["offsets"])
 
 
 def render(
-    model: Model,
+    model: Surfels,
     camera: Camera,
-    light: Light = Light("headlight"),  # noqa: B008, it is frozen
+    light: Light = HEADLIGHT,
     *,
     background: Tensor | None = None,
     outputs: Collection[str] = (),
@@ -63,7 +65,7 @@ def render(
         background: [3]; white by default.
         outputs: of the rasterizer.
     """
-    colored = shaded(model.parameters, model.optics, camera, light)
+    colored = shaded(model.parameters, model.shading, camera, light)
     kind = "texture" if isinstance(colored, Texture) else "features"
     return rasterize(
         *geometry(model.parameters),
@@ -73,6 +75,6 @@ def render(
         camera.height,
         background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
         outputs=outputs,
-        options=model.optics.options,
+        options=model.shading.options,
         **{kind: colored},  # type: ignore[arg-type]
     )

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from safetensors.torch import load, save
 
-from tests.scene.samples import STAGES, same, sample
+from tests.fields.surfels.samples import STAGES, same, sample
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
-from texgs.scene.model import Model
-from texgs.scene.model_file import FORMAT, read_model, write_model
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import FORMAT, read_model, write_model
 
 
 def rewritten(path, tensors=None, **description):
@@ -34,7 +34,7 @@ def test_round_trip_is_exact(tmp_path, stage, shared):
     model = sample(stage, shared=shared, low_pass=2.5, material="paper", local_viewer=False)
     found = read_model(write_model(tmp_path / "new" / "model.safetensors", model))
     assert same(found, model)
-    assert (found.stage, found.optics, found.metadata) == (stage, model.optics, model.metadata)
+    assert (found.stage, found.shading, found.metadata) == (stage, model.shading, model.metadata)
 
 
 @settings(max_examples=30, deadline=None)
@@ -46,7 +46,7 @@ def test_round_trip_is_exact(tmp_path, stage, shared):
 )
 def test_any_finite_value_and_any_metadata_come_back(tmp_path_factory, values, metadata):
     model = sample("shading", n=1)
-    model = Model({**model.parameters, "means": torch.tensor([values])}, model.optics, metadata)
+    model = Surfels({**model.parameters, "means": torch.tensor([values])}, model.shading, metadata)
     found = read_model(write_model(tmp_path_factory.mktemp("m") / "m", model))
     assert same(found, model)
     assert found.metadata == metadata
@@ -65,7 +65,7 @@ def test_the_same_model_gives_the_same_bytes(tmp_path):
 def test_views_of_one_memory_and_gradients_are_written(tmp_path):
     model = sample("shading")
     twice = torch.randn(7, 6, requires_grad=True)
-    model = Model({**model.parameters, "means": twice[:, ::2], "colors": twice[:, ::2]})
+    model = Surfels({**model.parameters, "means": twice[:, ::2], "colors": twice[:, ::2]})
     found = read_model(write_model(tmp_path / "m", model))
     assert torch.equal(found.parameters["means"], twice[:, ::2])
     assert not found.parameters["colors"].requires_grad
@@ -134,7 +134,10 @@ def test_files_that_are_no_model_are_named(tmp_path):
         ({"version": math.inf}, "expected JSON with a version"),
         ({"stage": "cooked"}, "expected stage surfels, shading, texture, got 'cooked'"),
         ({"stage": []}, "expected stage surfels, shading, texture"),
-        ({"optics": {"low_pass": 2.0, "lens": 1}}, "expected stage, optics and metadata in the header"),
+        (
+            {"optics": {"low_pass": 2.0, "lens": 1}},
+            "expected stage, optics and metadata in the header",
+        ),
         ({"optics": {"material": "wood"}}, "optics: expected values"),
         ({"optics": {"low_pass": -1}}, "optics: expected values"),
         ({"optics": {"low_pass": "thin"}}, "expected stage, optics and metadata in the header"),

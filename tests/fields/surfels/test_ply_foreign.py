@@ -5,12 +5,12 @@ import pytest
 import torch
 from plyfile import PlyData, PlyElement
 
+from tests.fields.surfels.ply_files import columns_of, write_vertices
+from tests.fields.surfels.samples import STAGES, same, sample
 from tests.real_data import real_data
-from tests.scene.ply_files import columns_of, write_vertices
-from tests.scene.samples import STAGES, same, sample
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.scene.model import Model
-from texgs.scene.ply import read_ply, write_ply
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.ply import read_ply, write_ply
 
 
 def test_text_other_orders_and_doubles_are_read(tmp_path):
@@ -39,10 +39,10 @@ def test_what_a_flavour_cannot_express(tmp_path):
     with pytest.raises(ArgumentError, match="release needs a model with shading, got stage surfels"):
         write_ply(path, sample("surfels"), "release")
     model = sample("shading", shared=True)
-    sharp = Model({**model.parameters, "shininess": torch.tensor([3.0])}, model.optics)
+    sharp = Surfels({**model.parameters, "shininess": torch.tensor([3.0])}, model.shading)
     with pytest.raises(ArgumentError, match=r"shininess: expected less than 50.*got up to 95\.3"):
         write_ply(path, sharp, "release")
-    bad = Model({**model.parameters, "means": torch.full((7, 3), math.nan)})
+    bad = Surfels({**model.parameters, "means": torch.full((7, 3), math.nan)})
     with pytest.raises(ArgumentError, match="means: expected finite values, got 21 NaN"):
         write_ply(path, bad)
     assert list(tmp_path.iterdir()) == []

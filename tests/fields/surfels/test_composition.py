@@ -2,14 +2,14 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.scene.samples import sample
+from tests.fields.surfels.samples import sample
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
-from texgs.scene.model import Model, Optics, raw_material
-from texgs.scene.render import render
-from texgs.volume.view_set import Light
+from texgs.core.light import Light
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.render import render
 
 CAMERA = orbit(30, 20, 3, 40, 64, 48)
 SIDE = Light("directional", 100, 30)
@@ -37,7 +37,7 @@ def ball(seed, n=150, stage="texture", shared=True, middle=0.0):
             "sizes": sizes,
             "offsets": counts.cumsum(0) - counts,
         }
-    return Model(p, Optics())
+    return Surfels(p, ShadingModel())
 
 
 def union(*models):
@@ -54,7 +54,7 @@ def union(*models):
         count += len(q["texels"])
         parts.append(q)
     p = {name: torch.cat([q[name] for q in parts]) for name in parts[0]}
-    return Model({**p, "palette": torch.zeros(3)}, models[0].optics)
+    return Surfels({**p, "palette": torch.zeros(3)}, models[0].shading)
 
 
 @pytest.mark.parametrize("light", [Light("headlight"), SIDE])
@@ -95,7 +95,7 @@ def test_an_edit_is_the_model_with_other_numbers():
         "opacities": opacities,
         **raw_material(**factors, kind="bounded"),
     }
-    expected = render(Model({**p, **changed}, model.optics), CAMERA, SIDE)
+    expected = render(Surfels({**p, **changed}, model.shading), CAMERA, SIDE)
     assert_close(Composition([model]).render(CAMERA, SIDE, [edit]).color, expected.color, atol=2e-5, rtol=0)
 
 
@@ -103,7 +103,7 @@ def test_an_opacity_above_one_is_one():
     model = ball(5)
     found = Composition([model]).render(CAMERA, SIDE, [Edit(opacity=1000.0)])
     full = {**model.parameters, "opacities": torch.full((150,), 40.0)}
-    assert torch.equal(found.alpha, render(Model(full), CAMERA, SIDE).alpha)
+    assert torch.equal(found.alpha, render(Surfels(full), CAMERA, SIDE).alpha)
 
 
 def test_edits_do_not_copy_texels():
@@ -125,7 +125,7 @@ def test_without_light_colours_are_those_of_palette_and_texels():
     model = ball(1, n=3000)
     flat = {**model.parameters, "texels": torch.zeros_like(model.parameters["texels"])}
     flat["colors"] = torch.zeros_like(flat["colors"])
-    found = Composition([Model(flat)]).render(CAMERA, SIDE, look="unshaded", background=torch.zeros(3))
+    found = Composition([Surfels(flat)]).render(CAMERA, SIDE, look="unshaded", background=torch.zeros(3))
     assert_close(found.color, found.alpha[..., None] * flat["palette"], atol=1e-5, rtol=0)
 
 
@@ -134,7 +134,11 @@ def test_without_light_colours_are_those_of_palette_and_texels():
     [
         ([], None, "models: expected at least one, got none"),
         ([sample("surfels")], None, "expected stage shading or texture, got surfels"),
-        ([ball(1), Model(ball(2).parameters, Optics(2.0))], None, r"expected one low_pass, got 2.0 and 6.0"),
+        (
+            [ball(1), Surfels(ball(2).parameters, ShadingModel(2.0))],
+            None,
+            r"expected one low_pass, got 2.0 and 6.0",
+        ),
         ([ball(1)], [Edit(), Edit()], "edits: expected one for each of 1 models, got 2"),
         ([ball(1, stage="shading")], [Edit(palette=(0, 0, 0))], "palette: expected a model with a texture"),
     ],

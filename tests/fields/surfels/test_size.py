@@ -1,10 +1,10 @@
 import pytest
 import torch
 
-from tests.scene.samples import STAGES, sample
-from texgs.scene.model import Model
-from texgs.scene.model_file import write_model
-from texgs.scene.size import sizes
+from tests.fields.surfels.samples import STAGES, sample
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.size import sizes
 
 N_TEXELS = 10_000_000  # per basic scene, found by a bisection of 0.1 %
 
@@ -36,7 +36,7 @@ def test_counts_what_the_paper_counts(dataset):
     p = {name: x.expand(n, *x.shape[1:]) for name, x in whole.parameters.items() if name in per_surfel}
     p |= {"palette": torch.zeros(3), "texels": torch.zeros(1, 3).expand(n_scenes * N_TEXELS, 3)}
     p |= {"sizes": torch.ones(1, 2, dtype=torch.int32).expand(n, 2), "offsets": torch.arange(n)}
-    found = sizes(Model(p))
+    found = sizes(Surfels(p))
     assert round(found["geometry_mib"], 1) == geometry
     assert round(found["shading_mib"], 1) == shading
     assert found["texture_mib"] == pytest.approx(texture, rel=1e-3)

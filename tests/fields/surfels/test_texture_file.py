@@ -2,16 +2,16 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
-from tests.scene.samples import same, sample
+from tests.fields.surfels.samples import same, sample
 from texgs.core.errors import ArgumentError
-from texgs.scene.model import Model
-from texgs.scene.texture_file import with_texture, write_texture
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texture_file import with_texture, write_texture
 
 
 def restyled(model):
     """The model with other texels and colours."""
     p = model.parameters
-    return Model({**p, "texels": p["texels"] + 0.5, "colors": -p["colors"]}, model.optics, model.metadata)
+    return Surfels({**p, "texels": p["texels"] + 0.5, "colors": -p["colors"]}, model.shading, model.metadata)
 
 
 def test_a_variant_brings_texels_and_colours_and_nothing_else(tmp_path):

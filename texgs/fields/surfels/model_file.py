@@ -16,9 +16,9 @@ from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
 from texgs.core.reading import reading
+from texgs.fields.surfels.model import GEOMETRY, MATERIAL, SHAPES, TEXTURE, ShadingModel, Surfels
 from texgs.raster import Texture
 from texgs.raster.atlas import check_texture
-from texgs.scene.model import GEOMETRY, MATERIAL, SHAPES, TEXTURE, Model, Optics
 
 FORMAT = "texgs-model"
 VERSION = 1
@@ -27,11 +27,12 @@ NEEDED = {"surfels": (*GEOMETRY, "sh"), "shading": SHADED, "texture": (*SHADED, 
 DTYPES = {"sizes": torch.int32, "offsets": torch.int64}  # all others are float32
 
 
-def write_model(path: str | Path, model: Model) -> Path:
+def write_model(path: str | Path, model: Surfels) -> Path:
     """Create or replace a model file in one step; the same model gives the same bytes.
 
     A safetensors file with the raw tensors under their names. Its header has one entry, "texgs-model": JSON
-    with `version`, `stage`, `optics` and `metadata`. One, because safetensors keeps no order of entries.
+    with `version`, `stage`, `optics` (the shading model) and `metadata`. One, because safetensors keeps no
+    order of entries.
 
     Args:
         path: target, by custom `model.safetensors`.
@@ -51,7 +52,7 @@ def write_model(path: str | Path, model: Model) -> Path:
     return write_bytes(path, save(arrays, {FORMAT: text}))
 
 
-def describe(path: str | Path, model: Model) -> dict[str, Any]:
+def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
     """Describe a model for the JSON of a file at `path`, and check that its tensors can be written.
 
     Raises:
@@ -61,7 +62,7 @@ def describe(path: str | Path, model: Model) -> dict[str, Any]:
     description = {
         "version": VERSION,
         "stage": model.stage,
-        "optics": asdict(model.optics),
+        "optics": asdict(model.shading),
         "metadata": dict(model.metadata),
     }
     try:
@@ -71,7 +72,7 @@ def describe(path: str | Path, model: Model) -> dict[str, Any]:
     return description
 
 
-def read_model(path: str | Path) -> Model:
+def read_model(path: str | Path) -> Surfels:
     """Read a model file as `write_model` writes it, bit for bit, to the CPU. Nothing in it is executed.
 
     Raises:
@@ -82,15 +83,15 @@ def read_model(path: str | Path) -> Model:
     return model_of(path, *_open(path))
 
 
-def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Model:
+def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Surfels:
     """Make a model of the tensors of a file and its description (see `describe`).
 
     Raises:
         ArgumentError, ShapeError: as `read_model`.
     """
     try:
-        stage, optics = str(description["stage"]), _optics(description["optics"])
-        model = Model(tensors, optics, dict(description["metadata"]))
+        stage, shading = str(description["stage"]), _optics(description["optics"])
+        model = Surfels(tensors, shading, dict(description["metadata"]))
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     except (KeyError, TypeError, ValueError) as error:
@@ -148,16 +149,16 @@ def _short(value: object) -> str:
     return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
 
 
-def _optics(stored: dict[str, Any]) -> Optics:
-    optics = Optics(**stored)
-    are_flags = isinstance(optics.local_viewer, bool) and isinstance(optics.facing, bool)
-    known = optics.material in ("bounded", "paper") and are_flags
-    if not known or not 0 < float(optics.low_pass) < math.inf:
+def _optics(stored: dict[str, Any]) -> ShadingModel:
+    shading = ShadingModel(**stored)
+    are_flags = isinstance(shading.local_viewer, bool) and isinstance(shading.facing, bool)
+    known = shading.material in ("bounded", "paper") and are_flags
+    if not known or not 0 < float(shading.low_pass) < math.inf:
         raise ArgumentError(f"optics: expected values of texgs {FORMAT} version {VERSION}, got {stored}")
-    return optics
+    return shading
 
 
-def _check(path: str | Path, model: Model, stage: str) -> None:
+def _check(path: str | Path, model: Surfels, stage: str) -> None:
     """Require the tensors of a stage with finite values, of the right type, in a layout that can be drawn.
 
     Raises:

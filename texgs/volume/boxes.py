@@ -7,18 +7,10 @@ step takes a third of the memory traffic.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from math import ceil, floor, isfinite
 from typing import NamedTuple
 
 import numpy as np
-import torch
-from torch import Tensor
 
-from texgs.core.camera import Camera
-from texgs.scene.model import Optics
-
-REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, below which nothing is drawn
 MARGIN = 11  # pixels: a window of SSIM, so that those of pixels near content end in white
 
 
@@ -51,34 +43,3 @@ def content_box(planes: np.ndarray) -> Box:
         return Box(middle_x, middle_y, middle_x, middle_y)
     columns, rows = np.flatnonzero(seen.any(axis=0)), np.flatnonzero(seen.any(axis=1))
     return Box(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)
-
-
-@torch.no_grad()
-def surfel_box(parameters: Mapping[str, Tensor], optics: Optics, camera: Camera) -> Box:
-    """A box around the projected bounding spheres of all surfels. Waits for a GPU once.
-
-    The whole image where a sphere reaches behind the camera, or a value is not finite.
-    """
-    whole = Box(0, 0, camera.width, camera.height)
-    means = parameters["means"]
-    if not len(means):
-        return Box(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
-    viewmat = camera.viewmat.to(means.device)
-    x, y, z = (means @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(dim=1)
-    reach = REACH * parameters["scales"].amax(dim=1).exp()
-    near, far = z - reach, z + reach
-    bounds = [near.min()]
-    for at in (x, y):
-        low, high = at - reach, at + reach
-        bounds += [torch.minimum(low / near, low / far).min(), torch.maximum(high / near, high / far).max()]
-    nearest, left, right, top, bottom = torch.stack(bounds).tolist()
-    if not isfinite(sum((nearest, left, right, top, bottom))) or nearest <= 0:
-        return whole
-    (fx, cx), (fy, cy) = camera.K[0, ::2].tolist(), camera.K[1, 1:].tolist()
-    disc = REACH / max(optics.low_pass, 1e-6) ** 0.5  # of the low-pass filter, pixels
-    return Box(
-        floor(fx * left + cx - disc),
-        floor(fy * top + cy - disc),
-        ceil(fx * right + cx + disc),
-        ceil(fy * bottom + cy + disc),
-    )

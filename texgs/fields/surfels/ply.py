@@ -15,10 +15,10 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_atomic
 from texgs.core.ply_file import read_vertices
 from texgs.core.rotation import quats_to_matrices
+from texgs.fields.surfels.model import ShadingModel, Surfels, material
+from texgs.fields.surfels.release_texture import read_texture
+from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.spherical_harmonics import DEGREES
-from texgs.scene.model import Model, Optics, material
-from texgs.scene.release_texture import read_texture
-from texgs.scene.texels import mean_texels
 
 FLAVOURS = ("2dgs", "3dgs", "release")
 Y00 = 0.5 / math.sqrt(math.pi)  # the constant harmonic
@@ -32,7 +32,7 @@ RELEASE = {  # our name of a factor by the release's, in the order of its files
 MOST_SPECULAR, MOST_SHININESS = 5.0, 50.0  # of the release
 
 
-def write_ply(path: str | Path, model: Model, flavour: str = "2dgs") -> Path:
+def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
     """Create or replace a binary PLY file in one step.
 
     All flavours hold means, unit normals (which 2DGS leaves at zero), opacities, scales and quaternions raw,
@@ -69,7 +69,7 @@ def write_ply(path: str | Path, model: Model, flavour: str = "2dgs") -> Path:
     parameters = {name: x.detach().cpu() for name, x in model.parameters.items()}
     try:
         check.finite(**parameters)
-        columns = _columns(Model(parameters, model.optics), flavour)
+        columns = _columns(Surfels(parameters, model.shading), flavour)
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     vertices = np.empty(len(model), [(name, "<f4") for name in columns])
@@ -78,13 +78,13 @@ def write_ply(path: str | Path, model: Model, flavour: str = "2dgs") -> Path:
     return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
 
 
-def read_ply(path: str | Path) -> Model:
+def read_ply(path: str | Path) -> Surfels:
     """Read surfels from a PLY file of 2DGS, of the paper's release, or of 3DGS where Gaussians are flat.
 
     Files are told apart by their properties. Those of the release become models of stage shading with
     material "paper" and colours of at least 0, as it clamps them; its textured ones, of stage texture, see
-    `texgs.scene.release_texture.read_texture`; all others, of stage surfels. The low-pass filter is that of
-    2DGS, as no file says; `dataclasses.replace` gives a model another.
+    `read_texture` of release_texture.py; all others, of stage surfels. The low-pass filter is that of 2DGS,
+    as no file says; `dataclasses.replace` gives a model another.
 
     Raises:
         ArgumentError: if the file is missing, no PLY, cut short or without surfels, or values are not finite.
@@ -95,12 +95,12 @@ def read_ply(path: str | Path) -> Model:
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
             parameters["sh"] = _harmonics(vertices)
-            optics = Optics(low_pass=2.0)
+            shading = ShadingModel(low_pass=2.0)
         else:
             parameters |= _appearance(vertices, path.parent)
-            optics = Optics(low_pass=2.0, material="paper", facing=False)
+            shading = ShadingModel(low_pass=2.0, material="paper", facing=False)
         check.finite(**parameters)
-        return Model(parameters, optics)
+        return Surfels(parameters, shading)
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
 
@@ -108,7 +108,7 @@ def read_ply(path: str | Path) -> Model:
 # -- writing ---
 
 
-def _columns(model: Model, flavour: str) -> dict[str, Tensor]:
+def _columns(model: Surfels, flavour: str) -> dict[str, Tensor]:
     """[N] values by property, in the order of the flavour."""
     p = model.parameters
     normals = quats_to_matrices(p["quats"])[..., 2]  # [N, 3]
@@ -140,11 +140,11 @@ def _color(p: Mapping[str, Tensor]) -> Tensor:
     return p["colors"].double() + p["palette"].double() + mean_texels(p)
 
 
-def _release_material(model: Model) -> dict[str, Tensor]:
+def _release_material(model: Surfels) -> dict[str, Tensor]:
     """Raw material under the release's names and activations, [N] each."""
     raw = {name: model.parameters[name] for name in RELEASE.values()}
-    if model.optics.material != "paper":
-        raw = material({name: x.double() for name, x in raw.items()}, model.optics.material)
+    if model.shading.material != "paper":
+        raw = material({name: x.double() for name, x in raw.items()}, model.shading.material)
         if bool((raw["shininess"] >= MOST_SHININESS).any()):
             raise ArgumentError(
                 f"shininess: expected less than {MOST_SHININESS:g}, as the release can express, got up to "

@@ -8,19 +8,19 @@ import yaml
 from safetensors.torch import load_file, save_file
 from torch.testing import assert_close
 
-from tests.scene.samples import sample
-from tests.scene.test_composition import CAMERA, OUTPUTS, SIDE, ball
+from tests.fields.surfels.samples import sample
+from tests.fields.surfels.test_composition import CAMERA, OUTPUTS, SIDE, ball
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.scene.compact import write_compact
-from texgs.scene.composition import Composition
-from texgs.scene.edits import Edit
+from texgs.fields.part_edit import Edit
+from texgs.fields.surfels.compact import write_compact
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.segment import labels_of, with_variants
+from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.export import joined
-from texgs.scene.model import Model
-from texgs.scene.model_file import write_model
 from texgs.scene.scene_file import Scene, SceneModel, SceneSegment, read_scene, write_scene
-from texgs.scene.segment import labels_of, with_variants
 from texgs.scene.segment_file import read_segment, write_segment
-from texgs.scene.texture_file import write_texture
 
 HALF = torch.arange(150) % 2 == 0
 TENTH = torch.arange(150) < 15
@@ -33,7 +33,7 @@ def only(model, mask):
         p[name] = p[name][mask]
     for name in ("ambient", "diffuse", "specular", "shininess"):
         p[name] = p[name] if len(p[name]) == 1 else p[name][mask]
-    return Model(p, model.optics)
+    return Surfels(p, model.shading)
 
 
 def with_texels(model, texels):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,10 +12,10 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.scene.crop import Box, content_box, surfel_box
-from texgs.scene.model import Optics
+from texgs.core.light import Light
+from texgs.volume.boxes import Box, content_box
 from texgs.volume.reduced import over_white, smaller
-from texgs.volume.view_set import Light, View
+from texgs.volume.view_set import View
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,11 +67,6 @@ class Images:
         planes = planes.to(device).float().div_(255)
         color = planes[:3].permute(1, 2, 0)
         return Target(color, planes[3], camera.to(device), self.lights[index], share)
-
-    def visible(self, index: int, parameters: Mapping[str, Tensor], optics: Optics) -> Target:
-        """The part of a view in which it or the surfels show anything, on the surfels' device."""
-        around = surfel_box(parameters, optics, self.cameras[index])
-        return self.target(index, parameters["means"].device, around)
 
 
 def load(views: Sequence[View], reduce: int = 1) -> Images:

@@ -20,7 +20,7 @@ SHININESS = (1.0, 100.0)  # range of the bounded exponent
 
 
 @dataclass(frozen=True)
-class Optics:
+class ShadingModel:
     """What belongs to a model because it was fitted with it."""
 
     low_pass: float = 6.0  # of the rasterizer, see texgs.raster.Options
@@ -35,7 +35,7 @@ class Optics:
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class Surfels:
     """Raw parameters by name, all float32 on one device.
 
     - geometry: `means` [N, 3] world units, `quats` [N, 4] wxyz of any length, `scales` [N, 2] natural
@@ -50,7 +50,7 @@ class Model:
     """
 
     parameters: Mapping[str, Tensor]
-    optics: Optics = field(default_factory=Optics)
+    shading: ShadingModel = field(default_factory=ShadingModel)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -71,7 +71,7 @@ class Model:
     def __len__(self) -> int:
         return len(self.parameters["means"])
 
-    def to(self, device: torch.device | str) -> Model:
+    def to(self, device: torch.device | str) -> Surfels:
         """The same model on another device."""
         return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
 

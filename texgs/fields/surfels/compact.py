@@ -20,10 +20,10 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 from texgs.core.memory import require_memory
 from texgs.core.reading import reading
-from texgs.scene.model import Model
-from texgs.scene.model_file import describe, model_of, read_model
-from texgs.scene.render import render
-from texgs.scene.texels import mean_texels, owners
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import describe, model_of, read_model
+from texgs.fields.surfels.render import render
+from texgs.fields.surfels.texels import mean_texels, owners
 
 FORMAT = "texgs-compact"
 VERSION = 1
@@ -37,7 +37,9 @@ COPIES = 6  # of what is unpacked, in memory at a time: texels are bytes in the 
 MEMORY = 2**28  # bytes that unpacking may use besides its result; these files need 9 MiB
 
 
-def write_compact(path: str | Path, model: Model, seen: Tensor | None = None, *, step: float = STEP) -> Path:
+def write_compact(
+    path: str | Path, model: Surfels, seen: Tensor | None = None, *, step: float = STEP
+) -> Path:
     """Create or replace a compact model file in one step; the same model gives the same bytes.
 
     Means and palette stay exact, and so does a material that all surfels share. Texels are rounded to
@@ -72,7 +74,7 @@ def write_compact(path: str | Path, model: Model, seen: Tensor | None = None, *,
     return write_bytes(path, json.dumps(header, separators=(",", ":")).encode() + b"\n" + packed)
 
 
-def read_compact(path: str | Path) -> Model:
+def read_compact(path: str | Path) -> Surfels:
     """Read a compact model file to the CPU. Nothing in it is executed.
 
     Raises:
@@ -89,7 +91,7 @@ def read_compact(path: str | Path) -> Model:
     return model_of(path, header["model"], parameters)
 
 
-def open_model(path: str | Path) -> Model:
+def open_model(path: str | Path) -> Surfels:
     """Read a model file of either kind, lossless or compact, told apart by how it begins.
 
     Raises:
@@ -105,7 +107,7 @@ def open_model(path: str | Path) -> Model:
 
 
 @torch.no_grad()
-def seen_surfels(model: Model, cameras: Sequence[Camera]) -> Tensor:
+def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
     """Which surfels [N] bool are blended into a pixel of any view.
 
     Edits that make a model more transparent can show others.
@@ -120,7 +122,7 @@ def seen_surfels(model: Model, cameras: Sequence[Camera]) -> Tensor:
 # -- writing ---
 
 
-def _without_unseen(model: Model, seen: Tensor) -> Model:
+def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
     """The model with one texel, the mean, for each unseen surfel."""
     check.shape("seen", seen, "N", N=len(model))
     if seen.dtype != torch.bool:

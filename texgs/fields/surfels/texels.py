@@ -8,7 +8,7 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
-from texgs.scene.model import Model
+from texgs.fields.surfels.model import Surfels
 
 
 def owners(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
@@ -28,7 +28,7 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
     return (running[offsets + counts] - running[offsets]) / counts[:, None]
 
 
-def bare_colors(model: Model) -> Tensor:
+def bare_colors(model: Surfels) -> Tensor:
     """c_ind of all texels [T, 3], each in its place in the list: palette + offset of its surfel + texel."""
     p = model.parameters
     place, surfel = owners(p)
@@ -37,7 +37,7 @@ def bare_colors(model: Model) -> Tensor:
     return p["palette"] + offsets + p["texels"]
 
 
-def recolored(model: Model, colors: Tensor, surfels: Tensor | None = None) -> Model:
+def recolored(model: Surfels, colors: Tensor, surfels: Tensor | None = None) -> Surfels:
     """Return the model with other colours without light: offsets are their means, texels the differences.
 
     Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in

@@ -1,0 +1,38 @@
+"""The one light of a view or of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from torch import Tensor
+
+from texgs.core.camera import Camera, orbit_direction
+from texgs.core.errors import ArgumentError
+
+
+@dataclass(frozen=True)
+class Light:
+    """White light from one direction: from the camera, or fixed in the world.
+
+    Raises:
+        ArgumentError: if the kind is unknown.
+    """
+
+    kind: Literal["headlight", "directional"]
+    azimuth: float = 0.0  # degrees, of a directional light; see orbit_direction
+    polar: float = 0.0  # degrees above the horizon
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("headlight", "directional"):
+            raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
+
+    def direction(self, camera: Camera) -> Tensor:
+        """Unit vector [3], float64, from the origin to the light; for a headlight, to the camera."""
+        if self.kind == "directional":
+            return orbit_direction(self.azimuth, self.polar)
+        position = camera.position.double().cpu()
+        return position / position.norm()
+
+
+HEADLIGHT = Light("headlight")
