@@ -13,6 +13,7 @@ from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
+from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.memory import keep_freed_memory
 from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
@@ -22,7 +23,7 @@ from texgs.volume.images import Images
 
 SURFELS = {400: 15_000, 800: 40_000}  # by image size; for other sizes those of the settings
 VIEWS = 8
-DISTANCE = 2 * 4.0311  # as the paper's cameras see an object of side 2
+DISTANCE = 2 * Lens().radius  # as the paper's cameras see an object of side 2
 PROFILED = 40  # steps
 LOSSES = Losses(alpha=0.1, normal=0.05, smoothness=0.01)
 RATES = Rates(*[1e-12] * 8)  # the scene stays as heavy as it is

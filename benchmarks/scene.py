@@ -11,12 +11,17 @@ from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.camera import orbit
 from texgs.core.light import Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
 
 MODELS, SURFELS, SIDE = 4, 30_000, 4  # models, surfels in each, texels along each side of a texture
-EDITS = [Edit(palette=(0.2, 0.6, 0.4)), Edit(opacity=0.5), Edit(diffuse=1.5), Edit(visible=False)]
+EDITS = [
+    PartEdit(palette=(0.2, 0.6, 0.4)),
+    PartEdit(opacity=0.5),
+    PartEdit(diffuse=1.5),
+    PartEdit(visible=False),
+]
 
 
 def run(settings: Settings) -> Section:

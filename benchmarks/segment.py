@@ -16,14 +16,14 @@ from texgs.core.camera import Camera, orbit
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import HEADLIGHT, Views
 from texgs.edit.votes import CentreVotes, ContributionVotes
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.models.grabcut import GrabCut
 from texgs.volume.cameras import icosphere
 
 MOST = 512  # pixels of a view that votes
-EDITS = [Edit(), Edit(palette=(0.2, 0.6, 0.4), opacity=0.7)]
+EDITS = [PartEdit(), PartEdit(palette=(0.2, 0.6, 0.4), opacity=0.7)]
 
 
 def run(settings: Settings) -> Section:

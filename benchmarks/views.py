@@ -19,6 +19,7 @@ from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.errors import DeviceError
+from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.cameras import icosphere
@@ -57,7 +58,7 @@ def _run(settings: Settings) -> Section:
     section = Section()
     size, pixels, n_views = (24, 64, 2) if settings.is_quick else (128, 512, 64)
     grid, look = sphere(size), Appearance()
-    shots = icosphere(3, 4.0311, 30.0, pixels, pixels)[:n_views]
+    shots = icosphere(3, *Lens().square(pixels))[:n_views]
     where = {"volume": size, "size": pixels}
     cases = [
         frame(grid, replace(look, step=step), shots[0], settings, where | {"step": step})

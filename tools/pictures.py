@@ -11,6 +11,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from texgs.core.camera import Camera, orbit
+from texgs.core.lens import Lens
 from texgs.core.progress import progress
 from texgs.report.strip import content, write_strip
 from texgs.scene.frame import frame
@@ -39,7 +40,7 @@ def shown(title: str, camera: Camera) -> np.ndarray:
 
 def write_hero(path: Path) -> None:
     """Six looks of one scene, a label below each."""
-    camera = orbit(30, 20, 4.0311, 30, 2 * PANEL, 2 * PANEL)
+    camera = orbit(30, 20, *Lens().square(2 * PANEL))
     pictures = [shown(title, camera) for title in progress(HERO, title=path.name, unit="look")]
     box = content(pictures)
     sheet = Image.new("RGB", (COLUMNS * PANEL, len(HERO) // COLUMNS * (PANEL + LABEL)), "white")
@@ -55,7 +56,8 @@ def write_hero(path: Path) -> None:
 def write_looks(path: Path) -> None:
     """Each edit from two sides."""
     titles = [title for title in LOOKS if title not in ("recoloured", "relit")]
-    sides = {"front": orbit(30, 20, 4.0311, 30, 512, 512), "from above": orbit(150, 50, 4.0311, 30, 512, 512)}
+    lens = Lens().square(512)
+    sides = {"front": orbit(30, 20, *lens), "from above": orbit(150, 50, *lens)}
     rows = {side: [shown(title, camera) for title in titles] for side, camera in sides.items()}
     small(Image.open(write_strip(path, rows, titles)), path)
 

@@ -10,9 +10,9 @@ from PIL import Image
 
 from tests.cli.test_scene_stages import WORDS
 from texgs.cli.main import main
-from texgs.cli.stages.edit_image import method, with_what_is_there
 from texgs.core.errors import MissingDataError
 from texgs.edit.recipe import preset
+from texgs.methods.image import ImageKeys, how, weights, with_what_is_there
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
@@ -120,7 +120,7 @@ def test_a_part_named_twice(results, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("verb", "words", "message"),
     [
-        ("edit_text", ["edit=glass"], "edit.kind: expected text, got image (edit=glass)"),
+        ("edit_text", ["edit=glass"], "edit.method: expected text, got image (edit=glass)"),
         ("edit_image", ["edit=glass", "edit.base=glass"], "edit.base: glass starts from itself"),
         ("edit_image", ["edit=glass", "edit.image.style=glas"], "edit.image.style: expected the file of a"),
         ("edit_image", ["edit=glass", "edit.image.recipe=default"], "vgg16: its weights"),
@@ -231,11 +231,9 @@ def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
 
 def test_without_clip_lambda_s_is_one_and_says_so():
     wanted = preset("paper")
-    weights = {"clip-vit-base-patch32": None}
-    settings = {"edit": {"image": {"lambda_s": None}}, "clip": "clip-vit-base-patch32", "weights": weights}
-    found = with_what_is_there(wanted, settings)
-    assert found == replace(wanted, lambda_s=1.0)
-    assert method(found, wanted) == "VGG-16 without CLIP, its weights are missing"
-    asked = {**settings, "edit": {"image": {"lambda_s": 0.9}}}
-    assert with_what_is_there(wanted, asked) == wanted
-    assert with_what_is_there(wanted, {**settings, "weights": {"clip-vit-base-patch32": "0f3c"}}) == wanted
+    recipe = with_what_is_there(wanted, "clip-vit-base-patch32", {"clip-vit-base-patch32": None})
+    assert recipe == replace(wanted, lambda_s=1.0)
+    assert how(recipe, wanted) == "VGG-16 without CLIP, its weights are missing"
+    assert with_what_is_there(wanted, "clip-vit-base-patch32", {"clip-vit-base-patch32": "0f3c"}) == wanted
+    assert weights(ImageKeys(recipe="paper"), "clip") == {"vgg16": True, "clip": False}
+    assert weights(ImageKeys(recipe="paper", lambda_s=0.9), "clip") == {"vgg16": True, "clip": True}

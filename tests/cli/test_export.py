@@ -8,7 +8,7 @@ from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.compact import read_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.ply import read_ply
@@ -26,7 +26,7 @@ def model(tmp_path):
 def scene(tmp_path, model):
     """scene.yaml with two models, one of which is red."""
     other = write_model(tmp_path / "b.safetensors", ball(2, n=80))
-    edit = Edit(palette=(1, 0, 0), opacity=0.5)
+    edit = PartEdit(palette=(1, 0, 0), opacity=0.5)
     return write_scene(tmp_path / "scene.yaml", Scene({"A": SceneModel(model), "B": SceneModel(other, edit)}))
 
 

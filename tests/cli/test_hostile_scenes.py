@@ -13,8 +13,8 @@ from safetensors.torch import save, save_file
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
-from texgs.cli.stages.parts import edit_parts
 from texgs.core.errors import ArgumentError, OutOfMemoryError
+from texgs.edit.parts import edit_parts
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene

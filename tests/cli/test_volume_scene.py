@@ -8,7 +8,7 @@ from texgs.cli.stages.volume_scene import VolumeScene, edited
 from texgs.core.camera import orbit
 from texgs.core.io import write_json
 from texgs.core.light import Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.scene_file import Scene, SceneModel
 from texgs.volume.generate import sphere
@@ -22,10 +22,10 @@ HIGH = {"opacity": [[0.6, 0.0], [0.7, 0.9], [1.0, 0.9]], "color": [[0.6, 0.8, 0.
 
 
 def test_opacity_and_colour_of_a_transfer_function():
-    found = edited(TF, Edit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
+    found = edited(TF, PartEdit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
     assert found.opacity == ((0, 0), (1, 0.75), (2, 1.0)), "at most 1"
     np.testing.assert_allclose(found.color, [(0, 0.4, 0.4, 0.2), (2, 0.6, 0.6, 0.4)])
-    assert edited(TF, Edit(), ()) == TF
+    assert edited(TF, PartEdit(), ()) == TF
 
 
 @pytest.fixture(scope="module")
@@ -48,19 +48,19 @@ CAMERA, LIGHT = orbit(20, 10, 4, 30, 48, 48), Light("headlight")
 
 def test_every_edit_reaches_the_picture(volume):
     plain = volume.render(CAMERA, LIGHT)
-    assert np.array_equal(volume.render(CAMERA, LIGHT, [Edit(), Edit()]), plain)
+    assert np.array_equal(volume.render(CAMERA, LIGHT, [PartEdit(), PartEdit()]), plain)
     palettes = [(0.2, 0.3, 0.8), (0.8, 0.5, 0.2)]
-    red = volume.render(CAMERA, LIGHT, [Edit(palette=(0.9, 0.3, 0.1)), Edit()], palettes)
+    red = volume.render(CAMERA, LIGHT, [PartEdit(palette=(0.9, 0.3, 0.1)), PartEdit()], palettes)
     assert red[..., 0].sum() > 1.1 * plain[..., 0].sum()
     assert red[..., 2].sum() < 0.9 * plain[..., 2].sum()
     np.testing.assert_allclose(red[..., 3], plain[..., 3], atol=1e-3)
-    faint = volume.render(CAMERA, LIGHT, [Edit(opacity=0.2), Edit()])
+    faint = volume.render(CAMERA, LIGHT, [PartEdit(opacity=0.2), PartEdit()])
     assert faint[..., 3].sum() < plain[..., 3].sum()
-    dark = volume.render(CAMERA, LIGHT, [Edit(ambient=0.2, diffuse=0.2, specular=0.0)] * 2)
+    dark = volume.render(CAMERA, LIGHT, [PartEdit(ambient=0.2, diffuse=0.2, specular=0.0)] * 2)
     assert dark[..., :3].sum() < 0.5 * plain[..., :3].sum()
-    alone = volume.render(CAMERA, LIGHT, [Edit(visible=False), Edit()])
+    alone = volume.render(CAMERA, LIGHT, [PartEdit(visible=False), PartEdit()])
     assert alone[..., 3].sum() < plain[..., 3].sum()
-    assert not volume.render(CAMERA, LIGHT, [Edit(visible=False)] * 2).any()
+    assert not volume.render(CAMERA, LIGHT, [PartEdit(visible=False)] * 2).any()
     side = volume.render(CAMERA, Light("directional", 110, 0))
     assert np.abs(side - plain).max() > 0.1
 
@@ -69,7 +69,7 @@ def test_a_scene_is_compared_with_the_volume_that_has_its_edits(volume):
     asked = []
     volume_render = volume.render
     fake = type("V", (), {"render": lambda self, *words: asked.append(words) or volume_render(*words)})()
-    edits = [Edit(opacity=0.5), Edit(palette=(0, 1, 0))]
+    edits = [PartEdit(opacity=0.5), PartEdit(palette=(0, 1, 0))]
     models = {str(i): SceneModel("x", edit) for i, edit in enumerate(edits)}
     step = Step("both", Scene(models, LIGHT))
     numbers, shown = compared(step, Composition([ball(1), ball(2)]), fake, [CAMERA])

@@ -27,7 +27,7 @@ def there(monkeypatch, tmp_path):
 def settings(stage, *words):
     """Digest of the settings of an edit's job, as the workflow plans it."""
     config = compose(("dataset=orbital", *words))
-    used = weights_of(stage, config, Checksums())
+    used = weights_of(STAGES[stage], config, Checksums())
     return settings_digest({**STAGES[stage].settings(config), "weights": used}), used
 
 
@@ -50,7 +50,7 @@ def test_an_edit_changes_with_the_weights_that_it_uses_and_no_others(there):
     assert set(used) == {"vgg16", CLIP}, "without lambda_s CLIP is used where it is there"
     _, used = settings("edit_segment", "edit=lobe", "edit.segment.masks=mobile_sam")
     assert used == {"mobile_sam": None}
-    assert weights_of("shading", compose(("dataset=orbital",)), Checksums()) == {}
+    assert weights_of(STAGES["shading"], compose(("dataset=orbital",)), Checksums()) is None
 
 
 def test_a_job_works_with_the_weights_it_was_planned_with(there):

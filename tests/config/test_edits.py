@@ -3,7 +3,6 @@ import pytest
 from texgs.config.compose import compose
 from texgs.config.edits import edits
 from texgs.config.project import members
-from texgs.config.stage import EDITS
 from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
 
@@ -20,7 +19,7 @@ def test_every_edit_of_conf_composes_and_is_named_after_its_file():
     for name in members("edit"):
         edit = compose(("dataset=engine", f"edit={name}")).edit
         assert edit.name == name
-        assert (edit.kind == "none") == (name == "none")
+        assert (edit.method == "none") == (name == "none")
         assert edit.base is None or edit.base in members("edit")
 
 
@@ -32,8 +31,8 @@ def test_what_an_edit_starts_from_comes_before_it():
 def test_a_base_and_parts_can_be_given_as_words():
     words = ("edit=glass", "edit.base=lobe", "edit.parts=[TF02/lobe]", "edit.name=part")
     lobe, part = (compose(each).edit for each in edits(words))
-    assert (lobe.name, lobe.kind, lobe.base, list(lobe.parts)) == ("lobe", "segment", None, [])
-    assert (part.name, part.kind, part.base, list(part.parts)) == ("part", "image", "lobe", ["TF02/lobe"])
+    assert (lobe.name, lobe.method, lobe.base, list(lobe.parts)) == ("lobe", "segment", None, [])
+    assert (part.name, part.method, part.base, list(part.parts)) == ("part", "image", "lobe", ["TF02/lobe"])
 
 
 def test_a_changed_value_holds_for_the_edit():
@@ -61,11 +60,14 @@ def test_a_mistake_is_one_sentence(words, message):
         [compose(each) for each in edits(words)]
 
 
-def test_each_kind_has_its_stage_and_the_models_are_those_of_another_configuration():
-    for name, kind in (("glass", "image"), ("gold", "text"), ("lobe", "segment")):
+def test_each_method_has_its_stage_and_the_models_are_those_of_another_configuration():
+    for name, stages in (
+        ("glass", {"edit_image", "edit_metrics"}),
+        ("gold", {"edit_text", "edit_metrics"}),
+        ("lobe", {"edit_segment"}),
+    ):
         config = compose(("dataset=engine", f"edit={name}"))
-        applying = [stage for stage in STAGES.values() if stage.applies(config)]
-        assert {stage.name for stage in applying} == {key for key, kinds in EDITS.items() if kind in kinds}
+        assert {stage.name for stage in STAGES.values() if stage.applies(config)} == stages
 
 
 def test_an_edit_reads_the_scene_of_its_base():

@@ -1,8 +1,8 @@
 import pytest
 
 from texgs.config.compose import compose
+from texgs.config.places import fit_folder
 from texgs.config.project import members
-from texgs.config.stage import fit_folder
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.core.errors import ConfigError

@@ -3,7 +3,7 @@ import torch
 
 from tests.edit.scenes import ball, views
 from texgs.edit.canvas import extent, paint, visible_part
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 
@@ -36,7 +36,7 @@ def test_a_part_is_what_the_scene_renders_there(scene, is_lit, look, opacity):
     cameras, lights = views()
     scene.parameters["opacities"].fill_(0.5)
     full = Composition([scene]).render(
-        cameras[0], lights[0], [Edit(opacity=opacity)], look=look, background=torch.zeros(3)
+        cameras[0], lights[0], [PartEdit(opacity=opacity)], look=look, background=torch.zeros(3)
     )
     canvas = paint(scene, scene.parameters["texels"], cameras[0], lights[0], opacity=opacity, is_lit=is_lit)
     assert canvas.alpha.numel() < full.alpha.numel()

@@ -11,7 +11,7 @@ from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side
 from texgs.edit.stylize import stylize
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import GEOMETRY, MATERIAL, Surfels
 from texgs.fields.surfels.render import render
@@ -133,14 +133,14 @@ def test_the_palette_of_a_styled_model_can_still_be_changed(style):
     cameras, lights = views()
     model = stylize(ball(), cameras, lights, style, preset("preview")).model
     palette = model.parameters["palette"]
-    moved = Edit(palette=tuple((palette + torch.tensor([0.1, 0.0, 0.2])).tolist()))
+    moved = PartEdit(palette=tuple((palette + torch.tensor([0.1, 0.0, 0.2])).tolist()))
     scene = Composition([model])
     plain = scene.render(cameras[0], look="unshaded")
     edited = scene.render(cameras[0], edits=[moved], look="unshaded")
     expected = plain.color + plain.alpha[..., None] * torch.tensor([0.1, 0.0, 0.2])
     torch.testing.assert_close(edited.color, expected, atol=1e-5, rtol=0)
-    darker = Edit(palette=tuple((palette - 0.1).clamp_min(0).tolist()))
-    lit, dark = (scene.render(cameras[0], edits=[edit]).color.mean() for edit in (Edit(), darker))
+    darker = PartEdit(palette=tuple((palette - 0.1).clamp_min(0).tolist()))
+    lit, dark = (scene.render(cameras[0], edits=[edit]).color.mean() for edit in (PartEdit(), darker))
     assert dark < lit - 0.01, "with light, too, and where colours become smaller"
 
 

@@ -12,7 +12,7 @@ from texgs.core.light import Light
 from texgs.edit.axis_views import axis_cameras
 from texgs.edit.target_update import Policy, update
 from texgs.edit.target_views import render_views
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
 
@@ -107,7 +107,7 @@ def test_later_rounds_see_the_others_as_they_are(model, options):
 def test_the_palette_still_recolours(model):
     done = update(model, around(6), Tint((0.5, 0.5, 0.5)), "x", QUICK)
     shift = torch.tensor([0.2, -0.1, 0.1])
-    edit = Edit(palette=tuple((model.parameters["palette"] + shift).tolist()))
+    edit = PartEdit(palette=tuple((model.parameters["palette"] + shift).tolist()))
     scene, camera = Composition([done.model]), around(3)[0]
     plain = scene.render(camera, look="unshaded")
     moved = scene.render(camera, edits=[edit], look="unshaded")

@@ -15,7 +15,7 @@ def rows(table):
 
 
 def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
-    edit = {"edit": "glass", "kind": "image", "method": "patches", "lambda_s": None, "edit_seconds": 90.0}
+    edit = {"edit": "glass", "method": "image", "how": "patches", "lambda_s": None, "edit_seconds": 90.0}
     paths = [metrics(tmp_path, "edit_image", edit)]
     measured = {
         "edit": "glass",
@@ -39,8 +39,8 @@ def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
 
 
 def test_what_was_not_measured_says_so_and_why(tmp_path):
-    edit = {"edit": "pick", "kind": "segment", "method": "grabcut", "edit_seconds": 6.0}
-    other = {"edit": "gold", "kind": "text", "method": "filters", "edit_seconds": 6.0}
+    edit = {"edit": "pick", "method": "segment", "how": "grabcut", "lambda_s": None, "edit_seconds": 6.0}
+    other = {"edit": "gold", "method": "text", "how": "filters", "lambda_s": None, "edit_seconds": 6.0}
     missing = {"edit": "gold", "clip_missing": "the weights of x are not on this machine"}
     paths = [
         metrics(tmp_path, stage, numbers)

@@ -7,7 +7,7 @@ from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.errors import ArgumentError
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import read_ply, write_ply
@@ -15,7 +15,7 @@ from texgs.fields.surfels.render import render
 from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.scene.export import joined, write_points
 
-EDITS = [Edit(palette=(0.9, 0.1, 0.4), opacity=0.6), Edit(visible=False), Edit(opacity=3.0)]
+EDITS = [PartEdit(palette=(0.9, 0.1, 0.4), opacity=0.6), PartEdit(visible=False), PartEdit(opacity=3.0)]
 
 
 def plain(seed):
@@ -55,7 +55,7 @@ def test_joined_surfels_look_like_the_edited_scene_without_light():
 
 
 def test_a_scene_goes_through_a_file_of_gaussians(tmp_path):
-    surfels = joined(Composition([plain(1), plain(2)]).parts, [Edit(), Edit(opacity=0.5)])
+    surfels = joined(Composition([plain(1), plain(2)]).parts, [PartEdit(), PartEdit(opacity=0.5)])
     back = read_ply(write_ply(tmp_path / "scene.ply", surfels, "3dgs"))
     for name, values in surfels.parameters.items():
         assert torch.equal(back.parameters[name], values), name
@@ -63,7 +63,7 @@ def test_a_scene_goes_through_a_file_of_gaussians(tmp_path):
 
 def test_nothing_visible_is_refused():
     parts = Composition([ball(1)]).parts
-    for edit in (Edit(visible=False), Edit(opacity=0)):
+    for edit in (PartEdit(visible=False), PartEdit(opacity=0)):
         with pytest.raises(ArgumentError, match="expected at least one visible surfel, got none"):
             joined(parts, [edit])
     with pytest.raises(ArgumentError, match="edits: expected one for each of 1 models, got 2"):

@@ -4,7 +4,7 @@ import torch
 
 from tests.fields.surfels.test_composition import CAMERA, SIDE, ball
 from texgs.core.errors import ArgumentError
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels, raw_material
 from texgs.scene.frame import frame
@@ -16,7 +16,7 @@ def scene():
 
 
 def shot(scene, mode, **options):
-    return frame(scene, CAMERA, SIDE, [Edit()], mode, **options)
+    return frame(scene, CAMERA, SIDE, [PartEdit()], mode, **options)
 
 
 def test_colour_is_what_is_rendered(scene):
@@ -63,7 +63,7 @@ def test_factors_are_grey_over_black():
 
 def test_nothing_to_see_is_the_background(scene):
     for mode in ("shaded", "normal", "depth"):
-        found = frame(scene, CAMERA, SIDE, [Edit(visible=False)], mode, (1.0, 0.0, 0.0))
+        found = frame(scene, CAMERA, SIDE, [PartEdit(visible=False)], mode, (1.0, 0.0, 0.0))
         assert (found == [255, 0, 0]).all()
 
 

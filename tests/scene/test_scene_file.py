@@ -9,7 +9,7 @@ from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
@@ -29,10 +29,10 @@ def folder(tmp_path):
 def scene_in(folder):
     first = SceneModel(
         folder / "a" / "model.safetensors",
-        Edit(palette=(0.1, 0.2, 0.3), opacity=0.5),
+        PartEdit(palette=(0.1, 0.2, 0.3), opacity=0.5),
         folder / "a" / "style.safetensors",
     )
-    second = SceneModel(folder / "b" / "model.safetensors", Edit(visible=False))
+    second = SceneModel(folder / "b" / "model.safetensors", PartEdit(visible=False))
     return Scene({"TF01": first, "TF02": second}, Light("directional", 30, -10), (0.0, 0.5, 1.0))
 
 
@@ -62,7 +62,7 @@ def test_a_folder_may_move(folder):
 
 def test_a_variant_replaces_texels(folder):
     scene = scene_in(folder)
-    styled = scene.open().render(CAMERA, edits=[Edit(), Edit(visible=False)]).color
+    styled = scene.open().render(CAMERA, edits=[PartEdit(), PartEdit(visible=False)]).color
     half = ball(1)
     half = replace(half, parameters={**half.parameters, "texels": half.parameters["texels"] * 0.5})
     write_model(folder / "half.safetensors", half)

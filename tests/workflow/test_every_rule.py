@@ -9,9 +9,9 @@ from tests.workflow.project import Project
 
 # A segment of the only model, and an edit of it alone.
 EDITS = {
-    "piece": "name: piece\nkind: segment\n"
+    "piece": "name: piece\nmethod: segment\n"
     "segment: {model: TF01, name: piece, points: [[0.5, 0.5]], masks: grabcut, views: 12, size: 64}\n",
-    "red": "name: red\nkind: text\nbase: piece\nparts: [TF01/piece]\n"
+    "red": "name: red\nmethod: text\nbase: piece\nparts: [TF01/piece]\n"
     "text: {instruction: make it crimson, guidance: filters}\n",
 }
 SWEEP = "name: tiny\nvariants:\n  few: [fit.seeds.count=150]\n  more: [fit.seeds.count=250]\n"
@@ -21,11 +21,11 @@ SMALL = (
 )
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
-FITS = {"surfels", "shading", "texture"}
-AFTER_FITS = {"figure", "compose", "pse", "timing", "edit_image", "edit_text", "edit_segment", "edit_metrics"}
+FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
+AFTER_FITS = {"figure", "compose", "pse", "timing", "edit", "edit_metrics"}
 TABLES = {"tables", "sweep", "report"}
 RULES = {"volume", "transfer", "views", "sheet"} | FITS | AFTER_FITS | TABLES
-GROUPS = {"all", "volumes", "sheets", "figures", "fits", "scenes", "edits"}  # rules without a command
+GROUPS = {"all", "volumes", "sheets", "figures", "fits", "scenes", "edits", "phase"}  # not told apart
 
 
 def changed(project, extra=""):
@@ -34,10 +34,13 @@ def changed(project, extra=""):
 
 
 def run(project, extra="", *words):
-    """Rules that ran, without those that only name others."""
+    """Rules that ran, phases of fits by their own names, without rules that only name others."""
     done = project.snakemake(*words, **{**OPTIONS, "overrides": f"{SMALL} {extra}"})
     assert done.returncode == 0, done.stdout + done.stderr
-    return set(re.findall(r"^(?:local)?rule (\w+):", done.stdout + done.stderr, re.MULTILINE)) - GROUPS
+    blocks = re.split(r"^(?:local)?rule (?=\w+:)", done.stdout + done.stderr, flags=re.MULTILINE)[1:]
+    rules = {block.partition(":")[0] for block in blocks}
+    phases = {phase for block in blocks for phase in re.findall(r"wildcards: .*\bphase=(\w+)", block)}
+    return {*rules, *phases} - GROUPS
 
 
 def metrics(project):
@@ -157,11 +160,11 @@ def test_a_cut_view_is_rendered_again_and_no_other(project):
 def test_a_failed_edit_keeps_the_earlier_one(project, sources):
     folder = project.work / "results" / "sphere" / "scene" / "demo" / "edits" / "gold"
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    sources("texgs/cli/stages/edit_text.py", "guidance = guidance_of(text", "guidance = no_guidance(text")
+    sources("texgs/methods/text.py", "guidance_of(task.settings", "no_guidance(task.settings")
     failed = project.snakemake(**OPTIONS)
     assert failed.returncode != 0
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-    assert "edit_text" in changed(project), "the earlier result is not taken for the new one"
+    assert "edit" in changed(project), "the earlier result is not taken for the new one"
 
 
 def test_what_was_made_by_hand_is_not_made_again(project):

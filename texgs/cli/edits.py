@@ -1,21 +1,13 @@
 """Mistakes in the configuration of an edit, told before any job runs and any earlier result goes."""
 
-from typing import Any
+from omegaconf import DictConfig
 
-import torch
-from omegaconf import DictConfig, OmegaConf
-
-from texgs.cli.segments import require_name, voting_views
-from texgs.cli.stages.edit_image import picture_of, recipe_of
-from texgs.cli.stages.edit_segment import DISTANCE, FOV, clicks_of
-from texgs.cli.stages.parts import shares
 from texgs.config.compose import compose
 from texgs.config.edits import lineage
 from texgs.config.inputs import scene_before
+from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.core.errors import MissingDataError
-from texgs.models.filters.vocabulary import understand
-from texgs.models.guidance import require_instruction
 
 
 def require_base(words: tuple[str, ...]) -> None:
@@ -30,9 +22,8 @@ def require_base(words: tuple[str, ...]) -> None:
     chain = lineage(words)
     if config.edit.base is not None and not scene_before(config).is_file():
         name, before = chain[-2]
-        raise MissingDataError(
-            f"edit.base: {name} is not done yet; run texgs edit_{compose(before).edit.kind} edit={name} first"
-        )
+        verb = method_of(compose(before).edit).stage
+        raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} edit={name} first")
 
 
 def check_edit(config: DictConfig) -> None:
@@ -41,26 +32,6 @@ def check_edit(config: DictConfig) -> None:
     Raises:
         ArgumentError: naming what is not as it should be.
     """
-    values: Any = OmegaConf.to_container(config.edit, resolve=True)
-    check = {"image": _image, "text": _text, "segment": _segment}.get(values["kind"])
-    if check is not None:
-        check(values)
-
-
-def _image(edit: dict[str, Any]) -> None:
-    recipe_of(edit["image"], edit["seed"])
-    picture_of(edit["image"]["style"])
-    shares("edit.image.region", edit["image"]["region"])
-
-
-def _text(edit: dict[str, Any]) -> None:
-    instruction = require_instruction(edit["text"]["instruction"])
-    if edit["text"]["guidance"] == "filters":
-        understand(instruction)
-
-
-def _segment(edit: dict[str, Any]) -> None:
-    wanted = edit["segment"]
-    require_name(wanted["name"], "edit.segment.name")
-    clicks_of(wanted, torch.device("cpu"))
-    voting_views(wanted["views"], DISTANCE, FOV, wanted["size"])
+    if config.edit.method != NO_METHOD:
+        method = method_of(config.edit)
+        method.check(method.of(config.edit))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
-    from texgs.fields.part_edit import Edit
+    from texgs.fields.part_edit import PartEdit
     from texgs.fields.surfels.composition import Composition
     from texgs.fields.surfels.model import Surfels
     from texgs.raster import Render
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
 DEFAULTS = {".ply": "3dgs", ".texgs": "compact"}
-RADIUS, FOV = 4.0311, 30.0  # of views: world units, vertical degrees
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
 
 
@@ -102,7 +101,9 @@ def kind_of(arguments: argparse.Namespace) -> str:
     return kind
 
 
-def of_scene(arguments: argparse.Namespace, scene: "Composition", edits: "Sequence[Edit]", kind: str) -> Path:
+def of_scene(
+    arguments: argparse.Namespace, scene: "Composition", edits: "Sequence[PartEdit]", kind: str
+) -> Path:
     """Export the visible models of a scene as one."""
     from texgs.fields.surfels.ply import write_ply
     from texgs.scene.export import joined, write_points
@@ -123,7 +124,7 @@ def of_scene(arguments: argparse.Namespace, scene: "Composition", edits: "Sequen
 
 def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path:
     """Export one model; Gaussians with all that they can hold of it."""
-    from texgs.fields.part_edit import Edit
+    from texgs.fields.part_edit import PartEdit
     from texgs.fields.surfels.compact import seen_surfels, write_compact
     from texgs.fields.surfels.composition import Composition
     from texgs.fields.surfels.ply import write_ply
@@ -138,7 +139,7 @@ def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path
     if kind != "mesh":
         return write_ply(arguments.to, model, kind)
     if model.stage != "surfels":
-        return of_scene(arguments, Composition([model]), [Edit()], kind)
+        return of_scene(arguments, Composition([model]), [PartEdit()], kind)
     black = model.parameters["means"].new_zeros(3)
     return write_fused(arguments, lambda camera: render(model, camera, background=black, outputs=("median",)))
 
@@ -158,9 +159,10 @@ def cameras(arguments: argparse.Namespace) -> "list[Camera]":
         ArgumentError: if no icosphere has so many views.
     """
     from texgs.core.errors import ArgumentError
+    from texgs.core.lens import Lens
     from texgs.volume.cameras import icosphere
 
     frequency = isqrt(max(arguments.views - 2, 0) // 10)
     if frequency < 1 or 10 * frequency**2 + 2 != arguments.views:
         raise ArgumentError(f"--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {arguments.views}")
-    return icosphere(frequency, RADIUS, FOV, arguments.size, arguments.size)
+    return icosphere(frequency, *Lens().square(arguments.size))

@@ -40,8 +40,8 @@ class Job:
             ConfigError: if the configuration does not fit the stage.
             MissingDataError: if a file from elsewhere is not there.
         """
-        settings, weights = stage.settings(config), weights_of(stage.name, config, checksums)
-        named = {"weights": weights} if weights else {}
+        settings, weights = stage.settings(config), weights_of(stage, config, checksums)
+        named = {} if weights is None else {"weights": weights}
         return cls(stage, {**settings, **named}, stage.inputs(config), stage.output(config), checksums)
 
     def identity(self) -> dict[str, Any]:
@@ -109,7 +109,12 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
             job.settings, dict(job.inputs), work
         )
         seconds = time.perf_counter() - start
-        metrics = {**record(job.settings, identity, seconds), "run": run.id, "numbers": outcome.numbers}
+        metrics = {
+            **record(job.settings, identity, seconds),
+            "run": run.id,
+            "numbers": outcome.numbers,
+            "pictures": dict(outcome.pictures),
+        }
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
         run.log(
@@ -117,8 +122,8 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
         )
         for step, values in enumerate(series(outcome.numbers)):
             run.log(values, step)
-        for path in (*outcome.pictures, work / result.METRICS):
-            run.artifact(job.output / path.relative_to(work))
+        for name in (*outcome.pictures, result.METRICS):
+            run.artifact(job.output / name)
 
 
 def _tags(job: Job, identity: Mapping[str, Any]) -> dict[str, str]:

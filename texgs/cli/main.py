@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from texgs import __version__
+from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import keep_freed_memory, told
 
@@ -26,9 +27,7 @@ STAGE_VERBS = {
     "compose": "make one scene of the basic models of a data set",
     "pse": "edit colours, opacities and lights of a scene beside those of its volume",
     "timing": "measure how long frames of a scene and of its volume take",
-    "edit_image": "give a scene the style of a picture",
-    "edit_text": "give a scene the look that an instruction asks for",
-    "edit_segment": "make a segment of a model of a scene, by clicks of the configuration",
+    **{method.stage: method.summary for method in methods().values()},
     "edit_metrics": "measure an edited scene: CLIP, style, consistency, time, size",
 }
 VERBS = {

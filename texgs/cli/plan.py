@@ -37,17 +37,16 @@ class Plan:
     experiment: str  # of the store
     mapper_gpu: int  # GPUs that a job of views takes
     fit_gpu: int  # and a job of the fits and edits
-    jobs: dict[str, dict[str, Any]]  # stage, settings file, code and input files of each job, by folder
+    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code and inputs of each job, by folder
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
-    wildcards: dict[str, list[str]]  # values of `dataset`, `views` and `fit`
-    edits: dict[str, list[str]]  # names of edits by their kinds
+    wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
     code: dict[str, str] = field(default_factory=dict)  # digests of modules that are no stages
 
-    def done(self, *stages: str, sweep: str = "") -> list[str]:
-        """The metrics files of all jobs of some stages, of a sweep or of none."""
+    def done(self, *places: str, sweep: str = "") -> list[str]:
+        """The metrics files of all jobs that have one of some places, of a sweep or of none."""
         folders = self.sweeps.get(sweep, ())
-        return sorted(f"{folder}/metrics.json" for folder in folders if self.jobs[folder]["stage"] in stages)
+        return sorted(f"{folder}/metrics.json" for folder in folders if self.jobs[folder]["place"] in places)
 
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
@@ -96,7 +95,9 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
 def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
     from texgs.config.compose import compose
-    from texgs.config.stage import fit_folder
+    from texgs.config.methods import NO_METHOD
+    from texgs.config.places import fit_folder
+    from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
 
     config, checksums = compose(words), Checksums.load()
@@ -118,8 +119,9 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "dataset": sorted({each.dataset.name for each in configs}),
             "views": sorted({each.views.name for each in configs}),
             "fit": sorted({fit_folder(each) for each in configs}),
+            "edit": sorted({each.edit.name for each in configs if each.edit.method != NO_METHOD}),
+            "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },
-        {kind: names_of(configs, kind) for kind in ("image", "text", "segment")},
         {module: code_digest(module) for module in OTHER_CODE},
     )
     checksums.save()
@@ -201,7 +203,13 @@ def plain(job: Job, results: str) -> dict[str, Any]:
     if (job.output / METRICS).exists():
         note_result(settings, None if job.is_done() else f"{job.output}: not whole, or of another job")
     inputs = {name: path.as_posix() for name, path in job.inputs.items()}
-    return {"stage": job.stage.name, "settings": settings, "code": job.stage.code, "inputs": inputs}
+    return {
+        "stage": job.stage.name,
+        "place": job.stage.place,
+        "settings": settings,
+        "code": job.stage.code,
+        "inputs": inputs,
+    }
 
 
 def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:
@@ -213,14 +221,11 @@ def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:
     return {cached_volume(each).as_posix(): (each.url, each.sha256) for each in absent}
 
 
-def names_of(configs: Iterable[DictConfig], kind: str) -> list[str]:
-    """Names of the edits of a kind."""
-    return sorted({config.edit.name for config in configs if config.edit.kind == kind})
-
-
 def missing_weights(configs: Iterable[DictConfig]) -> list[str]:
     """What edits need and this machine has not; mistakes in edits are told first."""
-    edited = [config for config in configs if config.edit.kind != "none"]
+    from texgs.config.methods import NO_METHOD
+
+    edited = [config for config in configs if config.edit.method != NO_METHOD]
     if not edited:
         return []
     from texgs.cli.edits import check_edit  # not at the top: most runs have no edits

@@ -5,10 +5,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from texgs.core.lens import Lens
+
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.core.light import Light
 
+LENS = Lens()
 MOST_FRAMES = 100_000  # an hour of film
 PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
 
@@ -28,7 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--path", choices=PATHS, default="view", help="camera or light path (%(default)s)")
     parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light 61")
-    parser.add_argument("--width", type=int, default=800, help="pixels (%(default)s)")
+    parser.add_argument("--width", type=int, default=LENS.width, help="pixels (%(default)s)")
     parser.add_argument("--height", type=int, help="pixels; default the width")
     parser.add_argument(
         "--azimuth",
@@ -39,9 +42,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--polar", type=float, default=20.0, help="above the horizon, degrees (%(default)s); not of path test"
     )
-    parser.add_argument("--radius", type=float, default=4.0311, help="distance, world units (%(default)s)")
     parser.add_argument(
-        "--fov", type=float, default=30.0, help="vertical field of view, degrees (%(default)s)"
+        "--radius", type=float, default=LENS.radius, help="distance, world units (%(default)s)"
+    )
+    parser.add_argument(
+        "--fov", type=float, default=LENS.fov_y, help="vertical field of view, degrees (%(default)s)"
     )
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second (%(default)s)")
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")

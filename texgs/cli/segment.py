@@ -4,11 +4,16 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.core.lens import Lens
+
 if TYPE_CHECKING:
     import torch
 
     from texgs.edit.clicks import Clicks
     from texgs.scene.scene_file import Scene
+
+
+LENS = Lens()
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,11 +67,13 @@ def add_views(parser: argparse.ArgumentParser) -> None:
     """The views that vote, and the lens of all views."""
     parser.add_argument("--views", type=int, default=42, help="that vote, 10 f^2 + 2 (%(default)s)")
     parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
-    parser.add_argument("--width", type=int, default=800, help="of the view clicked on (%(default)s)")
+    parser.add_argument("--width", type=int, default=LENS.width, help="of the view clicked on (%(default)s)")
     parser.add_argument("--height", type=int, help="default the width")
-    parser.add_argument("--radius", type=float, default=4.0311, help="distance, world units (%(default)s)")
     parser.add_argument(
-        "--fov", type=float, default=30.0, help="vertical field of view, degrees (%(default)s)"
+        "--radius", type=float, default=LENS.radius, help="distance, world units (%(default)s)"
+    )
+    parser.add_argument(
+        "--fov", type=float, default=LENS.fov_y, help="vertical field of view, degrees (%(default)s)"
     )
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
 
@@ -81,21 +88,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the preview, or the segment and the scene that has it."""
     import sys
 
-    from texgs.cli.segments import mask_model, voting_views, with_segment
     from texgs.core.device import torch_device
     from texgs.core.image import write_png
     from texgs.core.names import part_file
     from texgs.edit.lift import lift
     from texgs.edit.preview import preview
+    from texgs.edit.segments import voting_views, with_segment
     from texgs.fields.surfels.compact import open_model
+    from texgs.models.by_name import mask_model
     from texgs.scene.scene_file import read_scene, write_scene
 
     scene = read_scene(arguments.scene)
     name = chosen(arguments, scene)
     device = torch_device(arguments.device)
     clicks = clicks_of(arguments, device)
-    lens = (arguments.radius, arguments.fov, arguments.size)
-    around = [camera.to(device) for camera in voting_views(arguments.views, *lens)]
+    lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
+    around = [camera.to(device) for camera in voting_views(arguments.views, lens)]
     masks = mask_model(arguments.masks, device)
     model = open_model(scene.models[name].file).to(device)
     if arguments.preview:
@@ -146,8 +154,8 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
     Raises:
         ArgumentError: if there is no such model, the new name cannot be one, or nothing is to be written.
     """
-    from texgs.cli.segments import require_name, require_new
     from texgs.core.errors import ArgumentError
+    from texgs.edit.segments import require_name, require_new
 
     name = next(iter(scene.models)) if arguments.model is None and len(scene.models) == 1 else arguments.model
     if name not in scene.models:

@@ -12,6 +12,8 @@ from texgs.core.errors import ArgumentError
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
+    from texgs.config.stage import Stage
+
 
 class HelpWithKeys(argparse.Action):
     """`--help` that also lists every key of the configuration; read only now, because it takes a moment."""
@@ -54,13 +56,12 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
-    from texgs.config.stage import EDITS
     from texgs.config.stages import STAGES
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
-    if stage.name in EDITS:
-        require_edit(stage.name, config)
+    if stage.method or stage.name == "edit_metrics":
+        require_edit(stage, config)
         require_base(tuple(arguments.overrides))
     for name in tf_names(config) if stage.per_tf else [None]:
         chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
@@ -68,19 +69,21 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def require_edit(name: str, config: DictConfig) -> None:
+def require_edit(stage: Stage, config: DictConfig) -> None:
     """Require that the edit of a configuration is one for this stage, without mistakes.
 
     Raises:
         ConfigError, ArgumentError: naming what is not as it should be.
     """
     from texgs.cli.edits import check_edit
-    from texgs.config.stage import EDITS
+    from texgs.config.methods import methods
     from texgs.core.errors import ConfigError
 
-    if config.edit.kind not in EDITS[name]:
+    own = [name for name, method in methods().items() if method.stage == stage.name]
+    expected = own or [name for name, method in methods().items() if method.is_look]
+    if config.edit.method not in expected:
         raise ConfigError(
-            f"edit.kind: expected {' or '.join(EDITS[name])}, got {config.edit.kind} "
+            f"edit.method: expected {' or '.join(expected)}, got {config.edit.method} "
             f"(edit={config.edit.name}); choose another edit of conf/edit"
         )
     check_edit(config)
@@ -117,7 +120,7 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
     from texgs.cli.job import Job, execute
     from texgs.config.locate import tf_names
-    from texgs.config.stage import EDITS, for_tf
+    from texgs.config.stage import for_tf
     from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
 
@@ -126,7 +129,7 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
         fetch_volume(config)
     inputs = stage.inputs(config)
     for needed in stage.needs:
-        if needed in EDITS and config.edit.kind not in EDITS[needed]:
+        if STAGES[needed].method and not STAGES[needed].applies(config):
             continue
         once_per_tf = STAGES[needed].per_tf and not stage.per_tf
         for each in [for_tf(config, tf) for tf in tf_names(config)] if once_per_tf else [config]:
@@ -134,7 +137,7 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
                 ensure(needed, each)
     checksums = Checksums.load()
     job = Job.of(stage, config, checksums)
-    if name in EDITS and name != "edit_metrics" and (force or not job.is_done()):
+    if stage.method and (force or not job.is_done()):
         fetch_weights(config)
         job = Job.of(stage, config, checksums)  # with what was downloaded
     has_run = execute(job, config.tracking.uri, config.tracking.experiment, force=force)

@@ -6,13 +6,14 @@ import argparse
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from texgs.config.methods import NO_METHOD, method_of
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-    from texgs.edit.recipe import Recipe
+    from texgs.config.stage import Stage
 
 SHOWN = 12  # digits of checksums in settings
 
@@ -40,47 +41,39 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def used(config: DictConfig) -> Mapping[str, bool]:
+    """Names of the weights that the edit of a configuration works with, and whether it must have them."""
+    if config.edit.method == NO_METHOD:
+        return {}
+    method = method_of(config.edit)
+    return method.weights(method.of(config.edit), config.metric.clip)
+
+
 def needed(config: DictConfig) -> list[str]:
-    """Names of the weights that the edit of a configuration works with."""
-    edit = config.edit
-    if edit.kind == "image":
-        recipe = _recipe(config)
-        clicked = bool(edit.image.region) and edit.image.masks == "mobile_sam"
-        asks_for_clip = recipe.needs_clip and edit.image.lambda_s is not None  # else it is left out
-        own = {"vgg16": recipe.needs_vgg, config.metric.clip: asks_for_clip, "mobile_sam": clicked}
-        return [name for name, is_needed in own.items() if is_needed]
-    if edit.kind == "text":
-        return ["instruct-pix2pix"] * (edit.text.guidance == "instruct_pix2pix")
-    return ["mobile_sam"] * (edit.kind == "segment" and edit.segment.masks == "mobile_sam")
+    """Names of the weights that the edit of a configuration cannot do without."""
+    return [name for name, must in used(config).items() if must]
 
 
-def _recipe(config: DictConfig) -> Recipe:
-    from texgs.edit.recipe import preset
-
-    image = config.edit.image
-    changes = {key: image[key] for key in ("iterations", "lambda_s") if image[key] is not None}
-    return preset(image.recipe, **changes)
-
-
-def weights_of(stage: str, config: DictConfig, checksums: Checksums) -> dict[str, str | None]:
+def weights_of(stage: Stage, config: DictConfig, checksums: Checksums) -> dict[str, str | None] | None:
     """Checksums of all weights that a stage may work with, None for those that are not on this machine.
 
     They are part of a job's settings: when weights arrive or change, what used them is made again.
 
     Args:
-        stage: name of the stage.
+        stage: of the job.
         config: of one edit, or of none.
         checksums: what is known of files.
+
+    Returns:
+        None for a stage that never works with weights.
     """
-    if stage == "edit_metrics":
+    if stage.name == "edit_metrics":
         names = ["vgg16", "lpips_vgg", config.metric.clip]
-    elif stage in ("edit_image", "edit_text", "edit_segment"):
-        names = needed(config)
-        if config.edit.kind == "image" and _recipe(config).needs_clip:
-            names = [*names, config.metric.clip]
+    elif stage.method:
+        names = list(used(config))
     else:
-        return {}
-    return {name: _short(name, checksums) for name in dict.fromkeys(names)}
+        return None
+    return {name: _short(name, checksums) for name in names}
 
 
 def _short(name: str, checksums: Checksums) -> str | None:

@@ -3,11 +3,12 @@
 from texgs.config.compose import compose, is_scene_file
 from texgs.config.inputs import scene_before
 from texgs.config.locate import tf_names
+from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.config.slips import close
 from texgs.core.errors import ConfigError, MissingDataError
 
-OF_ONE = ("edit.name=", "edit.kind=", "edit.base=", "edit.parts=")  # not of what an edit starts from
+OF_ONE = ("edit.name=", "edit.method=", "edit.base=", "edit.parts=")  # not of what an edit starts from
 
 
 def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
@@ -20,7 +21,7 @@ def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     repeated = [name for name in config.edits if config.edits.count(name) > 1]
     if repeated:
         raise ConfigError(f"edits: expected different names, got {repeated[0]} twice")
-    if not config.edits and config.edit.kind == "none":
+    if not config.edits and config.edit.method == NO_METHOD:
         return []
     given = [(*words, f"edit={name}") for name in config.edits] or [words]
     found: dict[str, tuple[str, ...]] = {}
@@ -91,8 +92,5 @@ def require_parts(chain: list[tuple[str, tuple[str, ...]]]) -> None:
             if part not in known:
                 hint = close(part, known)
                 raise ConfigError(f"edit.parts: expected some of {', '.join(known)}, got {part}{hint}")
-        if edit.kind == "segment":
-            model = edit.segment.model or models[0]
-            if model not in models:
-                raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model}")
-            known.append(f"{model}/{edit.segment.name}")
+        method = method_of(edit)
+        known += method.adds(method.of(edit), models)

@@ -1,14 +1,18 @@
 """Which files and settings the stages of the workflow read."""
 
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig
 
 from texgs.config.compose import is_scene_file
+from texgs.config.edit import EditKeys
 from texgs.config.locate import source_file, tf_names, views_folder
-from texgs.config.stage import folder_of, for_tf
+from texgs.config.methods import method_of
+from texgs.config.places import folder_of, made
+from texgs.config.stage import for_tf
 from texgs.core.errors import ConfigError, MissingDataError
 
 
@@ -20,12 +24,13 @@ def volume_inputs(config: DictConfig) -> dict[str, Path]:
 
 def prepared_volume(config: DictConfig) -> dict[str, Path]:
     """What stage `volume` writes."""
-    return {"volume": folder_of("volume", config) / "volume.nrrd"}
+    return {"volume": made("volume", config)}
 
 
 def view_set(config: DictConfig) -> dict[str, Path]:
     """The views: those that stage `views` renders, or those that the data set consists of."""
-    return {"views": (views_folder(config) or folder_of("views", config)) / "transforms_train.json"}
+    given = views_folder(config)
+    return {"views": made("views", config) if given is None else given / "transforms_train.json"}
 
 
 def seeded(config: DictConfig) -> dict[str, Path]:
@@ -36,7 +41,7 @@ def seeded(config: DictConfig) -> dict[str, Path]:
 
 def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
     """The model that a stage of the fit writes, and the views."""
-    return lambda config: {"model": folder_of(stage, config) / "model.safetensors", **view_set(config)}
+    return lambda config: {"model": made("phase", config, stage), **view_set(config)}
 
 
 def all_models(config: DictConfig) -> dict[str, Path]:
@@ -47,14 +52,12 @@ def all_models(config: DictConfig) -> dict[str, Path]:
     """
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
-    return {
-        name: folder_of("texture", for_tf(config, name)) / "model.safetensors" for name in tf_names(config)
-    }
+    return {name: made("phase", for_tf(config, name), "texture") for name in tf_names(config)}
 
 
 def scene_and_volume(config: DictConfig) -> dict[str, Path]:
     """The scene with its models, and the prepared volume where there is one."""
-    scene = {"scene": folder_of("compose", config) / "scene.yaml", **models_of_scene(config)}
+    scene = {"scene": made("compose", config), **models_of_scene(config)}
     return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
 
 
@@ -96,7 +99,7 @@ def models(config: DictConfig) -> dict[str, Path]:
     """The models that the three phases of the fit write, and the views."""
     phases = ("surfels", "shading", "texture")
     return {
-        **{name: folder_of(name, config) / "model.safetensors" for name in phases},
+        **{name: made("phase", config, name) for name in phases},
         **view_set(config),
     }
 
@@ -119,10 +122,9 @@ def edited_scene(config: DictConfig) -> dict[str, Path]:
     if config.tf is not None:
         raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
     views = {f"views.{name}": view_set(for_tf(config, name))["views"] for name in tf_names(config)}
-    style = Path(config.edit.image.style)
-    picture = {"style": style} if config.edit.kind == "image" and style.is_file() else {}
+    method = method_of(config.edit)
     models = {} if is_scene_file(config.edit.base or "") else models_of_scene(config)
-    return {"scene": scene_before(config), **models, **views, **picture}
+    return {"scene": scene_before(config), **models, **views, **method.files(method.of(config.edit))}
 
 
 def scene_before(config: DictConfig) -> Path:
@@ -133,9 +135,9 @@ def scene_before(config: DictConfig) -> Path:
     """
     base = config.edit.base
     if base is None:
-        return folder_of("compose", config) / "scene.yaml"
+        return made("compose", config)
     if not is_scene_file(base):
-        return folder_of("edit_image", config).with_name(base) / "scene.yaml"
+        return folder_of("edit", config).with_name(base) / made("edit", config).name
     if not Path(base).is_file():
         raise MissingDataError(f"edit.base: {base} is not there; name the file of a scene, or another edit")
     return Path(base)
@@ -143,16 +145,11 @@ def scene_before(config: DictConfig) -> Path:
 
 def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:
     """The scene as fitted and as edited, and the views of all basic TFs."""
-    after = folder_of("edit_image", config) / "scene.yaml"
-    return {**edited_scene(config), "scene": after, "before": folder_of("compose", config) / "scene.yaml"}
+    return {**edited_scene(config), "scene": made("edit", config), "before": made("compose", config)}
 
 
-def edit_settings(part: str | None = None) -> Callable[[DictConfig], dict[str, Any]]:
-    """What a stage of edits reads: what holds for all kinds, and its own part of the edit."""
-
-    def select(config: DictConfig) -> dict[str, Any]:
-        parts = ("image", "text", "segment")
-        edit = {name: value for name, value in config.edit.items() if name not in parts or name == part}
-        return {"edit": edit, **fit_label(config), "reduce": config.fit.reduce, "clip": config.metric.clip}
-
-    return select
+def edit_settings(config: DictConfig) -> dict[str, Any]:
+    """What jobs of edits read: what all edits have, and the keys of this one's method."""
+    keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
+    edit = {name: config.edit[name] for name in keys}
+    return {"edit": edit, **fit_label(config), "reduce": config.fit.reduce, "clip": config.metric.clip}

@@ -12,7 +12,9 @@ from omegaconf import II, MISSING
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
 from texgs.config.keys import key
+from texgs.core.lens import Lens
 
+LENS = Lens()
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -111,8 +113,10 @@ class Views:
     test: CameraPath = key(CameraPath, "test views")
     width: int = key(II("dataset.image"), "width of views", "pixels", least=1)
     height: int = key(II("dataset.image"), "height of views", "pixels", least=1)
-    fov_y: float = key(30.0, "vertical field of view", "degrees", above=0, below=180)
-    radius: float = key(4.0311, "distance of cameras; the volume's longest side is 1", "world units", above=0)
+    fov_y: float = key(LENS.fov_y, "vertical field of view", "degrees", above=0, below=180)
+    radius: float = key(
+        LENS.radius, "distance of cameras; the volume's longest side is 1", "world units", above=0
+    )
     lights: list[Light] = field(
         default_factory=lambda: [Light()],
         metadata={"help": "view i is lit by light i modulo their number"},

@@ -14,45 +14,29 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.code import code_digest, digest
+from texgs.config.places import PLACES, folder_of
 from texgs.core.io import write_atomic
 
 LONG_AGO = 946684800  # the year 2000, in seconds
 
-FOLDERS = {  # of their files, below `results`
-    "volume": "{dataset}/volume",
-    "transfer": "{dataset}/transfer",
-    "views": "{dataset}/{tf}/{views}",
-    "sheet": "{dataset}/{tf}/sheet",
-    "surfels": "{dataset}/{tf}/{fit}/surfels",
-    "shading": "{dataset}/{tf}/{fit}/shading",
-    "texture": "{dataset}/{tf}/{fit}/texture",
-    "figure": "{dataset}/{tf}/{fit}/figure",
-    "compose": "{dataset}/scene/{fit}/compose",
-    "pse": "{dataset}/scene/{fit}/pse",
-    "timing": "{dataset}/scene/{fit}/timing",
-    "edit_image": "{dataset}/scene/{fit}/edits/{edit}",
-    "edit_text": "{dataset}/scene/{fit}/edits/{edit}",
-    "edit_segment": "{dataset}/scene/{fit}/edits/{edit}",
-    "edit_metrics": "{dataset}/scene/{fit}/edit_metrics/{edit}",
-}
-EDITS = {  # stages of edits, and the kinds of edit that they are for
-    "edit_image": ("image",),
-    "edit_text": ("text",),
-    "edit_segment": ("segment",),
-    "edit_metrics": ("image", "text"),
-}
-
 
 @dataclass(frozen=True)
 class Stage:
-    """One arrow of the data flow: a rule of the workflow and a verb of the command line."""
+    """One arrow of the data flow: a verb of the command line, and a job of the workflow."""
 
     name: str
     module: str  # what the job runs
     select: Callable[[DictConfig], dict[str, Any]]  # the part of the configuration that the job reads
     inputs: Callable[[DictConfig], dict[str, Path]]  # the files it reads
+    place: str  # of its files, a key of PLACES, and its rule in the workflow
     needs: tuple[str, ...] = ()  # stages that make these files
-    per_tf: bool = False  # a job per basic TF, not per data set
+    applies: Callable[[DictConfig], bool] = lambda config: True  # whether a data set or edit goes through it
+    method: str = ""  # module of the method that the job runs, for an edit
+
+    @property
+    def per_tf(self) -> bool:
+        """Whether there is a job for each basic TF, not for the whole data set."""
+        return PLACES[self.place].is_per_tf
 
     def settings(self, config: DictConfig) -> dict[str, Any]:
         """What a job reads, as plain lists and dicts.
@@ -66,43 +50,15 @@ class Stage:
         settings = OmegaConf.to_container(OmegaConf.create(selected), resolve=True)
         return {str(name): value for name, value in dict(settings).items()}  # type: ignore[arg-type]
 
-    def applies(self, config: DictConfig) -> bool:
-        """Whether the data set goes through this stage: one of views has no volume."""
-        if self.name in EDITS:
-            return config.tf is None and config.edit.kind in EDITS[self.name]
-        if config.edit.kind != "none":  # the scene that is edited is that of another configuration
-            return False
-        if self.name == "sheet":  # of the views of a sweep there is none
-            return bool(config.views.name == "views")
-        if self.name in ("compose", "pse", "timing"):  # of all basic TFs
-            return config.tf is None
-        return config.dataset.views_folder is None or self.name not in ("volume", "transfer", "views")
-
     def output(self, config: DictConfig) -> Path:
         """Folder of the job's files."""
-        return folder_of(self.name, config)
+        return folder_of(self.place, config, phase=self.name)
 
     @property
     def code(self) -> str:
         """Digest of the code that the job runs."""
-        return code_digest(self.module)
-
-
-def folder_of(stage: str, config: DictConfig) -> Path:
-    """Folder of the files of a stage's job."""
-    return Path(config.results) / FOLDERS[stage].format(
-        dataset=config.dataset.name,
-        tf=config.tf,
-        views=config.views.name,
-        fit=fit_folder(config),
-        edit=config.edit.name,
-    )
-
-
-def fit_folder(config: DictConfig) -> str:
-    """Name of the folder of a fit: the recipe, the variant of a sweep, and a seed other than 0."""
-    seed = f"s{config.fit.seed}" if config.fit.seed else ""
-    return "-".join(part for part in (config.fit.name, config.variant, seed) if part)
+        own = code_digest(self.module)
+        return digest(f"{own} {code_digest(self.method)}") if self.method else own
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:

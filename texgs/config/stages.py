@@ -1,4 +1,6 @@
-"""The stages of the workflow: a row for each."""
+"""The stages of the workflow: a row for each, and one for each method of editing."""
+
+from omegaconf import DictConfig
 
 from texgs.config.inputs import (
     all_models,
@@ -18,131 +20,170 @@ from texgs.config.inputs import (
     volume_inputs,
 )
 from texgs.config.locate import basic_tf
+from texgs.config.methods import NO_METHOD, Method, methods
 from texgs.config.stage import Stage
 
-STAGES = {
-    stage.name: stage
-    for stage in (
-        Stage(
-            "volume",
-            "texgs.cli.stages.volume",
-            select=lambda config: {
-                "volume": {k: v for k, v in config.dataset.volume.items() if k != "obtain"}
-            },
-            inputs=volume_inputs,
-        ),
-        Stage(
-            "transfer",
-            "texgs.cli.stages.transfer",
-            select=lambda config: {key: config.dataset[key] for key in ("title", "tf_values", "basic_tfs")},
-            inputs=prepared_volume,
-            needs=("volume",),
-        ),
-        Stage(
-            "views",
-            "texgs.cli.stages.views",
-            select=lambda config: {
-                "tf_values": config.dataset.tf_values,
-                "points": basic_tf(config),
-                "views": view_settings(config),
-            },
-            inputs=prepared_volume,
-            needs=("volume",),
-            per_tf=True,
-        ),
-        Stage(
-            "sheet",
-            "texgs.cli.stages.sheet",
-            select=lambda config: {},
-            inputs=view_set,
-            needs=("views",),
-            per_tf=True,
-        ),
-        Stage(
-            "surfels",
-            "texgs.cli.stages.surfels",
-            select=lambda config: {
-                **recipe("low_pass", "facing", "activation", "seeds")(config),
-                "phase": config.fit.surfels,
-            },
-            inputs=seeded,
-            needs=("volume", "views"),
-            per_tf=True,
-        ),
-        Stage(
-            "shading",
-            "texgs.cli.stages.shading",
-            select=lambda config: {
-                **recipe("activation", "material", "first_material")(config),
-                "phase": config.fit.shading,
-            },
-            inputs=model_of("surfels"),
-            needs=("surfels", "views"),
-            per_tf=True,
-        ),
-        Stage(
-            "texture",
-            "texgs.cli.stages.texture",
-            select=lambda config: {**recipe()(config), "texture": config.fit.texture},
-            inputs=model_of("shading"),
-            needs=("shading", "views"),
-            per_tf=True,
-        ),
-        Stage(
-            "figure",
-            "texgs.cli.stages.figure",
-            select=lambda config: {
-                "fit": {
-                    **fit_label(config)["fit"],
-                    "reduce": config.fit.reduce,
-                    "surfels_iterations": config.fit.surfels.iterations,
-                }
-            },
-            inputs=models,
-            needs=("texture",),  # which needs the others
-            per_tf=True,
-        ),
-        Stage(
-            "compose",
-            "texgs.cli.stages.compose",
-            select=lambda config: {"image": config.dataset.image, **fit_label(config)},
-            inputs=all_models,
-            needs=("texture",),
-        ),
-        Stage(
-            "pse",
-            "texgs.cli.stages.pse",
-            select=scene_settings,
-            inputs=scene_and_volume,
-            needs=("volume", "compose"),
-        ),
-        Stage(
-            "timing",
-            "texgs.cli.stages.timing",
-            select=scene_settings,
-            inputs=scene_and_volume,
-            needs=("volume", "compose"),
-        ),
-        *(
-            Stage(
-                name,
-                f"texgs.cli.stages.{name}",
-                select=edit_settings(part),
-                inputs=edited_scene,
-                needs=("compose", "views"),
-            )
-            for name, part in (("edit_image", "image"), ("edit_text", "text"), ("edit_segment", "segment"))
-        ),
-        Stage(
-            "edit_metrics",
-            "texgs.cli.stages.edit_metrics",
-            select=lambda config: {
-                **edit_settings("image")(config),
-                "compared": config.metric.views,
-                "views": view_settings(config),
-            },
-            inputs=scenes_before_and_after,
-            needs=("compose", "views", "edit_image", "edit_text"),
-        ),
+
+def is_fit(config: DictConfig) -> bool:
+    """Whether a configuration is of views and fits; the scene that is edited is that of another one."""
+    return bool(config.edit.method == NO_METHOD)
+
+
+def has_volume(config: DictConfig) -> bool:
+    """Whether the data set starts from a volume, not from views."""
+    return is_fit(config) and config.dataset.views_folder is None
+
+
+def has_scene(config: DictConfig) -> bool:
+    """Whether the configuration is of all basic TFs."""
+    return is_fit(config) and config.tf is None
+
+
+def edit_stage(method: Method) -> Stage:
+    """The stage of a method of editing."""
+    return Stage(
+        method.stage,
+        "texgs.cli.stages.edit",
+        select=edit_settings,
+        inputs=edited_scene,
+        place="edit",
+        needs=("compose", "views"),
+        applies=lambda config: config.tf is None and config.edit.method == method.name,
+        method=method.module,
     )
-}
+
+
+ROWS = (
+    Stage(
+        "volume",
+        "texgs.cli.stages.volume",
+        select=lambda config: {"volume": {k: v for k, v in config.dataset.volume.items() if k != "obtain"}},
+        inputs=volume_inputs,
+        place="volume",
+        applies=has_volume,
+    ),
+    Stage(
+        "transfer",
+        "texgs.cli.stages.transfer",
+        select=lambda config: {key: config.dataset[key] for key in ("title", "tf_values", "basic_tfs")},
+        inputs=prepared_volume,
+        place="transfer",
+        needs=("volume",),
+        applies=has_volume,
+    ),
+    Stage(
+        "views",
+        "texgs.cli.stages.views",
+        select=lambda config: {
+            "tf_values": config.dataset.tf_values,
+            "points": basic_tf(config),
+            "views": view_settings(config),
+        },
+        inputs=prepared_volume,
+        place="views",
+        needs=("volume",),
+        applies=has_volume,
+    ),
+    Stage(
+        "sheet",
+        "texgs.cli.stages.sheet",
+        select=lambda config: {},
+        inputs=view_set,
+        place="sheet",
+        needs=("views",),
+        applies=lambda config: is_fit(config) and config.views.name == "views",  # of those of a sweep none
+    ),
+    Stage(
+        "surfels",
+        "texgs.cli.stages.surfels",
+        select=lambda config: {
+            **recipe("low_pass", "facing", "activation", "seeds")(config),
+            "phase": config.fit.surfels,
+        },
+        inputs=seeded,
+        place="phase",
+        needs=("volume", "views"),
+        applies=is_fit,
+    ),
+    Stage(
+        "shading",
+        "texgs.cli.stages.shading",
+        select=lambda config: {
+            **recipe("activation", "material", "first_material")(config),
+            "phase": config.fit.shading,
+        },
+        inputs=model_of("surfels"),
+        place="phase",
+        needs=("surfels", "views"),
+        applies=is_fit,
+    ),
+    Stage(
+        "texture",
+        "texgs.cli.stages.texture",
+        select=lambda config: {**recipe()(config), "texture": config.fit.texture},
+        inputs=model_of("shading"),
+        place="phase",
+        needs=("shading", "views"),
+        applies=is_fit,
+    ),
+    Stage(
+        "figure",
+        "texgs.cli.stages.figure",
+        select=lambda config: {
+            "fit": {
+                **fit_label(config)["fit"],
+                "reduce": config.fit.reduce,
+                "surfels_iterations": config.fit.surfels.iterations,
+            }
+        },
+        inputs=models,
+        place="figure",
+        needs=("texture",),  # which needs the others
+        applies=is_fit,
+    ),
+    Stage(
+        "compose",
+        "texgs.cli.stages.compose",
+        select=lambda config: {"image": config.dataset.image, **fit_label(config)},
+        inputs=all_models,
+        place="compose",
+        needs=("texture",),
+        applies=has_scene,
+    ),
+    Stage(
+        "pse",
+        "texgs.cli.stages.pse",
+        select=scene_settings,
+        inputs=scene_and_volume,
+        place="pse",
+        needs=("volume", "compose"),
+        applies=has_scene,
+    ),
+    Stage(
+        "timing",
+        "texgs.cli.stages.timing",
+        select=scene_settings,
+        inputs=scene_and_volume,
+        place="timing",
+        needs=("volume", "compose"),
+        applies=has_scene,
+    ),
+    *map(edit_stage, methods().values()),
+    Stage(
+        "edit_metrics",
+        "texgs.cli.stages.edit_metrics",
+        select=lambda config: {
+            **edit_settings(config),
+            "compared": config.metric.views,
+            "views": view_settings(config),
+        },
+        inputs=scenes_before_and_after,
+        place="edit_metrics",
+        needs=("compose", "views", *(method.stage for method in methods().values())),
+        applies=lambda config: (
+            config.tf is None
+            and config.edit.method in [method.name for method in methods().values() if method.is_look]
+        ),
+    ),
+)
+STAGES = {stage.name: stage for stage in ROWS}

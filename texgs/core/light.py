@@ -31,8 +31,8 @@ class Light:
         """Unit vector [3], float64, from the origin to the light; for a headlight, to the camera."""
         if self.kind == "directional":
             return orbit_direction(self.azimuth, self.polar)
-        position = camera.position.double().cpu()
-        return position / position.norm()
+        position: Tensor = camera.position.double().cpu()
+        return position.div(position.norm())
 
 
 HEADLIGHT = Light("headlight")

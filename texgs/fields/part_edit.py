@@ -11,7 +11,7 @@ MOST = 1000.0  # of a factor: what is larger is a typing error
 
 
 @dataclass(frozen=True)
-class Edit:
+class PartEdit:
     """What a scene changes about one of its models; the defaults change nothing.
 
     Raises:

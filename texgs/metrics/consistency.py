@@ -14,7 +14,7 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition, Look
 
 SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
@@ -89,7 +89,7 @@ def frames_of(
     scene: Composition,
     cameras: Iterable[Camera],
     light: Light,
-    edits: Sequence[Edit] | None = None,
+    edits: Sequence[PartEdit] | None = None,
     look: Look = "shaded",
 ) -> Iterator[Frame]:
     """Views of a scene with what `consistency` needs.

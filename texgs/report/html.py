@@ -17,35 +17,8 @@ from texgs.report.metrics_files import PHASES, read
 from texgs.report.scene_tables import SCENE_TABLES, label
 from texgs.report.table import Table
 
-PICTURES = {  # files beside the metrics of a stage, and what they show
-    "compose": {"scene.png": "The basic models as one scene, rendered from their surfels."},
-    "pse": {
-        "pse.png": "Edits of colour, opacity and light; below each the volume with the same edit.",
-        "relight.png": "A light that moves from below to above, and the volume under the same light.",
-    },
-    "edit_image": {
-        "style.png": "The style picture.",
-        "edit.png": "Before and after the edit, under the light of the scene and under another one.",
-        "convergence.png": "Terms of the loss in each iteration.",
-    },
-    "edit_text": {
-        "views.png": "Views before and after they were edited as the instruction says.",
-        "edit.png": "Before and after the edit, under the light of the scene and under another one.",
-    },
-    "edit_segment": {
-        "edit.png": "Clicks with the mask of their view, and the segment that all views agree on."
-    },
-    "transfer": {"transfer.png": "Histogram of the volume with the basic transfer functions."},
-    "sheet": {"sheet.png": "Views that the model was fitted to, and test views."},
-    "figure": {"figure.png": "Test views, the phases of the fit, errors, normals, depth and material."},
-}
-ORDER = tuple(PICTURES)
-NARROW = (
-    "scene.png",
-    "transfer.png",
-    "style.png",
-    "convergence.png",
-)  # readable at any width; the others scroll on a narrow window
+NARROW = ("scene.png", "transfer.png", "style.png", "convergence.png")  # at any width; others scroll there
+UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
 JOB = ("stage", "dataset", "tf", "recipe", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
 
@@ -87,12 +60,11 @@ def write_report(path: str | Path, metrics_files: Iterable[str | Path]) -> Path:
 
 def sections(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> dict[str, list[dict[str, str]]]:
     """Pictures by data set, scenes first; each with what it shows and of which basic TF."""
-    found: dict[str, list[dict[str, str]]] = {}
-    shown = [(path, metrics) for path, metrics in jobs if metrics["stage"] in PICTURES]
-    for path, metrics in sorted(shown, key=lambda each: (ORDER.index(each[1]["stage"]), each[0])):
-        for name, words in PICTURES[metrics["stage"]].items():
+    entries: dict[str, list[dict[str, str]]] = {}
+    for path, metrics in sorted(jobs, key=lambda each: ("tf" in each[1], each[0])):
+        for name, words in metrics.get("pictures", {}).items():
             picture = path.with_name(name)
-            if picture.is_file():
+            if picture.is_file() and name not in UNREPORTED:
                 words_before = (metrics.get("tf"), label(metrics), metrics["numbers"].get("edit"))
                 entry = {
                     "kind": "" if name in NARROW else "wide",
@@ -100,8 +72,8 @@ def sections(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> dict[str, list[d
                     "label": " ".join(filter(None, words_before)),
                     "words": words,
                 }
-                found.setdefault(metrics["dataset"], []).append(entry)
-    return dict(sorted(found.items()))
+                entries.setdefault(metrics["dataset"], []).append(entry)
+    return dict(sorted(entries.items()))
 
 
 def curves(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> bytes:

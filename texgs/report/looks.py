@@ -10,7 +10,6 @@ from texgs.report.metrics_files import paper, read
 from texgs.report.scene_tables import label
 from texgs.report.table import Cell, Column, Row, Table
 
-EDITS = ("edit_image", "edit_text", "edit_segment")
 MEASURED = (
     "similarity",
     "direction",
@@ -66,13 +65,13 @@ def looks(paths: Iterable[str | Path]) -> Table:
     edits: dict[tuple[str, str, str], tuple[Path, dict[str, Any]]] = {}
     measures: dict[tuple[str, str, str], tuple[Path, dict[str, Any]]] = {}
     for path, metrics in read(paths):
-        if metrics["stage"] in (*EDITS, "edit_metrics"):
+        if "edit" in metrics["numbers"]:
             key = (metrics["dataset"], label(metrics), metrics["numbers"]["edit"])
             (measures if metrics["stage"] == "edit_metrics" else edits)[key] = (path, metrics["numbers"])
     rows = []
     for key, (path, numbers) in sorted(edits.items()):
         measured_in, measured = measures.get(key, (None, {}))
-        own: list[Cell] = [*key, numbers["method"], numbers.get("lambda_s"), numbers["edit_seconds"] / 60]
+        own: list[Cell] = [*key, numbers["how"], numbers["lambda_s"], numbers["edit_seconds"] / 60]
         kept = None
         if "geometry_kept" in measured:
             kept = "bit for bit" if measured["geometry_kept"] else "no"

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Part, by_part
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.ply import Y00
@@ -20,7 +20,7 @@ from texgs.fields.surfels.texels import mean_texels
 MOST_OPAQUE = 1 - 1e-6  # has a logit
 
 
-def joined(parts: Sequence[Part], edits: Sequence[Edit]) -> Surfels:
+def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
     """The visible surfels of a scene as one model of stage surfels, whatever light shone on them.
 
     Args:
@@ -54,7 +54,7 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
     from plyfile import PlyData, PlyElement
 
     if model.stage != "surfels":
-        model = joined([Part.of(model)], [Edit()])
+        model = joined([Part.of(model)], [PartEdit()])
     means, _, _, opacities = geometry(model.parameters)
     opaque = opacities >= least_opacity
     if not bool(opaque.any()):
@@ -79,7 +79,7 @@ def fill(vertices: np.ndarray, places: Tensor, colors: Tensor) -> None:
             vertices[name] = column
 
 
-def _surfels(part: Part, edits: Sequence[Edit]) -> dict[str, Tensor]:
+def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
     """Raw parameters of a part's visible surfels."""
     p = part.model.parameters
     colors = part.colored(edits).double()

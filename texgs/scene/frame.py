@@ -13,7 +13,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition, Look
 from texgs.raster import Render
 
@@ -28,7 +28,7 @@ def frame(
     scene: Composition,
     camera: Camera,
     light: Light,
-    edits: Sequence[Edit],
+    edits: Sequence[PartEdit],
     mode: Mode = "shaded",
     background: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> np.ndarray:

@@ -20,7 +20,7 @@ from texgs.core.names import label, named_file
 from texgs.core.numbers import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.reading import reading, reading_as
-from texgs.fields.part_edit import Edit, color
+from texgs.fields.part_edit import PartEdit, color
 from texgs.fields.surfels.compact import open_model
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -31,7 +31,7 @@ from texgs.scene.segment_file import read_segment
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
 KEYS = ("texgs-scene", "light", "background", "models")
-EDITS = tuple(each.name for each in fields(Edit))
+EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
 RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
@@ -43,7 +43,7 @@ class SceneSegment:
     """Surfels of a model that are edited on their own: the model's edit does not count for them."""
 
     file: Path  # mask of surfels, see `write_segment`
-    edit: Edit = field(default_factory=Edit)
+    edit: PartEdit = field(default_factory=PartEdit)
     texture: Path | None = None  # variant of the whole model, of which these surfels take their texels
 
 
@@ -55,7 +55,7 @@ class SceneModel:
     """
 
     file: Path  # lossless or compact
-    edit: Edit = field(default_factory=Edit)  # of what no segment holds
+    edit: PartEdit = field(default_factory=PartEdit)  # of what no segment holds
     texture: Path | None = None  # variant in place of the model's own texels
     segments: Mapping[str, SceneSegment] = field(default_factory=dict)
 
@@ -101,7 +101,7 @@ class Scene:
             raise ArgumentError("models: expected at least one, got none")
 
     @property
-    def edits(self) -> list[Edit]:
+    def edits(self) -> list[PartEdit]:
         """Of all models; behind the edit of a model those of its segments."""
         edits = []
         for model in self.models.values():
@@ -203,7 +203,7 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
 
 def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) -> dict[str, Any]:
     """File, texture and what is edited, as a scene file has them."""
-    unedited = asdict(Edit())
+    unedited = asdict(PartEdit())
     changed = {key: value for key, value in asdict(entry.edit).items() if value != unedited[key]}
     if "palette" in changed:
         changed["palette"] = list(changed["palette"])
@@ -226,12 +226,12 @@ def _model(where: str, values: Any, folder: Path) -> SceneModel:
     return SceneModel(*_entry(where, values, folder, "a model"), segments)
 
 
-def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Edit, Path | None]:
+def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, PartEdit, Path | None]:
     file, texture = named_file(f"{where}.file", folder, values.get("file"), kind), values.get("texture")
     if texture is not None:
         texture = named_file(f"{where}.texture", folder, texture, "a texture variant")
     try:
-        edit = Edit(**{key: value for key, value in values.items() if key in EDITS})
+        edit = PartEdit(**{key: value for key, value in values.items() if key in EDITS})
     except ArgumentError as error:
         raise ArgumentError(f"{where}.{error}") from error
     return file, edit, texture

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from texgs.cli.plan import planned, words_of
 from texgs.config.code import digest
-from texgs.config.stage import EDITS, FOLDERS
+from texgs.config.places import PLACES
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
 
@@ -30,37 +30,52 @@ RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
 MAPPER_GPU, FIT_GPU = PLAN.mapper_gpu, PLAN.fit_gpu
 
 
-def job(stage, wildcards):
+def job(place, wildcards):
     """Folder of the job that wildcards describe, and what the plan says of it."""
-    folder = Path(RESULTS, FOLDERS[stage].format(**dict(wildcards.items()))).as_posix()
+    folder = Path(RESULTS, PLACES[place].folder.format(**dict(wildcards.items()))).as_posix()
     return folder, PLAN.jobs[folder]
 
 
-def reads(stage):
+def reads(place):
     """The files a job reads, first its settings, as a function of wildcards."""
 
     def of(wildcards):
-        _, made = job(stage, wildcards)
-        return [made["settings"], *made["inputs"].values()]
+        _, planned = job(place, wildcards)
+        return [planned["settings"], *planned["inputs"].values()]
 
     return of
 
 
-def words(stage):
+def writes(place):
+    """The files a job writes that others read."""
+    return [f"<results>/{PLACES[place].folder}/{file}" for file in (*PLACES[place].files, "metrics.json")]
+
+
+def words(place):
     """The words of a job's command, first its stage, as a function of wildcards."""
 
     def of(wildcards):
-        folder, made = job(stage, wildcards)
-        inputs = [f"{name}={path}" for name, path in made["inputs"].items()]
+        folder, planned = job(place, wildcards)
+        inputs = [f"{name}={path}" for name, path in planned["inputs"].items()]
         files = ["--input", *inputs] if inputs else []
-        return [stage, "--settings", made["settings"], *files, "--output", folder]
+        return [planned["stage"], "--settings", planned["settings"], *files, "--output", folder]
 
     return of
 
 
-def code(stage):
+def code(place):
     """The digest of the code that a job runs, as a function of wildcards."""
-    return lambda wildcards: job(stage, wildcards)[1]["code"]
+    return lambda wildcards: job(place, wildcards)[1]["code"]
+
+
+def log_of(place):
+    """The log of a job."""
+    return f"<logs>/{PLACES[place].folder}.log"
+
+
+def times_of(place):
+    """Where Snakemake writes the time and memory of a job."""
+    return f"<benchmarks>/{PLACES[place].folder}.tsv"
 
 
 def any_of(names, otherwise="none"):
@@ -113,4 +128,5 @@ wildcard_constraints:
     tf="[A-Za-z][A-Za-z0-9_-]*",
     views=any_of(PLAN.wildcards["views"]),
     fit=any_of(PLAN.wildcards["fit"]),
-    edit=any_of(sorted(name for names in PLAN.edits.values() for name in names)),
+    phase=any_of(PLAN.wildcards["phase"]),
+    edit=any_of(PLAN.wildcards["edit"], "no-edit"),

@@ -1,9 +1,9 @@
-# The three phases of a basic model, by the recipe of conf/fit, and a figure of what they are worth.
+# The phases of a basic model, by the recipe of conf/fit, and a figure of what they are worth.
 
 
 rule fits:
     input:
-        PLAN.done("texture"),
+        PLAN.done("phase"),
 
 
 rule figures:
@@ -11,62 +11,21 @@ rule figures:
         PLAN.done("figure"),
 
 
-rule surfels:
+rule phase:
     input:
-        reads("surfels"),
+        reads("phase"),
     output:
-        model="<results>/{dataset}/{tf}/{fit}/surfels/model.safetensors",
-        metrics="<results>/{dataset}/{tf}/{fit}/surfels/metrics.json",
+        writes("phase"),
     log:
-        "<logs>/{dataset}/{tf}/{fit}/surfels.log",
+        log_of("phase"),
     benchmark:
-        "<benchmarks>/{dataset}/{tf}/{fit}/surfels.tsv"
+        times_of("phase")
     threads: 4
     resources:
         gpu=FIT_GPU,
     params:
-        code=code("surfels"),
-        words=words("surfels"),
-    shell:
-        RUN
-
-
-rule shading:
-    input:
-        reads("shading"),
-    output:
-        model="<results>/{dataset}/{tf}/{fit}/shading/model.safetensors",
-        metrics="<results>/{dataset}/{tf}/{fit}/shading/metrics.json",
-    log:
-        "<logs>/{dataset}/{tf}/{fit}/shading.log",
-    benchmark:
-        "<benchmarks>/{dataset}/{tf}/{fit}/shading.tsv"
-    threads: 4
-    resources:
-        gpu=FIT_GPU,
-    params:
-        code=code("shading"),
-        words=words("shading"),
-    shell:
-        RUN
-
-
-rule texture:
-    input:
-        reads("texture"),
-    output:
-        model="<results>/{dataset}/{tf}/{fit}/texture/model.safetensors",
-        metrics="<results>/{dataset}/{tf}/{fit}/texture/metrics.json",
-    log:
-        "<logs>/{dataset}/{tf}/{fit}/texture.log",
-    benchmark:
-        "<benchmarks>/{dataset}/{tf}/{fit}/texture.tsv"
-    threads: 4
-    resources:
-        gpu=FIT_GPU,
-    params:
-        code=code("texture"),
-        words=words("texture"),
+        code=code("phase"),
+        words=words("phase"),
     shell:
         RUN
 
@@ -75,12 +34,11 @@ rule figure:
     input:
         reads("figure"),
     output:
-        figure="<results>/{dataset}/{tf}/{fit}/figure/figure.png",
-        metrics="<results>/{dataset}/{tf}/{fit}/figure/metrics.json",
+        writes("figure"),
     log:
-        "<logs>/{dataset}/{tf}/{fit}/figure.log",
+        log_of("figure"),
     benchmark:
-        "<benchmarks>/{dataset}/{tf}/{fit}/figure.tsv"
+        times_of("figure")
     threads: 4
     params:
         code=code("figure"),

@@ -10,11 +10,9 @@ rule compose:
     input:
         reads("compose"),
     output:
-        scene="<results>/{dataset}/scene/{fit}/compose/scene.yaml",
-        picture="<results>/{dataset}/scene/{fit}/compose/scene.png",
-        metrics="<results>/{dataset}/scene/{fit}/compose/metrics.json",
+        writes("compose"),
     log:
-        "<logs>/{dataset}/scene/{fit}/compose.log",
+        log_of("compose"),
     threads: 4
     params:
         code=code("compose"),
@@ -27,13 +25,11 @@ rule pse:
     input:
         reads("pse"),
     output:
-        pse="<results>/{dataset}/scene/{fit}/pse/pse.png",
-        relight="<results>/{dataset}/scene/{fit}/pse/relight.png",
-        metrics="<results>/{dataset}/scene/{fit}/pse/metrics.json",
+        writes("pse"),
     log:
-        "<logs>/{dataset}/scene/{fit}/pse.log",
+        log_of("pse"),
     benchmark:
-        "<benchmarks>/{dataset}/scene/{fit}/pse.tsv"
+        times_of("pse")
     threads: 4
     params:
         code=code("pse"),
@@ -47,9 +43,9 @@ rule timing:
     input:
         reads("timing"),
     output:
-        metrics="<results>/{dataset}/scene/{fit}/timing/metrics.json",
+        writes("timing"),
     log:
-        "<logs>/{dataset}/scene/{fit}/timing.log",
+        log_of("timing"),
     threads: 16
     resources:
         gpu=FIT_GPU,

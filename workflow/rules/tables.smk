@@ -7,7 +7,7 @@ TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if
 
 rule tables:
     input:
-        PLAN.done("volume", "views", "surfels", "shading", "texture", "pse", "timing", *EDITS),
+        PLAN.done("volume", "views", "phase", "pse", "timing", "edit", "edit_metrics"),
     output:
         collect("<results>/tables/{name}.{format}", name=TABLES, format=("csv", "md", "tex")),
     log:
@@ -21,7 +21,7 @@ rule tables:
 
 rule sweep:
     input:
-        lambda wildcards: PLAN.done("surfels", "shading", "texture", sweep=wildcards.sweep),
+        lambda wildcards: PLAN.done("phase", sweep=wildcards.sweep),
     output:
         collect("<results>/tables/sweep-{{sweep}}.{format}", format=("csv", "md", "tex")),
     log:
@@ -35,7 +35,7 @@ rule sweep:
 
 rule report:
     input:
-        PLAN.done(*FOLDERS),
+        PLAN.done(*PLACES),
     output:
         "<results>/report.html",
     log:

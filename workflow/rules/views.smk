@@ -10,14 +10,11 @@ rule views:
     input:
         reads("views"),
     output:
-        train="<results>/{dataset}/{tf}/{views}/transforms_train.json",
-        test="<results>/{dataset}/{tf}/{views}/transforms_test.json",
-        turntable="<results>/{dataset}/{tf}/{views}/turntable.png",
-        metrics="<results>/{dataset}/{tf}/{views}/metrics.json",
+        writes("views"),
     log:
-        "<logs>/{dataset}/{tf}/{views}.log",
+        log_of("views"),
     benchmark:
-        "<benchmarks>/{dataset}/{tf}/{views}.tsv"
+        times_of("views")
     threads: 4
     resources:
         gpu=MAPPER_GPU,
@@ -32,12 +29,11 @@ rule sheet:
     input:
         reads("sheet"),
     output:
-        sheet="<results>/{dataset}/{tf}/sheet/sheet.png",
-        metrics="<results>/{dataset}/{tf}/sheet/metrics.json",
+        writes("sheet"),
     log:
-        "<logs>/{dataset}/{tf}/sheet.log",
+        log_of("sheet"),
     benchmark:
-        "<benchmarks>/{dataset}/{tf}/sheet.tsv"
+        times_of("sheet")
     params:
         code=code("sheet"),
         words=words("sheet"),

@@ -32,13 +32,11 @@ rule volume:
     input:
         reads("volume"),
     output:
-        volume="<results>/{dataset}/volume/volume.nrrd",
-        summary="<results>/{dataset}/volume/volume.json",
-        metrics="<results>/{dataset}/volume/metrics.json",
+        writes("volume"),
     log:
-        "<logs>/{dataset}/volume.log",
+        log_of("volume"),
     benchmark:
-        "<benchmarks>/{dataset}/volume.tsv"
+        times_of("volume")
     threads: 1
     params:
         code=code("volume"),
@@ -51,12 +49,11 @@ rule transfer:
     input:
         reads("transfer"),
     output:
-        plot="<results>/{dataset}/transfer/transfer.png",
-        metrics="<results>/{dataset}/transfer/metrics.json",
+        writes("transfer"),
     log:
-        "<logs>/{dataset}/transfer.log",
+        log_of("transfer"),
     benchmark:
-        "<benchmarks>/{dataset}/transfer.tsv"
+        times_of("transfer")
     params:
         code=code("transfer"),
         words=words("transfer"),

@@ -6,7 +6,7 @@ from tests.fields.surfels.samples import sample
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
 from texgs.fields.surfels.render import render
@@ -61,7 +61,7 @@ def union(*models):
 def test_one_model_unedited_is_the_model_bit_for_bit(light):
     model = ball(1)
     alone = render(model, CAMERA, light, outputs=OUTPUTS)
-    scene = Composition([model]).render(CAMERA, light, [Edit()], outputs=OUTPUTS)
+    scene = Composition([model]).render(CAMERA, light, [PartEdit()], outputs=OUTPUTS)
     for name in ("color", "alpha", *OUTPUTS):
         assert torch.equal(getattr(scene, name), getattr(alone, name)), name
 
@@ -77,7 +77,7 @@ def test_a_scene_is_the_union_of_its_surfels(light):
 
 def test_hiding_is_removing_bit_for_bit():
     models = [ball(1), ball(2, middle=0.2), ball(3, stage="shading", middle=-0.1)]
-    edits = [Edit(), Edit(visible=False), Edit()]
+    edits = [PartEdit(), PartEdit(visible=False), PartEdit()]
     hidden = Composition(models).render(CAMERA, SIDE, edits, outputs=OUTPUTS)
     removed = Composition([models[0], models[2]]).render(CAMERA, SIDE, outputs=OUTPUTS)
     for name in ("color", "alpha", *OUTPUTS):
@@ -86,7 +86,7 @@ def test_hiding_is_removing_bit_for_bit():
 
 def test_an_edit_is_the_model_with_other_numbers():
     model = ball(4)
-    edit = Edit(palette=(0.1, 0.7, 0.2), opacity=0.4, ambient=0.5, diffuse=1.5, specular=2, shininess=0.5)
+    edit = PartEdit(palette=(0.1, 0.7, 0.2), opacity=0.4, ambient=0.5, diffuse=1.5, specular=2, shininess=0.5)
     p = model.parameters
     factors = {"ambient": 0.2, "diffuse": 0.75, "specular": 0.4, "shininess": 10.0}
     opacities = torch.logit(0.4 * p["opacities"].sigmoid())
@@ -101,7 +101,7 @@ def test_an_edit_is_the_model_with_other_numbers():
 
 def test_an_opacity_above_one_is_one():
     model = ball(5)
-    found = Composition([model]).render(CAMERA, SIDE, [Edit(opacity=1000.0)])
+    found = Composition([model]).render(CAMERA, SIDE, [PartEdit(opacity=1000.0)])
     full = {**model.parameters, "opacities": torch.full((150,), 40.0)}
     assert torch.equal(found.alpha, render(Surfels(full), CAMERA, SIDE).alpha)
 
@@ -109,14 +109,14 @@ def test_an_opacity_above_one_is_one():
 def test_edits_do_not_copy_texels():
     scene = Composition([ball(1), ball(2)])
     before = scene.texels.data_ptr()
-    scene.render(CAMERA, SIDE, [Edit(palette=(1, 0, 0)), Edit(opacity=0.5)])
+    scene.render(CAMERA, SIDE, [PartEdit(palette=(1, 0, 0)), PartEdit(opacity=0.5)])
     assert scene.texels.data_ptr() == before
 
 
 def test_looks_of_the_material_are_its_factors():
     """Where a surfel is opaque, blending shows what it has; factors of both models differ."""
     models = [ball(1, n=2000), ball(2, n=2000, middle=0.0)]
-    edits = [Edit(diffuse=0.5), Edit(diffuse=0.5)]
+    edits = [PartEdit(diffuse=0.5), PartEdit(diffuse=0.5)]
     found = Composition(models).render(CAMERA, SIDE, edits, look="diffuse")
     assert_close(found.color, 0.25 * found.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
 
@@ -139,8 +139,12 @@ def test_without_light_colours_are_those_of_palette_and_texels():
             None,
             r"expected one low_pass, got 2.0 and 6.0",
         ),
-        ([ball(1)], [Edit(), Edit()], "edits: expected one for each of 1 models, got 2"),
-        ([ball(1, stage="shading")], [Edit(palette=(0, 0, 0))], "palette: expected a model with a texture"),
+        ([ball(1)], [PartEdit(), PartEdit()], "edits: expected one for each of 1 models, got 2"),
+        (
+            [ball(1, stage="shading")],
+            [PartEdit(palette=(0, 0, 0))],
+            "palette: expected a model with a texture",
+        ),
     ],
 )
 def test_what_cannot_be_composed(models, edits, message):
@@ -161,8 +165,8 @@ def test_what_cannot_be_composed(models, edits, message):
 )
 def test_edits_out_of_range(values, message):
     with pytest.raises(ArgumentError, match=message):
-        Edit(**values)
+        PartEdit(**values)
 
 
 def test_hexadecimal_colours():
-    assert Edit(palette="#ff0080").palette == pytest.approx((1, 0, 128 / 255))
+    assert PartEdit(palette="#ff0080").palette == pytest.approx((1, 0, 128 / 255))

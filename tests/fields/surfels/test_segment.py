@@ -11,7 +11,7 @@ from torch.testing import assert_close
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import CAMERA, OUTPUTS, SIDE, ball
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.compact import write_compact
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -41,15 +41,15 @@ def with_texels(model, texels):
 
 
 @pytest.mark.parametrize("shared", [True, False])
-@pytest.mark.parametrize("edit", [Edit(), Edit(palette=(0.3, 0.2, 0.9), opacity=0.5, shininess=2.0)])
+@pytest.mark.parametrize("edit", [PartEdit(), PartEdit(palette=(0.3, 0.2, 0.9), opacity=0.5, shininess=2.0)])
 def test_the_same_edit_everywhere_is_the_edit_of_the_model_bit_for_bit(shared, edit):
     models = [ball(1, shared=shared), ball(2, middle=0.2)]
-    plain = Composition(models).render(CAMERA, SIDE, [edit, Edit()], outputs=OUTPUTS)
+    plain = Composition(models).render(CAMERA, SIDE, [edit, PartEdit()], outputs=OUTPUTS)
     scene = Composition(models, [[HALF, TENTH], []])
-    found = scene.render(CAMERA, SIDE, [edit, edit, edit, Edit()], outputs=OUTPUTS)
+    found = scene.render(CAMERA, SIDE, [edit, edit, edit, PartEdit()], outputs=OUTPUTS)
     for name in ("color", "alpha", *OUTPUTS):
         assert torch.equal(getattr(found, name), getattr(plain, name)), name
-    if edit == Edit():
+    if edit == PartEdit():
         assert torch.equal(scene.render(CAMERA, SIDE).color, plain.color)
 
 
@@ -58,10 +58,10 @@ def test_segments_are_edited_as_models_of_their_own():
     model, other = ball(1, shared=False), ball(2, middle=0.2)
     third = TENTH & ~HALF  # what the first segment left of the second
     edits = [
-        Edit(palette=(1, 0, 0), opacity=0.7),
-        Edit(opacity=0.3, diffuse=1.5),
-        Edit(palette=(0, 0, 1), ambient=0.5, specular=3, shininess=0.25),
-        Edit(diffuse=0.5),
+        PartEdit(palette=(1, 0, 0), opacity=0.7),
+        PartEdit(opacity=0.3, diffuse=1.5),
+        PartEdit(palette=(0, 0, 1), ambient=0.5, specular=3, shininess=0.25),
+        PartEdit(diffuse=0.5),
     ]
     split = [only(model, ~HALF & ~third), only(model, HALF), only(model, third), other]
     expected = Composition(split).render(CAMERA, SIDE, edits)
@@ -72,9 +72,9 @@ def test_segments_are_edited_as_models_of_their_own():
 
 def test_hiding_a_segment_is_removing_it():
     model = ball(3)
-    found = Composition([model], [[HALF]]).render(CAMERA, SIDE, [Edit(), Edit(visible=False)])
+    found = Composition([model], [[HALF]]).render(CAMERA, SIDE, [PartEdit(), PartEdit(visible=False)])
     assert torch.equal(found.color, Composition([only(model, ~HALF)]).render(CAMERA, SIDE).color)
-    alone = Composition([model], [[HALF]]).render(CAMERA, SIDE, [Edit(visible=False), Edit()])
+    alone = Composition([model], [[HALF]]).render(CAMERA, SIDE, [PartEdit(visible=False), PartEdit()])
     assert torch.equal(alone.color, Composition([only(model, HALF)]).render(CAMERA, SIDE).color)
 
 
@@ -105,7 +105,7 @@ def test_what_other_programs_read_has_the_edits_of_segments():
     model = ball(5)
     scene = Composition([model], [[HALF]])
     split = Composition([only(model, ~HALF), only(model, HALF)])
-    edits = [Edit(palette=(0, 1, 0)), Edit(opacity=0.5)]
+    edits = [PartEdit(palette=(0, 1, 0)), PartEdit(opacity=0.5)]
     found, expected = joined(scene.parts, edits), joined(split.parts, edits)
     for mask, part in ((~HALF, slice(75)), (HALF, slice(75, 150))):
         for name, values in found.parameters.items():
@@ -117,7 +117,7 @@ def test_what_other_programs_read_has_the_edits_of_segments():
     [
         ([HALF[:9]], None, ShapeError, r"segment: expected \[150\], got \[9\]"),
         ([HALF.float()], None, ArgumentError, "segment: expected a mask of type bool, got torch.float32"),
-        ([HALF], [Edit()], ArgumentError, "one for each of 1 models and 1 segments, got 1"),
+        ([HALF], [PartEdit()], ArgumentError, "one for each of 1 models and 1 segments, got 1"),
     ],
 )
 def test_segments_that_do_not_fit(masks, edits, error, message):
@@ -141,14 +141,14 @@ def scene_in(folder, **segments):
 
 
 def test_a_scene_with_segments_is_saved_and_opened(folder):
-    styled = SceneSegment(folder / "half.safetensors", Edit(opacity=0.5), folder / "style.safetensors")
+    styled = SceneSegment(folder / "half.safetensors", PartEdit(opacity=0.5), folder / "style.safetensors")
     plain = SceneSegment(folder / "tenth.safetensors")
     path = write_scene(folder / "scenes" / "scene.yaml", scene_in(folder, shell=styled, core=plain))
     values = yaml.safe_load(path.read_text())["models"]["TF01"]["segments"]
     assert values["core"] == {"file": "../tenth.safetensors"}, "only what is edited"
     scene = read_scene(path)
     assert list(scene.models["TF01"].segments) == ["shell", "core"]
-    assert scene.edits == [Edit(), Edit(opacity=0.5), Edit()]
+    assert scene.edits == [PartEdit(), PartEdit(opacity=0.5), PartEdit()]
     model = ball(1)
     style = with_texels(model, 1 - model.parameters["texels"])
     split = [only(model, ~HALF & ~TENTH), only(style, HALF), only(model, TENTH & ~HALF)]

@@ -6,11 +6,12 @@ from typing import Any
 from texgs.cli.stages.outcome import Outcome
 from texgs.core.camera import orbit
 from texgs.core.device import torch_device
+from texgs.core.lens import Lens
 from texgs.core.movie import write_frames
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import Scene, SceneModel, write_scene
 
-FRONT = (-60.0, 20.0, 4.0311, 30.0)  # azimuth, polar, distance and field of view of the picture
+AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
@@ -24,8 +25,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     scene = Scene({name: SceneModel(path) for name, path in inputs.items()})
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings["fit"]["device"]))
-    camera = orbit(*FRONT, settings["image"], settings["image"])
+    camera = orbit(AZIMUTH, POLAR, *Lens().square(settings["image"]))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
-    path = write_frames(output / "scene.png", [picture])
+    write_frames(output / "scene.png", [picture])
     numbers = {"models": len(scene.models), "surfels": len(composition), "texels": len(composition.texels)}
-    return Outcome(numbers, [path])
+    return Outcome(numbers, {"scene.png": "The basic models as one scene, rendered from their primitives."})

@@ -7,14 +7,14 @@ from typing import Any
 
 import torch
 
-from texgs.cli.stages.edit_image import style_of
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.parts import parts_of
 from texgs.cli.stages.timing import milliseconds
+from texgs.config.methods import method_of
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
+from texgs.edit.parts import parts_of
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.size import sizes
 from texgs.metrics.clip import clip_scores
@@ -46,7 +46,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     frames = milliseconds(lambda camera: scenes[0].render(camera, after.light, after.edits), cameras, title)
     numbers = {
         "edit": edit["name"],
-        "kind": edit["kind"],
+        "method": edit["method"],
         "frame_mean_ms": fmean(frames),
         "frame_max_ms": max(frames),
         "primitives": len(scenes[0]),
@@ -117,11 +117,11 @@ def style_distance(
     title: str,
 ) -> dict[str, float]:
     """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
-    parts = parts_of(scene, edit["parts"])
-    if edit["kind"] != "image" or any(part.segment for part in parts) or not weights["vgg16"]:
+    parts, method = parts_of(scene, edit["parts"]), method_of(edit)
+    if method.style is None or any(part.segment for part in parts) or not weights["vgg16"]:
         return {}
     vgg = Vgg.load(device=device)
-    style = style_of(edit["image"]).scaled(max(cameras[0].width, cameras[0].height))
+    style = method.style(method.of(edit)).scaled(max(cameras[0].width, cameras[0].height))
     found = [
         likeness(
             scene.models[part.model].open()[0].to(device),

@@ -9,6 +9,8 @@ from texgs.report.fit_figure import write_fit_figure
 from texgs.report.fitting import PHASES
 from texgs.volume.view_set import read_views
 
+SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
+
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
     """Write figure.png.
@@ -28,11 +30,11 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     counts = {"surfels": len(texture), "texels": len(texture.parameters["texels"])}
     title = f"{settings['dataset']}/{settings['tf']}, recipe {fit['name']}: "
     title += ", ".join(f"{count:,} {things}" for things, count in counts.items())
-    path = write_fit_figure(
+    write_fit_figure(
         output / "figure.png",
         models,
         {f"{split} view {index}": candidates[index] for index in shown},
         fit["reduce"],
         title,
     )
-    return Outcome({"shown": shown, **counts}, [path])
+    return Outcome({"shown": shown, **counts}, {"figure.png": SHOWN})

@@ -15,13 +15,17 @@ from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.metrics.image import psnr, ssim
 from texgs.report.strip import write_strip
 from texgs.scene.scene_file import Scene, read_scene, write_scene
 from texgs.volume.cameras import orbit_path
 
+PICTURES = {
+    "pse.png": "Edits of colour, opacity and light; below each the volume with the same edit.",
+    "relight.png": "A light that moves from below to above, and the volume under the same light.",
+}
 COMPARED = 6  # views around the object, one of which is shown
 POLAR = 20.0  # of these views, degrees
 SWEEP = (-60.0, -20.0, 20.0, 60.0)  # polar angles of the light, degrees
@@ -49,7 +53,6 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
     cameras = orbit_path(COMPARED, POLAR, *lens)
     found: dict[str, list[dict[str, Any]]] = {}
-    pictures = []
     groups = {"pse": edits_of_the_paper(scene, palettes(composition)), "relight": light_sweep(scene)}
     for group, steps in groups.items():
         rows: dict[str, list[np.ndarray]] = {}
@@ -61,8 +64,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
         titles = [caption(entry) for entry in found[group]]
-        pictures.append(write_strip(output / f"{group}.png", rows, titles))
-    return Outcome({"views": COMPARED, **found}, pictures)
+        write_strip(output / f"{group}.png", rows, titles)
+    return Outcome({"views": COMPARED, **found}, PICTURES)
 
 
 def palettes(composition: Composition) -> list[tuple[float, ...]]:
@@ -100,7 +103,7 @@ def light_sweep(scene: Scene) -> list[Step]:
 def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
     """The scene with edits of some models changed."""
     models = {
-        name: replace(model, edit=Edit(**{**vars(model.edit), **changes.get(name, {})}))
+        name: replace(model, edit=PartEdit(**{**vars(model.edit), **changes.get(name, {})}))
         for name, model in scene.models.items()
     }
     return replace(scene, models=models)

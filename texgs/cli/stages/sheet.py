@@ -10,6 +10,7 @@ from texgs.volume.sheet import write_sheet
 from texgs.volume.view_set import read_views
 
 SHOWN = 12  # views
+CAPTION = "Views that the model was fitted to, and test views."
 
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
@@ -27,7 +28,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     write_sheet(output / "sheet.png", [picture.crop(common_box(pictures)) for picture in pictures])
     camera = views.train[0].camera
     counts = {"train": len(views.train), "test": len(views.test)}
-    return Outcome({**counts, "width": camera.width, "height": camera.height}, [output / "sheet.png"])
+    return Outcome({**counts, "width": camera.width, "height": camera.height}, {"sheet.png": CAPTION})
 
 
 def common_box(pictures: list[Image.Image]) -> tuple[int, int, int, int]:

@@ -12,6 +12,8 @@ from texgs.volume.basic_tfs import check_disjoint
 from texgs.volume.tf_files import write_paraview
 from texgs.volume.tf_plot import plot
 
+SHOWN = "Histogram of the volume with the basic transfer functions."
+
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
     """Write transfer.png, the histogram with the basic TFs over it, and each TF for ParaView.
@@ -36,4 +38,4 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         for name, tf in basic.items()
         for end, value in zip(("low", "high"), tf.support, strict=True)
     }
-    return Outcome({"basic_tfs": len(basic), **numbers}, [output / "transfer.png"])
+    return Outcome({"basic_tfs": len(basic), **numbers}, {"transfer.png": SHOWN})

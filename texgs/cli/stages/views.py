@@ -66,7 +66,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         write_geometry(grid, tf, appearance, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
-    return Outcome(numbers(shots, times, coverages), [output / "turntable.png"])
+    return Outcome(numbers(shots, times, coverages), {"turntable.png": "One turn around the volume."})
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:

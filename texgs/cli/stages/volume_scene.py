@@ -12,7 +12,7 @@ from texgs.cli.stages.views import mapper_for
 from texgs.core.camera import Camera
 from texgs.core.io import read_json
 from texgs.core.light import Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.volume.appearance import Appearance
 from texgs.volume.basic_tfs import combine
 from texgs.volume.nrrd_file import open_grid
@@ -44,7 +44,7 @@ class VolumeScene:
         self,
         camera: Camera,
         light: Light,
-        edits: Sequence[Edit] | None = None,
+        edits: Sequence[PartEdit] | None = None,
         palettes: Sequence[Sequence[float]] = (),
     ) -> np.ndarray:
         """Premultiplied RGBA [H, W, 4] of all visible basic TFs with edits.
@@ -58,7 +58,7 @@ class VolumeScene:
             edits: one for each basic TF; by default nothing is changed.
             palettes: as fitted, of each model; needed where an edit changes one.
         """
-        edits = [Edit()] * len(self.tfs) if edits is None else edits
+        edits = [PartEdit()] * len(self.tfs) if edits is None else edits
         shown = {}
         for index, (name, edit) in enumerate(zip(self.tfs, edits, strict=True)):
             if edit.visible and edit.opacity > 0:
@@ -74,7 +74,7 @@ class VolumeScene:
         return self._mappers[look].render(combine(shown), camera, light)
 
 
-def edited(tf: TransferFunction, edit: Edit, palette: Sequence[float]) -> TransferFunction:
+def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
     """A basic TF with an edit's colour and opacity."""
     opacity = tuple((value, min(1.0, alpha * edit.opacity)) for value, alpha in tf.opacity)
     color = tf.color

@@ -13,7 +13,7 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.part_edit import Edit
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import MATERIAL, Surfels, geometry, material
 from texgs.fields.surfels.render import light_direction, viewer
 from texgs.fields.surfels.segment import labels_of
@@ -66,7 +66,7 @@ class Part:
             return values[0]
         return self.opacities.new_tensor(values)[self.labels]
 
-    def colored(self, edits: Sequence[Edit]) -> Tensor:
+    def colored(self, edits: Sequence[PartEdit]) -> Tensor:
         """c_ind without texels [N, 3].
 
         Raises:
@@ -82,7 +82,7 @@ class Part:
             return self.colors + palettes[0]
         return self.colors + torch.stack(palettes)[self.labels]
 
-    def factors(self, edits: Sequence[Edit]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    def factors(self, edits: Sequence[PartEdit]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """k_a, k_d, k_s and beta with the edits' factors."""
         a, d, s, b = (
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
@@ -90,7 +90,9 @@ class Part:
         )
         return a, d, s, b
 
-    def look(self, edits: Sequence[Edit], camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
+    def look(
+        self, edits: Sequence[PartEdit], camera: Camera, light: Light, look: Look
+    ) -> tuple[Tensor, Tensor]:
         """Base [N, 3] and gain [N]: colour of a fragment is base + gain * texel."""
         p, shading, n = self.model.parameters, self.model.shading, len(self.model)
         colors, (a, d, s, b) = self.colored(edits), self.factors(edits)
@@ -105,7 +107,7 @@ class Part:
         )
         return base.clamp(0, 1), gain
 
-    def opacity(self, edits: Sequence[Edit]) -> Tensor:
+    def opacity(self, edits: Sequence[PartEdit]) -> Tensor:
         """Opacities [N] with the edits' factors; 0 where surfels are hidden, so that nothing is drawn."""
         factor = self.per_surfel([edit.opacity if edit.visible else 0.0 for edit in edits])
         return (self.opacities * factor).clamp_max(1)
@@ -146,7 +148,7 @@ class Composition:
         self,
         camera: Camera,
         light: Light = HEADLIGHT,
-        edits: Sequence[Edit] | None = None,
+        edits: Sequence[PartEdit] | None = None,
         *,
         look: Look = "shaded",
         background: Tensor | None = None,
@@ -189,14 +191,14 @@ class Composition:
         )
 
 
-def by_part(parts: Sequence[Part], edits: Sequence[Edit] | None) -> list[Sequence[Edit]]:
+def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
     """The edits of each part: of what no segment holds, and of each segment. None changes nothing.
 
     Raises:
         ArgumentError: if their number is not that of models and segments.
     """
     counts = [1 + part.segments for part in parts]
-    edits = [Edit()] * sum(counts) if edits is None else edits
+    edits = [PartEdit()] * sum(counts) if edits is None else edits
     if len(edits) != sum(counts):
         segments = sum(counts) - len(parts)
         more = f" and {segments} segments" if segments else ""

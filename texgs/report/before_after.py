@@ -8,6 +8,7 @@ import numpy as np
 import torch
 
 from texgs.core.camera import Camera
+from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
@@ -16,14 +17,16 @@ from texgs.scene.frame import frame
 from texgs.scene.scene_file import Scene
 from texgs.volume.cameras import orbit_path
 
-POLAR, DISTANCE, FOV = 20.0, 4.0311, 30.0
+POLAR = 20.0  # degrees
 SHOWN = 3  # views around the object
 SIDE = Light("directional", -30.0, 40.0)  # a light that no edit has seen
 SIZE = 512  # pixels of a picture
 TURN, TURN_SIZE = 36, 320  # frames of the turntable, and pixels of each half
 
 
-def show(before: Scene, after: Scene, output: Path, device: torch.device, title: str) -> list[Path]:
+def write_before_and_after(
+    before: Scene, after: Scene, output: Path, device: torch.device, title: str
+) -> None:
     """Write edit.png, views of both under the scene's light and under another, and turntable.mp4 of both.
 
     Args:
@@ -33,17 +36,16 @@ def show(before: Scene, after: Scene, output: Path, device: torch.device, title:
         device: that renders.
         title: of the progress bar.
     """
-    cameras = orbit_path(SHOWN, POLAR, DISTANCE, FOV, SIZE, SIZE)
+    cameras = orbit_path(SHOWN, POLAR, *Lens().square(SIZE))
     lights = [before.light] * SHOWN + [SIDE]
     titles = [f"view {index + 1}" for index in range(SHOWN)] + ["light from the side"]
     scenes = {"before": before, "after": after}
     rows = {name: pictures(scene, [*cameras, cameras[0]], lights, device) for name, scene in scenes.items()}
-    path = write_strip(output / "edit.png", rows, titles)
-    turn = orbit_path(TURN, POLAR, DISTANCE, FOV, TURN_SIZE, TURN_SIZE)
+    write_strip(output / "edit.png", rows, titles)
+    turn = orbit_path(TURN, POLAR, *Lens().square(TURN_SIZE))
     halves = [pictures(scene, turn, [scene.light] * TURN, device) for scene in scenes.values()]
     frames = [np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True)]
     write_frames(output / "turntable.mp4", progress(frames, title=f"{title}, turntable", unit="frame"))
-    return [path]
 
 
 def pictures(

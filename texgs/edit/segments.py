@@ -1,4 +1,4 @@
-"""What the verb `segment` and the stage `edit_segment` share: masks, views that vote, segments of scenes."""
+"""Segments of scenes: the views that vote on one, its name, its file."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import torch
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 from texgs.core.names import label
 from texgs.fields.surfels.model import Surfels
-from texgs.models.masks import MaskModel
 from texgs.scene.scene_file import RESERVED, Scene, SceneSegment
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.volume.cameras import icosphere
 
 
-def voting_views(count: int, radius: float, fov: float, size: int) -> list[Camera]:
-    """Cameras on an icosphere, of square views.
+def voting_views(count: int, lens: Lens) -> list[Camera]:
+    """Cameras on an icosphere.
 
     Raises:
         ArgumentError: if no icosphere has so many.
@@ -29,25 +29,7 @@ def voting_views(count: int, radius: float, fov: float, size: int) -> list[Camer
     frequency = isqrt(max(count - 2, 0) // 10)
     if frequency < 1 or 10 * frequency**2 + 2 != count:
         raise ArgumentError(f"views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")
-    return icosphere(frequency, radius, fov, size, size)
-
-
-def mask_model(name: str, device: torch.device) -> MaskModel:
-    """The mask model of a name, or in a folder.
-
-    Raises:
-        ArgumentError, MissingDataError: if there is neither, or its weights are missing or damaged.
-    """
-    from texgs.models.grabcut import GrabCut
-    from texgs.models.sam import mobile_sam, sam_folder
-
-    if name == "grabcut":
-        return GrabCut()
-    if name == "mobile_sam":
-        return mobile_sam(device=device)
-    if not Path(name).is_dir():
-        raise ArgumentError(f"masks: expected mobile_sam, grabcut or a folder with a SAM, got {name}")
-    return sam_folder(name, device)
+    return icosphere(frequency, *lens)
 
 
 def require_name(name: str | None, where: str) -> None:

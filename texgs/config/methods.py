@@ -1,0 +1,81 @@
+"""What a method of editing is, and the methods that there are: the modules of texgs/methods.
+
+All that has to know of methods reads their specifications: the schema, the command line, the plan of the
+workflow, the check of weights, the tables. A method is one file there, and a file of conf/edit for each set
+of its values.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from texgs.config.typed import typed
+
+PACKAGE = "texgs.methods"
+NO_METHOD = "none"  # of scenes as they are fitted
+Settings = TypeVar("Settings")
+
+
+@dataclass(frozen=True)
+class Method(Generic[Settings]):
+    """One way to edit a scene. Its module imports nothing heavy before one of these functions is called."""
+
+    name: str
+    summary: str
+    """What it does, in `texgs --help`."""
+    settings: type[Settings]
+    """Dataclass of its keys, `edit.NAME` in the configuration."""
+    run: Callable[[Any], Any]
+    """Edits a scene: from a `Task[Settings]` of texgs/edit/task.py to an `Edited`."""
+    check: Callable[[Settings], None]
+    """Raises an ArgumentError for what is wrong with its settings, without scene and weights."""
+    weights: Callable[[Settings, str], Mapping[str, bool]]
+    """Names of the weights that it may use, and whether it must; from its settings and the CLIP to use."""
+    needs: frozenset[str] = frozenset()
+    """What fields have to be capable of, of `texgs.fields.field.Capability`."""
+    files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}
+    """Files that it reads besides the scene and its views."""
+    adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
+    """Parts that the scene has afterwards in addition, from the names of its models."""
+    style: Callable[[Settings], Any] | None = None
+    """The `StylePicture` that it follows, which the result is compared with."""
+    is_look: bool = True
+    """Whether the scene looks different afterwards."""
+
+    @property
+    def stage(self) -> str:
+        """Its verb, and its stage in the workflow."""
+        return f"edit_{self.name}"
+
+    @property
+    def module(self) -> str:
+        """Where it is."""
+        return self.run.__module__
+
+    def of(self, edit: Mapping[str, Any]) -> Settings:
+        """Its settings among the values of an edit."""
+        return typed(self.settings, edit[self.name])
+
+
+@cache
+def methods() -> dict[str, Method[Any]]:
+    """All methods by name."""
+    package = import_module(PACKAGE)
+    modules = (import_module(f"{PACKAGE}.{entry.name}") for entry in pkgutil.iter_modules(package.__path__))
+    specifications = [module.METHOD for module in modules if hasattr(module, "METHOD")]
+    return {method.name: method for method in specifications}
+
+
+def method_of(edit: Mapping[str, Any]) -> Method[Any]:
+    """The method of an edit.
+
+    Raises:
+        KeyError: for the edit `none`, which has no method.
+    """
+    return methods()[edit["method"]]

@@ -1,0 +1,59 @@
+"""Where the jobs of the workflow put their files, below the folder of results: all paths, in one place."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from omegaconf import DictConfig
+
+
+@dataclass(frozen=True)
+class Place:
+    """The folder of a job, and the files in it that other jobs and people read."""
+
+    folder: str  # of wildcards dataset, tf, views, fit, phase and edit
+    files: tuple[str, ...] = ()  # the first is the one that other jobs ask for; metrics.json comes with all
+
+    @property
+    def is_per_tf(self) -> bool:
+        """Whether there is a job for each basic TF, not for the whole data set."""
+        return "{tf}" in self.folder
+
+
+PLACES = {
+    "volume": Place("{dataset}/volume", ("volume.nrrd", "volume.json")),
+    "transfer": Place("{dataset}/transfer", ("transfer.png",)),
+    "views": Place(
+        "{dataset}/{tf}/{views}", ("transforms_train.json", "transforms_test.json", "turntable.png")
+    ),
+    "sheet": Place("{dataset}/{tf}/sheet", ("sheet.png",)),
+    "phase": Place("{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",)),
+    "figure": Place("{dataset}/{tf}/{fit}/figure", ("figure.png",)),
+    "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
+    "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
+    "timing": Place("{dataset}/scene/{fit}/timing"),
+    "edit": Place("{dataset}/scene/{fit}/edits/{edit}", ("scene.yaml", "edit.png")),
+    "edit_metrics": Place("{dataset}/scene/{fit}/edit_metrics/{edit}"),
+}
+
+
+def folder_of(place: str, config: DictConfig, phase: str = "") -> Path:
+    """Folder of a job's files."""
+    return Path(config.results) / PLACES[place].folder.format(
+        dataset=config.dataset.name,
+        tf=config.tf,
+        views=config.views.name,
+        fit=fit_folder(config),
+        phase=phase,
+        edit=config.edit.name,
+    )
+
+
+def made(place: str, config: DictConfig, phase: str = "") -> Path:
+    """The file of a job that other jobs ask for."""
+    return folder_of(place, config, phase) / PLACES[place].files[0]
+
+
+def fit_folder(config: DictConfig) -> str:
+    """Name of the folder of a fit: the recipe, the variant of a sweep, and a seed other than 0."""
+    seed = f"s{config.fit.seed}" if config.fit.seed else ""
+    return "-".join(part for part in (config.fit.name, config.variant, seed) if part)

@@ -1,0 +1,175 @@
+"""Image-driven editing of textures (the paper's section Image-Driven NPSE): the style of a picture."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from texgs.config.keys import key
+from texgs.config.methods import Method
+from texgs.methods import style
+from texgs.methods.style import StyleKeys
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from texgs.edit.recipe import Recipe
+    from texgs.edit.style_picture import StylePicture
+    from texgs.edit.task import Edited, Task
+    from texgs.fields.surfels.model import Surfels
+    from texgs.volume.view_set import View
+
+KEYS = "edit.image"  # where its keys stand
+
+
+@dataclass
+class ImageKeys(StyleKeys):
+    """How texels take on a style."""
+
+    recipe: str = key(
+        "default",
+        "default; translucent, for scenes one looks into; patches, which needs no weights; preview; paper",
+        choices=("default", "translucent", "patches", "preview", "paper"),
+    )
+    iterations: int | None = key(None, "views, one each; default the recipe's", least=0)
+    lambda_s: float | None = key(
+        None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
+    )
+    pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
+    start: str | None = key(
+        None,
+        "colours at the start: the picture laid onto the surface, its mean, random pixels of it, or the "
+        "model's own moved to its colours; default the recipe's",
+        choices=("projected", "mean", "random", "transfer"),
+    )
+    textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
+
+
+def run(task: Task[ImageKeys]) -> Edited:
+    """Give the parts the style; write style.png and convergence.png."""
+    from texgs.core.image import write_png
+    from texgs.edit.clip_loss import ClipLoss
+    from texgs.edit.stylize import stylize
+    from texgs.edit.task import Edited
+    from texgs.models.clip import Clip
+    from texgs.models.vgg import Vgg
+    from texgs.report.convergence import write_convergence
+    from texgs.volume.reduced import smaller
+
+    wanted = recipe_of(task.settings, task.edit.seed)
+    recipe, picture = with_what_is_there(wanted, task.clip, task.weights), style_of(task.settings)
+    pixels = picture.image.permute(1, 2, 0)
+    vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
+    clip = ClipLoss(Clip.load(task.clip, task.device), pixels.to(task.device)) if recipe.needs_clip else None
+    curves: dict[str, dict[str, list[float]]] = {}
+    seconds: dict[str, dict[str, float]] = {}
+
+    def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
+        start = time.monotonic()
+        result = stylize(
+            model,
+            [smaller(view.camera, task.reduce) for view in views],
+            [view.light for view in views],
+            picture,
+            recipe,
+            vgg=vgg,
+            clip=clip,
+            surfels=surfels,
+            title=f"{task.title} {task.edit.name}, {name}",
+        )
+        curves[name] = result.history.losses
+        seconds[name] = {"all": time.monotonic() - start, **result.history.seconds}
+        return result.model
+
+    scene = task.each_part(one)
+    write_png(task.output / "style.png", pixels)
+    write_convergence(task.output / "convergence.png", curves)
+    return Edited(
+        scene,
+        how(recipe, wanted),
+        sum(each["all"] for each in seconds.values()),
+        {"style.png": "The style picture.", "convergence.png": "Terms of the loss in each iteration."},
+        recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
+        {"seconds": seconds},
+    )
+
+
+def style_of(settings: ImageKeys) -> StylePicture:
+    """The picture, of it the object that was clicked on."""
+    return style.style_of(settings, KEYS)
+
+
+def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
+    """The recipe of an edit, with what the configuration changes about it.
+
+    Raises:
+        ArgumentError: naming the value that is out of range.
+    """
+    from texgs.edit.recipe import preset
+
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("iterations", "lambda_s", "start")
+        if (value := getattr(settings, name)) is not None
+    }
+    return preset(
+        settings.recipe, pattern=settings.pattern, is_textured=settings.textured, seed=seed, **changes
+    )
+
+
+def with_what_is_there(recipe: Recipe, clip: str, weights: Mapping[str, str | None]) -> Recipe:
+    """The recipe with lambda_s 1 where the weights of the CLIP that it would use are missing."""
+    if not recipe.needs_clip or weights[clip] is not None:
+        return recipe
+    sys.stderr.write(f"the weights of {clip} are not on this machine: lambda_s is 1\n")
+    return replace(recipe, lambda_s=1.0)
+
+
+def how(recipe: Recipe, wanted: Recipe) -> str:
+    """What the edit works with, for tables; and that CLIP is missing, where a recipe wants it."""
+    names = {
+        "VGG-16": recipe.needs_vgg,
+        "CLIP": recipe.needs_clip,
+        "patches": recipe.patches > 0 and recipe.iterations > 0,
+    }
+    used = [name for name, is_used in names.items() if is_used] or ["projection"]
+    words = " + ".join(used) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")
+    words += " without CLIP, its weights are missing" if wanted.needs_clip and not recipe.needs_clip else ""
+    return words if recipe.is_textured else f"{words}, without texture"
+
+
+def check(settings: ImageKeys) -> None:
+    """Require numbers that a recipe can have, and a picture.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    recipe_of(settings)
+    style.check(settings, KEYS)
+
+
+def weights(settings: ImageKeys, clip: str) -> Mapping[str, bool]:
+    """Those of the recipe; CLIP is left out where it is missing and nobody has asked for a share of it."""
+    recipe = recipe_of(settings)
+    vgg = {"vgg16": True} if recipe.needs_vgg else {}
+    return {
+        **vgg,
+        **style.weights(settings),
+        **({clip: settings.lambda_s is not None} if recipe.needs_clip else {}),
+    }
+
+
+METHOD = Method(
+    "image",
+    "give a scene the style of a picture",
+    ImageKeys,
+    run,
+    check,
+    weights,
+    needs=frozenset({"texture", "relight"}),
+    files=style.files,
+    style=style_of,
+)

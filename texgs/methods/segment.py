@@ -1,0 +1,202 @@
+"""2D-lift-3D segmentation (the paper's section Partial editing): clicks on a view make a part of a model."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from texgs.config.keys import key
+from texgs.config.methods import Method
+from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.lens import Lens
+
+if TYPE_CHECKING:
+    import torch
+
+    from texgs.core.camera import Camera
+    from texgs.edit.clicks import Clicks
+    from texgs.edit.lift import Lifted
+    from texgs.edit.task import Edited, Task
+    from texgs.fields.surfels.model import Surfels
+    from texgs.scene.scene_file import Scene
+
+LENS = Lens()  # of the view that is clicked on
+SHOWN = 3  # views of the segment around the object
+POLAR = 20.0  # of these views, degrees
+DIMMED = 0.15  # opacity of what is not in the segment, in its picture
+
+
+@dataclass
+class SegmentKeys:
+    """Where is clicked, and how masks become surfels."""
+
+    model: str = key("", "whose part it is; may be left out where there is one")
+    name: str = key("part", "of the segment")
+    view: list[float] = key([30.0, 20.0], "azimuth and polar angle of the view clicked on", "degrees")
+    # OmegaConf takes no integers for list[list[float]].
+    points: list[Any] = key([], "clicks on the part: right and down, as shares of the view's sides")
+    others: list[Any] = key([], "clicks on what does not belong to it")
+    masks: str = key(
+        "mobile_sam",
+        "what finds the part in a view; grabcut needs no weights",
+        choices=("mobile_sam", "grabcut"),
+    )
+    vote: str = key(
+        "contribution",
+        "how masks become surfels; centre: as in the paper",
+        choices=("contribution", "centre"),
+    )
+    connected: bool = key(False, "only the connected pieces that hold a click are kept")
+    views: int = key(42, "that vote, 10 f^2 + 2", least=12)
+    size: int = key(512, "of these views", "pixels", least=32)
+
+
+def run(task: Task[SegmentKeys]) -> Edited:
+    """Make the segment; write its file, and edit.png with the clicks, their mask and the segment."""
+    from texgs.core.names import part_file
+    from texgs.edit.lift import lift
+    from texgs.edit.segments import require_new, voting_views, with_segment
+    from texgs.edit.task import Edited
+    from texgs.models.by_name import mask_model
+
+    settings, scene, device = task.settings, task.scene, task.device
+    name = model_of(scene, settings.model)
+    part = f"{name}/{settings.name}"
+    require_new(scene, part)
+    model = scene.models[name].open()[0].to(device)
+    clicks = clicks_of(settings, device)
+    start = time.monotonic()
+    lifted = lift(
+        model,
+        clicks,
+        [camera.to(device) for camera in voting_views(settings.views, LENS.square(settings.size))],
+        mask_model(settings.masks, device),
+        light=scene.light,
+        vote=settings.vote,  # type: ignore[arg-type]
+        connected=settings.connected,
+        title=f"{task.title} {task.edit.name}",
+    )
+    seconds = time.monotonic() - start
+    sys.stderr.write(f"{part}: {lifted.basis}\n")
+    file = task.output / part_file("edit.segment.name", name, settings.name)
+    after = with_segment(scene, part, model, lifted.mask, file, asdict(settings))
+    show(task, model, clicks, lifted)
+    return Edited(
+        after,
+        f"{settings.masks}, {settings.vote}",
+        seconds,
+        {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
+        notes={
+            "surfels": int(lifted.mask.sum()),
+            "views": {"used": lifted.used, "left out": lifted.left_out},
+        },
+    )
+
+
+def model_of(scene: Scene, name: str) -> str:
+    """The model to segment: the one named, or the only one.
+
+    Raises:
+        ArgumentError: if there is no such model.
+    """
+    if not name and len(scene.models) == 1:
+        return next(iter(scene.models))
+    if name not in scene.models:
+        raise ArgumentError(f"edit.segment.model: expected one of {', '.join(scene.models)}, got {name!r}")
+    return name
+
+
+def clicks_of(settings: SegmentKeys, device: torch.device) -> Clicks:
+    """Clicks in pixels.
+
+    Raises:
+        ArgumentError: if one is no place in the view, or none is on the object.
+    """
+    import torch
+
+    from texgs.core.camera import orbit
+    from texgs.edit.clicks import Clicks, shares
+
+    places = shares("edit.segment.points", [*settings.points, *settings.others])
+    if not settings.points:
+        raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
+    if len(settings.view) != 2:
+        raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {settings.view}")
+    azimuth, polar = settings.view
+    camera = orbit(azimuth, polar, *LENS).to(device)
+    points = LENS.width * torch.tensor(places, dtype=torch.float32, device=device)
+    positive = torch.arange(len(points), device=device) < len(settings.points)
+    return Clicks(camera, points, positive)
+
+
+def show(task: Task[SegmentKeys], model: Surfels, clicks: Clicks, lifted: Lifted) -> None:
+    """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
+    import torch
+
+    from texgs.edit.preview import overlay
+    from texgs.fields.surfels.model import Surfels
+    from texgs.fields.surfels.render import render
+    from texgs.report.strip import write_strip
+    from texgs.volume.cameras import orbit_path
+
+    faint = lifted.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~lifted.mask, DIMMED)
+    opacities = (model.parameters["opacities"].sigmoid() * faint).clamp(1e-6, 1 - 1e-6).logit()
+    dimmed = Surfels({**model.parameters, "opacities": opacities}, model.shading, model.metadata)
+
+    @torch.no_grad()
+    def shown(of: Surfels, camera: Camera) -> torch.Tensor:
+        return render(of, camera.to(task.device), task.scene.light).color.clamp(0, 1)
+
+    marked = overlay(shown(model, clicks.camera), lifted.reference, clicks.points, clicks.positive)
+    around = orbit_path(SHOWN, POLAR, *LENS)
+    pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
+    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
+    write_strip(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
+
+
+def check(settings: SegmentKeys) -> None:
+    """Require a name, clicks, and a number of views that an icosphere has.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    import torch
+
+    from texgs.edit.segments import require_name, voting_views
+
+    require_name(settings.name, "edit.segment.name")
+    clicks_of(settings, torch.device("cpu"))
+    voting_views(settings.views, LENS.square(settings.size))
+
+
+def weights(settings: SegmentKeys, clip: str) -> Mapping[str, bool]:
+    """The mask model's, where it has some."""
+    return {"mobile_sam": True} if settings.masks == "mobile_sam" else {}
+
+
+def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:
+    """The segment.
+
+    Raises:
+        ConfigError: if there is no such model.
+    """
+    model = settings.model or models[0]
+    if model not in models:
+        raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model}")
+    return [f"{model}/{settings.name}"]
+
+
+METHOD = Method(
+    "segment",
+    "make a segment of a model of a scene, by clicks of the configuration",
+    SegmentKeys,
+    run,
+    check,
+    weights,
+    needs=frozenset({"segments"}),
+    adds=adds,
+    is_look=False,
+)
