@@ -16,8 +16,8 @@ from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.memory import keep_freed_memory
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.volume.images import Images
 
@@ -74,7 +74,7 @@ def training(size: int, n: int, device: torch.device) -> Fit:
 def views(model: Surfels, size: int) -> Images:
     """Views around a model, as 8-bit images."""
     cameras = [orbit(-60.0 + 360 / VIEWS * i, 25.0, DISTANCE, 30.0, size, size) for i in range(VIEWS)]
-    shown = [render(model, camera.to(model.parameters["means"].device)) for camera in cameras]
+    shown = [model.render(camera.to(model.device)) for camera in cameras]
     planes = [torch.cat([x.color.permute(2, 0, 1), x.alpha[None]]) for x in shown]
     eight_bits = torch.stack(planes).clamp(0, 1).mul(255).round().to(torch.uint8).cpu()
     return Images(eight_bits, cameras, [Light("headlight")] * VIEWS)

@@ -13,7 +13,8 @@ from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 
 MODELS, SURFELS, SIDE = 4, 30_000, 4  # models, surfels in each, texels along each side of a texture
 EDITS = [

@@ -7,7 +7,7 @@ from texgs.cli.stages.edit_metrics import agreement
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.scene.scene_file import Scene, SceneModel
-from texgs.volume.cameras import test_path as path
+from texgs.volume.cameras import spiral as path
 
 
 def test_a_scene_that_is_nowhere_opaque_has_no_consistency(tmp_path):

@@ -72,9 +72,9 @@ def test_pictures_show_both(results):
 
 def test_numbers_name_the_method(results):
     glass, gold = (numbers(results / "edits" / edit) for edit in ("glass", "gold"))
-    assert glass["method"] == "patches (no weights)"
-    assert gold["method"] == "procedural filters, default"
-    assert set(glass["parts"]) == {"TF01", "TF02"}
+    assert glass["how"] == "patches (no weights)"
+    assert gold["how"] == "procedural filters, default"
+    assert set(glass["notes"]["seconds"]) == {"TF01", "TF02"}
     assert glass["edit_seconds"] > 0
     assert json.loads((results / "edits" / "glass" / "metrics.json").read_text())["seed"] == 3
 
@@ -84,7 +84,7 @@ def test_a_part_of_a_model_is_edited_alone(results, edit):
     models = read_scene(results / "edits" / edit / "scene.yaml").models
     before, after = parameters(results, "compose", "TF01"), parameters(results, f"edits/{edit}", "TF01")
     (mask,) = models["TF01"].open()[1]
-    assert 0 < int(mask.sum()) == numbers(results / "edits" / "lobe")["surfels"]
+    assert 0 < int(mask.sum()) == numbers(results / "edits" / "lobe")["notes"]["surfels"]
     counts = before["sizes"].long().prod(1)
     owner = torch.repeat_interleave(counts)
     changed = (before["texels"] != after["texels"]).any(1)

@@ -32,7 +32,7 @@ def numbers(results, stage):
 def test_the_scene_has_all_models_and_a_picture(results):
     scene = read_scene(results / "compose" / "scene.yaml")
     assert list(scene.models) == ["TF01", "TF02"]
-    assert len(scene.open()) == numbers(results, "compose")["surfels"]
+    assert len(scene.open()) == numbers(results, "compose")["primitives"]
     picture = np.asarray(Image.open(results / "compose" / "scene.png"))
     assert picture.min() < 200, "there is something to see"
 

@@ -4,7 +4,8 @@ import torch
 from kornia.geometry.conversions import rotation_matrix_to_quaternion
 
 from tests.fit.scenes import HEADLIGHT, RADIUS, cameras
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 
 
 def sphere_points(count):

@@ -9,7 +9,6 @@ from texgs.core.errors import ArgumentError, ShapeError
 from texgs.edit.clicks import Clicks, is_visible, projected, prompts_at
 from texgs.edit.lift import HEADLIGHT, Views, lift, middle_of
 from texgs.edit.preview import preview
-from texgs.fields.surfels.render import render
 from texgs.models.grabcut import GrabCut
 
 SIZE = 120
@@ -90,10 +89,10 @@ def test_places_are_visible_where_nothing_is_in_front_of_them():
     expected = {-90: [True, False, False], 90: [False, False, True]}
     for azimuth, seen in expected.items():
         camera = orbit(azimuth, 0, 4.0, 22.0, SIZE, SIZE)
-        median = render(model, camera, outputs=("median",)).median
+        median = model.render(camera, outputs=("median",)).median
         assert is_visible(*projected(places, camera), median, 0.03).tolist() == seen
     above = orbit(-90, 50, 4.0, 22.0, SIZE, SIZE)
-    median = render(model, above, outputs=("median",)).median
+    median = model.render(above, outputs=("median",)).median
     assert is_visible(*projected(places, above), median, 0.03).tolist() == [True, True, False]
     outside = torch.tensor([[50.0, 0.0, 0.0], [0.0, 0.0, 9.0]])
     assert not is_visible(*projected(outside, FRONT), median, 0.03).any(), "beside and behind the camera"
@@ -126,7 +125,7 @@ def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along():
     image, ((point,), _) = masks.images[0], masks.clicked[0]
     assert image.shape[0] * image.shape[1] < 0.7 * SIZE * SIZE
     x, y = point.long().tolist()
-    full = render(model, FRONT).color
+    full = model.render(FRONT).color
     column, row = click.points[0].long().tolist()
     torch.testing.assert_close(image[y, x], full[row, column].clamp(0, 1), atol=1e-4, rtol=0)
     expected = (full[..., 2] - full[..., 0]) > 0.1
@@ -170,7 +169,7 @@ def test_a_preview_shows_the_mask_and_the_clicks():
     model, _ = two_balls()
     click = clicks((-0.3, 0.0, 0.25), negative=[(0.3, 0.1, 0.35)])
     mask, picture = preview(model, click, Alike())
-    full = render(model, FRONT).color.clamp(0, 1)
+    full = model.render(FRONT).color.clamp(0, 1)
     (x0, y0), (x1, y1) = click.points.long().tolist()
     assert mask[y0, x0]
     assert not mask[y1, x1]

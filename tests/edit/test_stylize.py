@@ -13,8 +13,9 @@ from texgs.edit.style_start import pixel_side
 from texgs.edit.stylize import stylize
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.model import GEOMETRY, MATERIAL, Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import MATERIAL
 from texgs.fields.surfels.texels import owners
 from texgs.models.vgg import Vgg
 
@@ -211,7 +212,7 @@ def test_views_that_do_not_show_the_model_change_nothing(vgg, style):
     start = stylize(ball(), cameras, lights, style, preset("preview")).model
     done = stylize(ball(), away, lights, style, short(), vgg=vgg)
     assert torch.equal(done.model.parameters["texels"], start.parameters["texels"])
-    assert render(ball(), away[0]).alpha.max() == 0
+    assert ball().render(away[0]).alpha.max() == 0
 
 
 def test_mistakes_are_named_before_any_work(vgg, style):

@@ -3,7 +3,8 @@
 import torch
 
 from texgs.core.camera import orbit
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.texels import textured
 
 RADIUS = 0.4

@@ -7,7 +7,7 @@ import torch
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
 from texgs.core.light import Light
-from texgs.fields.surfels.model import ShadingModel, raw_material
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.fit.seeds import surfels_at
 from texgs.volume.images import Images

@@ -5,7 +5,8 @@ from texgs.config.fit import Densify, Losses, Rates
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
-from texgs.fields.surfels.model import MATERIAL, Surfels, raw_material
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import MATERIAL, raw_material
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import split, zeroth
 from texgs.fit.loop import CHECKED_EVERY, extent

@@ -7,8 +7,8 @@ from torch.testing import assert_close
 from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
 from texgs.config.fit import Losses
 from texgs.fields.surfels.bounds import visible_part
-from texgs.fields.surfels.model import ShadingModel, Surfels, material
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.losses import view_loss
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
 
@@ -47,7 +47,7 @@ def loss(parameters, target, **weights):
 
 def test_color_and_alpha(target):
     parameters = per_surfel()
-    seen = render(Surfels(parameters, OPTICS), target.camera, target.light)
+    seen = Surfels(parameters, OPTICS).render(target.camera, target.light)
     color = photometric(seen.color, target.color, 0.2)
     alpha = photometric(seen.alpha[..., None], target.alpha[..., None], 0.2)
     assert loss(parameters, target, alpha=0.0) == pytest.approx(float(color), rel=1e-4)
@@ -64,7 +64,7 @@ def test_smoothness_of_each_map_of_the_material(target):
         unlit |= {"specular": torch.full((1,), -40.0), "shininess": torch.zeros(1)}
         scale = float(values.max())
         unlit["colors"] = unlit["colors"] / scale  # colours are clamped to 1
-        plane = scale * render(Surfels(unlit, OPTICS), target.camera, background=torch.zeros(3)).color[..., 0]
+        plane = scale * Surfels(unlit, OPTICS).render(target.camera, background=torch.zeros(3)).color[..., 0]
         expected += float(bilateral_smoothness(plane.double(), target.color.double(), target.alpha.double()))
     without, with_it = loss(parameters, target), loss(parameters, target, smoothness=0.01)
     assert with_it - without == pytest.approx(0.01 * expected, rel=1e-3)
@@ -92,7 +92,7 @@ def gradients(parameters, target, turns_normals=True, **weights):
 
 def test_alpha_without_l1_is_its_dissimilarity_at_the_same_weight(target):
     parameters = per_surfel()
-    alpha = render(Surfels(parameters, OPTICS), target.camera, target.light).alpha[..., None].double()
+    alpha = Surfels(parameters, OPTICS).render(target.camera, target.light).alpha[..., None].double()
     expected = 0.5 * 0.2 * (1 - ssim(alpha, target.alpha[..., None].double()))
     found = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
     assert found == pytest.approx(float(expected), rel=1e-3)

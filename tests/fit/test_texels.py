@@ -8,8 +8,8 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import HEADLIGHT, ball_images, ball_seeds, cameras, images_of, new_fit, run
 from texgs.core.errors import ArgumentError
-from texgs.fields.surfels.model import ShadingModel, Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit.texels import mean_color, textured, texturize
 from texgs.fit.texture_layout import Sight, look, offsets_of, sizes_for_budget, sizes_where_seen
 from texgs.raster.atlas import check_texture
@@ -32,7 +32,7 @@ def total(sizes):
 
 
 def color(model, view):
-    return render(model, view, HEADLIGHT).color
+    return model.render(view, HEADLIGHT).color
 
 
 def sight(largest, pixel):

@@ -9,8 +9,8 @@ from torch.testing import assert_close
 from tests.fit.scenes import HEADLIGHT, ball_images, ball_planes, ball_seeds, cameras, images_of, new_fit, run
 from texgs.config.fit import Densify
 from texgs.core.errors import FitError
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
-from texgs.fields.surfels.render import render, shaded
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material, shaded
 from texgs.fit.texels import textured
 from texgs.fit.texture_adam import refine, without_texture
 from texgs.fit.texture_layout import look, sizes_for_budget
@@ -43,7 +43,7 @@ def start(images):
 
 def squared(model, images):
     targets = [images.target(i) for i in range(len(images))]
-    return sum(float((render(model, t.camera, t.light).color - t.color).square().sum()) for t in targets)
+    return sum(float((model.render(t.camera, t.light).color - t.color).square().sum()) for t in targets)
 
 
 def one_surfel():
@@ -59,20 +59,20 @@ def one_surfel():
     views = [camera for camera in cameras(8, 32) if abs(float(camera.position[0])) > 0.7]
     known = Surfels({**model.parameters, "texels": texels}, model.shading)
     planes = [
-        torch.cat([render(known, c, HEADLIGHT).color.permute(2, 0, 1), torch.ones(1, 32, 32)]) for c in views
+        torch.cat([known.render(c, HEADLIGHT).color.permute(2, 0, 1), torch.ones(1, 32, 32)]) for c in views
     ]
     return model, texels, images_of(planes, views)
 
 
 def dense(model, images):
     """Columns of one channel's matrix A [V H W, T], one texel at a time."""
-    base = [render(model, c, HEADLIGHT).color for c in images.cameras]
+    base = [model.render(c, HEADLIGHT).color for c in images.cameras]
     columns = []
     for texel in range(len(model.parameters["texels"])):
         unit = torch.zeros_like(model.parameters["texels"])
         unit[texel] = 1
         lit = Surfels({**model.parameters, "texels": unit}, model.shading)
-        shown = [render(lit, c, HEADLIGHT).color - b for c, b in zip(images.cameras, base, strict=True)]
+        shown = [lit.render(c, HEADLIGHT).color - b for c, b in zip(images.cameras, base, strict=True)]
         columns.append(torch.stack(shown)[..., 0].flatten())
     return torch.stack(columns, dim=1).double()
 
@@ -80,7 +80,7 @@ def dense(model, images):
 def test_solve_agrees_with_dense_least_squares():
     model, _, images = one_surfel()
     A = dense(model, images)
-    base = torch.stack([render(model, c, HEADLIGHT).color for c in images.cameras])
+    base = torch.stack([model.render(c, HEADLIGHT).color for c in images.cameras])
     wanted = torch.stack([images.target(i).color for i in range(len(images))])
     residual = (wanted - base).flatten(end_dim=2).double()
     exact = torch.linalg.lstsq(A, residual).solution
@@ -172,7 +172,7 @@ def test_without_texture_is_the_model_with_texels_of_zero(start, images):
 def shown(model, images):
     """The first view."""
     target = images.target(0)
-    return render(model, target.camera, target.light).color.detach()
+    return model.render(target.camera, target.light).color.detach()
 
 
 def test_numbers_that_are_not_finite_are_reported(start):

@@ -6,8 +6,8 @@ import torch
 from texgs.core.camera import orbit
 from texgs.core.image import write_png
 from texgs.core.light import Light
-from texgs.fields.surfels.model import Surfels, raw_material
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import raw_material
 from texgs.metrics.quality import evaluate, mean
 from texgs.volume.view_set import View
 
@@ -32,7 +32,7 @@ def test_a_model_is_almost_its_own_pictures(tmp_path: Path):
     views = []
     for index in range(3):
         camera = orbit(120.0 * index, 20, 4, 20, 32, 24)
-        seen = render(model, camera, light, background=torch.zeros(3))
+        seen = model.render(camera, light, background=torch.zeros(3))
         write_png(tmp_path / f"{index}.png", seen.color, seen.alpha)
         views.append(View(camera, tmp_path / f"{index}.png", light))
     found = evaluate(model, views)

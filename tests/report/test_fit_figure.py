@@ -11,8 +11,9 @@ from PIL import Image
 from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
-from texgs.fields.surfels.model import GEOMETRY, Surfels, material
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import material
 from texgs.report.fit_figure import (
     Scale,
     compare,
@@ -77,7 +78,7 @@ def test_the_same_models_give_the_same_bytes_2000_pixels_wide(tmp_path, view):
 def test_words_do_not_overlap(tmp_path, monkeypatch, view, kind):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, _file, **_options: drawn.append(figure))
-    models = {"shading": shading(kind), "texture": texture(kind)}
+    models = {"surfels": None, "shading": shading(kind), "texture": texture(kind)}
     write_fit_figure(tmp_path / "a.png", models, {"training view 100": view, "b": view}, title="ball, TF01")
     (figure,) = drawn
     figure.draw_without_rendering()
@@ -103,7 +104,7 @@ def test_phases_stand_beside_the_view(view):
     ]
     truth = ball_planes(view.camera)
     torch.testing.assert_close(panels[0].pixels, truth[:3].permute(1, 2, 0), atol=1 / 255, rtol=0)
-    shown = render(MODELS["shading"], view.camera)
+    shown = MODELS["shading"].render(view.camera)
     assert torch.equal(panels[2].pixels, shown.color.clamp(0, 1))
     error = ((panels[2].pixels - panels[0].pixels) ** 2).mean().item()
     assert panels[2].words == f"PSNR {-10 * math.log10(error):.2f} dB"
@@ -125,7 +126,7 @@ def test_the_error_is_that_of_the_worst_channel():
 
 def test_a_perfect_fit_has_no_error(tmp_path):
     (camera,) = cameras(1)
-    shown = render(MODELS["texture"], camera)
+    shown = MODELS["texture"].render(camera)
     color = shown.color - 1 + shown.alpha[..., None]
     view = View(camera, write_png(tmp_path / "view.png", color, shown.alpha), HEADLIGHT)
     panels, _ = compare(MODELS, view, 1)
@@ -192,8 +193,8 @@ def test_nothing_visible_shows_the_whole_frame():
 
 
 def test_mistakes_are_named(tmp_path, view):
-    with pytest.raises(ArgumentError, match=r"a\.png: expected models shading and texture and a view"):
-        write_fit_figure(tmp_path / "a.png", {"shading": shading()}, {"a": view})
+    with pytest.raises(ArgumentError, match=r"a\.png: expected a model of the last phase and a view, got shading"):
+        write_fit_figure(tmp_path / "a.png", {"shading": None}, {"a": view})
     with pytest.raises(ArgumentError, match="got surfels, shading, texture and 0 views"):
         write_fit_figure(tmp_path / "a.png", MODELS, {})
     assert not (tmp_path / "a.png").exists()

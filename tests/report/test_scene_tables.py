@@ -30,7 +30,7 @@ def test_data_sets_by_size_of_their_views(tmp_path):
 
 
 def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
-    sizes = {"surfels": 1000, "geometry_mib": 1.0, "shading_mib": 0.5, "texture_mib": 8.0}
+    sizes = {"primitives": 1000, "geometry_mib": 1.0, "shading_mib": 0.5, "texture_mib": 8.0}
     for tf in ("TF01", "TF02"):
         for seed in (0, 1):
             metrics(tmp_path, "texture", sizes, tf=tf, dataset="wood", seed=seed)
@@ -43,7 +43,14 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
 
 
 def test_frames_beside_those_of_the_volume(tmp_path):
-    numbers = {"surfels": 9, "width": 8, "height": 6, "threads": 2, "frame_mean_ms": 4.0, "frame_max_ms": 5.0}
+    numbers = {
+        "primitives": 9,
+        "width": 8,
+        "height": 6,
+        "threads": 2,
+        "frame_mean_ms": 4.0,
+        "frame_max_ms": 5.0,
+    }
     metrics(tmp_path, "timing", {**numbers, "volume_mean_ms": 100.0})
     metrics(tmp_path, "timing", numbers, dataset="vortex", device="a GPU")
     first, second = rows(rendering(tmp_path.iterdir()))

@@ -20,7 +20,7 @@ def run(
     paths = []
     for phase in phases:
         path = folder / f"{dataset}-{variant}-{seed}-{phase}.json"
-        numbers = {"fit_seconds": 60.0, "surfels": 1000}
+        numbers = {"fit_seconds": 60.0, "primitives": 1000}
         if phase == "texture":
             numbers |= {"psnr": psnr, "train_psnr": psnr + 1, "ssim": 0.9}
         if phase == "shading":

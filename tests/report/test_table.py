@@ -36,7 +36,7 @@ def test_markdown_and_latex_say_what_was_not_measured():
 def metrics(folder, dataset, recipe, phase, **numbers):
     path = folder / dataset / "TF01" / recipe / phase / "metrics.json"
     path.parent.mkdir(parents=True)
-    numbers = {"fit_seconds": 90.0, "surfels": 1234, **numbers}
+    numbers = {"fit_seconds": 90.0, "primitives": 1234, **numbers}
     record = {"stage": phase, "dataset": dataset, "tf": "TF01", "peak_memory_mib": 512.0, "numbers": numbers}
     path.write_text(json.dumps(record))
     return path

@@ -11,7 +11,6 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import read_ply, write_ply
-from texgs.fields.surfels.render import render
 from texgs.fields.surfels.texels import mean_texels, owners
 from texgs.scene.export import joined, write_points
 
@@ -49,7 +48,7 @@ def test_joined_surfels_look_like_the_edited_scene_without_light():
     expected = scene.render(CAMERA, edits=EDITS, look="unshaded")
     surfels = joined(scene.parts, EDITS)
     assert (len(surfels), surfels.stage) == (300, "surfels")
-    found = render(surfels, CAMERA)
+    found = surfels.render(CAMERA)
     assert_close(found.alpha, expected.alpha, atol=1e-5, rtol=0)
     assert_close(found.color, expected.color, atol=1e-5, rtol=0)
 

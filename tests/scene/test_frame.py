@@ -6,7 +6,8 @@ from tests.fields.surfels.test_composition import CAMERA, SIDE, ball
 from texgs.core.errors import ArgumentError
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.model import Surfels, raw_material
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import raw_material
 from texgs.scene.frame import frame
 
 

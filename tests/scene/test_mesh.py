@@ -7,8 +7,8 @@ import torch
 from tests.fields.surfels.ply_files import vertices
 from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError
-from texgs.fields.surfels.model import ShadingModel, Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render
 from texgs.scene.mesh import Mesh, fuse, write_mesh
 from texgs.volume.cameras import geodesic_vertices, icosphere
@@ -42,7 +42,7 @@ def ball(opacity=8.0):
 
 
 def show(model):
-    return lambda camera: render(model, camera, background=torch.zeros(3), outputs=("median",))
+    return lambda camera: model.render(camera, background=torch.zeros(3), outputs=("median",))
 
 
 def exact(camera):
@@ -131,4 +131,4 @@ def test_mistakes_are_named(monkeypatch):
 def test_renders_without_median_are_refused():
     open3d()
     with pytest.raises(ArgumentError, match="show: expected renders with median"):
-        fuse(lambda camera: render(sample("surfels"), camera), VIEWS, VOXEL)
+        fuse(lambda camera: sample("surfels").render(camera), VIEWS, VOXEL)

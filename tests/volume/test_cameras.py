@@ -34,7 +34,7 @@ def test_icosphere_is_the_published_training_set_view_by_view():
 
 
 def test_test_path_is_the_published_test_set_view_by_view():
-    ours, theirs = camera_to_world(cameras.test_path(181, **LENS)), published("test")
+    ours, theirs = camera_to_world(cameras.spiral(181, **LENS)), published("test")
     assert ours.shape == theirs.shape == (181, 3, 4)
     np.testing.assert_allclose(ours, theirs, atol=2e-6)
 
@@ -73,8 +73,8 @@ def test_162_views_hold_the_six_along_the_axes():
 
 
 def test_test_path_of_any_length_goes_from_pole_to_pole():
-    ours = positions(cameras.test_path(7, **LENS))
-    full = positions(cameras.test_path(181, **LENS))
+    ours = positions(cameras.spiral(7, **LENS))
+    full = positions(cameras.spiral(181, **LENS))
     np.testing.assert_allclose(ours, full[::30], atol=1e-5)
 
 
@@ -92,6 +92,6 @@ def test_mistakes_are_named():
     with pytest.raises(
         ArgumentError, match="count: expected at least 2 cameras on a path from pole to pole, got 1"
     ):
-        cameras.test_path(1, **LENS)
+        cameras.spiral(1, **LENS)
     with pytest.raises(ArgumentError, match="count: expected at least 1 camera, got 0"):
         cameras.orbit_path(0, 0, **LENS)

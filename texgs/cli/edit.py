@@ -1,12 +1,11 @@
 """Edit a scene by words such as TF01.palette=#ff8800 and write it to a new file; nothing is trained."""
 
 import argparse
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from texgs.scene.scene_file import Scene
+    from texgs.scene.session import Session
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,95 +25,73 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the edited scene."""
-    from texgs.core.errors import ArgumentError
-    from texgs.scene.scene_file import read_scene, read_values, scene_of, write_scene
+    from texgs.core.errors import TexgsError
+    from texgs.scene.session import Session
 
-    before = read_scene(arguments.scene)  # says what is wrong with it before anything is changed
-    values = read_values(arguments.scene)
-    values["models"] = {str(name): entry for name, entry in values["models"].items()}
+    session = Session.open(arguments.scene)
     for word in arguments.overrides:
         try:
-            apply(values, word, arguments.scene.parent)
-            scene = scene_of(values, arguments.scene.parent)
-        except ArgumentError as error:
-            raise ArgumentError(f"{word}: {error}") from error
-    scene = scene_of(values, arguments.scene.parent)
-    require_openable(scene, before)
-    print(write_scene(arguments.output, scene))
+            apply(session, word)
+        except TexgsError as error:
+            raise type(error)(f"{word}: {error}") from error
+    print(session.save(arguments.output))
     return 0
 
 
-def require_openable(scene: "Scene", before: "Scene") -> None:
-    """Require that the files that edits have brought into a scene are there, whole, and of its models.
+def apply(session: "Session", word: str) -> None:
+    """Make the change that a word asks for.
 
     Raises:
-        ArgumentError, ShapeError: naming the model and the file.
-    """
-    from texgs.core.errors import TexgsError
-
-    for name, entry in scene.models.items():
-        if name in before.models and entry.files == before.models[name].files:
-            continue
-        try:
-            entry.open()
-        except TexgsError as error:
-            raise type(error)(f"models.{name}: {error}") from error
-
-
-def apply(values: dict[str, Any], word: str, folder: Path) -> None:
-    """Set one key of a scene's plain values; files in them are relative to the folder.
-
-    Raises:
-        ArgumentError: if the word is no KEY=VALUE or names no model.
+        TexgsError: if it is no KEY=VALUE, or the scene has no such part, key or value.
     """
     from texgs.core.errors import ArgumentError
 
-    key, is_edit, text = word.partition("=")
+    name, is_edit, text = word.partition("=")
     if not is_edit:
         raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
-    table, key = place(values, key, is_new=text != "")
-    if text == "":
-        table.pop(key, None)
-    elif key in ("file", "texture"):
-        table[key] = file(text, folder)
+    part, dot, key = name.rpartition(".")
+    if part in session.scene.models or (dot and "/" in part and "/" not in key):
+        change_part(session, part, key, text)
+    elif "/" in name:
+        session.add_segment(name, file(text)) if text else session.remove_segment(name)
+    elif dot:
+        models = ", ".join(session.scene.models)
+        raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
     else:
-        table[key] = light(text) if key == "light" else plain(text)
+        change_scene(session, name, text)
 
 
-def place(values: dict[str, Any], key: str, is_new: bool) -> tuple[dict[str, Any], str]:
-    """The table of a scene's plain values that a key is in, and the key there.
+def change_part(session: "Session", part: str, key: str, text: str) -> None:
+    """Change one value of a part; an empty text takes it back."""
+    from texgs.scene.parts import entry_of, place_of
+    from texgs.scene.scene_file import SEGMENT_KEYS, known
 
-    MODEL/SEGMENT is the file of a segment where one is given (`is_new`), else the segment itself.
-
-    Raises:
-        ArgumentError: if there is no such model or segment.
-    """
-    from texgs.core.errors import ArgumentError
-
-    models = values["models"]
-    name, dot, last = key.rpartition(".")
-    if name in models:
-        return models[name], last
-    if not dot and "/" not in key:
-        return values, key
-    name, slash, rest = key.rpartition("/")  # names of models may have both marks, those of segments none
-    if not slash or name not in models:
-        raise ArgumentError(
-            f"expected a model of the scene ({', '.join(models)}), got {name or key.rpartition('.')[0]}"
-        )
-    segments = {str(found): entry for found, entry in models[name].get("segments", {}).items()}
-    models[name]["segments"] = segments
-    segment, dot, last = rest.partition(".")
-    if is_new and not dot:
-        return segments.setdefault(segment, {}), "file"
-    if segment not in segments:
-        known = ", ".join(segments) or "it has none"
-        raise ArgumentError(f"expected a segment of {name} ({known}), got {segment}")
-    return (segments[segment], last) if dot else (segments, segment)
+    entry_of(session.scene, part)
+    known({key: text}, SEGMENT_KEYS, place_of(part))
+    if key == "texture":
+        session.set_texture(part, file(text) if text else None)
+    elif key == "file":
+        session.set_file(part, file(text))
+    elif text:
+        session.set(part, key, plain(text))
+    else:
+        session.reset(part, key)
 
 
-def file(text: str, folder: Path) -> str:
-    """A file, named from where one is, as scenes in a folder name it.
+def change_scene(session: "Session", key: str, text: str) -> None:
+    """Change the light or the background; an empty text takes it back."""
+    from texgs.core.light import HEADLIGHT
+    from texgs.scene.scene_file import WHITE, known, light_of
+
+    known({key: text}, ("light", "background"), "the scene")
+    if key == "background":
+        session.set_background(plain(text) if text else WHITE)
+    else:
+        session.set_light(light_of(light(text)) if text else HEADLIGHT)
+
+
+def file(text: str) -> Path:
+    """A file, from where one is.
 
     Raises:
         ArgumentError: if it is not there.
@@ -123,7 +100,7 @@ def file(text: str, folder: Path) -> str:
 
     if not Path(text).is_file():
         raise ArgumentError(f"expected a file that is there, got {text}")
-    return Path(os.path.relpath(Path(text).resolve(), folder.resolve())).as_posix()
+    return Path(text).resolve()
 
 
 def plain(text: str) -> Any:

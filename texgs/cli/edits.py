@@ -4,6 +4,7 @@ from omegaconf import DictConfig
 
 from texgs.config.compose import compose
 from texgs.config.edits import lineage
+from texgs.config.fields import require
 from texgs.config.inputs import scene_before
 from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
@@ -34,4 +35,5 @@ def check_edit(config: DictConfig) -> None:
     """
     if config.edit.method != NO_METHOD:
         method = method_of(config.edit)
+        require(config.fit.field, method.needs, f"edit {config.edit.name}")
         method.check(method.of(config.edit))

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Callable, Sequence
-from math import isqrt
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -54,12 +53,27 @@ def run(arguments: argparse.Namespace) -> int:
         scene = read_scene(arguments.source)
         if arguments.model is not None:
             entry = chosen(scene, arguments.model)
-            print(of_model(arguments, entry.open()[0].to(arguments.device), kind))
+            print(of_model(arguments, entry.surfels()[0].to(arguments.device), kind))
             return 0
-        print(of_scene(arguments, scene.open(arguments.device), scene.edits, kind))
+        print(of_scene(arguments, composition_of(scene, arguments.device), scene.edits, kind))
     else:
         print(of_model(arguments, open_model(arguments.source).to(arguments.device), kind))
     return 0
+
+
+def composition_of(scene: "Scene", device: str) -> "Composition":
+    """The surfels of a scene, joined.
+
+    Raises:
+        ArgumentError: if it has none, but fields of another kind.
+    """
+    from texgs.core.errors import ArgumentError
+    from texgs.fields.surfels.composition import Composition
+
+    composed = scene.open(device)
+    if not isinstance(composed, Composition):
+        raise ArgumentError("export: expected a scene of surfels, got fields of another kind")
+    return composed
 
 
 def chosen(scene: "Scene", name: str) -> "SceneModel":
@@ -128,7 +142,6 @@ def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path
     from texgs.fields.surfels.compact import seen_surfels, write_compact
     from texgs.fields.surfels.composition import Composition
     from texgs.fields.surfels.ply import write_ply
-    from texgs.fields.surfels.render import render
     from texgs.scene.export import write_points
 
     if kind == "compact":
@@ -141,7 +154,7 @@ def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path
     if model.stage != "surfels":
         return of_scene(arguments, Composition([model]), [PartEdit()], kind)
     black = model.parameters["means"].new_zeros(3)
-    return write_fused(arguments, lambda camera: render(model, camera, background=black, outputs=("median",)))
+    return write_fused(arguments, lambda camera: model.render(camera, background=black, outputs=("median",)))
 
 
 def write_fused(arguments: argparse.Namespace, show: "Callable[[Camera], Render]") -> Path:
@@ -158,11 +171,7 @@ def cameras(arguments: argparse.Namespace) -> "list[Camera]":
     Raises:
         ArgumentError: if no icosphere has so many views.
     """
-    from texgs.core.errors import ArgumentError
     from texgs.core.lens import Lens
-    from texgs.volume.cameras import icosphere
+    from texgs.volume.cameras import icosphere_of
 
-    frequency = isqrt(max(arguments.views - 2, 0) // 10)
-    if frequency < 1 or 10 * frequency**2 + 2 != arguments.views:
-        raise ArgumentError(f"--views: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {arguments.views}")
-    return icosphere(frequency, *Lens().square(arguments.size))
+    return icosphere_of(arguments.views, Lens().square(arguments.size), "--views")

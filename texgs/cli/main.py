@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 
 from texgs import __version__
+from texgs.config.fields import kinds
 from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import keep_freed_memory, told
@@ -23,6 +24,7 @@ STAGE_VERBS = {
     "surfels": "seed surfels and fit them with spherical harmonics",
     "shading": "fit relightable surfels with Blinn-Phong shading",
     "texture": "give relightable surfels textures",
+    **{kind.name: kind.summary for kind in kinds().values() if kind.fit is not None},
     "figure": "show a fit beside test views, with its maps",
     "compose": "make one scene of the basic models of a data set",
     "pse": "edit colours, opacities and lights of a scene beside those of its volume",

@@ -93,17 +93,18 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.names import part_file
     from texgs.edit.lift import lift
     from texgs.edit.preview import preview
-    from texgs.edit.segments import voting_views, with_segment
     from texgs.fields.surfels.compact import open_model
     from texgs.models.by_name import mask_model
-    from texgs.scene.scene_file import read_scene, write_scene
+    from texgs.scene.scene_file import read_scene
+    from texgs.scene.session import Session
+    from texgs.volume.cameras import icosphere_of
 
     scene = read_scene(arguments.scene)
     name = chosen(arguments, scene)
     device = torch_device(arguments.device)
     clicks = clicks_of(arguments, device)
     lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
-    around = [camera.to(device) for camera in voting_views(arguments.views, lens)]
+    around = [camera.to(device) for camera in icosphere_of(arguments.views, lens)]
     masks = mask_model(arguments.masks, device)
     model = open_model(scene.models[name].file).to(device)
     if arguments.preview:
@@ -121,8 +122,9 @@ def run(arguments: argparse.Namespace) -> int:
     facts = {key: getattr(arguments, key) for key in keys}
     file = arguments.output.with_name(part_file("--name", arguments.output.stem, name, arguments.name))
     sys.stderr.write(f"{name}/{arguments.name}: {found.basis}\n")
-    changed = with_segment(scene, f"{name}/{arguments.name}", model, found.mask, file, facts)
-    print(write_scene(arguments.output, changed), file, sep="\n")
+    session = Session(scene)
+    session.make_segment(f"{name}/{arguments.name}", found.mask, file, facts)
+    print(session.save(arguments.output), file, sep="\n")
     return 0
 
 
@@ -155,7 +157,7 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
         ArgumentError: if there is no such model, the new name cannot be one, or nothing is to be written.
     """
     from texgs.core.errors import ArgumentError
-    from texgs.edit.segments import require_name, require_new
+    from texgs.scene.parts import require_name, require_new
 
     name = next(iter(scene.models)) if arguments.model is None and len(scene.models) == 1 else arguments.model
     if name not in scene.models:

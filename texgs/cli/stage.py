@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
-    if stage.method or stage.name == "edit_metrics":
+    if stage.place == "edit" or stage.name == "edit_metrics":
         require_edit(stage, config)
         require_base(tuple(arguments.overrides))
     for name in tf_names(config) if stage.per_tf else [None]:
@@ -129,7 +129,7 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
         fetch_volume(config)
     inputs = stage.inputs(config)
     for needed in stage.needs:
-        if STAGES[needed].method and not STAGES[needed].applies(config):
+        if STAGES[needed].place == "edit" and not STAGES[needed].applies(config):
             continue
         once_per_tf = STAGES[needed].per_tf and not stage.per_tf
         for each in [for_tf(config, tf) for tf in tf_names(config)] if once_per_tf else [config]:
@@ -137,7 +137,7 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
                 ensure(needed, each)
     checksums = Checksums.load()
     job = Job.of(stage, config, checksums)
-    if stage.method and (force or not job.is_done()):
+    if stage.place == "edit" and (force or not job.is_done()):
         fetch_weights(config)
         job = Job.of(stage, config, checksums)  # with what was downloaded
     has_run = execute(job, config.tracking.uri, config.tracking.experiment, force=force)

@@ -69,7 +69,7 @@ def weights_of(stage: Stage, config: DictConfig, checksums: Checksums) -> dict[s
     """
     if stage.name == "edit_metrics":
         names = ["vgg16", "lpips_vgg", config.metric.clip]
-    elif stage.method:
+    elif stage.place == "edit":
         names = list(used(config))
     else:
         return None

@@ -1,7 +1,9 @@
 """Settings of the fit: phases as data. The names of presets in conf/fit stand in every table."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
+from typing import Any
 
+from texgs.config.fields import kinds
 from texgs.config.keys import key
 
 
@@ -101,10 +103,11 @@ class Texture:
 
 
 @dataclass
-class Fit:
-    """A recipe."""
+class FitKeys:
+    """A recipe. The keys of other fields than surfels stand in tables of their own."""
 
     name: str = key("default", "of the preset, in tables")
+    field: str = key("surfels", "what is fitted", choices=tuple(kinds()))
     seed: int = key(0, "random numbers")
     reduce: int = key(1, "factor by which images are made smaller, by averaging", least=1)
     low_pass: float = key(6.0, "k of the low-pass filter, variance 1/k px^2; stays with the model", least=0)
@@ -118,3 +121,13 @@ class Fit:
     surfels: Phase = key(Phase, "phase 1, with spherical harmonics")
     shading: Phase = key(Phase, "phase 2, with Blinn-Phong")
     texture: Texture = key(Texture, "phase 3")
+
+
+def _with_kinds() -> Any:
+    """The keys of fits of surfels, and a table of keys for each other kind of field."""
+    others = [kind for kind in kinds().values() if kind.settings is not None]
+    tables = [(kind.name, kind.settings, key(kind.settings, kind.summary)) for kind in others]
+    return make_dataclass("Fit", tables, bases=(FitKeys,), namespace={"__doc__": FitKeys.__doc__})
+
+
+Fit = _with_kinds()

@@ -9,6 +9,7 @@ from omegaconf import DictConfig
 
 from texgs.config.compose import is_scene_file
 from texgs.config.edit import EditKeys
+from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.config.methods import method_of
 from texgs.config.places import folder_of, made
@@ -45,14 +46,19 @@ def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
 
 
 def all_models(config: DictConfig) -> dict[str, Path]:
-    """The textured models of all basic TFs, by name.
+    """The models of all basic TFs after the last phase, by name.
 
     Raises:
         ConfigError: if one basic TF is chosen.
     """
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
-    return {name: made("phase", for_tf(config, name), "texture") for name in tf_names(config)}
+    return {name: made("phase", for_tf(config, name), last_phase(config)) for name in tf_names(config)}
+
+
+def last_phase(config: DictConfig) -> str:
+    """The phase of a fit that makes what scenes are composed of."""
+    return str(kinds()[config.fit.field].phases[-1])
 
 
 def scene_and_volume(config: DictConfig) -> dict[str, Path]:
@@ -96,8 +102,8 @@ def view_settings(config: DictConfig) -> dict[str, Any]:
 
 
 def models(config: DictConfig) -> dict[str, Path]:
-    """The models that the three phases of the fit write, and the views."""
-    phases = ("surfels", "shading", "texture")
+    """The models that the phases of the fit write, and the views."""
+    phases = kinds()[config.fit.field].phases
     return {
         **{name: made("phase", config, name) for name in phases},
         **view_set(config),

@@ -7,14 +7,12 @@ of its values.
 
 from __future__ import annotations
 
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib import import_module
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from texgs.config.specifications import specifications
 from texgs.config.typed import typed
 
 PACKAGE = "texgs.methods"
@@ -38,7 +36,7 @@ class Method(Generic[Settings]):
     weights: Callable[[Settings, str], Mapping[str, bool]]
     """Names of the weights that it may use, and whether it must; from its settings and the CLIP to use."""
     needs: frozenset[str] = frozenset()
-    """What fields have to be capable of, of `texgs.fields.field.Capability`."""
+    """What fields have to be capable of, of `texgs.config.fields.Capability`."""
     files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}
     """Files that it reads besides the scene and its views."""
     adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
@@ -63,13 +61,9 @@ class Method(Generic[Settings]):
         return typed(self.settings, edit[self.name])
 
 
-@cache
 def methods() -> dict[str, Method[Any]]:
     """All methods by name."""
-    package = import_module(PACKAGE)
-    modules = (import_module(f"{PACKAGE}.{entry.name}") for entry in pkgutil.iter_modules(package.__path__))
-    specifications = [module.METHOD for module in modules if hasattr(module, "METHOD")]
-    return {method.name: method for method in specifications}
+    return specifications(PACKAGE, "METHOD")
 
 
 def method_of(edit: Mapping[str, Any]) -> Method[Any]:

@@ -31,7 +31,7 @@ class Stage:
     place: str  # of its files, a key of PLACES, and its rule in the workflow
     needs: tuple[str, ...] = ()  # stages that make these files
     applies: Callable[[DictConfig], bool] = lambda config: True  # whether a data set or edit goes through it
-    method: str = ""  # module of the method that the job runs, for an edit
+    specification: str = ""  # module of the method of an edit, or of the kind of a field, that the job runs
 
     @property
     def per_tf(self) -> bool:
@@ -58,7 +58,7 @@ class Stage:
     def code(self) -> str:
         """Digest of the code that the job runs."""
         own = code_digest(self.module)
-        return digest(f"{own} {code_digest(self.method)}") if self.method else own
+        return digest(f"{own} {code_digest(self.specification)}") if self.specification else own
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:

@@ -1,7 +1,10 @@
 """The stages of the workflow: a row for each, and one for each method of editing."""
 
+from collections.abc import Callable
+
 from omegaconf import DictConfig
 
+from texgs.config.fields import Kind, kinds
 from texgs.config.inputs import (
     all_models,
     edit_settings,
@@ -29,6 +32,11 @@ def is_fit(config: DictConfig) -> bool:
     return bool(config.edit.method == NO_METHOD)
 
 
+def is_fit_of(kind: str) -> Callable[[DictConfig], bool]:
+    """Whether a configuration is of fits of a kind of field."""
+    return lambda config: is_fit(config) and config.fit.field == kind
+
+
 def has_volume(config: DictConfig) -> bool:
     """Whether the data set starts from a volume, not from views."""
     return is_fit(config) and config.dataset.views_folder is None
@@ -49,7 +57,21 @@ def edit_stage(method: Method) -> Stage:
         place="edit",
         needs=("compose", "views"),
         applies=lambda config: config.tf is None and config.edit.method == method.name,
-        method=method.module,
+        specification=method.module,
+    )
+
+
+def fit_stage(kind: Kind) -> Stage:
+    """The stage of a kind of field that is fitted in one phase."""
+    return Stage(
+        kind.name,
+        "texgs.cli.stages.fit",
+        select=lambda config: {**recipe()(config), "keys": config.fit[kind.name]},
+        inputs=view_set,
+        place="phase",
+        needs=("views",),
+        applies=is_fit_of(kind.name),
+        specification=kind.module,
     )
 
 
@@ -103,7 +125,7 @@ ROWS = (
         inputs=seeded,
         place="phase",
         needs=("volume", "views"),
-        applies=is_fit,
+        applies=is_fit_of("surfels"),
     ),
     Stage(
         "shading",
@@ -115,7 +137,7 @@ ROWS = (
         inputs=model_of("surfels"),
         place="phase",
         needs=("surfels", "views"),
-        applies=is_fit,
+        applies=is_fit_of("surfels"),
     ),
     Stage(
         "texture",
@@ -124,8 +146,9 @@ ROWS = (
         inputs=model_of("shading"),
         place="phase",
         needs=("shading", "views"),
-        applies=is_fit,
+        applies=is_fit_of("surfels"),
     ),
+    *(fit_stage(kind) for kind in kinds().values() if kind.fit is not None),
     Stage(
         "figure",
         "texgs.cli.stages.figure",
@@ -138,7 +161,7 @@ ROWS = (
         },
         inputs=models,
         place="figure",
-        needs=("texture",),  # which needs the others
+        needs=tuple(kind.phases[-1] for kind in kinds().values()),  # which need those before
         applies=is_fit,
     ),
     Stage(
@@ -147,7 +170,7 @@ ROWS = (
         select=lambda config: {"image": config.dataset.image, **fit_label(config)},
         inputs=all_models,
         place="compose",
-        needs=("texture",),
+        needs=tuple(kind.phases[-1] for kind in kinds().values()),
         applies=has_scene,
     ),
     Stage(

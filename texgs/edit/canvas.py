@@ -11,7 +11,7 @@ from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.bounds import surfel_box
 from texgs.fields.surfels.model import Surfels, geometry
-from texgs.fields.surfels.render import shaded
+from texgs.fields.surfels.shading import shaded
 from texgs.raster import Render, Texture, rasterize
 
 SEEN = 0.02  # of alpha: less is not looked at

@@ -17,7 +17,6 @@ from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
 from texgs.fields.surfels.bounds import surfel_box
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.render import render
 from texgs.models.masks import MaskModel
 
 CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
@@ -114,7 +113,7 @@ class Views:
             camera.width, camera.height
         )
         cut = camera.crop(*box)
-        image = render(self.model, cut, self.light).color.clamp(0, 1)
+        image = self.model.render(cut, self.light).color.clamp(0, 1)
         moved = clicks.points.to(image) - image.new_tensor(box[:2])
         inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
         found = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)

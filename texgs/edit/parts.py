@@ -14,6 +14,7 @@ from texgs.core.names import part_file
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of
 from texgs.fields.surfels.texture_file import write_texture
+from texgs.scene.parts import entry_of, replaced
 from texgs.scene.scene_file import Scene, SceneModel
 
 
@@ -76,12 +77,11 @@ def edit_parts(
     """
     for part in parts_of(scene, names):
         entry = scene.models[part.model]
-        model, masks = entry.open()
+        model, masks = entry.surfels()
         model = model.to(device)
         edited = edit(part, model, surfels_of(part, entry, masks, model))
         path = write_texture(output / part.file, edited, {"part": part.name})
-        models = {**scene.models, part.model: with_texture_of(part, entry, path)}
-        scene = replace(scene, models=models)
+        scene = replaced(scene, part.name, replace(entry_of(scene, part.name), texture=path))
     return scene
 
 
@@ -93,7 +93,7 @@ def surfels_of(part: ScenePart, entry: SceneModel, masks: Sequence[Tensor], mode
     """
     if not masks:
         return None
-    labels = labels_of(masks, len(model)).to(model.parameters["means"].device)
+    labels = labels_of(masks, len(model)).to(model.device)
     number = 0 if part.segment is None else 1 + list(entry.segments).index(part.segment)
     surfels = labels == number
     if not bool(surfels.any()):
@@ -102,11 +102,3 @@ def surfels_of(part: ScenePart, entry: SceneModel, masks: Sequence[Tensor], mode
             "name other parts"
         )
     return surfels
-
-
-def with_texture_of(part: ScenePart, entry: SceneModel, path: Path) -> SceneModel:
-    """The model's entry with a texture for one of its parts."""
-    if part.segment is None:
-        return replace(entry, texture=path)
-    segment = replace(entry.segments[part.segment], texture=path)
-    return replace(entry, segments={**entry.segments, part.segment: segment})

@@ -9,7 +9,6 @@ from texgs.core.light import Light
 from texgs.edit.clicks import Clicks, prompts_at
 from texgs.edit.lift import HEADLIGHT, Views
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.render import render
 from texgs.models.masks import MaskModel
 
 MASKED, COVER = (1.0, 0.1, 0.1), 0.6  # colour over what is masked, and its opacity
@@ -36,7 +35,7 @@ def preview(
     """
     prompts_at(model, clicks)
     mask = Views(model, light, masks).mask(clicks)
-    image = render(model, clicks.camera, light).color.clamp(0, 1)
+    image = model.render(clicks.camera, light).color.clamp(0, 1)
     return mask, overlay(image, mask, clicks.points, clicks.positive)
 
 

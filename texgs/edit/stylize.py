@@ -72,7 +72,7 @@ def stylize(
         FitError: if the loss is no longer finite; nothing is returned then.
     """
     _check(model, cameras, lights, surfels)
-    watch = Stopwatch(model.parameters["means"].device)
+    watch = Stopwatch(model.device)
     with watch.part("start"):
         steps = StyleSteps.prepare(model, cameras, style, recipe, vgg, clip, surfels)
     losses: dict[str, list[float]] = defaultdict(list)

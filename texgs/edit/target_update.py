@@ -187,14 +187,14 @@ def _changing(model: Surfels, surfels: Tensor | None) -> Tensor:
     """
     n = len(model)
     if surfels is None:
-        return torch.ones(n, dtype=torch.bool, device=model.parameters["means"].device)
+        return torch.ones(n, dtype=torch.bool, device=model.device)
     check.shape("surfels", surfels, "N", N=n)
     if surfels.dtype != torch.bool or not bool(surfels.any()):
         raise ArgumentError(
             f"surfels: expected at least one that may change as bool, got {int(surfels.sum())} "
             f"of {surfels.dtype}; choose a segment that is not empty"
         )
-    return surfels.to(model.parameters["means"].device)
+    return surfels.to(model.device)
 
 
 def _share(weights: Tensor, model: Surfels, changing: Tensor) -> float:

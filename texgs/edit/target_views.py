@@ -10,8 +10,8 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.surfels.model import Surfels, geometry, material
-from texgs.fields.surfels.render import light_direction, viewer
+from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.shading import light_direction, material, viewer
 from texgs.models.guidance import Views
 from texgs.raster import Texture, rasterize
 from texgs.raster.shading import blinn_phong_texture

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.config.fit import Densify
 from texgs.core.rotation import quats_to_matrices
-from texgs.fields.surfels.model import MATERIAL
+from texgs.fields.surfels.shading import MATERIAL
 from texgs.fit.optimizer import Optimizer
 
 CHILDREN = 2  # of a split

@@ -12,7 +12,7 @@ from texgs.config.fit import Phase, Rates
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.surfels.bounds import visible_part
-from texgs.fields.surfels.model import MATERIAL, ShadingModel
+from texgs.fields.surfels.shading import MATERIAL, ShadingModel
 from texgs.fit.densify import DensityControl
 from texgs.fit.harmonics import join
 from texgs.fit.losses import view_loss

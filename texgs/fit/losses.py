@@ -9,8 +9,8 @@ import torch
 from torch import Tensor
 
 from texgs.config.fit import Losses
-from texgs.fields.surfels.model import MATERIAL, ShadingModel, geometry, material
-from texgs.fields.surfels.render import shaded
+from texgs.fields.surfels.model import geometry
+from texgs.fields.surfels.shading import MATERIAL, ShadingModel, material, shaded
 from texgs.raster import Render, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.smoothness import bilateral_smoothness

@@ -57,7 +57,7 @@ def texturize(
             raise ArgumentError(f"{name}: expected 0 or more, got {value}")
     if model.stage != "shading":
         raise ArgumentError(f"model: expected stage shading, got {model.stage}; pass what that stage wrote")
-    palette = mean_color(images).to(model.parameters["means"].device)
+    palette = mean_color(images).to(model.device)
     n, scales = len(model), model.parameters["scales"].exp()
     flat = textured(model, palette, torch.ones(n, 2, dtype=torch.int32, device=scales.device))
     sight = look(flat, images, title)

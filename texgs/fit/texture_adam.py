@@ -7,8 +7,8 @@ import torch
 from texgs.core.errors import FitError
 from texgs.core.progress import progress
 from texgs.fields.surfels.bounds import visible_part
-from texgs.fields.surfels.model import TEXTURE, Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.groups import TEXTURE
+from texgs.fields.surfels.model import Surfels
 from texgs.raster.ssim import l1_dssim
 from texgs.volume.images import Images
 
@@ -43,11 +43,11 @@ def refine(
         if not order:
             order = torch.randperm(len(images), generator=generator).tolist()
         target = visible_part(images, order.pop(), model.parameters, model.shading)
-        image = render(moving, target.camera, target.light).color
+        image = moving.render(target.camera, target.light).color
         loss = l1_dssim(image, target.color, DSSIM)
         if sparsity > 0:
             with torch.no_grad():
-                without = render(plain, target.camera, target.light).color
+                without = plain.render(target.camera, target.light).color
             loss = loss + sparsity * (image - without).abs().mean()
         adam.param_groups[0]["lr"] = rate * FINAL ** (iteration / iterations)
         (target.share * loss).backward()

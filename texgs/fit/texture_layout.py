@@ -11,7 +11,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.fields.surfels.bounds import visible_part
 from texgs.fields.surfels.model import Surfels, geometry
-from texgs.fields.surfels.render import shaded
+from texgs.fields.surfels.shading import shaded
 from texgs.raster import Texture, rasterize
 from texgs.raster.atlas import MOST_TEXELS
 from texgs.volume.images import Images

@@ -8,7 +8,6 @@ from torch import Tensor
 from texgs.core.progress import progress
 from texgs.fields.surfels.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.render import render
 from texgs.fit.texture_layout import EXTENT, Sight
 from texgs.raster.ssim import l1_dssim
 from texgs.volume.images import Images, Target
@@ -46,7 +45,7 @@ def solve(
     order = [i for _ in range(sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
         target = visible_part(images, index, model.parameters, model.shading)
-        image = render(moving, target.camera, target.light).color
+        image = moving.render(target.camera, target.light).color
         structure = STRUCTURE * image.numel() * l1_dssim(image, target.color, 1.0)
         loss = 0.5 * squared_error(image, target) + structure
         (gradient,) = torch.autograd.grad(loss, texels)
@@ -65,9 +64,9 @@ def squared_error(image: Tensor, target: Target) -> Tensor:
 @torch.no_grad()
 def sampled_error(model: Surfels, images: Images) -> float:
     """Squared error of some views, evenly spaced, with colours clamped as on a screen."""
-    device = model.parameters["means"].device
+    device = model.device
     targets = [images.target(i, device) for i in range(0, len(images), max(1, len(images) // CHECKED))]
-    errors = [squared_error(render(model, t.camera, t.light).color.clamp(0, 1), t) for t in targets]
+    errors = [squared_error(model.render(t.camera, t.light).color.clamp(0, 1), t) for t in targets]
     return float(torch.stack(errors).sum())
 
 

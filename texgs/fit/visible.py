@@ -9,8 +9,8 @@ from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.volume.images import Images
 from texgs.volume.reduced import smaller
@@ -55,7 +55,7 @@ def shown(model: Surfels, images: Images) -> Tensor:
     """Sum [N] of the blending weights of each surfel over all pixels of all views."""
     total = torch.zeros(len(model))
     for camera, light in zip(images.cameras, images.lights, strict=True):
-        statistics = render(model, camera, light, outputs=("statistics",)).statistics
+        statistics = model.render(camera, light, outputs=("statistics",)).statistics
         total += statistics.weight_sum  # type: ignore[union-attr]
     return total
 

@@ -58,21 +58,23 @@ def run(task: Task[SegmentKeys]) -> Edited:
     """Make the segment; write its file, and edit.png with the clicks, their mask and the segment."""
     from texgs.core.names import part_file
     from texgs.edit.lift import lift
-    from texgs.edit.segments import require_new, voting_views, with_segment
     from texgs.edit.task import Edited
     from texgs.models.by_name import mask_model
+    from texgs.scene.parts import require_new
+    from texgs.scene.session import Session
+    from texgs.volume.cameras import icosphere_of
 
     settings, scene, device = task.settings, task.scene, task.device
     name = model_of(scene, settings.model)
     part = f"{name}/{settings.name}"
     require_new(scene, part)
-    model = scene.models[name].open()[0].to(device)
+    model = scene.models[name].surfels()[0].to(device)
     clicks = clicks_of(settings, device)
     start = time.monotonic()
     lifted = lift(
         model,
         clicks,
-        [camera.to(device) for camera in voting_views(settings.views, LENS.square(settings.size))],
+        [camera.to(device) for camera in icosphere_of(settings.views, LENS.square(settings.size))],
         mask_model(settings.masks, device),
         light=scene.light,
         vote=settings.vote,  # type: ignore[arg-type]
@@ -82,10 +84,11 @@ def run(task: Task[SegmentKeys]) -> Edited:
     seconds = time.monotonic() - start
     sys.stderr.write(f"{part}: {lifted.basis}\n")
     file = task.output / part_file("edit.segment.name", name, settings.name)
-    after = with_segment(scene, part, model, lifted.mask, file, asdict(settings))
+    session = Session(scene)
+    session.make_segment(part, lifted.mask, file, asdict(settings))
     show(task, model, clicks, lifted)
     return Edited(
-        after,
+        session.scene,
         f"{settings.masks}, {settings.vote}",
         seconds,
         {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
@@ -138,7 +141,6 @@ def show(task: Task[SegmentKeys], model: Surfels, clicks: Clicks, lifted: Lifted
 
     from texgs.edit.preview import overlay
     from texgs.fields.surfels.model import Surfels
-    from texgs.fields.surfels.render import render
     from texgs.report.strip import write_strip
     from texgs.volume.cameras import orbit_path
 
@@ -148,7 +150,7 @@ def show(task: Task[SegmentKeys], model: Surfels, clicks: Clicks, lifted: Lifted
 
     @torch.no_grad()
     def shown(of: Surfels, camera: Camera) -> torch.Tensor:
-        return render(of, camera.to(task.device), task.scene.light).color.clamp(0, 1)
+        return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), lifted.reference, clicks.points, clicks.positive)
     around = orbit_path(SHOWN, POLAR, *LENS)
@@ -165,11 +167,12 @@ def check(settings: SegmentKeys) -> None:
     """
     import torch
 
-    from texgs.edit.segments import require_name, voting_views
+    from texgs.scene.parts import require_name
+    from texgs.volume.cameras import icosphere_of
 
     require_name(settings.name, "edit.segment.name")
     clicks_of(settings, torch.device("cpu"))
-    voting_views(settings.views, LENS.square(settings.size))
+    icosphere_of(settings.views, LENS.square(settings.size))
 
 
 def weights(settings: SegmentKeys, clip: str) -> Mapping[str, bool]:

@@ -14,8 +14,8 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
+from texgs.fields.field import Composed, Look
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.composition import Composition, Look
 
 SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised scenes
 OPAQUE = 0.5  # least alpha of a pixel that has a depth
@@ -86,7 +86,7 @@ def consistency(
 
 
 def frames_of(
-    scene: Composition,
+    scene: Composed,
     cameras: Iterable[Camera],
     light: Light,
     edits: Sequence[PartEdit] | None = None,

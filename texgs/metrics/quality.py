@@ -8,8 +8,7 @@ from statistics import fmean
 import torch
 
 from texgs.core.progress import progress
-from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.field import Field
 from texgs.metrics.image import psnr, ssim
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
@@ -17,7 +16,7 @@ from texgs.volume.view_set import View
 
 @torch.no_grad()
 def evaluate(
-    model: Surfels, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
+    model: Field, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
 ) -> dict[str, list[float]]:
     """PSNR in dB and SSIM of each view over white, full frame, against the exact image.
 
@@ -28,10 +27,10 @@ def evaluate(
         title: of the progress bar.
     """
     found: dict[str, list[float]] = {"psnr": [], "ssim": []}
-    device = model.parameters["means"].device
+    device = model.device
     for view in progress(views, title=title, unit="view"):
         target = over_white(view, reduce)[:3].permute(1, 2, 0).to(device)
-        image = render(model, smaller(view.camera, reduce).to(device), view.light).color
+        image = model.render(smaller(view.camera, reduce).to(device), view.light).color
         found["psnr"].append(psnr(image, target))
         found["ssim"].append(ssim(image, target))
     return found

@@ -12,8 +12,7 @@ from torch.nn import functional as F
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.field import Field
 from texgs.models.nnfm import StyleFeatures, nnfm
 from texgs.models.vgg import Vgg
 
@@ -33,7 +32,7 @@ class Likeness:
 
 @torch.no_grad()
 def likeness(
-    model: Surfels,
+    model: Field,
     cameras: Sequence[Camera],
     lights: Sequence[Light],
     style: Tensor,
@@ -52,7 +51,7 @@ def likeness(
         region: [h, w] bool, what of the style counts; by default all.
         title: of the progress bar.
     """
-    device = model.parameters["means"].device
+    device = model.device
     style = style.to(device)
     found = vgg.features(style)
     part = None
@@ -64,7 +63,7 @@ def likeness(
     for camera, light in progress(
         list(zip(cameras, lights, strict=True)), len(cameras), title=title, unit="view"
     ):
-        shown = render(model, camera.to(device), light)
+        shown = model.render(camera.to(device), light)
         image = shown.color.clamp(0, 1)
         colors.append(image[shown.alpha > OPAQUE])
         seen = vgg.features(image.permute(2, 0, 1))

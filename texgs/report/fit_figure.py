@@ -14,12 +14,12 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.core.plots import words
-from texgs.fields.surfels.model import MATERIAL, Surfels, geometry, material
-from texgs.fields.surfels.render import render
+from texgs.fields.field import Field
+from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.shading import MATERIAL, material
 from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
-from texgs.report.fitting import PHASES
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
 
@@ -83,7 +83,7 @@ class Row:
 @torch.no_grad()
 def write_fit_figure(
     path: str | Path,
-    models: Mapping[str, Surfels],
+    models: Mapping[str, Field | None],
     views: Mapping[str, View],
     reduce: int = 1,
     title: str = "",
@@ -97,7 +97,7 @@ def write_fit_figure(
 
     Args:
         path: the file to write.
-        models: by phase, "shading" and "texture" at least; without "surfels" its panels say "seeds only".
+        models: by phase, the last of which has one; None for a phase that only seeds.
         views: by the name that stands beside them, at least one; all of one size.
         reduce: of the images, as in `images.load`.
         title: line at the top.
@@ -108,31 +108,31 @@ def write_fit_figure(
     Raises:
         ArgumentError: if there is no view, a model is missing, or the path is not writable.
     """
-    if not views or not {"shading", "texture"} <= set(models):
+    last = list(models.values())[-1] if models else None
+    if not views or last is None:
         raise ArgumentError(
-            f"{path}: expected models shading and texture and a view, got {', '.join(models) or 'no model'} "
+            f"{path}: expected a model of the last phase and a view, got {', '.join(models) or 'no model'} "
             f"and {len(views)} views"
         )
     compared = [compare(models, view, reduce) for view in views.values()]
     rows = [Row(name, panels) for name, (panels, _) in zip(views, compared, strict=True)]
     name, view = next(iter(views.items()))
-    rows.append(Row(name, maps(models["texture"], view, reduce)))
+    rows.append(Row(name, maps(last, view, reduce)))
     box = frame(torch.stack([visible for _, visible in compared]).any(dim=0))
     return draw(path, [Row(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
 
 
-def compare(models: Mapping[str, Surfels], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
+def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
     """Panels of one view, and where it or one of its renderings shows something, [H, W]."""
     planes = over_white(view, reduce)
     truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
     height, width = visible.shape
     panels = [Panel("ground truth", truth, f"PSNR over {width} × {height} pixels")]
-    for phase in PHASES:
-        if phase not in models:
+    for phase, model in models.items():
+        if model is None:
             panels.append(Panel(phase, words="seeds only"))
             continue
-        model = models[phase]
-        image = render(model, smaller(view.camera, reduce).to(model.parameters["means"].device), view.light)
+        image = model.render(smaller(view.camera, reduce).to(model.device), view.light)
         color = image.color.cpu().clamp(0, 1)
         visible = visible | (image.alpha.cpu() > VISIBLE)
         panels.append(Panel(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
@@ -147,18 +147,18 @@ def signed_error(image: Tensor, target: Tensor) -> Tensor:
     return error.gather(2, error.abs().argmax(dim=2, keepdim=True))[..., 0]
 
 
-def maps(model: Surfels, view: View, reduce: int) -> list[Panel]:
-    """Panels of normals, depth, alpha and material of a model with shading in one view."""
-    camera = smaller(view.camera, reduce).to(model.parameters["means"].device)
-    image = render(model, camera, view.light, outputs=("normal", "depth"))
-    alpha, normal, depth = image.alpha.cpu(), image.normal.cpu(), image.depth.cpu()  # type: ignore[union-attr]
-    cover = alpha[..., None]
-    grey = Scale(0, 1, "gray_r")
-    panels = [
-        Panel("normals", (0.5 * (normal + cover) + 1 - cover).clamp(0, 1), "xyz as RGB"),
-        map_panel("depth, world units", depth, alpha),
-        Panel("alpha", grey(alpha), scale=grey),
-    ]
+def maps(model: Field, view: View, reduce: int) -> list[Panel]:
+    """Panels of depth and alpha in one view; of surfels also normals and material."""
+    camera = smaller(view.camera, reduce).to(model.device)
+    has_normals = isinstance(model, Surfels)
+    image = model.render(camera, view.light, outputs=("normal", "depth") if has_normals else ("depth",))
+    alpha, depth = image.alpha.cpu(), image.depth.cpu()  # type: ignore[union-attr]
+    cover, grey = alpha[..., None], Scale(0, 1, "gray_r")
+    panels = [map_panel("depth, world units", depth, alpha), Panel("alpha", grey(alpha), scale=grey)]
+    if not isinstance(model, Surfels):
+        return panels
+    normal = image.normal.cpu()  # type: ignore[union-attr]
+    panels.insert(0, Panel("normals", (0.5 * (normal + cover) + 1 - cover).clamp(0, 1), "xyz as RGB"))
     features = material_maps(model.parameters, model.shading)
     if features is None:
         factors = material(model.parameters, model.shading.material)

@@ -45,6 +45,6 @@ def cells(
     numbers, phase = metrics["numbers"], metrics["stage"]
     beside = published.get((metrics["dataset"], phase), {})
     own = [numbers.get("psnr"), numbers.get("ssim"), numbers["fit_seconds"] / 60]
-    own += [metrics["peak_memory_mib"] / 1024, numbers["surfels"]]
+    own += [metrics["peak_memory_mib"] / 1024, numbers["primitives"]]
     theirs = [float(beside[key]) if key in beside else None for key in ("psnr", "ssim", "minutes")]
     return [metrics["dataset"], metrics["tf"], recipe, phase, *own, *theirs]

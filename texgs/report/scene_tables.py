@@ -66,7 +66,7 @@ def rendering(paths: Iterable[str | Path]) -> Table:
         if metrics["stage"] == "timing":
             n, volume = metrics["numbers"], metrics["numbers"].get("volume_mean_ms")
             ratio = None if volume is None else volume / n["frame_mean_ms"]
-            where = [n["surfels"], f"{n['width']}x{n['height']}", metrics["device"], n["threads"]]
+            where = [n["primitives"], f"{n['width']}x{n['height']}", metrics["device"], n["threads"]]
             times = [n["frame_mean_ms"], n["frame_max_ms"], volume, ratio]
             rows.append(Row([metrics["dataset"], label(metrics), *where, *times], [path]))
     caption = (
@@ -94,7 +94,7 @@ def model_size(paths: Iterable[str | Path]) -> Table:
             found[metrics["dataset"], label(metrics)].append((path, metrics["numbers"]))
     rows = []
     for (name, recipe), parts in sorted(found.items()):
-        sums = [sum(each[key] for _, each in parts) for key in ("surfels", *groups)]
+        sums = [sum(each[key] for _, each in parts) for key in ("primitives", *groups)]
         theirs = numbers(published.get((name,), {}), *groups)
         rows.append(Row([name, recipe, len(parts), *sums, *theirs], [path for path, _ in parts]))
     return Table("Sums over the basic scenes, 32 bits a value.", columns, rows)

@@ -90,7 +90,7 @@ def cells(runs: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[Cell]:
     minutes = [sum(phase["numbers"]["fit_seconds"] for phase in run.values()) / 60 for run in complete]
     memory = [max(phase["peak_memory_mib"] for phase in run.values()) / 1024 for run in complete]
     quality = [mean("texture", "train_psnr"), mean("texture", "psnr"), spread, mean("texture", "ssim")]
-    costs = [fmean(minutes), max(memory), mean("texture", "surfels")]
+    costs = [fmean(minutes), max(memory), mean("texture", "primitives")]
     return [len(complete), *quality, *costs, *(mean("shading", key) for key in MATERIAL)]
 
 

@@ -13,8 +13,8 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
+from texgs.fields.field import Composed, Look
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.composition import Composition, Look
 from texgs.raster import Render
 
 Mode = Literal[
@@ -25,7 +25,7 @@ BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a backgr
 
 
 def frame(
-    scene: Composition,
+    scene: Composed,
     camera: Camera,
     light: Light,
     edits: Sequence[PartEdit],
@@ -54,8 +54,8 @@ def frame(
         raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode}")
     what = f"a frame of {camera.width} x {camera.height} pixels"
     require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
-    camera = camera.to(scene.means.device)
-    behind = scene.means.new_tensor(background)
+    camera = camera.to(scene.device)
+    behind = torch.tensor(background, device=scene.device)
     look: Look = mode if mode in get_args(Look) else "unshaded"  # type: ignore[assignment]
     outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
     is_factor = mode in get_args(Look)[2:]

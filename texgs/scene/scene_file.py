@@ -13,6 +13,7 @@ import torch
 import yaml
 from torch import Tensor
 
+from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
 from texgs.core.light import Light
@@ -20,9 +21,9 @@ from texgs.core.names import label, named_file
 from texgs.core.numbers import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.reading import reading, reading_as
+from texgs.fields.field import Composed, Field
+from texgs.fields.files import open_field
 from texgs.fields.part_edit import PartEdit, color
-from texgs.fields.surfels.compact import open_model
-from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of, with_variants
 from texgs.fields.surfels.texture_file import with_texture
@@ -67,13 +68,29 @@ class SceneModel:
             found += [segment.file, segment.texture]
         return found
 
-    def open(self) -> tuple[Surfels, list[Tensor]]:
-        """The model with the texels of all variants, and the masks [N] of its segments.
+    def open(self) -> tuple[Field, list[Tensor]]:
+        """The field, of surfels with the texels of all variants, and the masks [N] of its segments.
 
         Raises:
             ArgumentError, ShapeError: naming the file.
         """
-        fitted = open_model(self.file)
+        fitted = open_field(self.file)
+        if isinstance(fitted, Surfels) or self.texture is not None or self.segments:
+            return self.surfels(fitted)
+        return fitted, []
+
+    def surfels(self, fitted: Field | None = None) -> tuple[Surfels, list[Tensor]]:
+        """The same, for what only surfels can.
+
+        Args:
+            fitted: what the file holds, where that is known.
+
+        Raises:
+            ArgumentError, ShapeError: naming the file, also where it holds a field of another kind.
+        """
+        fitted = open_field(self.file) if fitted is None else fitted
+        if not isinstance(fitted, Surfels):
+            raise ArgumentError(f"{self.file}: expected surfels, got {fitted.kind}; fit surfels for this")
         model = fitted if self.texture is None else with_texture(fitted, self.texture)
         masks, variants = [], []
         for name, segment in self.segments.items():
@@ -108,7 +125,7 @@ class Scene:
             edits += [model.edit, *(segment.edit for segment in model.segments.values())]
         return edits
 
-    def open(self, device: torch.device | str = "cpu") -> Composition:
+    def open(self, device: torch.device | str = "cpu") -> Composed:
         """Read and join the models.
 
         Raises:
@@ -122,7 +139,11 @@ class Scene:
                 raise type(error)(f"models.{name}: {error}") from error
             models.append(model.to(device))
             segments.append([mask.to(device) for mask in masks])
-        return Composition(models, segments)
+        made_of = sorted({model.kind for model in models})
+        if len(made_of) > 1:
+            raise ArgumentError(f"models: expected fields of one kind, got {' and '.join(made_of)}")
+        composed: Composed = kinds()[made_of[0]].compose(models, segments)
+        return composed
 
 
 def read_scene(path: str | Path) -> Scene:
@@ -175,7 +196,7 @@ def scene_of(values: Any, folder: Path) -> Scene:
         label("models", name): _model(f"models.{name}", x, folder) for name, x in values["models"].items()
     }
     background = color("background", values.get("background", WHITE))
-    return Scene(models, _light(values.get("light", "headlight")), background)
+    return Scene(models, light_of(values.get("light", "headlight")), background)
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
@@ -237,7 +258,12 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
     return file, edit, texture
 
 
-def _light(value: Any) -> Light:
+def light_of(value: Any) -> Light:
+    """The light that a value of a scene file stands for.
+
+    Raises:
+        ArgumentError: if it stands for none.
+    """
     if value == "headlight":
         return Light("headlight")
     if isinstance(value, dict) and set(value) <= {"azimuth", "polar"} and all(map(is_number, value.values())):

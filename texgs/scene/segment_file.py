@@ -67,7 +67,7 @@ def read_segment(path: str | Path, model: Surfels) -> Tensor:
             f"{path}: expected a segment of this model, got one of another with {len(mask)} surfels; "
             "segment this model again"
         )
-    return mask.to(model.parameters["means"].device)
+    return mask.to(model.device)
 
 
 def _anchors(model: Surfels) -> Tensor:

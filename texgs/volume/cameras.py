@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import combinations, product
-from math import asin, atan2, degrees, sqrt
+from math import asin, atan2, degrees, isqrt, sqrt
 
 import numpy as np
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
 FRONT = -90.0  # azimuth of +z, degrees
@@ -38,7 +39,19 @@ def icosphere(frequency: int, radius: float, fov_y: float, width: int, height: i
     return [_orbit(azimuth, polar, radius, fov_y, width, height) for polar, azimuth in angles]
 
 
-def test_path(count: int, radius: float, fov_y: float, width: int, height: int) -> list[Camera]:
+def icosphere_of(count: int, lens: Lens, where: str = "views") -> list[Camera]:
+    """The icosphere with so many cameras, 10 f^2 + 2 for some frequency f.
+
+    Raises:
+        ArgumentError: naming where the number comes from, if no icosphere has so many.
+    """
+    frequency = isqrt(max(count - 2, 0) // 10)
+    if frequency < 1 or 10 * frequency**2 + 2 != count:
+        raise ArgumentError(f"{where}: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")
+    return icosphere(frequency, *lens)
+
+
+def spiral(count: int, radius: float, fov_y: float, width: int, height: int) -> list[Camera]:
     """Cameras on a spiral from below to above that turns once, looking at the origin: the paper's test views.
 
     View i is at azimuth -180 + 360 i / (count - 1) and polar angle -90 + 180 i / (count - 1) degrees, with

@@ -2,7 +2,8 @@
 
 import torch
 
-from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel
 
 STAGES = ("surfels", "shading", "texture")
 

@@ -9,8 +9,8 @@ from torch.testing import assert_close
 from tests.fit.scenes import cameras, images_of, random_surfels
 from texgs.core.camera import orbit
 from texgs.fields.surfels.bounds import surfel_box
-from texgs.fields.surfels.model import ShadingModel, Surfels
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.volume.boxes import MARGIN, Box, content_box
 
 
@@ -37,7 +37,7 @@ def test_nothing_is_drawn_outside_the_box_of_the_surfels(seed, count, spread, si
     p = random_surfels(seed, count, spread, size)
     camera = orbit(seed % 360, 20, distance, 50, 48, 40)
     shading = ShadingModel(low_pass)
-    alpha = render(Surfels(p, shading), camera).alpha
+    alpha = Surfels(p, shading).render(camera).alpha
     if (alpha > 0).any():
         assert is_inside(box_of(alpha > 0), surfel_box(p, shading, camera))
 
@@ -45,7 +45,7 @@ def test_nothing_is_drawn_outside_the_box_of_the_surfels(seed, count, spread, si
 def test_the_box_is_not_much_larger_than_what_is_drawn():
     p = random_surfels(3, 200, 0.05, 0.02)
     camera = orbit(30, 20, 2, 50, 200, 200)
-    drawn, box = box_of(render(Surfels(p), camera).alpha > 0), surfel_box(p, ShadingModel(), camera)
+    drawn, box = box_of(Surfels(p).render(camera).alpha > 0), surfel_box(p, ShadingModel(), camera)
     assert max(abs(a - b) for a, b in zip(drawn, box, strict=True)) <= 10
 
 
@@ -83,8 +83,8 @@ def test_a_box_gets_a_margin_but_stays_in_the_image_with_a_pixel_at_least():
 
 def test_the_camera_of_a_part_sees_that_part():
     p, camera = random_surfels(5, 40, 0.2, 0.1), orbit(30, 20, 1.5, 50, 48, 40)
-    whole = render(Surfels(p), camera).color
-    part = render(Surfels(p), camera.crop(7, 3, 40, 31)).color
+    whole = Surfels(p).render(camera).color
+    part = Surfels(p).render(camera.crop(7, 3, 40, 31)).color
     assert_close(part, whole[3:31, 7:40], atol=2e-5, rtol=0)
 
 

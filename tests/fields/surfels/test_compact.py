@@ -16,7 +16,6 @@ from texgs.core.errors import ArgumentError, ShapeError, TexgsError
 from texgs.core.rotation import quats_to_matrices
 from texgs.fields.surfels.compact import STEP, open_model, read_compact, seen_surfels, write_compact
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.render import render
 from texgs.metrics.image import psnr
 from texgs.scene.scene_file import Scene, SceneModel
 
@@ -92,17 +91,17 @@ def test_colors_hardly_change_and_the_file_is_an_eighth(tmp_path):
     assert path.stat().st_size < texels.nbytes / 8
     for azimuth in (0, 120, 240):
         camera = orbit(azimuth, 20, 3, 40, 128, 128)
-        one, other = (render(m, camera).color for m in (model, found))
+        one, other = (m.render(camera).color for m in (model, found))
         assert psnr(other, one) > 54.3, "costs a model at 38 dB less than 0.1 dB"
 
 
 def test_a_model_of_38_db_loses_less_than_a_tenth(tmp_path):
     model = ball(2, n=500)
     found = read_compact(write_compact(tmp_path / "m", model))
-    exact = render(model, CAMERA).color
+    exact = model.render(CAMERA).color
     noise = torch.randn(exact.shape, generator=torch.Generator().manual_seed(1))
     target = exact + 10 ** (-38 / 20) * noise  # an image that the model explains to 38 dB
-    assert psnr(exact, target) - psnr(render(found, CAMERA).color, target) < 0.1
+    assert psnr(exact, target) - psnr(found.render(CAMERA).color, target) < 0.1
 
 
 def test_unseen_surfels_keep_one_mean_texel(tmp_path):

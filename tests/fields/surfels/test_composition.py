@@ -8,8 +8,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.model import ShadingModel, Surfels, raw_material
-from texgs.fields.surfels.render import render
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 
 CAMERA = orbit(30, 20, 3, 40, 64, 48)
 SIDE = Light("directional", 100, 30)
@@ -60,7 +60,7 @@ def union(*models):
 @pytest.mark.parametrize("light", [Light("headlight"), SIDE])
 def test_one_model_unedited_is_the_model_bit_for_bit(light):
     model = ball(1)
-    alone = render(model, CAMERA, light, outputs=OUTPUTS)
+    alone = model.render(CAMERA, light, outputs=OUTPUTS)
     scene = Composition([model]).render(CAMERA, light, [PartEdit()], outputs=OUTPUTS)
     for name in ("color", "alpha", *OUTPUTS):
         assert torch.equal(getattr(scene, name), getattr(alone, name)), name
@@ -69,7 +69,7 @@ def test_one_model_unedited_is_the_model_bit_for_bit(light):
 @pytest.mark.parametrize("light", [Light("headlight"), SIDE])
 def test_a_scene_is_the_union_of_its_surfels(light):
     models = [ball(1), ball(2, shared=False, middle=0.2), ball(3, middle=-0.1)]
-    expected = render(union(*models), CAMERA, light)
+    expected = union(*models).render(CAMERA, light)
     found = Composition(models).render(CAMERA, light)
     assert_close(found.color, expected.color, atol=1e-6, rtol=0)
     assert_close(found.alpha, expected.alpha, atol=1e-6, rtol=0)
@@ -95,7 +95,7 @@ def test_an_edit_is_the_model_with_other_numbers():
         "opacities": opacities,
         **raw_material(**factors, kind="bounded"),
     }
-    expected = render(Surfels({**p, **changed}, model.shading), CAMERA, SIDE)
+    expected = Surfels({**p, **changed}, model.shading).render(CAMERA, SIDE)
     assert_close(Composition([model]).render(CAMERA, SIDE, [edit]).color, expected.color, atol=2e-5, rtol=0)
 
 
@@ -103,7 +103,7 @@ def test_an_opacity_above_one_is_one():
     model = ball(5)
     found = Composition([model]).render(CAMERA, SIDE, [PartEdit(opacity=1000.0)])
     full = {**model.parameters, "opacities": torch.full((150,), 40.0)}
-    assert torch.equal(found.alpha, render(Surfels(full), CAMERA, SIDE).alpha)
+    assert torch.equal(found.alpha, Surfels(full).render(CAMERA, SIDE).alpha)
 
 
 def test_edits_do_not_copy_texels():

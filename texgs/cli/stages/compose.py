@@ -28,5 +28,5 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     camera = orbit(AZIMUTH, POLAR, *Lens().square(settings["image"]))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
-    numbers = {"models": len(scene.models), "surfels": len(composition), "texels": len(composition.texels)}
+    numbers = {"models": len(scene.models), "primitives": len(composition)}
     return Outcome(numbers, {"scene.png": "The basic models as one scene, rendered from their primitives."})

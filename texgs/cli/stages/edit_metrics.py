@@ -15,8 +15,7 @@ from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.edit.parts import parts_of
-from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.size import sizes
+from texgs.fields.field import Composed
 from texgs.metrics.clip import clip_scores
 from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
 from texgs.metrics.style import likeness
@@ -24,7 +23,7 @@ from texgs.models.clip import Clip
 from texgs.models.lpips import Lpips
 from texgs.models.vgg import Vgg
 from texgs.scene.scene_file import Scene, read_scene
-from texgs.volume.cameras import test_path
+from texgs.volume.cameras import spiral
 
 
 def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
@@ -41,7 +40,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
     scenes = after.open(device), before.open(device)
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
-    cameras = [camera.to(device) for camera in test_path(views["test"]["count"], *lens)]
+    cameras = [camera.to(device) for camera in spiral(views["test"]["count"], *lens)]
     some = cameras[:: max(1, len(cameras) // settings["compared"])]
     frames = milliseconds(lambda camera: scenes[0].render(camera, after.light, after.edits), cameras, title)
     numbers = {
@@ -61,11 +60,11 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 
 def size_of(scene: Scene) -> list[float]:
     """MiB of each model, as the paper counts them."""
-    return [sizes(entry.open()[0])["total_mib"] for entry in scene.models.values()]
+    return [entry.open()[0].sizes()["total_mib"] for entry in scene.models.values()]
 
 
 @torch.no_grad()
-def is_geometry_kept(after: Composition, before: Composition, cameras: Sequence[Camera]) -> bool:
+def is_geometry_kept(after: Composed, before: Composed, cameras: Sequence[Camera]) -> bool:
     """Whether depth, normals and alpha of all views are the same, bit for bit."""
     outputs = ("depth", "normal")
     pairs = [[scene.render(camera, outputs=outputs) for scene in (after, before)] for camera in cameras]
@@ -79,7 +78,7 @@ def is_geometry_kept(after: Composition, before: Composition, cameras: Sequence[
 
 @torch.no_grad()
 def agreement(
-    composition: Composition,
+    composition: Composed,
     scene: Scene,
     cameras: Sequence[Camera],
     count: int,
@@ -94,7 +93,7 @@ def agreement(
     frames = list(frames_of(composition, some, scene.light, scene.edits, look="unshaded"))
     perceptual = None
     if weights["vgg16"] and weights["lpips_vgg"]:
-        lpips = Lpips.load(device=composition.means.device)
+        lpips = Lpips.load(device=composition.device)
         perceptual = lambda one, two: float(lpips.distance(one, two))  # noqa: E731
     found: dict[str, float | None] = {}
     for name, apart in (("short", SHORT), ("long", LONG)):
@@ -144,7 +143,7 @@ def style_distance(
 def clip_numbers(
     settings: dict[str, Any],
     scenes: tuple[Scene, Scene],
-    compositions: tuple[Composition, Composition],
+    compositions: tuple[Composed, Composed],
     cameras: Sequence[Camera],
     title: str,
 ) -> dict[str, Any]:
@@ -154,7 +153,7 @@ def clip_numbers(
         return {"clip_missing": f"the weights of {backbone} are not on this machine"}
     if not edit["source_caption"] or not edit["target_caption"]:
         return {"clip_missing": "the edit has no captions"}
-    clip = Clip.load(backbone, compositions[0].means.device)
+    clip = Clip.load(backbone, compositions[0].device)
     edited, originals = (
         (
             composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)

@@ -4,9 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.fields.surfels.model_file import read_model
+from texgs.fields.files import open_field
+from texgs.fields.surfels.model import Surfels
 from texgs.report.fit_figure import write_fit_figure
-from texgs.report.fitting import PHASES
 from texgs.volume.view_set import read_views
 
 SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
@@ -17,24 +17,30 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
 
     Args:
         settings: what the stage reads of the configuration.
-        inputs: `surfels`, `shading` and `texture`, the models of these phases, and `views`, the
-            transforms_train.json; without test views training views are shown.
+        inputs: the models of all phases by their names, and `views`, the transforms_train.json; without test
+            views training views are shown.
         output: folder.
     """
     fit, views = settings["fit"], read_views(inputs["views"].parent)
     split, candidates = ("test", views.test) if views.test else ("training", views.train)
     shown = sorted({0, len(candidates) // 3})
-    fitted = [phase for phase in PHASES if phase != "surfels" or fit["surfels_iterations"]]
-    models = {phase: read_model(inputs[phase]) for phase in fitted}
-    texture = models["texture"]
-    counts = {"surfels": len(texture), "texels": len(texture.parameters["texels"])}
+    models = {phase: open_field(path) for phase, path in inputs.items() if phase != "views"}
+    last = next(reversed(models.values()))
+    counts = {last.kind: len(last)}
+    if isinstance(last, Surfels):
+        counts["texels"] = len(last.parameters["texels"])
     title = f"{settings['dataset']}/{settings['tf']}, recipe {fit['name']}: "
     title += ", ".join(f"{count:,} {things}" for things, count in counts.items())
     write_fit_figure(
         output / "figure.png",
-        models,
+        {phase: model if is_fitted(phase, fit) else None for phase, model in models.items()},
         {f"{split} view {index}": candidates[index] for index in shown},
         fit["reduce"],
         title,
     )
     return Outcome({"shown": shown, **counts}, {"figure.png": SHOWN})
+
+
+def is_fitted(phase: str, fit: dict[str, Any]) -> bool:
+    """Whether a phase does more than seed."""
+    return phase != "surfels" or fit["surfels_iterations"] > 0

@@ -10,7 +10,9 @@ from torch import Tensor
 
 from texgs.config.fit import Densify, Losses, Phase, Rates
 from texgs.core.progress import progress
-from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.field import Field
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit import checkpoint
 from texgs.fit.loop import Fit
 from texgs.metrics.quality import evaluate, mean
@@ -68,12 +70,12 @@ def run_phase(
     )
 
 
-def quality(model: Surfels, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
+def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """PSNR and SSIM on the test views; none where there are none."""
     return mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {}
 
 
-def training_quality(model: Surfels, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
+def training_quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """The same on the views that the model was fitted to."""
     found = mean(evaluate(model, views.train, reduce, f"{title}: training views"))
     return {f"train_{name}": value for name, value in found.items()}

@@ -15,11 +15,11 @@ from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.composition import Composition
+from texgs.fields.field import Composed
 from texgs.metrics.image import psnr, ssim
 from texgs.report.strip import write_strip
 from texgs.scene.scene_file import Scene, read_scene, write_scene
+from texgs.scene.session import Session
 from texgs.volume.cameras import orbit_path
 
 PICTURES = {
@@ -53,7 +53,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
     cameras = orbit_path(COMPARED, POLAR, *lens)
     found: dict[str, list[dict[str, Any]]] = {}
-    groups = {"pse": edits_of_the_paper(scene, palettes(composition)), "relight": light_sweep(scene)}
+    groups = {"pse": edits_of_the_paper(scene, composition.palettes), "relight": light_sweep(scene)}
     for group, steps in groups.items():
         rows: dict[str, list[np.ndarray]] = {}
         found[group] = []
@@ -66,14 +66,6 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         titles = [caption(entry) for entry in found[group]]
         write_strip(output / f"{group}.png", rows, titles)
     return Outcome({"views": COMPARED, **found}, PICTURES)
-
-
-def palettes(composition: Composition) -> list[tuple[float, ...]]:
-    """The palette of each model as fitted; black for a model without one."""
-    return [
-        (0.0, 0.0, 0.0) if part.palette is None else tuple(part.palette.tolist())
-        for part in composition.parts
-    ]
 
 
 def edits_of_the_paper(scene: Scene, fitted: Sequence[tuple[float, ...]]) -> list[Step]:
@@ -102,20 +94,20 @@ def light_sweep(scene: Scene) -> list[Step]:
 
 def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
     """The scene with edits of some models changed."""
-    models = {
-        name: replace(model, edit=PartEdit(**{**vars(model.edit), **changes.get(name, {})}))
-        for name, model in scene.models.items()
-    }
-    return replace(scene, models=models)
+    session = Session(scene)
+    for part, values in changes.items():
+        for key, value in values.items():
+            session.set(part, key, value)
+    return session.scene
 
 
 def compared(
-    step: Step, composition: Composition, volume: VolumeScene | None, cameras: Sequence[Camera]
+    step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
 ) -> tuple[dict[str, float], dict[str, np.ndarray]]:
     """PSNR and SSIM against the volume over some views, and the first of these [H, W, 3] from each."""
     found: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
-    background = composition.means.new_tensor(step.scene.background)
+    background = torch.tensor(step.scene.background, device=composition.device)
     for camera in cameras if volume else cameras[:1]:
         image = composition.render(
             camera.to(background.device), step.scene.light, step.scene.edits, background=background
@@ -124,7 +116,7 @@ def compared(
         shown.setdefault("scene", image.clamp(0, 1).numpy())
         if volume is not None:
             rgba = torch.from_numpy(
-                volume.render(camera, step.scene.light, step.scene.edits, palettes(composition))
+                volume.render(camera, step.scene.light, step.scene.edits, composition.palettes)
             )
             truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
             shown.setdefault("volume", truth.clamp(0, 1).numpy())

@@ -6,8 +6,9 @@ from typing import Any
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
 from texgs.core.device import torch_device
-from texgs.fields.surfels.model import Surfels, material, raw_material
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
+from texgs.fields.surfels.shading import material, raw_material
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import base_color
 from texgs.volume.images import load
@@ -40,7 +41,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     factors = material(model.parameters, before.shading.material)
     numbers = {
         "fit_seconds": seconds,
-        "surfels": len(model),
+        "primitives": len(model),
         "iterations": phase.iterations,
         "losses": losses,
         **{f"{name}_median": float(value.median()) for name, value in factors.items()},

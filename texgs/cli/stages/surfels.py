@@ -8,8 +8,9 @@ import torch
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
 from texgs.core.device import torch_device
-from texgs.fields.surfels.model import ShadingModel, Surfels
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import join, split, zeroth
 from texgs.fit.seeds import seed_surfels
@@ -45,7 +46,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     write_model(output / "model.safetensors", model)
     numbers = {
         "fit_seconds": seconds,
-        "surfels": len(model),
+        "primitives": len(model),
         "iterations": phase.iterations,
         "losses": losses,
     }

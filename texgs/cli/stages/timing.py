@@ -14,7 +14,7 @@ from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.progress import progress
 from texgs.scene.scene_file import read_scene
-from texgs.volume.cameras import test_path
+from texgs.volume.cameras import spiral
 
 WARM = 3  # frames before those that count
 VOLUME_FRAMES = 12  # of the volume, spread over the path: they take long, and differ little
@@ -30,10 +30,10 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     """
     scene, views = read_scene(inputs["scene"]), settings["views"]
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
-    cameras = test_path(views["test"]["count"], *lens)
+    cameras = spiral(views["test"]["count"], *lens)
     composition = scene.open(torch_device(settings["fit"]["device"]))
     title = f"{settings['dataset']}: timing"
-    device = composition.means.device
+    device = composition.device
     frames = milliseconds(
         lambda camera: composition.render(camera.to(device), scene.light, scene.edits), cameras, title
     )
@@ -41,7 +41,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         "frame_mean_ms": fmean(frames),
         "frame_max_ms": max(frames),
         "frame_median_ms": median(frames),
-        "surfels": len(composition),
+        "primitives": len(composition),
         "width": views["width"],
         "height": views["height"],
         "threads": torch.get_num_threads(),

@@ -19,7 +19,7 @@ from texgs.core.io import read_json, write_atomic
 from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.volume.appearance import Appearance
-from texgs.volume.cameras import icosphere, orbit_path, test_path
+from texgs.volume.cameras import icosphere, orbit_path, spiral
 from texgs.volume.cpu_mapper import CpuMapper
 from texgs.volume.geometry import geometry
 from texgs.volume.gpu_mapper import GpuMapper
@@ -82,7 +82,7 @@ def cameras(path: dict[str, Any], views: dict[str, Any]) -> list[Camera]:
     if path["kind"] == "icosphere":
         return icosphere(path["frequency"], *lens)
     if path["kind"] == "spiral":
-        return test_path(path["count"], *lens)
+        return spiral(path["count"], *lens)
     return orbit_path(path["count"], path["polar"], *lens)
 
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.fields.surfels.model import ShadingModel
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.volume.boxes import Box
 from texgs.volume.images import Images, Target
 

@@ -22,7 +22,6 @@ from texgs.core.memory import require_memory
 from texgs.core.reading import reading
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import describe, model_of, read_model
-from texgs.fields.surfels.render import render
 from texgs.fields.surfels.texels import mean_texels, owners
 
 FORMAT = "texgs-compact"
@@ -114,7 +113,7 @@ def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
     """
     seen = torch.zeros_like(model.parameters["opacities"], dtype=torch.bool)
     for camera in cameras:
-        statistics = render(model, camera.to(seen.device), outputs=("statistics",)).statistics
+        statistics = model.render(camera.to(seen.device), outputs=("statistics",)).statistics
         seen |= statistics.pixels > 0  # type: ignore[union-attr]
     return seen
 

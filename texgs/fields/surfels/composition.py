@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
-from typing import Literal, get_args
+from typing import get_args
 
 import torch
 from torch import Tensor
@@ -13,14 +13,13 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.field import Look
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.model import MATERIAL, Surfels, geometry, material
-from texgs.fields.surfels.render import light_direction, viewer
+from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.segment import labels_of
+from texgs.fields.surfels.shading import MATERIAL, light_direction, material, viewer
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import blinn_phong_texture
-
-Look = Literal["shaded", "unshaded", "ambient", "diffuse", "specular", "shininess"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,6 +58,10 @@ class Part:
         return cls(
             model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid(), len(masks), labels
         )
+
+    def label_of(self, surfel: int) -> int:
+        """Number of the segment that holds a surfel, 0 for none."""
+        return 0 if self.labels is None else int(self.labels[surfel])
 
     def per_surfel(self, values: Sequence[float]) -> float | Tensor:
         """The value of each surfel's edit [N]; a plain number where all are the same."""
@@ -142,6 +145,25 @@ class Composition:
 
     def __len__(self) -> int:
         return len(self.means)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the surfels are."""
+        return self.means.device
+
+    @property
+    def palettes(self) -> list[tuple[float, ...]]:
+        """The palette of each model as fitted; black for a model without one."""
+        given = (part.palette for part in self.parts)
+        return [(0.0, 0.0, 0.0) if palette is None else tuple(palette.tolist()) for palette in given]
+
+    def place_of(self, surfel: int) -> tuple[int, int]:
+        """Number of the part that has a surfel of the whole, and the surfel's place in it."""
+        for number, part in enumerate(self.parts):
+            if surfel < len(part.model):
+                return number, surfel
+            surfel -= len(part.model)
+        raise ArgumentError(f"surfel: expected one of {len(self)}, got one beyond them")
 
     @torch.no_grad()
     def render(

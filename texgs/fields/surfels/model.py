@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import torch
 from torch import Tensor
 
 from texgs.core import check
+from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.raster import Options
-
-GEOMETRY = ("means", "quats", "scales", "opacities")
-MATERIAL = ("ambient", "diffuse", "specular", "shininess")
-TEXTURE = ("palette", "texels", "sizes", "offsets")
-SHININESS = (1.0, 100.0)  # range of the bounded exponent
-
-
-@dataclass(frozen=True)
-class ShadingModel:
-    """What belongs to a model because it was fitted with it."""
-
-    low_pass: float = 6.0  # of the rasterizer, see texgs.raster.Options
-    material: Literal["bounded", "paper"] = "bounded"  # how raw material becomes factors
-    local_viewer: bool = True  # whether directions to viewer and headlight differ from surfel to surfel
-    facing: bool = True  # whether lights shine on the side that faces the viewer, or on both
-
-    @property
-    def options(self) -> Options:
-        """For the rasterizer."""
-        return Options(low_pass=self.low_pass)
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.field import Role
+from texgs.fields.surfels import groups
+from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fields.surfels.shading import MATERIAL, ShadingModel, shaded
+from texgs.raster import Render, Texture, rasterize
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +34,8 @@ class Surfels:
     Raises:
         ShapeError, ArgumentError: if a tensor is missing, unknown or of another shape.
     """
+
+    kind: ClassVar[str] = "surfels"
 
     parameters: Mapping[str, Tensor]
     shading: ShadingModel = field(default_factory=ShadingModel)
@@ -76,11 +64,55 @@ class Surfels:
         return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
 
     @property
+    def device(self) -> torch.device:
+        """Where its tensors are."""
+        return self.parameters["means"].device
+
+    def tensors(self, role: Role) -> dict[str, Tensor]:
+        """Parameters of geometry, or of colour, material and texture."""
+        is_geometry = role == "geometry"
+        return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
+
+    def sizes(self) -> dict[str, float]:
+        """MiB of each group of parameters, see `groups.sizes`."""
+        return groups.sizes(self.parameters)
+
+    @property
     def stage(self) -> Literal["surfels", "shading", "texture"]:
         """The phase that the model has gone through."""
         if "texels" in self.parameters:
             return "texture"
         return "shading" if "ambient" in self.parameters else "surfels"
+
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        *,
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render the surfels.
+
+        Args:
+            camera: on the model's device.
+            light: shines on the surfels; before the shading phase, their colours are spherical harmonics.
+            background: [3]; white by default.
+            outputs: of the rasterizer.
+        """
+        colored = shaded(self.parameters, self.shading, camera, light)
+        kind = "texture" if isinstance(colored, Texture) else "features"
+        return rasterize(
+            *geometry(self.parameters),
+            camera.viewmat,
+            camera.K,
+            camera.width,
+            camera.height,
+            background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
+            outputs=outputs,
+            options=self.shading.options,
+            **{kind: colored},  # type: ignore[arg-type]
+        )
 
 
 SHAPES = {
@@ -101,38 +133,3 @@ def geometry(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor, Tensor, 
     """Means, quaternions, standard deviations and opacities as the rasterizer takes them; differentiable."""
     p = parameters
     return p["means"], p["quats"], p["scales"].exp(), p["opacities"].sigmoid()
-
-
-def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
-    """Factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
-
-    "bounded": factors in (0, 1), exponent in (1, 100). "paper": k_a and k_d as they are, k_s in (0, 5),
-    exponent in (0, 50), which is what the release does.
-    """
-    a, d, s, b = (parameters[name] for name in MATERIAL)
-    if kind == "paper":
-        factors = (a, d, 5 * s.sigmoid(), 50 * b.sigmoid())
-    else:
-        low, high = SHININESS
-        factors = (a.sigmoid(), d.sigmoid(), s.sigmoid(), low + (high - low) * b.sigmoid())
-    return dict(zip(MATERIAL, factors, strict=True))
-
-
-def raw_material(
-    ambient: float, diffuse: float, specular: float, shininess: float, kind: str
-) -> dict[str, Tensor]:
-    """The inverse of `material` for one material, [1] each.
-
-    Raises:
-        ArgumentError: if a factor is outside what the kind can express.
-    """
-    low, high = SHININESS
-    given = torch.tensor([ambient, diffuse, specular, shininess])
-    if kind == "paper":
-        linear, shares = given[:2], given[2:] / torch.tensor([5.0, 50.0])
-    else:
-        linear, shares = given[:0], torch.cat([given[:3], (given[3:] - low) / (high - low)])
-    if not ((shares > 0) & (shares < 1)).all():
-        raise ArgumentError(f"material: expected factors that {kind!r} can express, got {given.tolist()}")
-    raw = torch.cat([linear, shares.logit()])
-    return dict(zip(MATERIAL, raw[:, None], strict=True))

@@ -16,7 +16,9 @@ from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_bytes
 from texgs.core.reading import reading
-from texgs.fields.surfels.model import GEOMETRY, MATERIAL, SHAPES, TEXTURE, ShadingModel, Surfels
+from texgs.fields.surfels.groups import GEOMETRY, TEXTURE
+from texgs.fields.surfels.model import SHAPES, Surfels
+from texgs.fields.surfels.shading import MATERIAL, ShadingModel
 from texgs.raster import Texture
 from texgs.raster.atlas import check_texture
 

@@ -15,8 +15,9 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import write_atomic
 from texgs.core.ply_file import read_vertices
 from texgs.core.rotation import quats_to_matrices
-from texgs.fields.surfels.model import ShadingModel, Surfels, material
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.release_texture import read_texture
+from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.spherical_harmonics import DEGREES
 

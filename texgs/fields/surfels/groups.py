@@ -1,32 +1,36 @@
-"""How large a basic model is, by attribute group."""
+"""The parameters of surfels in groups, and how large these are."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
-from texgs.fields.surfels.model import GEOMETRY, MATERIAL, TEXTURE, Surfels
+from torch import Tensor
 
+from texgs.fields.surfels.shading import MATERIAL
+
+GEOMETRY = ("means", "quats", "scales", "opacities")
+TEXTURE = ("palette", "texels", "sizes", "offsets")
 MIB = 2**20
 # What the paper counts, and what we store; every tensor of a model is in one group.
 COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
 STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", *MATERIAL), "texture": TEXTURE}
 
 
-def sizes(model: Surfels) -> dict[str, float]:
-    """Size of a model in MiB, of its geometry, shading, texture and in total.
+def sizes(parameters: Mapping[str, Tensor]) -> dict[str, float]:
+    """Sizes of the parameters of surfels in MiB, of its geometry, shading, texture and in total.
 
     `geometry_mib`, `shading_mib`, `texture_mib` and `total_mib` count what the paper's breakdown counts: 10
     floats of geometry per surfel, 4 of material (or 4 in all where surfels share one) and 3 per texel.
     `stored_geometry_mib` and so on count the bytes of all tensors: colours and harmonics as shading, palette
     and layout as texture. A model file is as large as `stored_total_mib` and a header of about a kilobyte.
     """
-    counted, stored = _mebibytes(model, COUNTED), _mebibytes(model, STORED)
+    counted, stored = _mebibytes(parameters, COUNTED), _mebibytes(parameters, STORED)
     return counted | {f"stored_{name}": value for name, value in stored.items()}
 
 
-def _mebibytes(model: Surfels, groups: Mapping[str, Collection[str]]) -> dict[str, float]:
+def _mebibytes(parameters: Mapping[str, Tensor], groups: Mapping[str, Collection[str]]) -> dict[str, float]:
     found = {
-        f"{group}_mib": sum(x.nbytes for name, x in model.parameters.items() if name in names) / MIB
+        f"{group}_mib": sum(x.nbytes for name, x in parameters.items() if name in names) / MIB
         for group, names in groups.items()
     }
     return found | {"total_mib": sum(found.values())}

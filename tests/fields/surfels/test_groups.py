@@ -4,7 +4,6 @@ import torch
 from tests.fields.surfels.samples import STAGES, sample
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.size import sizes
 
 N_TEXELS = 10_000_000  # per basic scene, found by a bisection of 0.1 %
 
@@ -36,7 +35,7 @@ def test_counts_what_the_paper_counts(dataset):
     p = {name: x.expand(n, *x.shape[1:]) for name, x in whole.parameters.items() if name in per_surfel}
     p |= {"palette": torch.zeros(3), "texels": torch.zeros(1, 3).expand(n_scenes * N_TEXELS, 3)}
     p |= {"sizes": torch.ones(1, 2, dtype=torch.int32).expand(n, 2), "offsets": torch.arange(n)}
-    found = sizes(Surfels(p))
+    found = Surfels(p).sizes()
     assert round(found["geometry_mib"], 1) == geometry
     assert round(found["shading_mib"], 1) == shading
     assert found["texture_mib"] == pytest.approx(texture, rel=1e-3)
@@ -48,7 +47,7 @@ def test_stored_is_the_file_without_its_header(tmp_path, stage):
     model = sample(stage, n=500)
     data = write_model(tmp_path / "m", model).read_bytes()
     header = 8 + int.from_bytes(data[:8], "little")
-    found = sizes(model)
+    found = model.sizes()
     assert found["stored_total_mib"] * 2**20 == pytest.approx(len(data) - header, abs=1e-6)
     groups = ("stored_geometry_mib", "stored_shading_mib", "stored_texture_mib")
     assert found["stored_total_mib"] == pytest.approx(sum(found[group] for group in groups))
@@ -56,9 +55,9 @@ def test_stored_is_the_file_without_its_header(tmp_path, stage):
 
 
 def test_groups():
-    found = sizes(sample("shading", n=64, shared=True))
+    found = sample("shading", n=64, shared=True).sizes()
     assert found["geometry_mib"] == 64 * 40 / 2**20
     assert found["shading_mib"] == 4 * 4 / 2**20
     assert found["stored_shading_mib"] == (64 * 12 + 4 * 4) / 2**20
     assert found["texture_mib"] == found["stored_texture_mib"] == 0
-    assert sizes(sample("surfels"))["shading_mib"] == 0
+    assert sample("surfels").sizes()["shading_mib"] == 0

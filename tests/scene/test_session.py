@@ -1,0 +1,156 @@
+"""A scene that is edited: changes, their history, what a pixel shows."""
+
+import numpy as np
+import pytest
+import torch
+
+from tests.fields.surfels.test_composition import CAMERA, ball
+from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.texture_file import write_texture
+from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.segment_file import write_segment
+from texgs.scene.session import Session
+
+
+@pytest.fixture
+def session(tmp_path):
+    """Two balls, the second of which has another place."""
+    models = {}
+    for index, name in enumerate(("left", "v1.2/right")):
+        model = ball(index + 1)
+        path = write_model(tmp_path / f"{index}.safetensors", model)
+        models[name] = SceneModel(path)
+    return Session(Scene(models))
+
+
+def half(tmp_path, index=0):
+    model = ball(index + 1)
+    return write_segment(tmp_path / "half", model, torch.arange(len(model)) % 2 == 0)
+
+
+def test_frames_are_those_of_a_scene_that_was_written_so(session, tmp_path):
+    session.set("left", "palette", (0.9, 0.1, 0.2))
+    session.set("v1.2/right", "opacity", 0.5)
+    session.set_light(Light("directional", 30.0, 40.0))
+    session.set_background("#000000")
+    written = Session.open(session.save(tmp_path / "new.yaml"))
+    assert written.scene == session.scene
+    assert np.array_equal(written.frame(CAMERA), session.frame(CAMERA))
+    assert session.frame(CAMERA)[0, 0].tolist() == [0, 0, 0]
+
+
+def test_numbers_read_no_file_again_and_files_do(session, tmp_path):
+    before = session.composition
+    session.set("left", "diffuse", 0.5)
+    assert session.composition is before
+    session.set_texture("left", write_texture(tmp_path / "a", ball(1)))
+    assert session.composition is not before
+
+
+def test_each_change_is_undone_and_made_again(session, tmp_path):
+    scenes = [session.scene]
+    for change in (
+        lambda: session.set("left", "visible", False),
+        lambda: session.add_segment("left/shell", half(tmp_path)),
+        lambda: session.set("left/shell", "opacity", 0.25),
+        lambda: session.remove_segment("left/shell"),
+        lambda: session.reset("left", "visible"),
+    ):
+        change()
+        scenes.append(session.scene)
+    assert scenes[-1] == scenes[0]
+    for scene in reversed(scenes[:-1]):
+        assert session.undo()
+        assert session.scene == scene
+    assert not session.undo()
+    for scene in scenes[1:]:
+        assert session.redo()
+        assert session.scene == scene
+    assert not session.redo()
+    session.undo()
+    session.set("left", "diffuse", 2)
+    assert not session.redo(), "another way was taken"
+
+
+def test_a_new_segment_looks_as_its_model_does(session, tmp_path):
+    session.set("left", "palette", (0.9, 0.1, 0.2))
+    before = session.frame(CAMERA)
+    session.add_segment("left/shell", half(tmp_path))
+    assert np.array_equal(session.frame(CAMERA), before)
+    session.set("left/shell", "visible", False)
+    assert not np.array_equal(session.frame(CAMERA), before)
+
+
+def test_a_pixel_shows_the_surfel_that_most_of_its_colour_is_from(session, tmp_path):
+    session.set("v1.2/right", "visible", False)
+    session.add_segment("left/shell", half(tmp_path))
+    model = session.composition.parts[0].model
+    ids = torch.arange(len(model)).float()[:, None]
+    y, x = CAMERA.height // 2, CAMERA.width // 2
+    picked = session.pick(CAMERA, x, y)
+    pixel = CAMERA.crop(x, y, x + 1, y + 1)
+    from texgs.fields.surfels.model import geometry
+    from texgs.raster import rasterize
+
+    one_hot = (ids == ids.T).float()  # the share of each surfel, by brute force
+    shares = torch.cat(
+        [
+            rasterize(
+                *geometry(model.parameters),
+                pixel.viewmat,
+                pixel.K,
+                1,
+                1,
+                features=chunk.contiguous(),
+                options=model.shading.options,
+            ).color[0, 0]
+            for chunk in one_hot.split(32, dim=1)
+        ]
+    )
+    assert picked.surfel == int(shares.argmax())
+    assert picked.share == pytest.approx(float(shares.max()), abs=1e-6)
+    assert picked.part == ("left/shell" if picked.surfel % 2 == 0 else "left")
+    assert session.pick(CAMERA, 0, 0) is None
+
+
+def test_surfels_of_the_second_model_have_its_name(session):
+    session.set("left", "visible", False)
+    picked = session.pick(CAMERA, CAMERA.width // 2, CAMERA.height // 2)
+    assert picked.part == "v1.2/right"
+    assert picked.surfel < len(session.composition.parts[1].model)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda s: s.set("right", "opacity", 1),
+            r"expected a model of the scene \(left, v1.2/right\), got right",
+        ),
+        (lambda s: s.set("left/x", "opacity", 1), r"expected a segment of left \(it has none\), got x"),
+        (lambda s: s.set("left", "opasity", 1), "models.left: no such key 'opasity', did you mean opacity"),
+        (lambda s: s.set("left", "opacity", -1), "models.left.opacity: expected a factor from 0 to 1000"),
+        (lambda s: s.set_background("red"), "background: expected three numbers"),
+        (
+            lambda s: s.set_texture("left", s.scene.models["left"].file),
+            "models.left: .*texgs-texture",
+        ),
+        (lambda s: s.add_segment("left/a.b", s.scene.models["left"].file), "expected a name without"),
+        (lambda s: s.remove_segment("left"), "expected a segment to remove, got the model left"),
+        (lambda s: s.pick(CAMERA, 10_000, 0), "pixel: expected one of a frame of"),
+    ],
+)
+def test_a_change_that_cannot_be_made_leaves_the_scene(session, change, message):
+    before = session.scene
+    with pytest.raises(ArgumentError, match=message):
+        change(session)
+    assert session.scene is before
+    assert not session.undo()
+
+
+def test_the_file_says_what_the_session_says(session, tmp_path):
+    path = session.save(tmp_path / "a.yaml")
+    assert read_scene(path) == session.scene
+    assert write_scene(tmp_path / "b.yaml", session.scene).read_text() == path.read_text()

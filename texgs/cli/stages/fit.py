@@ -1,0 +1,52 @@
+"""Stages of fits in one phase: a field of another kind than surfels, from the views alone."""
+
+from pathlib import Path
+from typing import Any
+
+from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.phase import gpu_memory, quality, training_quality
+from texgs.config.fields import kinds
+from texgs.config.typed import typed
+from texgs.core.device import torch_device
+from texgs.core.errors import ArgumentError
+from texgs.fit.task import FitTask, Fitted
+from texgs.volume.images import load
+from texgs.volume.view_set import read_views
+
+
+def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write model.safetensors.
+
+    Args:
+        settings: what the stage reads of the configuration.
+        inputs: `views`, the transforms_train.json.
+        output: folder.
+    """
+    kind, fit = kinds()[settings["stage"]], settings["fit"]
+    if kind.settings is None or kind.fit is None:
+        raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
+    title = f"{settings['dataset']}/{settings['tf']}: {kind.name}"
+    device, views = torch_device(fit["device"]), read_views(inputs["views"].parent)
+    task: FitTask[Any] = FitTask(
+        typed(kind.settings, settings["keys"]),
+        views,
+        load(views.train, fit["reduce"]),
+        output,
+        device,
+        fit["seed"],
+        title,
+    )
+    fitted: Fitted = kind.fit(task)
+    kind.write(output / "model.safetensors", fitted.field)
+    numbers = {
+        "fit_seconds": fitted.seconds,
+        "primitives": len(fitted.field),
+        "iterations": fitted.iterations,
+        "losses": list(fitted.losses),
+        "notes": dict(fitted.notes),
+        **fitted.field.sizes(),
+        **quality(fitted.field, views, fit["reduce"], title),
+        **training_quality(fitted.field, views, fit["reduce"], title),
+        **gpu_memory(device),
+    }
+    return Outcome(numbers)

@@ -1,0 +1,22 @@
+"""Specifications in modules of their own: what a package offers is what its modules define."""
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+
+@cache
+def specifications(package: str, attribute: str) -> dict[str, Any]:
+    """What the modules of a package define under one name, by the names of the specifications.
+
+    The modules are imported, so they must stay light: what they run imports the rest when it is called.
+
+    Args:
+        package: such as texgs.methods.
+        attribute: such as METHOD; modules without it are helpers of others.
+    """
+    folder = import_module(package).__path__
+    modules = (import_module(f"{package}.{entry.name}") for entry in pkgutil.iter_modules(folder))
+    found = [getattr(module, attribute) for module in modules if hasattr(module, attribute)]
+    return {specification.name: specification for specification in found}

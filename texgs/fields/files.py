@@ -1,0 +1,44 @@
+"""Files of fields of any kind, told apart by how they begin."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from texgs.config.fields import kinds
+from texgs.fields.field import Field
+
+LONGEST_HEADER = 1 << 20  # bytes; those of fields have a kilobyte
+FIRST = "surfels"  # whose reader says what is wrong with a file that is of no kind
+
+
+def open_field(path: str | Path) -> Field:
+    """Read a field of any kind to the CPU. Nothing in the file is executed.
+
+    Raises:
+        ArgumentError, ShapeError: if the file is missing, damaged or of no kind.
+    """
+    path = Path(path)
+    names = formats(path)
+    known = kinds()
+    kind = next((kind for kind in known.values() if names & {*kind.formats}), known[FIRST])
+    field: Field = kind.read(path)
+    return field
+
+
+def formats(path: Path) -> set[str]:
+    """Entries of a file's header, one of which names its format; none where it has no header of ours.
+
+    Files of fields are safetensors with one entry of metadata, or begin with a line of JSON.
+    """
+    try:
+        with path.open("rb") as file:
+            start = file.read(9)
+            if start[:1] == b"{":
+                header = json.loads(start + file.readline(LONGEST_HEADER))
+            else:
+                length = min(int.from_bytes(start[:8], "little"), LONGEST_HEADER)
+                header = json.loads(start[8:] + file.read(length - 1)).get("__metadata__", {})
+    except (OSError, ValueError, AttributeError, RecursionError):
+        return set()
+    return set(header) if isinstance(header, dict) else set()

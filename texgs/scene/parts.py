@@ -1,0 +1,92 @@
+"""Parts of a scene by their names: MODEL, what no segment of it holds, and MODEL/SEGMENT."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from texgs.core.errors import ArgumentError
+from texgs.core.names import label
+from texgs.scene.scene_file import RESERVED, Scene, SceneModel, SceneSegment
+
+Entry = SceneModel | SceneSegment
+
+
+def split(scene: Scene, part: str) -> tuple[str, str | None]:
+    """Model and segment of a part; the segment may be a new one.
+
+    Names of models may have the mark between the two, those of segments have none.
+
+    Raises:
+        ArgumentError: if there is no such model.
+    """
+    if part in scene.models:
+        return part, None
+    model, _, segment = part.rpartition("/")
+    if model not in scene.models:
+        expected = ", ".join(scene.models)
+        raise ArgumentError(f"expected a model of the scene ({expected}), got {model or part}")
+    return model, segment
+
+
+def entry_of(scene: Scene, part: str) -> Entry:
+    """The model or segment of a name.
+
+    Raises:
+        ArgumentError: if there is none.
+    """
+    model, segment = split(scene, part)
+    if segment is None:
+        return scene.models[model]
+    segments = scene.models[model].segments
+    if segment not in segments:
+        raise ArgumentError(
+            f"expected a segment of {model} ({', '.join(segments) or 'it has none'}), got {segment}"
+        )
+    return segments[segment]
+
+
+def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
+    """The scene with another model or segment of a name; None removes a segment.
+
+    Raises:
+        ArgumentError: if there is no such model, or no segment to remove.
+    """
+    model, segment = split(scene, part)
+    if segment is not None:
+        if entry is None:
+            entry_of(scene, part)
+        segments = {**scene.models[model].segments, segment: entry}
+        kept = {name: each for name, each in segments.items() if isinstance(each, SceneSegment)}
+        entry = replace(scene.models[model], segments=kept)
+    if not isinstance(entry, SceneModel):
+        raise ArgumentError(f"expected a segment to remove, got the model {part}")
+    return replace(scene, models={**scene.models, model: entry})
+
+
+def place_of(part: str) -> str:
+    """Where a part stands in a scene file."""
+    model, slash, segment = part.rpartition("/")
+    return f"models.{model}.segments.{segment}" if slash else f"models.{part}"
+
+
+def require_name(name: str | None, where: str) -> None:
+    """Require a name that a segment can have.
+
+    Raises:
+        ArgumentError: naming where it comes from.
+    """
+    if not name or any(mark in label(where, name) for mark in RESERVED):
+        raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
+
+
+def require_new(scene: Scene, part: str) -> None:
+    """Require that the model of MODEL/SEGMENT has no such segment.
+
+    Raises:
+        ArgumentError: if it has, or there is no such model.
+    """
+    model, segment = split(scene, part)
+    if segment in scene.models[model].segments:
+        raise ArgumentError(
+            f"{part}: is there already; choose another name, or remove it by texgs edit {part}="
+        )

@@ -1,0 +1,249 @@
+"""A scene that is being edited: each change makes a new scene, and all of them can be undone."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.field import Composed
+from texgs.fields.part_edit import PartEdit, color
+from texgs.fields.surfels.composition import Composition
+from texgs.scene.frame import Mode, frame
+from texgs.scene.parts import entry_of, place_of, replaced, require_name, require_new, split
+from texgs.scene.scene_file import EDITS, WHITE, Scene, SceneSegment, known, read_scene, write_scene
+from texgs.scene.segment_file import read_segment, write_segment
+
+
+@dataclass(frozen=True)
+class Picked:
+    """What a pixel of a frame shows most of."""
+
+    part: str
+    surfel: int  # its place in the model
+    share: float  # of the pixel, 0 to 1
+
+
+class Session:
+    """A scene and its history. Parts have the names MODEL and MODEL/SEGMENT.
+
+    What is edited by numbers (colours, opacities, light) costs nothing but the next frame: files are read
+    again only where a change brings others. A change that cannot be made leaves the scene as it is.
+
+    Args:
+        scene: to begin with.
+        device: that frames are rendered on.
+    """
+
+    def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
+        self._past, self._future = [scene], list[Scene]()
+        self._device = device
+        self._opened: tuple[list[Path | None], Composed] | None = None
+
+    @classmethod
+    def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
+        """A session that begins with a scene file; its models are read when a frame needs them.
+
+        Raises:
+            ArgumentError: if it is no scene file.
+        """
+        return cls(read_scene(path), device)
+
+    @property
+    def scene(self) -> Scene:
+        """As it is now."""
+        return self._past[-1]
+
+    # ---- Changes ------------------------------------------------------------
+
+    def set(self, part: str, key: str, value: Any) -> None:
+        """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material.
+
+        Raises:
+            ArgumentError: if there is no such part or key, or the value is out of range.
+        """
+        entry = entry_of(self.scene, part)
+        known({key: value}, EDITS, place_of(part))
+        try:
+            edit = replace(entry.edit, **{key: value})
+        except ArgumentError as error:
+            raise ArgumentError(f"{place_of(part)}.{error}") from error
+        self._push(replaced(self.scene, part, replace(entry, edit=edit)))
+
+    def reset(self, part: str, key: str) -> None:
+        """Take a value of a part's edit back.
+
+        Raises:
+            ArgumentError: if there is no such part or key.
+        """
+        self.set(part, key, getattr(PartEdit(), key, None))
+
+    def set_texture(self, part: str, file: Path | None) -> None:
+        """Give a part the texels of a texture file; None: those that it was fitted with.
+
+        Raises:
+            ArgumentError, ShapeError: if there is no such part, or the file is not one of its model.
+        """
+        self._push_read(part, replace(entry_of(self.scene, part), texture=file))
+
+    def set_file(self, part: str, file: Path) -> None:
+        """Put another file in the place of a model or a segment.
+
+        Raises:
+            ArgumentError, ShapeError: if there is no such part, or the file is not one for it.
+        """
+        self._push_read(part, replace(entry_of(self.scene, part), file=file))
+
+    def set_light(self, light: Light = HEADLIGHT) -> None:
+        """Let another light shine on the scene."""
+        self._push(replace(self.scene, light=light))
+
+    def set_background(self, value: object = WHITE) -> None:
+        """Put another colour behind the scene.
+
+        Raises:
+            ArgumentError: if it is no colour.
+        """
+        self._push(replace(self.scene, background=color("background", value)))
+
+    def add_segment(self, part: str, file: Path) -> None:
+        """Make surfels of a model a part of their own, which looks as the rest of the model does.
+
+        Args:
+            part: MODEL/SEGMENT, a new name or one whose surfels change.
+            file: of the segment, see `write_segment`.
+
+        Raises:
+            ArgumentError, ShapeError: if there is no such model, or the file is not one of it.
+        """
+        model, name = split(self.scene, part)
+        entry = self.scene.models[model]
+        require_name(name, place_of(part))
+        before = entry.segments.get(str(name), SceneSegment(file, entry.edit, entry.texture))
+        self._push_read(part, replace(before, file=file))
+
+    def make_segment(self, part: str, mask: Tensor, file: Path, facts: Mapping[str, Any]) -> None:
+        """Write the file of a new segment, and add it.
+
+        Args:
+            part: MODEL/SEGMENT, a new name.
+            mask: [N] bool, surfels of the model.
+            file: target.
+            facts: what the segment comes from, JSON.
+
+        Raises:
+            ArgumentError: if it is there already, or earlier segments have all of its surfels.
+        """
+        require_new(self.scene, part)
+        name, mask = split(self.scene, part)[0], mask.cpu()
+        entry = self.scene.models[name]
+        fitted, free = replace(entry, texture=None, segments={}).surfels()[0], mask.clone()
+        for other in entry.segments.values():
+            free &= ~read_segment(other.file, fitted)
+        if not bool(free.any()):
+            raise ArgumentError(
+                f"{part}: expected surfels that no segment of {name} has, got none; remove one that has them "
+                f"({', '.join(entry.segments)})"
+            )
+        held, count = int((mask & ~free).sum()), int(mask.sum())
+        note = f", of which {held} stay with earlier segments" if held else ""
+        sys.stderr.write(f"{part}: {count} of {len(mask)} surfels{note}\n")
+        write_segment(file, fitted, mask, facts)
+        self.add_segment(part, file)
+
+    def remove_segment(self, part: str) -> None:
+        """Give the surfels of a segment back to their model.
+
+        Raises:
+            ArgumentError: if there is no such segment.
+        """
+        self._push(replaced(self.scene, part, None))
+
+    def undo(self) -> bool:
+        """Take the latest change back; whether there was one."""
+        if len(self._past) == 1:
+            return False
+        self._future.append(self._past.pop())
+        return True
+
+    def redo(self) -> bool:
+        """Make again what was undone last; whether there was anything."""
+        if not self._future:
+            return False
+        self._past.append(self._future.pop())
+        return True
+
+    # ---- Views ------------------------------------------------------------
+
+    @property
+    def composition(self) -> Composed:
+        """The models of the scene, joined; kept as long as their files are the same.
+
+        Raises:
+            ArgumentError, ShapeError: naming the model and its file.
+        """
+        files = [file for entry in self.scene.models.values() for file in entry.files]
+        if self._opened is None or self._opened[0] != files:
+            self._opened = (files, self.scene.open(self._device))
+        return self._opened[1]
+
+    def frame(self, camera: Camera, mode: Mode = "shaded") -> np.ndarray:
+        """One frame [H, W, 3], uint8; see `texgs.scene.frame.frame`."""
+        scene = self.scene
+        return frame(self.composition, camera, scene.light, scene.edits, mode, scene.background)
+
+    def pick(self, camera: Camera, x: int, y: int) -> Picked | None:
+        """The surfel that a pixel shows most of, counted from 0, 0 at the upper left; None on the background.
+
+        Raises:
+            ArgumentError: if the pixel is outside of the frame.
+        """
+        if not (0 <= x < camera.width and 0 <= y < camera.height):
+            size = f"{camera.width} x {camera.height}"
+            raise ArgumentError(f"pixel: expected one of a frame of {size}, got {x}, {y}")
+        pixel, composition = camera.crop(x, y, x + 1, y + 1).to(self._device), self.composition
+        if not isinstance(composition, Composition):
+            raise ArgumentError("pick: expected a scene of surfels, got fields of another kind")
+        shown = composition.render(pixel, self.scene.light, self.scene.edits, outputs=("statistics",))
+        weights = shown.statistics.weight_sum  # type: ignore[union-attr]
+        if not bool((weights > 0).any()):
+            return None
+        share, place = weights.max(dim=0)
+        part, surfel = composition.place_of(int(place))
+        name = list(self.scene.models)[part]
+        label = int(composition.parts[part].label_of(surfel))
+        segments = ["", *(f"/{segment}" for segment in self.scene.models[name].segments)]
+        return Picked(f"{name}{segments[label]}", surfel, float(share))
+
+    def save(self, path: str | Path) -> Path:
+        """Write the scene file in one step; files in it are relative to its folder.
+
+        Raises:
+            ArgumentError: if it cannot be written.
+        """
+        return write_scene(path, self.scene)
+
+    # ---- History ------------------------------------------------------------
+
+    def _push_read(self, part: str, entry: Any) -> None:
+        """Add a change that brings a file, which is read first."""
+        scene = replaced(self.scene, part, entry)
+        model, _ = split(self.scene, part)
+        try:
+            scene.models[model].open()
+        except TexgsError as error:
+            raise type(error)(f"models.{model}: {error}") from error
+        self._push(scene)
+
+    def _push(self, scene: Scene) -> None:
+        self._past.append(scene)
+        self._future.clear()
