@@ -18,9 +18,9 @@ LEFT["scene"] = LEFT["fields"] | {"fields"}
 for name in ("fit", "edit", "metrics"):
     LEFT[name] = LEFT["scene"] | {"scene", "models"}
 LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
-for name in ("methods", "viewer"):
+for name in ("methods", "kinds", "viewer"):
     LEFT[name] = LEFT["report"] | {"report"}
-LEFT["cli"] = LEFT["methods"] | {"methods", "track", "viewer"}
+LEFT["cli"] = LEFT["methods"] | {"methods", "kinds", "track", "viewer"}
 
 
 def package_of(path: Path) -> str:

@@ -149,7 +149,8 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatc
     monkeypatch.setattr(figure, "write_fit_figure", lambda *args: drawn.append(args) or write(*args))
     assert main(["figure", *TINY]) == 0
     ((path, models, views, reduce, title),) = drawn
-    assert list(models) == ["shading", "texture"], "this recipe only seeds surfels"
+    assert list(models) == ["surfels", "shading", "texture"]
+    assert [phase for phase, model in models.items() if model is None] == ["surfels"], "it only seeds them"
     assert list(views) == ["test view 0", "test view 1"]
     assert (reduce, title.partition(":")[0]) == (1, "sphere/TF01, recipe demo")
     assert path == Path("results/sphere/TF01/demo/.figure.work/figure.png")

@@ -112,7 +112,7 @@ def test_phases_stand_beside_the_view(view):
 
 
 def test_seeds_only_and_half_the_size(view):
-    panels, visible = compare({"shading": shading(), "texture": texture()}, view, 2)
+    panels, visible = compare({"surfels": None, "shading": shading(), "texture": texture()}, view, 2)
     assert (panels[1].pixels, panels[1].words) == (None, "seeds only")
     assert panels[0].words == "PSNR over 16 × 16 pixels"
     assert visible.shape == panels[2].pixels.shape[:2] == (16, 16)
@@ -193,7 +193,7 @@ def test_nothing_visible_shows_the_whole_frame():
 
 
 def test_mistakes_are_named(tmp_path, view):
-    with pytest.raises(ArgumentError, match=r"a\.png: expected a model of the last phase and a view, got shading"):
+    with pytest.raises(ArgumentError, match=r"a\.png: expected a model of the last phase and a view"):
         write_fit_figure(tmp_path / "a.png", {"shading": None}, {"a": view})
     with pytest.raises(ArgumentError, match="got surfels, shading, texture and 0 views"):
         write_fit_figure(tmp_path / "a.png", MODELS, {})

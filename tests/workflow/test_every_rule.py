@@ -132,29 +132,24 @@ def test_sources_that_are_put_back_want_the_results_of_before(project):
     assert changed(project) == set()
 
 
-@pytest.mark.parametrize("harm", ["removed", "cut", "one bit"])
-def test_a_damaged_model_is_made_again_and_nothing_else(project, harm):
-    model = project.work / "results" / "sphere" / "TF01" / "demo" / "shading" / "model.safetensors"
-    whole, before = model.read_bytes(), metrics(project)
-    if harm == "removed":
-        model.unlink()
-    else:
-        model.write_bytes(whole[:-100] if harm == "cut" else whole[:-1] + bytes([whole[-1] ^ 1]))
+def test_what_is_damaged_is_made_again_and_nothing_else(project):
+    """A view cut short, a model removed, one cut short, and one with a flipped bit: each at once."""
+    folder = project.work / "results" / "sphere" / "TF01"
+    image, other = folder / "views" / "train" / "r_0003.png", folder / "views" / "train" / "r_0004.png"
+    models = [folder / "demo" / phase / "model.safetensors" for phase in ("surfels", "shading", "texture")]
+    whole = {path: path.read_bytes() for path in (image, *models)}
+    written, before = other.stat().st_mtime_ns, metrics(project)
+    removed, cut, flipped = models
+    removed.unlink()
+    for path in (image, cut):
+        path.write_bytes(whole[path][: len(whole[path]) // 2])
+    flipped.write_bytes(whole[flipped][:-1] + bytes([whole[flipped][-1] ^ 1]))
     run(project)
-    assert model.read_bytes() == whole
-    assert made_again(before, metrics(project)) == {"sphere/TF01/demo/shading"}
+    assert {path: path.read_bytes() for path in whole} == whole
+    assert other.stat().st_mtime_ns == written, "the other views are those of before"
+    phases = {f"sphere/TF01/demo/{path.parent.name}" for path in models}
+    assert made_again(before, metrics(project)) == {"sphere/TF01/views", *phases}
     assert changed(project) == set()
-
-
-def test_a_cut_view_is_rendered_again_and_no_other(project):
-    views = project.work / "results" / "sphere" / "TF01" / "views"
-    image, other = views / "train" / "r_0003.png", views / "train" / "r_0004.png"
-    whole, written, before = image.read_bytes(), other.stat().st_mtime_ns, metrics(project)
-    image.write_bytes(whole[: len(whole) // 2])
-    run(project)
-    assert image.read_bytes() == whole
-    assert other.stat().st_mtime_ns == written
-    assert made_again(before, metrics(project)) == {"sphere/TF01/views"}
 
 
 def test_a_failed_edit_keeps_the_earlier_one(project, sources):

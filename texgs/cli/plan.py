@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -138,21 +138,30 @@ def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
     from texgs.config.sweep import variants
 
     base = compose(words)
-    names = [(*words, f"dataset={name}") for name in base.datasets] or [words]
-    repeated = [name for name in base.datasets if base.datasets.count(name) > 1]
-    if repeated:
-        raise ConfigError(f"datasets: expected different names, got {repeated[0]} twice")
+    for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
+        if repeated := [name for name in listed if listed.count(name) > 1]:
+            raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
+    sets = [(*words, f"dataset={name}") for name in base.datasets] or [words]
+    names = [(*each, f"fit={name}") for each in sets for name in base.fits] or sets
     found: dict[str, list[DictConfig]] = {}
     for each in names:
         config = compose(each)
         name = config.sweep.name if config.sweep.variants else ""
         found.setdefault(name, []).extend(compose(variant) for variant in variants((*each, "edit=none")))
         if not name:
-            found[name] += [compose(edit) for edit in edits(each)]
+            found[name] += [edit for edit in map(compose, edits(each)) if is_possible(edit, base.fits)]
     for name, dataset in base.sweeps.items():
         of_sweep = (*words, f"dataset={dataset}", f"sweep={name}", "edit=none")
         found[name] = [compose(variant) for variant in variants(of_sweep)]
     return found
+
+
+def is_possible(config: DictConfig, several: Sequence[str]) -> bool:
+    """Whether the field of a fit can be edited so; of a single fit that is told as a mistake later."""
+    from texgs.config.fields import kinds
+    from texgs.config.methods import method_of
+
+    return len(several) < 2 or method_of(config.edit).needs <= kinds()[config.fit.field].can
 
 
 def add_jobs(

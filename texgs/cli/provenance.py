@@ -47,11 +47,11 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
 
 
 def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the recipe, of the sweep and of its variant, where the stage is of a fit."""
+    """Names of the recipe, its field, the sweep and its variant, where the stage is of a fit."""
     fit = settings.get("fit", {})
     if "variant" not in fit:
         return {}
-    return {"recipe": fit["name"], "variant": fit["variant"], "sweep": fit["sweep"]}
+    return {"recipe": fit["name"], "field": fit["field"], "variant": fit["variant"], "sweep": fit["sweep"]}
 
 
 def gpu_name() -> str:

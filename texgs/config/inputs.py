@@ -88,6 +88,7 @@ def fit_label(config: DictConfig) -> dict[str, Any]:
     return {
         "fit": {
             "name": config.fit.name,
+            "field": config.fit.field,
             "seed": config.fit.seed,
             "sweep": config.sweep.name,
             "variant": config.variant,

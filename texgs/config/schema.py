@@ -181,6 +181,7 @@ class Config:
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: Views = key(Views, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")
+    fits: list[str] = key([], "recipes of a whole experiment, files of conf/fit; default the one of `fit`")
     edit: Edit = key(Edit, "a new look for the scene")
     edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
     metric: Metric = key(Metric, "what edits are measured with")

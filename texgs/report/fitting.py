@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from texgs.report.metrics_files import PHASES, fits, paper
+from texgs.report.metrics_files import fits, paper, phases
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 COLUMNS = (
@@ -32,9 +32,9 @@ def fitting(paths: Iterable[str | Path]) -> Table:
     Raises:
         ArgumentError: if a file is no metrics file.
     """
-    published = paper("fitting", keys=2)
+    published, order = paper("fitting", keys=2), phases()
     rows = [Row(cells(metrics, path.parts[-3], published), [path]) for path, metrics in fits(paths)]
-    rows.sort(key=lambda row: (row.cells[:3], PHASES.index(str(row.cells[3]))))
+    rows.sort(key=lambda row: (row.cells[:3], order.index(str(row.cells[3]))))
     return Table(CAPTION, COLUMNS, rows)
 
 

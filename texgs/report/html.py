@@ -13,7 +13,7 @@ from texgs.core.io import write_bytes
 from texgs.core.plots import words as plot_words
 from texgs.report.fitting import fitting
 from texgs.report.looks import looks
-from texgs.report.metrics_files import PHASES, read
+from texgs.report.metrics_files import read
 from texgs.report.scene_tables import SCENE_TABLES, label
 from texgs.report.table import Table
 
@@ -81,7 +81,7 @@ def curves(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> bytes:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    found = [m for _, m in jobs if m["stage"] in PHASES and len(m["numbers"].get("losses", ())) > 1]
+    found = [m for _, m in jobs if len(m["numbers"].get("losses", ())) > 1]
     if not found:
         return b""
     figure = Figure(figsize=(8, 3.2), dpi=120, layout="constrained")

@@ -8,10 +8,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-
-PHASES = ("surfels", "shading", "texture")
 
 
 def read(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
@@ -35,9 +34,14 @@ def below(folder: str | Path) -> list[Path]:
     return sorted(path for path in paths if not any(part.startswith(".") for part in path.parts))
 
 
+def phases() -> list[str]:
+    """The phases of all kinds of fields, in their order."""
+    return [phase for kind in kinds().values() for phase in kind.phases]
+
+
 def fits(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
     """The metrics of the phases of fits; see `read`."""
-    return [(path, metrics) for path, metrics in read(paths) if metrics["stage"] in PHASES]
+    return [(path, metrics) for path, metrics in read(paths) if metrics["stage"] in phases()]
 
 
 def paper(name: str, keys: int = 1) -> dict[tuple[str, ...], dict[str, str]]:

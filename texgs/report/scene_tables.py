@@ -90,7 +90,7 @@ def model_size(paths: Iterable[str | Path]) -> Table:
     published = paper("model_size")
     found: dict[tuple[str, str], list[tuple[Path, dict[str, Any]]]] = defaultdict(list)
     for path, metrics in read(paths):
-        if metrics["stage"] == "texture":
+        if "total_mib" in metrics["numbers"]:
             found[metrics["dataset"], label(metrics)].append((path, metrics["numbers"]))
     rows = []
     for (name, recipe), parts in sorted(found.items()):

@@ -8,6 +8,7 @@ from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
+from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import fits, paper
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
@@ -36,7 +37,7 @@ COLUMNS = (
     *(Column(title, 2) for title in ("k_a", "k_d", "k_s", "beta")),
 )
 CAPTION = (
-    "Test views after the texture phase; means over seeds, ± their standard deviation; "
+    "Test views after the last phase; means over seeds, ± their standard deviation; "
     "minutes of all phases; medians of the material."
 )
 
@@ -77,20 +78,24 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
 
 def cells(runs: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[Cell]:
     """The cells of one variant from the metrics of its runs, by phase; None where a phase is missing."""
-    complete = [run for run in runs if {"surfels", "shading", "texture"} <= set(run)]
+    last = next(
+        (kind.phases[-1] for kind in kinds().values() if any(set(kind.phases) <= set(run) for run in runs)),
+        "",
+    )
+    complete = [run for run in runs if last in run]
     if not complete:
         return [0, *[None] * (len(COLUMNS) - 5)]
 
     def mean(stage: str, key: str) -> float | None:
-        values = [run[stage]["numbers"].get(key) for run in complete]
-        return None if None in values else fmean(values)
+        values = [run[stage]["numbers"].get(key) for run in complete if stage in run]
+        return None if None in values or not values else fmean(values)
 
-    psnr = [run["texture"]["numbers"].get("psnr") for run in complete]
+    psnr = [run[last]["numbers"].get("psnr") for run in complete]
     spread = stdev(psnr) if len(psnr) > 1 and None not in psnr else None
     minutes = [sum(phase["numbers"]["fit_seconds"] for phase in run.values()) / 60 for run in complete]
     memory = [max(phase["peak_memory_mib"] for phase in run.values()) / 1024 for run in complete]
-    quality = [mean("texture", "train_psnr"), mean("texture", "psnr"), spread, mean("texture", "ssim")]
-    costs = [fmean(minutes), max(memory), mean("texture", "primitives")]
+    quality = [mean(last, "train_psnr"), mean(last, "psnr"), spread, mean(last, "ssim")]
+    costs = [fmean(minutes), max(memory), mean(last, "primitives")]
     return [len(complete), *quality, *costs, *(mean("shading", key) for key in MATERIAL)]
 
 
