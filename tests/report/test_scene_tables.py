@@ -30,7 +30,13 @@ def test_data_sets_by_size_of_their_views(tmp_path):
 
 
 def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
-    sizes = {"primitives": 1000, "geometry_mib": 1.0, "shading_mib": 0.5, "texture_mib": 8.0}
+    sizes = {
+        "primitives": 1000,
+        "geometry_mib": 1.0,
+        "shading_mib": 0.5,
+        "texture_mib": 8.0,
+        "total_mib": 9.5,
+    }
     for tf in ("TF01", "TF02"):
         for seed in (0, 1):
             metrics(tmp_path, "texture", sizes, tf=tf, dataset="wood", seed=seed)

@@ -78,11 +78,9 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
 
 def cells(runs: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[Cell]:
     """The cells of one variant from the metrics of its runs, by phase; None where a phase is missing."""
-    last = next(
-        (kind.phases[-1] for kind in kinds().values() if any(set(kind.phases) <= set(run) for run in runs)),
-        "",
-    )
-    complete = [run for run in runs if last in run]
+    whole = (kind.phases for kind in kinds().values() if any(set(kind.phases) <= set(run) for run in runs))
+    phases = next(whole, ("none",))
+    last, complete = phases[-1], [run for run in runs if set(phases) <= set(run)]
     if not complete:
         return [0, *[None] * (len(COLUMNS) - 5)]
 
