@@ -152,7 +152,8 @@ def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
     record = {"stage": "pse", "dataset": "engine", "recipe": "quick", "variant": "", "seconds": 1.5}
     versions = {"versions": {"python": "3.11", "texgs": "1"}, "code_sha": "abc"}
     pictures = {"pse.png": "Edits of colour.", "relight.png": "Not written."}
-    metrics = {**record, **versions, "numbers": numbers, "pictures": pictures}
+    metrics = {**record, **versions, "result": "PseResult", "numbers": numbers}
+    metrics["pictures"] = pictures
     (folder / "metrics.json").write_text(json.dumps(metrics))
     assert main(["report"]) == 0
     text = (tmp_path / "results" / "report.html").read_text()

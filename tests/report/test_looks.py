@@ -1,13 +1,20 @@
 import json
+from dataclasses import replace
 
-from texgs.report.looks import COLUMNS, looks
+from texgs.report.looks import looks
+from texgs.report.metrics_files import read
+from texgs.report.results import EditMeasures, EditResult, SceneResult, plain
 
 
-def metrics(folder, stage, numbers):
+def metrics(folder, stage, result):
     path = folder / f"{len(list(folder.iterdir())):03}.json"
     record = {"stage": stage, "dataset": "engine", "recipe": "quick", "variant": "", "seed": 0}
-    path.write_text(json.dumps({**record, "numbers": numbers}))
+    told = {"result": type(result).__name__, "numbers": plain(result)}
+    path.write_text(json.dumps({**record, **told}))
     return path
+
+
+MEASURES = EditMeasures("gold", "text", 4.0, 5.0, primitives=9, megabytes=1.0, geometry_kept=True)
 
 
 def rows(table):
@@ -15,17 +22,10 @@ def rows(table):
 
 
 def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
-    edit = {"edit": "glass", "method": "image", "how": "patches", "lambda_s": None, "edit_seconds": 90.0}
-    paths = [metrics(tmp_path, "edit_image", edit)]
-    measured = {
-        "edit": "glass",
-        "frame_mean_ms": 4.0,
-        "geometry_kept": True,
-        "similarity": 0.3,
-        "clip": "B/32",
-    }
+    paths = [metrics(tmp_path, "edit_image", EditResult("glass", "image", "patches", 90.0))]
+    measured = replace(MEASURES, edit="glass", method="image", similarity=0.3, clip="B/32")
     paths.append(metrics(tmp_path, "edit_metrics", measured))
-    table = looks(paths)
+    table = looks(read(paths))
     first, *theirs = rows(table)
     assert (first["minutes"], first["mean ms"], first["CLIP similarity"]) == (1.5, 4.0, 0.3)
     assert first["geometry kept"] == "bit for bit"
@@ -39,20 +39,19 @@ def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
 
 
 def test_what_was_not_measured_says_so_and_why(tmp_path):
-    edit = {"edit": "pick", "method": "segment", "how": "grabcut", "lambda_s": None, "edit_seconds": 6.0}
-    other = {"edit": "gold", "method": "text", "how": "filters", "lambda_s": None, "edit_seconds": 6.0}
-    missing = {"edit": "gold", "clip_missing": "the weights of x are not on this machine"}
+    missing = replace(MEASURES, clip_missing="the weights of x are not on this machine")
     paths = [
-        metrics(tmp_path, stage, numbers)
-        for stage, numbers in (("edit_segment", edit), ("edit_text", other), ("edit_metrics", missing))
+        metrics(tmp_path, "edit_segment", EditResult("pick", "segment", "grabcut", 6.0)),
+        metrics(tmp_path, "edit_text", EditResult("gold", "text", "filters", 6.0)),
+        metrics(tmp_path, "edit_metrics", missing),
     ]
-    table = looks(paths)
+    table = looks(read(paths))
     text = table.markdown()
     assert "CLIP not measured: the weights of x are not on this machine." in text
     line = next(line for line in text.splitlines() if "| gold |" in line)
-    assert line.count("not measured") >= len(COLUMNS) - 8
-    assert rows(table)[0]["geometry kept"] is None
+    assert line.count("not measured") == 8, "CLIP, style and consistency"
+    assert rows(table)[1]["geometry kept"] is None, "the segment was not measured"
 
 
 def test_without_edits_there_are_no_rows(tmp_path):
-    assert looks([metrics(tmp_path, "timing", {})]).rows == []
+    assert looks(read([metrics(tmp_path, "compose", SceneResult(1, 9))])).rows == []

@@ -1,12 +1,24 @@
 import json
+from dataclasses import replace
 
+from texgs.report.metrics_files import read
+from texgs.report.results import (
+    Comparison,
+    FitResult,
+    PseResult,
+    TimingResult,
+    ViewsResult,
+    VolumeResult,
+    plain,
+)
 from texgs.report.scene_tables import datasets, edits, model_size, rendering
 
 
-def metrics(folder, stage, numbers, *, dataset="engine", tf="TF01", **more):
+def metrics(folder, stage, result, *, dataset="engine", tf="TF01", **more):
     path = folder / f"{len(list(folder.iterdir())):03}.json"
     record = {"stage": stage, "dataset": dataset, "tf": tf, "recipe": "quick", "variant": "", "seed": 0}
-    path.write_text(json.dumps({**record, "device": "CPU", **more, "numbers": numbers}))
+    told = {"result": type(result).__name__, "numbers": plain(result)}
+    path.write_text(json.dumps({**record, "device": "CPU", **more, **told}))
 
 
 def rows(table):
@@ -14,10 +26,11 @@ def rows(table):
 
 
 def test_data_sets_by_size_of_their_views(tmp_path):
-    metrics(tmp_path, "volume", {"dims": [4, 5, 6], "volume_mib": 2.5})
+    lattice = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
+    metrics(tmp_path, "volume", VolumeResult([4, 5, 6], "uint8", **lattice, volume_mib=2.5))
     for tf, size, ms in (("TF01", 64, 10.0), ("TF02", 64, 30.0), ("TF01", 800, 500.0)):
-        metrics(tmp_path, "views", {"width": size, "height": size, "frame_ms": ms}, tf=tf)
-    table = datasets(tmp_path.iterdir())
+        metrics(tmp_path, "views", ViewsResult(9, 2, size, size, frame_ms=ms), tf=tf)
+    table = datasets(read(tmp_path.iterdir()))
     assert [[path.stem for path in row.sources] for row in table.rows] == [
         ["000", "001", "002"],
         ["000", "003"],
@@ -30,17 +43,12 @@ def test_data_sets_by_size_of_their_views(tmp_path):
 
 
 def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
-    sizes = {
-        "primitives": 1000,
-        "geometry_mib": 1.0,
-        "shading_mib": 0.5,
-        "texture_mib": 8.0,
-        "total_mib": 9.5,
-    }
+    sizes = {"geometry_mib": 1.0, "shading_mib": 0.5, "texture_mib": 8.0, "total_mib": 9.5}
+    result = FitResult(60.0, 1000, sizes=sizes)
     for tf in ("TF01", "TF02"):
         for seed in (0, 1):
-            metrics(tmp_path, "texture", sizes, tf=tf, dataset="wood", seed=seed)
-    table = model_size(tmp_path.iterdir())
+            metrics(tmp_path, "texture", result, tf=tf, dataset="wood", seed=seed)
+    table = model_size(read(tmp_path.iterdir()))
     assert [[path.stem for path in row.sources] for row in table.rows] == [["000", "002"], ["001", "003"]]
     found = rows(table)
     assert [row["recipe"] for row in found] == ["quick", "quick-s1"]
@@ -49,24 +57,16 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
 
 
 def test_frames_beside_those_of_the_volume(tmp_path):
-    numbers = {
-        "primitives": 9,
-        "width": 8,
-        "height": 6,
-        "threads": 2,
-        "frame_mean_ms": 4.0,
-        "frame_max_ms": 5.0,
-    }
-    metrics(tmp_path, "timing", {**numbers, "volume_mean_ms": 100.0})
-    metrics(tmp_path, "timing", numbers, dataset="vortex", device="a GPU")
-    first, second = rows(rendering(tmp_path.iterdir()))
+    alone = TimingResult(4.0, 5.0, 4.0, primitives=9, width=8, height=6, threads=2)
+    metrics(tmp_path, "timing", replace(alone, volume_mean_ms=100.0))
+    metrics(tmp_path, "timing", alone, dataset="vortex", device="a GPU")
+    first, second = rows(rendering(read(tmp_path.iterdir())))
     assert (first["volume / scene"], first["pixels"], first["mean ms"]) == (25.0, "8x6", 4.0)
     assert (second["volume / scene"], second["device"]) == (None, "a GPU")
 
 
 def test_edits_with_and_without_a_volume(tmp_path):
-    steps = {"pse": [{"title": "a", "psnr": 30.0, "ssim": 0.9}], "relight": [{"title": "b"}], "views": 6}
-    metrics(tmp_path, "pse", steps)
-    first, second = rows(edits(tmp_path.iterdir()))
+    metrics(tmp_path, "pse", PseResult(6, [Comparison("a", 30.0, 0.9)], [Comparison("b")]))
+    first, second = rows(edits(read(tmp_path.iterdir())))
     assert (first["edit"], first["views"], first["PSNR"]) == ("a", 6, 30.0)
     assert (second["edit"], second["PSNR"]) == ("b", None)

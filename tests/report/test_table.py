@@ -8,7 +8,7 @@ import pytest
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.report.fitting import COLUMNS, fitting
-from texgs.report.metrics_files import paper
+from texgs.report.metrics_files import paper, read
 from texgs.report.table import Column, Row, Table
 
 TABLE = Table(
@@ -37,8 +37,8 @@ def metrics(folder, dataset, recipe, phase, **numbers):
     path = folder / dataset / "TF01" / recipe / phase / "metrics.json"
     path.parent.mkdir(parents=True)
     numbers = {"fit_seconds": 90.0, "primitives": 1234, **numbers}
-    record = {"stage": phase, "dataset": dataset, "tf": "TF01", "peak_memory_mib": 512.0, "numbers": numbers}
-    path.write_text(json.dumps(record))
+    record = {"stage": phase, "dataset": dataset, "tf": "TF01", "recipe": recipe, "peak_memory_mib": 512.0}
+    path.write_text(json.dumps({**record, "result": "FitResult", "numbers": numbers}))
     return path
 
 
@@ -46,7 +46,7 @@ def test_fitting_stands_beside_the_paper(tmp_path):
     paths = [metrics(tmp_path, "engine", "default", "texture", psnr=40.0, ssim=0.99)]
     paths.append(metrics(tmp_path, "engine", "default", "surfels"))
     paths.append(metrics(tmp_path, "sphere", "quick", "shading", psnr=30.0, ssim=0.9))
-    table = fitting(paths)
+    table = fitting(read(paths))
     assert [row.cells[:4] for row in table.rows] == [
         ["engine", "TF01", "default", "surfels"],
         ["engine", "TF01", "default", "texture"],
@@ -80,4 +80,8 @@ def test_the_verb_writes_three_files_a_table(tmp_path, capsys):
 def test_a_file_that_is_no_metrics_is_named(tmp_path):
     (tmp_path / "a.json").write_text("[]")
     with pytest.raises(ArgumentError, match=r"a\.json: expected the metrics of a job"):
-        fitting([tmp_path / "a.json"])
+        read([tmp_path / "a.json"])
+    old = {"stage": "texture", "dataset": "engine", "numbers": {"fit_seconds": 1.0, "surfels": 9}}
+    (tmp_path / "a.json").write_text(json.dumps(old))
+    with pytest.raises(ArgumentError, match="of this version of texgs, got others; run the job again"):
+        read([tmp_path / "a.json"])

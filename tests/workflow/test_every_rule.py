@@ -2,13 +2,19 @@
 
 import json
 import re
+import shutil
+from pathlib import Path
 
 import pytest
 
 from tests.workflow.project import Project
 
-# A segment of the only model, and an edit of it alone.
+# A method and a field that are one file each, as a user would add them.
+TOYS = Path(__file__).parents[1] / "toys"
+BALL = "defaults: [default]\nname: ball\nfield: ball\nball: {radius: 0.45}\n"
+# A segment of the only model, an edit of it alone, and an edit by the method of the toys.
 EDITS = {
+    "fade": "name: fade\nmethod: fade\nfade: {opacity: 0.6}\n",
     "piece": "name: piece\nmethod: segment\n"
     "segment: {model: TF01, name: piece, points: [[0.5, 0.5]], masks: grabcut, views: 12, size: 64}\n",
     "red": "name: red\nmethod: text\nbase: piece\nparts: [TF01/piece]\n"
@@ -17,14 +23,14 @@ EDITS = {
 SWEEP = "name: tiny\nvariants:\n  few: [fit.seeds.count=150]\n  more: [fit.seeds.count=250]\n"
 SMALL = (
     "fit.seeds.count=200 fit.surfels.iterations=4 fit.shading.iterations=12 fit.shading.densify.stop=10 "
-    "edits=[glass,gold,piece,red] edit.image.iterations=2 +sweeps.tiny=sphere"
+    "fits=[demo,ball] edits=[glass,gold,piece,red,fade] edit.image.iterations=2 +sweeps.tiny=sphere"
 )
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
 AFTER_FITS = {"figure", "compose", "pse", "timing", "edit", "edit_metrics"}
 TABLES = {"tables", "sweep", "report"}
-RULES = {"volume", "transfer", "views", "sheet"} | FITS | AFTER_FITS | TABLES
+RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
 GROUPS = {"all", "volumes", "sheets", "figures", "fits", "scenes", "edits", "phase"}  # not told apart
 
 
@@ -59,9 +65,12 @@ def made_again(before, after):
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     project = Project(tmp_path_factory.mktemp("every"), native=True)
+    for folder, toy in (("methods", "fade"), ("kinds", "ball")):
+        shutil.copy(TOYS / f"{toy}.py", project.sources / "texgs" / folder)
     for name, text in EDITS.items():
         (project.sources / "conf" / "edit" / f"{name}.yaml").write_text(text)
     (project.sources / "conf" / "sweep" / "tiny.yaml").write_text(SWEEP)
+    (project.sources / "conf" / "fit" / "ball.yaml").write_text(BALL)
     assert run(project) == RULES
     return project
 
@@ -83,7 +92,8 @@ def sources(project):
 
 def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
-    assert len(metrics(project)) == 4 + 4 + 3 + 4 + 3 + 2 * 3
+    of_surfels, of_ball = 4 + 3 + 5 + 4, 2 + 3 + 2
+    assert len(metrics(project)) == 4 + of_surfels + of_ball + 2 * 3
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "sweep-tiny"):
         assert (results / "tables" / f"{name}.csv").stat().st_size > 0
     assert "red" in (results / "tables" / "looks.md").read_text()
@@ -95,6 +105,27 @@ def test_every_result_is_there_and_recorded(project):
     assert {"threads", "torch_blas", "texgs_cpu"} <= set(shading["machine"])
     assert not list(results.rglob(".*.work"))
     assert not list(results.rglob(".*.old"))
+
+
+def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project):
+    results = project.work / "results"
+    rows = {
+        name: (results / "tables" / f"{name}.csv").read_text().splitlines()
+        for name in ("fitting", "rendering", "model_size", "edits", "looks")
+    }
+    for name, lines in rows.items():
+        assert any(",ball," in line for line in lines), f"{name} has a row of the fit `ball`"
+    faded = [line for line in rows["looks"] if ",fade,a toy," in line]
+    assert {line.split(",")[1] for line in faded} == {"demo", "ball"}, "both fields can fade"
+    assert sum(",glass," in line for line in rows["looks"]) == 1, "a ball has no texture"
+    report = (results / "report.html").read_text()
+    assert "<b>ball fade</b>" in report
+    assert "<b>TF01 ball</b>" in report
+    words = ("edit_fade", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")
+    assert "edit.method: expected fade, got image (edit=glass)" in project.texgs(*words).stderr
+    refused = project.texgs("edit_image", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")
+    message = "edit glass: expected a fit of surfels, got one of ball, which has no relight, texture"
+    assert message in refused.stderr
 
 
 def test_a_second_time_there_is_nothing_to_do(project):

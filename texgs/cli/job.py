@@ -20,6 +20,7 @@ from texgs.config.stage import Stage, settings_digest
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
+from texgs.report.results import plain
 
 
 @dataclass(frozen=True)
@@ -109,18 +110,18 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
             job.settings, dict(job.inputs), work
         )
         seconds = time.perf_counter() - start
+        numbers = plain(outcome.result)
         metrics = {
             **record(job.settings, identity, seconds),
             "run": run.id,
-            "numbers": outcome.numbers,
+            "result": type(outcome.result).__name__,
+            "numbers": numbers,
             "pictures": dict(outcome.pictures),
         }
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
-        run.log(
-            {"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(outcome.numbers)}
-        )
-        for step, values in enumerate(series(outcome.numbers)):
+        run.log({"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(numbers)})
+        for step, values in enumerate(series(numbers)):
             run.log(values, step)
         for name in (*outcome.pictures, result.METRICS):
             run.artifact(job.output / name)
@@ -147,5 +148,11 @@ def series(numbers: Mapping[str, Any]) -> Iterator[dict[str, float]]:
 
 
 def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
-    """The entries that are single numbers."""
-    return {key: float(value) for key, value in numbers.items() if isinstance(value, int | float)}
+    """The entries that are single numbers, also those of tables in them, but for notes."""
+    found: dict[str, float] = {}
+    for key, value in numbers.items():
+        if isinstance(value, int | float):
+            found[key] = float(value)
+        elif isinstance(value, dict) and key != "notes":
+            found |= scalars(value)
+    return found

@@ -15,11 +15,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the tables and print them."""
     from texgs.core.errors import ArgumentError
-    from texgs.report.fitting import fitting
-    from texgs.report.looks import looks
-    from texgs.report.metrics_files import below
-    from texgs.report.scene_tables import SCENE_TABLES
+    from texgs.report.metrics_files import below, read
     from texgs.report.sweep import sweep
+    from texgs.report.tables import TABLES
 
     paths = arguments.metrics or below("results")
     if not paths:
@@ -27,10 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.sweep and not re.fullmatch(r"[A-Za-z0-9_-]+", arguments.sweep):
         raise ArgumentError(f"--sweep: expected letters, digits, _ or -, got {arguments.sweep!r}")
     if arguments.sweep:
-        tables = {f"sweep-{arguments.sweep}": sweep(paths, arguments.sweep)}
+        tables = {f"sweep-{arguments.sweep}": sweep(read(paths), arguments.sweep)}
     else:
-        makers = {"fitting": fitting, **SCENE_TABLES, "looks": looks}
-        tables = {name: make(paths) for name, make in makers.items()}
+        records = read(paths)
+        tables = {name: make(records) for name, make in TABLES.items()}
     for name, table in tables.items():
         table.write(arguments.output, name)
         print(table.markdown())

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
-from texgs.report.metrics_files import fits, paper, phases
+from texgs.report.metrics_files import Record, of, paper, phases
+from texgs.report.results import FitResult
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 COLUMNS = (
@@ -26,25 +26,18 @@ COLUMNS = (
 CAPTION = "Test views; minutes of the phase itself. The paper: means over basic scenes, on an RTX 4090."
 
 
-def fitting(paths: Iterable[str | Path]) -> Table:
-    """The table of all jobs of the fit among some metrics files.
-
-    Raises:
-        ArgumentError: if a file is no metrics file.
-    """
+def fitting(records: Iterable[Record[Any]]) -> Table:
+    """The table of all phases of fits among some jobs."""
     published, order = paper("fitting", keys=2), phases()
-    rows = [Row(cells(metrics, path.parts[-3], published), [path]) for path, metrics in fits(paths)]
+    rows = [Row(cells(record, published), [record.path]) for record in of(FitResult, records)]
     rows.sort(key=lambda row: (row.cells[:3], order.index(str(row.cells[3]))))
     return Table(CAPTION, COLUMNS, rows)
 
 
-def cells(
-    metrics: dict[str, Any], recipe: str, published: dict[tuple[str, ...], dict[str, str]]
-) -> list[Cell]:
+def cells(record: Record[FitResult], published: dict[tuple[str, ...], dict[str, str]]) -> list[Cell]:
     """The cells of one job."""
-    numbers, phase = metrics["numbers"], metrics["stage"]
-    beside = published.get((metrics["dataset"], phase), {})
-    own = [numbers.get("psnr"), numbers.get("ssim"), numbers["fit_seconds"] / 60]
-    own += [metrics["peak_memory_mib"] / 1024, numbers["primitives"]]
+    result, beside = record.result, published.get((record.dataset, record.stage), {})
+    own = [result.psnr, result.ssim, result.fit_seconds / 60]
+    own += [record.facts["peak_memory_mib"] / 1024, result.primitives]
     theirs = [float(beside[key]) if key in beside else None for key in ("psnr", "ssim", "minutes")]
-    return [metrics["dataset"], metrics["tf"], recipe, phase, *own, *theirs]
+    return [record.dataset, record.tf, record.label, record.stage, *own, *theirs]

@@ -11,11 +11,10 @@ from typing import Any
 
 from texgs.core.io import write_bytes
 from texgs.core.plots import words as plot_words
-from texgs.report.fitting import fitting
-from texgs.report.looks import looks
-from texgs.report.metrics_files import read
-from texgs.report.scene_tables import SCENE_TABLES, label
+from texgs.report.metrics_files import Record, of, read
+from texgs.report.results import EditResult, FitResult, Result
 from texgs.report.table import Table
+from texgs.report.tables import TABLES
 
 NARROW = ("scene.png", "transfer.png", "style.png", "convergence.png")  # at any width; others scroll there
 UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
@@ -38,59 +37,60 @@ def write_report(path: str | Path, metrics_files: Iterable[str | Path]) -> Path:
     """
     from jinja2 import Environment
 
-    jobs = read(metrics_files)
-    paths = [file for file, _ in jobs]
-    tables = {"Fitting": fitting(paths)}
-    makers = {**SCENE_TABLES, "looks": looks}
-    tables |= {name.replace("_", " ").capitalize(): make(paths) for name, make in makers.items()}
+    records = read(metrics_files)
+    tables = {name.replace("_", " ").capitalize(): make(records) for name, make in TABLES.items()}
     template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        sections=sections(jobs),
+        sections=sections(records),
         tables={name: table for name, table in tables.items() if table.rows},
-        curves=data_uri(curves(jobs)),
-        jobs=[job(metrics) for _, metrics in jobs],
-        places={path: index for index, path in enumerate(paths, start=1)},
-        versions=versions([metrics for _, metrics in jobs]),
+        curves=data_uri(curves(of(FitResult, records))),
+        jobs=[job(record.facts) for record in records],
+        places={record.path: index for index, record in enumerate(records, start=1)},
+        versions=versions([record.facts for record in records]),
         headings=(*JOB, *SOURCE),
         kinds=kinds,
     )
     return write_bytes(path, text.encode())
 
 
-def sections(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> dict[str, list[dict[str, str]]]:
+def sections(records: Sequence[Record[Any]]) -> dict[str, list[dict[str, str]]]:
     """Pictures by data set, scenes first; each with what it shows and of which basic TF."""
     entries: dict[str, list[dict[str, str]]] = {}
-    for path, metrics in sorted(jobs, key=lambda each: ("tf" in each[1], each[0])):
-        for name, words in metrics.get("pictures", {}).items():
-            picture = path.with_name(name)
+    for record in sorted(records, key=lambda each: (each.tf is not None, each.path)):
+        for name, words in record.facts.get("pictures", {}).items():
+            picture = record.path.with_name(name)
             if picture.is_file() and name not in UNREPORTED:
-                words_before = (metrics.get("tf"), label(metrics), metrics["numbers"].get("edit"))
                 entry = {
                     "kind": "" if name in NARROW else "wide",
                     "uri": data_uri(picture.read_bytes()),
-                    "label": " ".join(filter(None, words_before)),
+                    "label": " ".join(filter(None, (record.tf, record.label, edit_of(record.result)))),
                     "words": words,
                 }
-                entries.setdefault(metrics["dataset"], []).append(entry)
+                entries.setdefault(record.dataset, []).append(entry)
     return dict(sorted(entries.items()))
 
 
-def curves(jobs: Sequence[tuple[Path, Mapping[str, Any]]]) -> bytes:
+def edit_of(result: Result) -> str:
+    """The name of an edit; empty for other jobs."""
+    return result.edit if isinstance(result, EditResult) else ""
+
+
+def curves(records: Sequence[Record[FitResult]]) -> bytes:
     """PNG of the losses that the phases have looked at, over iterations; empty if there are none."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    found = [m for _, m in jobs if len(m["numbers"].get("losses", ())) > 1]
-    if not found:
+    shown = [record for record in records if len(record.result.losses) > 1]
+    if not shown:
         return b""
     figure = Figure(figsize=(8, 3.2), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots()
-    for metrics in found:
-        losses, total = metrics["numbers"]["losses"], metrics["numbers"]["iterations"]
+    for record in shown:
+        losses, total = record.result.losses, record.result.iterations
         steps = [total * (i + 1) / len(losses) for i in range(len(losses))]
-        name = f"{metrics['dataset']}/{metrics['tf']} {label(metrics)} {metrics['stage']}"
+        name = f"{record.dataset}/{record.tf} {record.label} {record.stage}"
         axes.semilogy(steps, losses, label=plot_words(name))
     axes.set_xlabel("iterations")
     axes.set_ylabel("loss of one view")

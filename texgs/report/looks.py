@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from texgs.report.metrics_files import paper, read
-from texgs.report.scene_tables import label
+from texgs.report.metrics_files import Record, of, paper
+from texgs.report.results import EditMeasures, EditResult
 from texgs.report.table import Cell, Column, Row, Table
 
 MEASURED = (
@@ -56,28 +55,23 @@ PUBLISHED = {  # columns of the paper's files by our own
 }
 
 
-def looks(paths: Iterable[str | Path]) -> Table:
-    """The table of all edits among some metrics files; without any it is empty.
-
-    Raises:
-        ArgumentError: if a file is no metrics file.
-    """
-    edits: dict[tuple[str, str, str], tuple[Path, dict[str, Any]]] = {}
-    measures: dict[tuple[str, str, str], tuple[Path, dict[str, Any]]] = {}
-    for path, metrics in read(paths):
-        if "edit" in metrics["numbers"]:
-            key = (metrics["dataset"], label(metrics), metrics["numbers"]["edit"])
-            (measures if metrics["stage"] == "edit_metrics" else edits)[key] = (path, metrics["numbers"])
+def looks(records: Iterable[Record[Any]]) -> Table:
+    """The table of all edits among some jobs; without any it is empty."""
+    records = list(records)
+    measures = {(each.dataset, each.label, each.result.edit): each for each in of(EditMeasures, records)}
+    edits = {(each.dataset, each.label, each.result.edit): each for each in of(EditResult, records)}
     rows = []
-    for key, (path, numbers) in sorted(edits.items()):
-        measured_in, measured = measures.get(key, (None, {}))
-        own: list[Cell] = [*key, numbers["how"], numbers["lambda_s"], numbers["edit_seconds"] / 60]
-        kept = None
-        if "geometry_kept" in measured:
-            kept = "bit for bit" if measured["geometry_kept"] else "no"
-        sources = [each for each in (path, measured_in) if each]
-        rows.append(Row([*own, *(measured.get(name) for name in MEASURED), kept], sources))
-    return Table(caption(measures.values()), COLUMNS, rows + published() if rows else [])
+    for key, edit in sorted(edits.items()):
+        own: list[Cell] = [*key, edit.result.how, edit.result.lambda_s, edit.result.edit_seconds / 60]
+        measured, sources = measures.get(key), [edit.path]
+        cells: list[Cell] = [None] * (len(MEASURED) + 1)
+        if measured is not None:
+            kept = "bit for bit" if measured.result.geometry_kept else "no"
+            cells = [*(getattr(measured.result, name) for name in MEASURED), kept]
+            sources.append(measured.path)
+        rows.append(Row([*own, *cells], sources))
+    words = caption([each.result for each in measures.values()])
+    return Table(words, COLUMNS, rows + published() if rows else [])
 
 
 def published() -> list[Row]:
@@ -94,10 +88,10 @@ def published() -> list[Row]:
     return rows
 
 
-def caption(measured: Iterable[tuple[Path, dict[str, Any]]]) -> str:
+def caption(measured: Sequence[EditMeasures]) -> str:
     """What the columns are, which CLIP it was, and why it was not."""
-    notes = {numbers.get("clip_missing") for _, numbers in measured} - {None}
-    backbones = {numbers.get("clip") for _, numbers in measured} - {None}
+    notes = {each.clip_missing for each in measured} - {None}
+    backbones = {each.clip for each in measured} - {None}
     words = [
         "Minutes of the edit alone; frames along the test path; NNFM and Gram distance to the style in views "
         "that it was not learned from; RMSE and LPIPS between views warped by their depth, without light.",

@@ -4,28 +4,50 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
+
+from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
+from texgs.report.results import Result, result_of
+
+R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
-def read(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
+@dataclass(frozen=True)
+class Record(Generic[R_co]):
+    """A job: what it told, and what is known of it."""
+
+    path: Path  # of metrics.json
+    stage: str
+    dataset: str
+    tf: str | None  # None for jobs of a whole data set
+    label: str  # recipe, variant and a seed other than 0, as in tables; empty for jobs before a fit
+    field: str  # kind of the fit
+    variant: str
+    sweep: str
+    seed: int
+    result: R_co
+    facts: dict[str, Any]  # the file, for its times, versions and digests
+
+
+def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
     """All metrics, in the order of their paths.
 
     Raises:
-        ArgumentError: if a file is no metrics file.
+        ArgumentError: if a file is no metrics file, or of another version of texgs.
     """
-    found = []
-    for path in sorted(map(Path, paths)):
-        metrics = read_json(path)
-        if not isinstance(metrics, dict) or "numbers" not in metrics:
-            raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
-        found.append((path, metrics))
-    return found
+    return [_record(path) for path in sorted(map(Path, paths))]
+
+
+def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
+    """Those with a result of one kind."""
+    return [record for record in records if isinstance(record.result, kind)]
 
 
 def below(folder: str | Path) -> list[Path]:
@@ -39,11 +61,6 @@ def phases() -> list[str]:
     return [phase for kind in kinds().values() for phase in kind.phases]
 
 
-def fits(paths: Iterable[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
-    """The metrics of the phases of fits; see `read`."""
-    return [(path, metrics) for path, metrics in read(paths) if metrics["stage"] in phases()]
-
-
 def paper(name: str, keys: int = 1) -> dict[tuple[str, ...], dict[str, str]]:
     """The paper's numbers of a table, by the values of its first columns; none for other tables."""
     file = files("texgs.report").joinpath("paper", f"{name}.csv")
@@ -51,3 +68,20 @@ def paper(name: str, keys: int = 1) -> dict[tuple[str, ...], dict[str, str]]:
         return {}
     lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
     return {tuple(list(row.values())[:keys]): row for row in csv.DictReader(lines)}
+
+
+def _record(path: Path) -> Record[Any]:
+    facts = read_json(path)
+    if not isinstance(facts, dict) or "numbers" not in facts:
+        raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
+    try:
+        result = result_of(facts["result"], facts["numbers"])
+        stage, dataset = str(facts["stage"]), str(facts["dataset"])
+    except (KeyError, OmegaConfBaseException) as error:
+        raise ArgumentError(
+            f"{path}: expected the metrics of this version of texgs, got others; run the job again"
+        ) from error
+    recipe, variant, seed = (facts.get(key) or "" for key in ("recipe", "variant", "seed"))
+    label = "-".join(filter(None, (recipe, variant, f"s{seed}" if seed and recipe else "")))
+    rest = (facts.get("tf"), label, facts.get("field", ""), variant, facts.get("sweep", ""), int(seed or 0))
+    return Record(path, stage, dataset, *rest, result, facts)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
-from pathlib import Path
+from collections.abc import Iterable
 from typing import Any
 
-from texgs.report.metrics_files import paper, read
-from texgs.report.table import UNPUBLISHED, Column, Row, Table
+from texgs.report.metrics_files import Record, of, paper
+from texgs.report.results import FitResult, PseResult, TimingResult, ViewsResult, VolumeResult
+from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 
-def datasets(paths: Iterable[str | Path]) -> Table:
+def datasets(records: Iterable[Record[Any]]) -> Table:
     """Volumes, and how long the volume renderer takes for a frame of a basic TF."""
     columns = (
         Column("data set"),
@@ -25,29 +25,26 @@ def datasets(paths: Iterable[str | Path]) -> Table:
         Column("ms / frame (paper)", 1, UNPUBLISHED),
     )
     published = paper("datasets")
-    volumes: dict[str, tuple[Path, dict[str, Any]]] = {}
-    views: dict[tuple[str, str, str], dict[str, tuple[Path, float | None]]] = defaultdict(dict)
-    for path, metrics in read(paths):
-        n = metrics["numbers"]
-        if metrics["stage"] == "volume":
-            volumes[metrics["dataset"]] = (path, n)
-        if metrics["stage"] == "views":
-            size = f"{n['width']}x{n['height']}"
-            views[metrics["dataset"], size, metrics["device"]][metrics["tf"]] = (path, n.get("frame_ms"))
+    records = list(records)
+    volumes = {record.dataset: record for record in of(VolumeResult, records)}
+    views: dict[tuple[str, str, str], dict[str | None, Record[ViewsResult]]] = defaultdict(dict)
+    for record in of(ViewsResult, records):
+        size = f"{record.result.width}x{record.result.height}"
+        views[record.dataset, size, record.facts["device"]][record.tf] = record
     rows = []
     for (name, size, device), by_tf in sorted(views.items()):
-        of, volume = volumes.get(name, (None, None))
-        theirs = published.get((name,), {})
-        sources = [path for path in (of, *(path for path, _ in by_tf.values())) if path]
-        times = [ms for _, ms in by_tf.values() if ms is not None]
-        of_volume = ["x".join(map(str, volume["dims"])), volume["volume_mib"]] if volume else [None, None]
+        volume, theirs = volumes.get(name), published.get((name,), {})
+        of_volume: list[Cell] = [None, None]
+        if volume is not None:
+            of_volume = ["x".join(map(str, volume.result.dims)), volume.result.volume_mib]
+        times = [x.result.frame_ms for x in by_tf.values() if x.result.frame_ms is not None]
         mean = sum(times) / len(times) if times else None
         cells = [name, *of_volume, size, len(by_tf), device, mean, *numbers(theirs, "volume_mib", "dvr_ms")]
-        rows.append(Row(cells, sources))
+        rows.append(Row(cells, [each.path for each in (volume, *by_tf.values()) if each is not None]))
     return Table("Volume rendering of single basic TFs. The paper: on an RTX 4090.", columns, rows)
 
 
-def rendering(paths: Iterable[str | Path]) -> Table:
+def rendering(records: Iterable[Record[Any]]) -> Table:
     """Time of frames of whole scenes, and of their volumes in the same job."""
     columns = (
         Column("data set"),
@@ -62,20 +59,20 @@ def rendering(paths: Iterable[str | Path]) -> Table:
         Column("volume / scene", 1),
     )
     rows = []
-    for path, metrics in read(paths):
-        if metrics["stage"] == "timing":
-            n, volume = metrics["numbers"], metrics["numbers"].get("volume_mean_ms")
-            ratio = None if volume is None else volume / n["frame_mean_ms"]
-            where = [n["primitives"], f"{n['width']}x{n['height']}", metrics["device"], n["threads"]]
-            times = [n["frame_mean_ms"], n["frame_max_ms"], volume, ratio]
-            rows.append(Row([metrics["dataset"], label(metrics), *where, *times], [path]))
+    for record in of(TimingResult, records):
+        frames, volume = record.result, record.result.volume_mean_ms
+        ratio = None if volume is None else volume / frames.frame_mean_ms
+        device = record.facts["device"]
+        where = [frames.primitives, f"{frames.width}x{frames.height}", device, frames.threads]
+        times = [frames.frame_mean_ms, frames.frame_max_ms, volume, ratio]
+        rows.append(Row([record.dataset, record.label, *where, *times], [record.path]))
     caption = (
         "Test path. The paper, means over scenes on an RTX 4090: 11.82 ms at 800x800, 7.21 ms at 512x512."
     )
     return Table(caption, columns, rows)
 
 
-def model_size(paths: Iterable[str | Path]) -> Table:
+def model_size(records: Iterable[Record[Any]]) -> Table:
     """Sizes of the models of a data set together, as the paper counts them."""
     groups = ("geometry_mib", "shading_mib", "texture_mib")
     titles = ("geometry MiB", "shading MiB", "texture MiB")
@@ -88,19 +85,20 @@ def model_size(paths: Iterable[str | Path]) -> Table:
         *(Column(f"{title} (paper)", 1, UNPUBLISHED) for title in titles),
     )
     published = paper("model_size")
-    found: dict[tuple[str, str], list[tuple[Path, dict[str, Any]]]] = defaultdict(list)
-    for path, metrics in read(paths):
-        if "total_mib" in metrics["numbers"]:
-            found[metrics["dataset"], label(metrics)].append((path, metrics["numbers"]))
+    by_recipe: dict[tuple[str, str], list[Record[FitResult]]] = defaultdict(list)
+    for record in of(FitResult, records):
+        if record.result.sizes:
+            by_recipe[record.dataset, record.label].append(record)
     rows = []
-    for (name, recipe), parts in sorted(found.items()):
-        sums = [sum(each[key] for _, each in parts) for key in ("primitives", *groups)]
+    for (name, recipe), parts in sorted(by_recipe.items()):
+        sums = [sum(part.result.sizes[group] for part in parts) for group in groups]
+        own = [len(parts), sum(part.result.primitives for part in parts), *sums]
         theirs = numbers(published.get((name,), {}), *groups)
-        rows.append(Row([name, recipe, len(parts), *sums, *theirs], [path for path, _ in parts]))
+        rows.append(Row([name, recipe, *own, *theirs], [part.path for part in parts]))
     return Table("Sums over the basic scenes, 32 bits a value.", columns, rows)
 
 
-def edits(paths: Iterable[str | Path]) -> Table:
+def edits(records: Iterable[Record[Any]]) -> Table:
     """Edited scenes against the volume with the same edits."""
     columns = (
         Column("data set"),
@@ -111,23 +109,14 @@ def edits(paths: Iterable[str | Path]) -> Table:
         Column("SSIM", 4),
     )
     rows = []
-    for path, metrics in read(paths):
-        if metrics["stage"] == "pse":
-            for step in (*metrics["numbers"]["pse"], *metrics["numbers"]["relight"]):
-                quality = [metrics["numbers"]["views"], step.get("psnr"), step.get("ssim")]
-                rows.append(Row([metrics["dataset"], label(metrics), step["title"], *quality], [path]))
+    for record in of(PseResult, records):
+        result = record.result
+        for step in (*result.pse, *result.relight):
+            cells: list[Cell] = [record.dataset, record.label, step.title, result.views, step.psnr, step.ssim]
+            rows.append(Row(cells, [record.path]))
     return Table("Views around the object; nothing is trained for an edit.", columns, rows)
-
-
-def label(metrics: Mapping[str, Any]) -> str:
-    """Recipe, variant and a seed other than 0, as they stand in tables."""
-    seed = f"s{metrics['seed']}" if metrics.get("seed") else ""
-    return "-".join(part for part in (metrics.get("recipe", ""), metrics.get("variant", ""), seed) if part)
 
 
 def numbers(line: dict[str, str], *keys: str) -> list[float | None]:
     """Numbers of the paper, where it has them."""
     return [float(line[key]) if line.get(key) else None for key in keys]
-
-
-SCENE_TABLES = {"datasets": datasets, "rendering": rendering, "model_size": model_size, "edits": edits}

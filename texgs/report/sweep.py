@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
 from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
-from texgs.report.metrics_files import fits, paper
+from texgs.report.metrics_files import Record, of, paper
+from texgs.report.results import FitResult
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
-MATERIAL = ("ambient_median", "diffuse_median", "specular_median", "shininess_median")
+MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 PUBLISHED = {  # columns of the paper's numbers, by their headings in its files
     "train_psnr": Column("PSNR, training (paper)", 2, UNPUBLISHED),
     "test_psnr": Column("PSNR (paper)", 2, UNPUBLISHED),
@@ -36,31 +37,30 @@ COLUMNS = (
     Column("primitives", 0),
     *(Column(title, 2) for title in ("k_a", "k_d", "k_s", "beta")),
 )
+Run = dict[str, Record[FitResult]]  # by phase
 CAPTION = (
     "Test views after the last phase; means over seeds, ± their standard deviation; "
     "minutes of all phases; medians of the material."
 )
 
 
-def sweep(paths: Iterable[str | Path], name: str) -> Table:
-    """The table of the variants among some metrics files.
+def sweep(records: Iterable[Record[Any]], name: str) -> Table:
+    """The table of the variants among some jobs.
 
     Args:
-        paths: metrics files; those of other fits do not count.
+        records: jobs; those of other fits do not count.
         name: of the sweep; the paper's numbers stand beside those of its data set, where it has them.
 
     Raises:
-        ArgumentError: if a file is no metrics file, or none is of the sweep.
+        ArgumentError: if none is of the sweep.
     """
-    groups: dict[tuple[str, ...], dict[int, dict[str, dict[str, Any]]]] = defaultdict(
-        lambda: defaultdict(dict)
-    )
+    groups: dict[tuple[str, ...], dict[int, Run]] = defaultdict(lambda: defaultdict(dict))
     sources: dict[tuple[str, ...], list[Path]] = defaultdict(list)
-    for path, metrics in fits(paths):
-        if metrics.get("variant") and metrics["sweep"] == name:
-            key = tuple(metrics[part] for part in ("dataset", "tf", "recipe", "variant"))
-            sources[key].append(path)
-            groups[key][metrics["seed"]][metrics["stage"]] = metrics
+    for record in of(FitResult, records):
+        if record.variant and record.sweep == name:
+            key: tuple[str, ...] = (record.dataset, str(record.tf), record.facts["recipe"], record.variant)
+            sources[key].append(record.path)
+            groups[key][record.seed][record.stage] = record
     if not groups:
         raise ArgumentError(f"sweep {name}: no fit of it among the metrics files; run it first")
     published = paper(name, keys=2)
@@ -76,25 +76,29 @@ def sweep(paths: Iterable[str | Path], name: str) -> Table:
     return Table(CAPTION, (*COLUMNS, *beside), rows)
 
 
-def cells(runs: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[Cell]:
-    """The cells of one variant from the metrics of its runs, by phase; None where a phase is missing."""
+def cells(runs: Sequence[Run]) -> list[Cell]:
+    """The cells of one variant from its runs; None where a phase is missing."""
     whole = (kind.phases for kind in kinds().values() if any(set(kind.phases) <= set(run) for run in runs))
-    phases = next(whole, ("none",))
-    last, complete = phases[-1], [run for run in runs if set(phases) <= set(run)]
-    if not complete:
+    phases = next(whole, None)
+    if phases is None:
         return [0, *[None] * (len(COLUMNS) - 5)]
+    complete = [run for run in runs if set(phases) <= set(run)]
+    last = [run[phases[-1]].result for run in complete]
+    psnr = [result.psnr for result in last if result.psnr is not None]
+    spread = stdev(psnr) if 1 < len(psnr) == len(last) else None
+    minutes = [sum(phase.result.fit_seconds for phase in run.values()) / 60 for run in complete]
+    memory = [max(phase.facts["peak_memory_mib"] for phase in run.values()) / 1024 for run in complete]
+    quality = [mean([x.train_psnr for x in last]), mean([x.psnr for x in last]), spread]
+    costs = [fmean(minutes), max(memory), mean([x.primitives for x in last])]
+    materials = [run["shading"].result.material for run in complete if "shading" in run]
+    factors = [mean([material.get(name) for material in materials]) for name in MATERIAL]
+    return [len(complete), *quality, mean([x.ssim for x in last]), *costs, *factors]
 
-    def mean(stage: str, key: str) -> float | None:
-        values = [run[stage]["numbers"].get(key) for run in complete if stage in run]
-        return None if None in values or not values else fmean(values)
 
-    psnr = [run[last]["numbers"].get("psnr") for run in complete]
-    spread = stdev(psnr) if len(psnr) > 1 and None not in psnr else None
-    minutes = [sum(phase["numbers"]["fit_seconds"] for phase in run.values()) / 60 for run in complete]
-    memory = [max(phase["peak_memory_mib"] for phase in run.values()) / 1024 for run in complete]
-    quality = [mean(last, "train_psnr"), mean(last, "psnr"), spread, mean(last, "ssim")]
-    costs = [fmean(minutes), max(memory), mean(last, "primitives")]
-    return [len(complete), *quality, *costs, *(mean("shading", key) for key in MATERIAL)]
+def mean(values: Sequence[float | None]) -> float | None:
+    """The mean; None where a value is missing, or there is none."""
+    known = [value for value in values if value is not None]
+    return fmean(known) if known and len(known) == len(values) else None
 
 
 def natural(name: str) -> tuple[float, str]:

@@ -56,7 +56,7 @@ def frame(
     require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
     camera = camera.to(scene.device)
     behind = torch.tensor(background, device=scene.device)
-    look: Look = mode if mode in get_args(Look) else "unshaded"  # type: ignore[assignment]
+    look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
     outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
     is_factor = mode in get_args(Look)[2:]
     render = scene.render(

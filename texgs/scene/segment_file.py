@@ -45,7 +45,8 @@ def write_segment(
             f"{path}: expected a mask of type bool that holds a surfel, got {mask.dtype} with "
             f"{int(mask.count_nonzero())}"
         )
-    header = {FORMAT: json.dumps({"version": VERSION, "metadata": dict(metadata or {})}, allow_nan=False)}
+    description = {"version": VERSION, "metadata": dict(sorted((metadata or {}).items()))}
+    header = {FORMAT: json.dumps(description, allow_nan=False)}
     tensors = {"mask": mask.cpu().contiguous(), "anchors": _anchors(model)}
     return write_bytes(path, save(tensors, header))
 

@@ -1,8 +1,10 @@
 # Tables and the report, from the metrics files of jobs.
 
 
+from texgs.report import tables
+
 SWEEPS = sorted(filter(None, PLAN.sweeps))
-TABLES = ["fitting", "datasets", "rendering", "model_size", "edits", "looks"] if "" in PLAN.sweeps else []
+TABLES = list(tables.TABLES) if "" in PLAN.sweeps else []
 
 
 rule tables:

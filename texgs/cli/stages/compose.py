@@ -8,9 +8,11 @@ from texgs.core.camera import orbit
 from texgs.core.device import torch_device
 from texgs.core.lens import Lens
 from texgs.core.movie import write_frames
+from texgs.report.results import SceneResult
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import Scene, SceneModel, write_scene
 
+SHOWN = "The basic models as one scene, rendered from their primitives."
 AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
 
@@ -28,5 +30,4 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     camera = orbit(AZIMUTH, POLAR, *Lens().square(settings["image"]))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
-    numbers = {"models": len(scene.models), "primitives": len(composition)}
-    return Outcome(numbers, {"scene.png": "The basic models as one scene, rendered from their primitives."})
+    return Outcome(SceneResult(len(scene.models), len(composition)), {"scene.png": SHOWN})

@@ -10,6 +10,7 @@ from texgs.config.typed import typed
 from texgs.core.device import torch_device
 from texgs.edit.task import Task
 from texgs.report.before_after import write_before_and_after
+from texgs.report.results import EditResult
 from texgs.scene.scene_file import read_scene, write_scene
 
 SHOWN = "Before and after the edit, under the light of the scene and under another one."
@@ -45,12 +46,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     if method.is_look:
         write_before_and_after(before, edited.scene, output, device, title)
         pictures["edit.png"] = SHOWN
-    numbers = {
-        "edit": task.edit.name,
-        "method": method.name,
-        "how": edited.how,
-        "lambda_s": edited.lambda_s,
-        "edit_seconds": edited.seconds,
-        "notes": dict(edited.notes),
-    }
-    return Outcome(numbers, pictures)
+    result = EditResult(
+        task.edit.name, method.name, edited.how, edited.seconds, edited.lambda_s, dict(edited.notes)
+    )
+    return Outcome(result, pictures)

@@ -9,6 +9,7 @@ import torch
 
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.timing import milliseconds
+from texgs.config.fields import kinds
 from texgs.config.methods import method_of
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
@@ -22,6 +23,7 @@ from texgs.metrics.style import likeness
 from texgs.models.clip import Clip
 from texgs.models.lpips import Lpips
 from texgs.models.vgg import Vgg
+from texgs.report.results import EditMeasures
 from texgs.scene.scene_file import Scene, read_scene
 from texgs.volume.cameras import spiral
 
@@ -35,7 +37,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         output: folder.
     """
     edit, views, weights = settings["edit"], settings["views"], settings["weights"]
-    title = f"{settings['dataset']}: {edit['name']}"
+    title, can = f"{settings['dataset']}: {edit['name']}", kinds()[settings["fit"]["field"]].can
     device = torch_device(settings["fit"]["device"])
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
     scenes = after.open(device), before.open(device)
@@ -43,19 +45,19 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     cameras = [camera.to(device) for camera in spiral(views["test"]["count"], *lens)]
     some = cameras[:: max(1, len(cameras) // settings["compared"])]
     frames = milliseconds(lambda camera: scenes[0].render(camera, after.light, after.edits), cameras, title)
-    numbers = {
-        "edit": edit["name"],
-        "method": edit["method"],
-        "frame_mean_ms": fmean(frames),
-        "frame_max_ms": max(frames),
-        "primitives": len(scenes[0]),
-        "megabytes": sum(size_of(after)) * 2**20 / 1e6,
-        "geometry_kept": is_geometry_kept(*scenes, some),
-        **agreement(scenes[0], after, cameras, settings["compared"], weights),
+    result = EditMeasures(
+        edit["name"],
+        edit["method"],
+        fmean(frames),
+        max(frames),
+        len(scenes[0]),
+        megabytes=sum(size_of(after)) * 2**20 / 1e6,
+        geometry_kept=is_geometry_kept(*scenes, some, "normals" in can),
+        **agreement(scenes[0], after, cameras, settings["compared"], weights, "unlit" in can),
         **style_distance(after, edit, some, device, weights, title),
         **clip_numbers(settings, (after, before), scenes, cameras, title),
-    }
-    return Outcome(numbers)
+    )
+    return Outcome(result)
 
 
 def size_of(scene: Scene) -> list[float]:
@@ -64,14 +66,14 @@ def size_of(scene: Scene) -> list[float]:
 
 
 @torch.no_grad()
-def is_geometry_kept(after: Composed, before: Composed, cameras: Sequence[Camera]) -> bool:
-    """Whether depth, normals and alpha of all views are the same, bit for bit."""
-    outputs = ("depth", "normal")
+def is_geometry_kept(after: Composed, before: Composed, cameras: Sequence[Camera], has_normals: bool) -> bool:
+    """Whether depth, alpha and, where there are any, normals of all views are the same, bit for bit."""
+    outputs = ("depth", "normal") if has_normals else ("depth",)
     pairs = [[scene.render(camera, outputs=outputs) for scene in (after, before)] for camera in cameras]
     return all(
         torch.equal(one.alpha, two.alpha)
         and torch.equal(one.depth, two.depth)  # type: ignore[arg-type]
-        and torch.equal(one.normal, two.normal)  # type: ignore[arg-type]
+        and (not has_normals or torch.equal(one.normal, two.normal))  # type: ignore[arg-type]
         for one, two in pairs
     )
 
@@ -83,14 +85,17 @@ def agreement(
     cameras: Sequence[Camera],
     count: int,
     weights: Mapping[str, str | None],
-) -> dict[str, float | None]:
-    """Consistency of consecutive views in the middle of the path, near and far, without light.
+    is_unlit: bool = True,
+) -> dict[str, Any]:
+    """Consistency of consecutive views in the middle of the path, near and far; `is_unlit`: without light.
 
     None where no two views see the same, as of a scene that is nowhere opaque.
     """
     start = max(0, (len(cameras) - count - LONG) // 2)
     some = cameras[start : start + count + LONG]
-    frames = list(frames_of(composition, some, scene.light, scene.edits, look="unshaded"))
+    frames = list(
+        frames_of(composition, some, scene.light, scene.edits, look="unshaded" if is_unlit else "shaded")
+    )
     perceptual = None
     if weights["vgg16"] and weights["lpips_vgg"]:
         lpips = Lpips.load(device=composition.device)
@@ -114,7 +119,7 @@ def style_distance(
     device: torch.device,
     weights: Mapping[str, str | None],
     title: str,
-) -> dict[str, float]:
+) -> dict[str, Any]:
     """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
     parts, method = parts_of(scene, edit["parts"]), method_of(edit)
     if method.style is None or any(part.segment for part in parts) or not weights["vgg16"]:

@@ -7,6 +7,7 @@ from texgs.cli.stages.outcome import Outcome
 from texgs.fields.files import open_field
 from texgs.fields.surfels.model import Surfels
 from texgs.report.fit_figure import write_fit_figure
+from texgs.report.results import FigureResult
 from texgs.volume.view_set import read_views
 
 SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
@@ -38,7 +39,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         fit["reduce"],
         title,
     )
-    return Outcome({"shown": shown, **counts}, {"figure.png": SHOWN})
+    return Outcome(FigureResult(shown, len(last)), {"figure.png": SHOWN})
 
 
 def is_fitted(phase: str, fit: dict[str, Any]) -> bool:

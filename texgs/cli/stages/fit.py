@@ -10,6 +10,7 @@ from texgs.config.typed import typed
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.fit.task import FitTask, Fitted
+from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
@@ -38,15 +39,15 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
     fitted: Fitted = kind.fit(task)
     kind.write(output / "model.safetensors", fitted.field)
-    numbers = {
-        "fit_seconds": fitted.seconds,
-        "primitives": len(fitted.field),
-        "iterations": fitted.iterations,
-        "losses": list(fitted.losses),
-        "notes": dict(fitted.notes),
-        **fitted.field.sizes(),
+    result = FitResult(
+        fitted.seconds,
+        len(fitted.field),
+        fitted.iterations,
+        list(fitted.losses),
+        sizes=fitted.field.sizes(),
+        notes=dict(fitted.notes),
         **quality(fitted.field, views, fit["reduce"], title),
         **training_quality(fitted.field, views, fit["reduce"], title),
-        **gpu_memory(device),
-    }
-    return Outcome(numbers)
+        peak_gpu_memory_mib=gpu_memory(device),
+    )
+    return Outcome(result)

@@ -2,12 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+
+from texgs.report.results import Result
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Numbers for metrics.json, and pictures for the report and the tracked run."""
+    """A result for metrics.json, and pictures for the report and the tracked run."""
 
-    numbers: dict[str, Any]  # values that JSON knows; units in the names (`_ms`, `_mib`)
+    result: Result
     pictures: Mapping[str, str] = field(default_factory=dict)  # what files of the output show, by their names

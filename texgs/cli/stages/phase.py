@@ -29,11 +29,9 @@ def phase_from(values: Mapping[str, Any]) -> Phase:
     return Phase(**{**values, **{name: kind(**values[name]) for name, kind in parts.items()}})
 
 
-def gpu_memory(device: torch.device) -> dict[str, float]:
-    """Peak memory of the GPU in this process; nothing on a CPU."""
-    if device.type != "cuda":
-        return {}
-    return {"peak_gpu_memory_mib": torch.cuda.max_memory_allocated(device) / 2**20}
+def gpu_memory(device: torch.device) -> float | None:
+    """Peak memory of the GPU in this process, MiB; None on a CPU."""
+    return torch.cuda.max_memory_allocated(device) / 2**20 if device.type == "cuda" else None
 
 
 def run_phase(

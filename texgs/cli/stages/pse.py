@@ -1,6 +1,6 @@
 """Stage `pse`: the photorealistic edits of the paper's figure, beside the same edits of the volume."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
@@ -11,12 +11,14 @@ import torch
 
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.volume_scene import VolumeScene
+from texgs.config.fields import kinds
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.metrics.image import psnr, ssim
+from texgs.report.results import Comparison, PseResult
 from texgs.report.strip import write_strip
 from texgs.scene.scene_file import Scene, read_scene, write_scene
 from texgs.scene.session import Session
@@ -52,24 +54,31 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
     lens = (views["radius"], views["fov_y"], views["width"], views["height"])
     cameras = orbit_path(COMPARED, POLAR, *lens)
-    found: dict[str, list[dict[str, Any]]] = {}
-    groups = {"pse": edits_of_the_paper(scene, composition.palettes), "relight": light_sweep(scene)}
+    done: dict[str, list[Comparison]] = {}
+    can = kinds()[settings["fit"]["field"]].can
+    groups = {
+        "pse": edits_of_the_paper(scene, composition.palettes, can),
+        "relight": light_sweep(scene),
+    }
     for group, steps in groups.items():
         rows: dict[str, list[np.ndarray]] = {}
-        found[group] = []
+        done[group] = []
         for step in progress(steps, title=f"{settings['dataset']}: {group}", unit="edit"):
-            write_scene(output / f"{group}-{len(found[group])}.yaml", step.scene)
-            numbers, shown = compared(step, composition, volume, cameras)
-            found[group].append({"title": step.title, **numbers})
+            write_scene(output / f"{group}-{len(done[group])}.yaml", step.scene)
+            comparison, shown = compared(step, composition, volume, cameras)
+            done[group].append(comparison)
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
-        titles = [caption(entry) for entry in found[group]]
+        titles = [caption(entry) for entry in done[group]]
         write_strip(output / f"{group}.png", rows, titles)
-    return Outcome({"views": COMPARED, **found}, PICTURES)
+    return Outcome(PseResult(COMPARED, **done), PICTURES)
 
 
-def edits_of_the_paper(scene: Scene, fitted: Sequence[tuple[float, ...]]) -> list[Step]:
-    """Nothing, one model alone, opacity, colour, magnitude and direction of the light; each on its own."""
+def edits_of_the_paper(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:
+    """Nothing, one model alone, opacity, colour, magnitude and direction of the light; each on its own.
+
+    What fields of a kind cannot do is left out, but for lights: without shading they change nothing.
+    """
     names = list(scene.models)
     first, last = names[0], names[-1]
     turned = {name: {"palette": (b, r, g)} for name, (r, g, b) in zip(names, fitted, strict=True)}
@@ -79,8 +88,10 @@ def edits_of_the_paper(scene: Scene, fitted: Sequence[tuple[float, ...]]) -> lis
     if len(names) > 1:
         steps.append(Step(f"{last} alone", edited(scene, alone)))
     steps.append(Step(f"opacity of {first} x 0.4", edited(scene, {first: {"opacity": 0.4}})))
-    steps.append(Step("other colours", edited(scene, turned)))
-    steps.append(Step("k_a x 0.7, k_d x 1.2, k_s x 2", edited(scene, magnitude)))
+    if "palette" in can:
+        steps.append(Step("other colours", edited(scene, turned)))
+    if "relight" in can:
+        steps.append(Step("k_a x 0.7, k_d x 1.2, k_s x 2", edited(scene, magnitude)))
     steps.append(Step("light from the side", replace(scene, light=Light("directional", -30.0, 40.0))))
     return steps
 
@@ -103,7 +114,7 @@ def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
 
 def compared(
     step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
-) -> tuple[dict[str, float], dict[str, np.ndarray]]:
+) -> tuple[Comparison, dict[str, np.ndarray]]:
     """PSNR and SSIM against the volume over some views, and the first of these [H, W, 3] from each."""
     found: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
@@ -122,9 +133,11 @@ def compared(
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
             found["psnr"].append(psnr(image, truth))
             found["ssim"].append(ssim(image, truth))
-    return {name: fmean(values) for name, values in found.items() if values}, shown
+    means = {name: fmean(values) for name, values in found.items() if values}
+    return Comparison(step.title, **means), shown
 
 
-def caption(entry: Mapping[str, Any]) -> str:
+def caption(entry: Comparison) -> str:
     """Title of a picture, with the mean PSNR of all views where it was measured."""
-    return entry["title"] + (f"\nmean of {COMPARED} views: {entry['psnr']:.1f} dB" if "psnr" in entry else "")
+    measured = "" if entry.psnr is None else f"\nmean of {COMPARED} views: {entry.psnr:.1f} dB"
+    return entry.title + measured

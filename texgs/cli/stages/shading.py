@@ -11,6 +11,7 @@ from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.shading import material, raw_material
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import base_color
+from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
@@ -39,14 +40,14 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     model = Surfels(model.parameters, before.shading, before.metadata)
     write_model(output / "model.safetensors", model)
     factors = material(model.parameters, before.shading.material)
-    numbers = {
-        "fit_seconds": seconds,
-        "primitives": len(model),
-        "iterations": phase.iterations,
-        "losses": losses,
-        **{f"{name}_median": float(value.median()) for name, value in factors.items()},
+    result = FitResult(
+        seconds,
+        len(model),
+        phase.iterations,
+        losses,
+        material={name: float(value.median()) for name, value in factors.items()},
         **quality(model, views, fit["reduce"], title),
-        **gpu_memory(device),
-    }
+        peak_gpu_memory_mib=gpu_memory(device),
+    )
     checkpoint.discard(output / CHECKPOINT)
-    return Outcome(numbers)
+    return Outcome(result)

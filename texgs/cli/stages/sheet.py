@@ -6,6 +6,7 @@ from typing import Any
 from PIL import Image
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.report.results import SheetResult
 from texgs.volume.sheet import write_sheet
 from texgs.volume.view_set import read_views
 
@@ -27,8 +28,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     pictures = [Image.fromarray(view.load().numpy()) for view in shown]
     write_sheet(output / "sheet.png", [picture.crop(common_box(pictures)) for picture in pictures])
     camera = views.train[0].camera
-    counts = {"train": len(views.train), "test": len(views.test)}
-    return Outcome({**counts, "width": camera.width, "height": camera.height}, {"sheet.png": CAPTION})
+    result = SheetResult(len(views.train), len(views.test), camera.width, camera.height)
+    return Outcome(result, {"sheet.png": CAPTION})
 
 
 def common_box(pictures: list[Image.Image]) -> tuple[int, int, int, int]:

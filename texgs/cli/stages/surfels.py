@@ -14,6 +14,7 @@ from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import join, split, zeroth
 from texgs.fit.seeds import seed_surfels
+from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.view_set import read_views
@@ -44,13 +45,10 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     model, seconds, losses = run_phase(start, shading, images, phase, fit["seed"], output, title)
     model = Surfels(join(model.parameters), shading, {"dataset": settings["dataset"], "tf": settings["tf"]})
     write_model(output / "model.safetensors", model)
-    numbers = {
-        "fit_seconds": seconds,
-        "primitives": len(model),
-        "iterations": phase.iterations,
-        "losses": losses,
-    }
-    if phase.iterations:
-        numbers |= quality(model, views, fit["reduce"], title) | gpu_memory(device)
+    measured = quality(model, views, fit["reduce"], title) if phase.iterations else {}
     checkpoint.discard(output / CHECKPOINT)
-    return Outcome(numbers)
+    return Outcome(
+        FitResult(
+            seconds, len(model), phase.iterations, losses, peak_gpu_memory_mib=gpu_memory(device), **measured
+        )
+    )

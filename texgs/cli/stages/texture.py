@@ -9,6 +9,7 @@ from texgs.cli.stages.phase import gpu_memory, quality, training_quality
 from texgs.core.device import torch_device
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fit.texels import texturize
+from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
@@ -29,7 +30,13 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     model = texturize(before, images, **settings["texture"], seed=fit["seed"], title=title)
     seconds = time.monotonic() - start
     write_model(output / "model.safetensors", model)
-    numbers = {"fit_seconds": seconds, "primitives": len(model), "texels": len(model.parameters["texels"])}
-    found = quality(model, views, fit["reduce"], title)
-    found |= training_quality(model, views, fit["reduce"], title) | gpu_memory(device)
-    return Outcome({**numbers, **model.sizes(), **found})
+    result = FitResult(
+        seconds,
+        len(model),
+        sizes=model.sizes(),
+        notes={"texels": len(model.parameters["texels"])},
+        **quality(model, views, fit["reduce"], title),
+        **training_quality(model, views, fit["reduce"], title),
+        peak_gpu_memory_mib=gpu_memory(device),
+    )
+    return Outcome(result)

@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from statistics import fmean, median
 from typing import Any
@@ -13,6 +14,7 @@ from texgs.cli.stages.volume_scene import VolumeScene
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.progress import progress
+from texgs.report.results import TimingResult
 from texgs.scene.scene_file import read_scene
 from texgs.volume.cameras import spiral
 
@@ -37,23 +39,23 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     frames = milliseconds(
         lambda camera: composition.render(camera.to(device), scene.light, scene.edits), cameras, title
     )
-    numbers = {
-        "frame_mean_ms": fmean(frames),
-        "frame_max_ms": max(frames),
-        "frame_median_ms": median(frames),
-        "primitives": len(composition),
-        "width": views["width"],
-        "height": views["height"],
-        "threads": torch.get_num_threads(),
-    }
+    result = TimingResult(
+        fmean(frames),
+        max(frames),
+        median(frames),
+        len(composition),
+        views["width"],
+        views["height"],
+        torch.get_num_threads(),
+    )
     if "volume" in inputs:
         volume = VolumeScene(settings, inputs["volume"])
         some = cameras[:: max(1, len(cameras) // VOLUME_FRAMES)]
         of_volume = milliseconds(
             lambda camera: volume.render(camera, scene.light, scene.edits), some, f"{title}, volume"
         )
-        numbers |= {"volume_mean_ms": fmean(of_volume), "volume_max_ms": max(of_volume)}
-    return Outcome(numbers)
+        result = replace(result, volume_mean_ms=fmean(of_volume), volume_max_ms=max(of_volume))
+    return Outcome(result)
 
 
 def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:

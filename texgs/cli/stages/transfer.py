@@ -8,6 +8,7 @@ import numpy as np
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.tf import in_data_values
 from texgs.core.io import read_json
+from texgs.report.results import TransferResult
 from texgs.volume.basic_tfs import check_disjoint
 from texgs.volume.tf_files import write_paraview
 from texgs.volume.tf_plot import plot
@@ -33,9 +34,5 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     plot(output / "transfer.png", np.array(summary["histogram"]), low, high, basic, settings["title"])
     for name, tf in basic.items():
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings['dataset']} {name}")
-    numbers = {
-        f"{name}_{end}": value
-        for name, tf in basic.items()
-        for end, value in zip(("low", "high"), tf.support, strict=True)
-    }
-    return Outcome({"basic_tfs": len(basic), **numbers}, {"transfer.png": SHOWN})
+    ranges = {name: list(tf.support) for name, tf in basic.items()}
+    return Outcome(TransferResult(len(basic), ranges), {"transfer.png": SHOWN})

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from statistics import mean, median
@@ -18,6 +19,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_atomic
 from texgs.core.light import Light
 from texgs.core.progress import progress
+from texgs.report.results import ViewsResult
 from texgs.volume.appearance import Appearance
 from texgs.volume.cameras import icosphere, orbit_path, spiral
 from texgs.volume.cpu_mapper import CpuMapper
@@ -66,7 +68,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         write_geometry(grid, tf, appearance, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
-    return Outcome(numbers(shots, times, coverages), {"turntable.png": "One turn around the volume."})
+    return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
@@ -142,17 +144,18 @@ def coverage(view: View) -> float:
     return float((view.load()[..., 3] > 0).float().mean())
 
 
-def numbers(shots: Mapping[Any, list[View]], times: Times, coverages: list[float]) -> dict[str, Any]:
+def result_of(shots: Mapping[Any, list[View]], times: Times, coverages: list[float]) -> ViewsResult:
     """Counts, sizes, mean coverage, and the time per view over all runs that this job took."""
     camera = shots["train"][0].camera
-    counts = {split: len(shot) for split, shot in shots.items()}
-    size = {"width": camera.width, "height": camera.height, "coverage": mean(coverages)}
+    result = ViewsResult(
+        len(shots["train"]), len(shots["test"]), camera.width, camera.height, mean(coverages)
+    )
     if not times.others:
-        return {**counts, **size}
-    timing = {
-        "frame_ms": median(times.others),
-        "frame_max_ms": max(times.others),
-        "first_frame_ms": times.first[0],
-        "frames_ms": times.others,
-    }
-    return {**counts, **size, **timing}
+        return result
+    return replace(
+        result,
+        frame_ms=median(times.others),
+        frame_max_ms=max(times.others),
+        first_frame_ms=times.first[0],
+        frames_ms=times.others,
+    )

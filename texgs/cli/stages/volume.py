@@ -9,6 +9,7 @@ from texgs.cli.stages.outcome import Outcome
 from texgs.config.locate import cached_volume
 from texgs.core.io import write_json
 from texgs.core.progress import progress
+from texgs.report.results import VolumeResult
 from texgs.volume.download import require_whole
 from texgs.volume.generate import GENERATORS, RANDOM
 from texgs.volume.prepare import prepare
@@ -40,9 +41,18 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         progress=slabs,
     )
     write_json(output / "volume.json", asdict(summary))
-    numbers = {key: value for key, value in asdict(summary).items() if key != "histogram"}
-    size = (output / "volume.nrrd").stat().st_size / 2**20
-    return Outcome({**numbers, "voxels": summary.voxels, "volume_mib": size})
+    return Outcome(
+        VolumeResult(
+            list(summary.dims),
+            summary.dtype,
+            list(summary.spacing),
+            list(summary.origin),
+            summary.minimum,
+            summary.maximum,
+            summary.voxels,
+            volume_mib=(output / "volume.nrrd").stat().st_size / 2**20,
+        )
+    )
 
 
 def generated(volume: dict[str, Any]) -> Source:

@@ -1,0 +1,35 @@
+"""A toy of a method: everything fades. All that a method needs is in one file."""
+
+from dataclasses import dataclass
+
+from texgs.config.keys import key
+from texgs.config.methods import Method
+
+
+@dataclass
+class FadeKeys:
+    """How much."""
+
+    opacity: float = key(0.5, "factor on opacities", least=0, most=1)
+
+
+def run(task):
+    """Let all models fade."""
+    from texgs.edit.task import Edited
+    from texgs.scene.session import Session
+
+    session = Session(task.scene)
+    for model in task.scene.models:
+        session.set(model, "opacity", task.settings.opacity)
+    return Edited(session.scene, "a toy", seconds=0.5)
+
+
+METHOD = Method(
+    "fade",
+    "let a scene fade",
+    FadeKeys,
+    run,
+    check=lambda settings: None,
+    weights=lambda settings, clip: {},
+    needs=frozenset({"opacity"}),
+)

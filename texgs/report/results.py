@@ -1,0 +1,192 @@
+"""What jobs tell about their results: stages make these, `metrics.json` holds them, tables read them.
+
+What was not measured is None, and is left out of the file. Units are in the names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from texgs.config.typed import typed
+
+
+@dataclass(frozen=True)
+class VolumeResult:
+    """A volume, checked and in one file."""
+
+    dims: list[int]  # samples along x, y, z
+    dtype: str
+    spacing: list[float]
+    origin: list[float]
+    minimum: float
+    maximum: float
+    voxels: int
+    volume_mib: float
+
+
+@dataclass(frozen=True)
+class TransferResult:
+    """Basic transfer functions over a histogram."""
+
+    basic_tfs: int
+    ranges: dict[str, list[float]]  # lowest and highest value of each
+
+
+@dataclass(frozen=True)
+class ViewsResult:
+    """Views of a basic transfer function."""
+
+    train: int  # views
+    test: int
+    width: int
+    height: int
+    coverage: float | None = None  # mean share of the pixels that show something
+    frame_ms: float | None = None  # median, without the first frame
+    frame_max_ms: float | None = None
+    first_frame_ms: float | None = None
+    frames_ms: list[float] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class SheetResult:
+    """A contact sheet of views."""
+
+    train: int  # views there are
+    test: int
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class FitResult:
+    """A phase of a fit."""
+
+    fit_seconds: float
+    primitives: int
+    iterations: int = 0
+    losses: list[float] = field(default_factory=list)  # that were looked at
+    psnr: float | None = None  # of test views, dB
+    ssim: float | None = None
+    train_psnr: float | None = None
+    train_ssim: float | None = None
+    peak_gpu_memory_mib: float | None = None
+    sizes: dict[str, float] = field(default_factory=dict)  # of the last phase, see `Field.sizes`
+    material: dict[str, float] = field(default_factory=dict)  # medians of its factors, by name
+    notes: dict[str, Any] = field(default_factory=dict)  # for people
+
+
+@dataclass(frozen=True)
+class FigureResult:
+    """A figure of a fit."""
+
+    shown: list[int]  # views
+    primitives: int
+
+
+@dataclass(frozen=True)
+class SceneResult:
+    """Fields as one scene."""
+
+    models: int
+    primitives: int
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """An edit by numbers, against the volume with the same edit."""
+
+    title: str
+    psnr: float | None = None  # means over views, dB
+    ssim: float | None = None
+
+
+@dataclass(frozen=True)
+class PseResult:
+    """Edits by numbers, and a light that moves."""
+
+    views: int
+    pse: list[Comparison]
+    relight: list[Comparison]
+
+
+@dataclass(frozen=True)
+class TimingResult:
+    """Frames of a scene, and of its volume in the same job."""
+
+    frame_mean_ms: float
+    frame_max_ms: float
+    frame_median_ms: float
+    primitives: int
+    width: int
+    height: int
+    threads: int
+    volume_mean_ms: float | None = None
+    volume_max_ms: float | None = None
+
+
+@dataclass(frozen=True)
+class EditResult:
+    """A scene with a new look or a new part."""
+
+    edit: str
+    method: str
+    how: str  # what the method worked with
+    edit_seconds: float
+    lambda_s: float | None = None
+    notes: dict[str, Any] = field(default_factory=dict)  # for people
+
+
+@dataclass(frozen=True)
+class EditMeasures:
+    """What was measured of an edited scene."""
+
+    edit: str
+    method: str
+    frame_mean_ms: float
+    frame_max_ms: float
+    primitives: int
+    megabytes: float  # of all models, as the paper counts
+    geometry_kept: bool
+    short_rmse: float | None = None  # between consecutive views, and views farther apart
+    short_lpips: float | None = None
+    long_rmse: float | None = None
+    long_lpips: float | None = None
+    style_nnfm: float | None = None
+    style_gram: float | None = None
+    clip: str | None = None  # backbone
+    similarity: float | None = None
+    direction: float | None = None
+    clip_missing: str | None = None  # why CLIP measured nothing
+
+
+Result = (
+    VolumeResult
+    | TransferResult
+    | ViewsResult
+    | SheetResult
+    | FitResult
+    | FigureResult
+    | SceneResult
+    | PseResult
+    | TimingResult
+    | EditResult
+    | EditMeasures
+)
+KINDS: dict[str, type[Any]] = {kind.__name__: kind for kind in Result.__args__}
+
+
+def plain(result: Result) -> dict[str, Any]:
+    """A result for JSON, without what was not measured."""
+    return {name: value for name, value in asdict(result).items() if value is not None}
+
+
+def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
+    """The result that `plain` made these numbers of.
+
+    Raises:
+        KeyError, OmegaConfBaseException: if they are those of no result.
+    """
+    result: Result = typed(KINDS[kind], numbers)
+    return result
