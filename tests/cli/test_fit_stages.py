@@ -84,8 +84,8 @@ def test_texture_makes_what_it_needs_first(folder):
     shading, texture = numbers(folder, "shading"), numbers(folder, "texture")
     assert shading["psnr"] > 25
     assert texture["psnr"] >= shading["psnr"] - 0.1
-    assert texture["texels"] == len(models["texture"].parameters["texels"])
-    assert texture["total_mib"] > 0
+    assert texture["notes"]["texels"] == len(models["texture"].parameters["texels"])
+    assert texture["sizes"]["total_mib"] > 0
     assert shading["losses"][-1] < 0.1
 
 
