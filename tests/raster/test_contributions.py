@@ -8,7 +8,7 @@ import torch
 from tests.raster.agreement import decided, dense
 from tests.raster.scenes import HARD_CASES, random_scene
 from texgs.raster.api import rasterize, splat
-from texgs.raster.reference.render import statistics
+from texgs.raster.reference.render import kind_of, statistics
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
 GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
@@ -17,11 +17,12 @@ GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
 def explicit(scene, options=DEFAULT_OPTIONS):
     """Blending weights [H W, N] by the definition, in the order of the inputs, and its statistics."""
     scene = scene.double()
-    surfels, _, weights, _ = dense(scene, options)
+    projected, _, weights, _ = dense(scene, options)
     n = len(scene.means)
     ordered = weights.new_zeros(len(weights), n)
-    ordered[:, surfels.index] = weights
-    return ordered, statistics(weights, surfels, n, (scene.width, scene.height), options)
+    ordered[:, projected.index] = weights
+    radii = kind_of(scene.scales).visible_radii(projected, (scene.width, scene.height), options)
+    return ordered, statistics(weights, radii, projected.index, n)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
