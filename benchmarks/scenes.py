@@ -78,6 +78,13 @@ def surfels(kind: str, n: int = 60_000, seed: int = 0) -> dict[str, Tensor]:
     }
 
 
+def gaussians(kind: str, n: int = 60_000, seed: int = 0, thickness: float = 0.3) -> dict[str, Tensor]:
+    """The surfels of a scene as 3D Gaussians: scales [N, 3], the third in units of the smaller one."""
+    made = surfels(kind, n, seed)
+    third = thickness * made["scales"].amin(1, keepdim=True)
+    return made | {"scales": torch.cat([made["scales"], third], 1)}
+
+
 def camera(size: int) -> Camera:
     """Square view with a field of view of 45 degrees in which the scenes cover 52 % of the pixels."""
     return orbit(azimuth=-60.0, polar=25.0, radius=3.2, fov_y=45.0, width=size, height=size)

@@ -14,6 +14,7 @@ from texgs.core.errors import ArgumentError
 SECTIONS = (
     "rasterize",
     "outputs",
+    "primitives",
     "losses",
     "peers",
     "growth",

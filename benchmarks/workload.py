@@ -68,16 +68,17 @@ def plain(
     channels: int = 3,
     outputs: tuple[str, ...] = (),
     options: Options | None = None,
+    make: Callable[[str, int], dict[str, Tensor]] = scenes.surfels,
 ) -> Workload:
     """A scene with `channels` features; `view` is a camera or the size of the scenes' own."""
-    surfels = _on(device, kind, n)
+    surfels = _on(device, make(kind, n))
     surfels["features"] = surfels["features"].repeat(1, -(-channels // 3))[:, :channels].contiguous()
     return _workload(surfels, {}, view, device, learned, channels, outputs, options)
 
 
 def textured(kind: str, size: int, n: int, device: torch.device, texels: tuple[int, int]) -> Workload:
     """A scene with textures of random sizes between the two numbers of texels; only the texels learn."""
-    surfels = _on(device, kind, n)
+    surfels = _on(device, scenes.surfels(kind, n))
     base = surfels.pop("features")
     low, high = texels
     generator = torch.Generator().manual_seed(1)
@@ -96,8 +97,8 @@ def interleaved(images: dict[str, Tensor]) -> dict[str, Tensor]:
     return {name: x.contiguous() for name, x in images.items()}
 
 
-def _on(device: torch.device, kind: str, n: int) -> dict[str, Tensor]:
-    return {name: x.to(device) for name, x in scenes.surfels(kind, n).items()}
+def _on(device: torch.device, tensors: dict[str, Tensor]) -> dict[str, Tensor]:
+    return {name: x.to(device) for name, x in tensors.items()}
 
 
 def _workload(

@@ -5,7 +5,7 @@ import torch
 
 from tests.cuda_emulation import emulated
 from tests.raster import test_normals, test_shading, test_smoothness, test_ssim
-from tests.raster.scenes import random_scene, textured
+from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything
 from texgs.raster.normals import normal_consistency
 from texgs.raster.shading import blinn_phong_texture
@@ -34,6 +34,7 @@ def losses():
 
 COMPUTED = {
     "surfels": lambda: everything(random_scene(1, n=150)),
+    "gaussians": lambda: everything(gaussians(random_scene(3, n=150))),
     "textured surfels": lambda: everything(textured(random_scene(2, n=150))),
     "losses": losses,
 }

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import torch
 
-from texgs.raster.reference.projection import project
-from texgs.raster.reference.render import ALPHA_MAX, TEXTURE_SIGMA, composite, intersect, pixel_centres
+from texgs.raster.reference.fragments import ALPHA_MAX
+from texgs.raster.reference.render import TEXTURE_SIGMA, composite, kind_of, pixel_centres
 from texgs.raster.types import DEFAULT_OPTIONS
 
 MARGIN = 1e-3
@@ -33,11 +33,12 @@ def decided(scene, options=DEFAULT_OPTIONS):
 
 
 def dense(scene, options):
-    """Every surfel at every pixel: surfels, fragments, weights [P, M] and light before each [P, M]."""
+    """Every primitive at every pixel: as projected, fragments, weights [P, M], light before each [P, M]."""
+    kind, size = kind_of(scene.scales), (scene.width, scene.height)
     geometry = (scene.means, scene.quats, scene.scales, scene.opacities, scene.viewmat, scene.K)
-    surfels = project(*geometry, scene.shift, options)
-    fragments = intersect(surfels, pixel_centres(scene.width, scene.height, scene.means), options)
-    return surfels, fragments, *composite(fragments.alpha, options.transmittance_min)
+    projected = kind.project(*geometry, scene.shift, size, options)
+    fragments = kind.intersect(projected, pixel_centres(*size, scene.means), options)
+    return projected, fragments, *composite(fragments.alpha, options.transmittance_min)
 
 
 def decisions(scene, options):
@@ -61,6 +62,11 @@ def near_texel_centre(scene, options):
         inside = (x > -MARGIN) & (x < size - 1 + MARGIN)
         near |= inside & ((x - x.round()).abs() < MARGIN)
     return (near & (weights > 0)).any(1)
+
+
+def names_of(scene):
+    """The names of all images that a scene has."""
+    return tuple(name for name in IMAGES if name in ("color", "alpha", *scene.outputs))
 
 
 def images(render):

@@ -11,7 +11,14 @@ import pytest
 import torch
 
 from tests.cuda_emulation import emulated
+from tests.raster.scenes import PRIMITIVES
 from texgs.raster import native
+
+
+@pytest.fixture(params=PRIMITIVES)
+def drawn(request):
+    """A function that turns a scene of surfels into one of each primitive."""
+    return PRIMITIVES[request.param]
 
 
 @pytest.fixture(params=["cpu", "cuda", "emulated cuda"])

@@ -2,8 +2,8 @@
 
 import torch
 
-from texgs.raster.reference.projection import project, visible_radii
-from texgs.raster.reference.render import composite, intersect
+from texgs.raster.reference.render import composite
+from texgs.raster.reference.surfels import intersect, project, visible_radii
 from texgs.raster.types import DEFAULT_OPTIONS
 
 TILE = 16
@@ -15,8 +15,9 @@ def fragments_per_pixel(surfels, camera, stride=1):
     Every `stride`-th tile along either axis is looked at, so an odd stride larger than 1 gives an estimate.
     """
     inputs = (surfels[name].double() for name in ("means", "quats", "scales", "opacities"))
-    projected = project(*inputs, camera.viewmat.double(), camera.K.double(), None, DEFAULT_OPTIONS)
-    reach = visible_radii(projected, camera.width, camera.height, DEFAULT_OPTIONS)[:, None] + TILE / 2
+    size = (camera.width, camera.height)
+    projected = project(*inputs, camera.viewmat.double(), camera.K.double(), None, size, DEFAULT_OPTIONS)
+    reach = visible_radii(projected, size, DEFAULT_OPTIONS)[:, None] + TILE / 2
     grid = torch.cartesian_prod(torch.arange(TILE), torch.arange(TILE)).double() + 0.5
     blended, covered, pixels = 0, 0, 0
     for y in range(0, camera.height, stride * TILE):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields, replace
 import torch
 from torch import Tensor
 
-from texgs.raster.types import DEFAULT_OPTIONS, Options, Render, Texture
+from texgs.raster.types import DEFAULT_OPTIONS, OUTPUTS, Options, Render, Texture
 
 SURFEL_TENSORS = ("means", "quats", "scales", "opacities", "shift", "features")
 TEXTURE_TENSORS = ("base", "gain", "texels")
@@ -32,6 +32,11 @@ class Scene:
     texture: Texture | None = None
     background: Tensor | None = None
     shift: Tensor | None = None
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """All outputs that the scene has: 3D Gaussians have no normal."""
+        return tuple(name for name in OUTPUTS if name != "normal" or self.scales.shape[1] == 2)
 
     def arguments(self) -> dict:
         """Keyword arguments of rasterize."""
@@ -110,6 +115,16 @@ def random_scene(seed: int = 0, n: int = 200, width: int = 53, height: int = 37,
         features=rand(n, channels),
         background=rand(channels),
     )
+
+
+def gaussians(scene: Scene) -> Scene:
+    """The scene with 3D Gaussians instead of surfels: as thick as 0.05 to 1.5 times their smaller scale."""
+    generator = torch.Generator().manual_seed(len(scene.scales))
+    thickness = 0.05 * 30 ** torch.rand(len(scene.scales), 1, generator=generator)
+    return replace(scene, scales=torch.cat([scene.scales, thickness * scene.scales.amin(1, keepdim=True)], 1))
+
+
+PRIMITIVES: dict[str, Callable[[Scene], Scene]] = {"surfels": lambda scene: scene, "gaussians": gaussians}
 
 
 def textured(scene: Scene, sizes=TEXTURE_SIZES, seed: int = 0) -> Scene:

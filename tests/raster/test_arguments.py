@@ -1,21 +1,25 @@
 """Wrong arguments give one clear sentence; unusual but right ones work."""
 
+import ctypes
 from dataclasses import replace
 
 import pytest
 import torch
 
-from tests.raster.agreement import gradients, images, random_cotangents
-from tests.raster.scenes import random_scene, textured
+from tests.raster.agreement import gradients, images, names_of, random_cotangents
+from tests.raster.scenes import gaussians, random_scene, textured
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
+from texgs.raster import native
 from texgs.raster.api import rasterize, splat
-from texgs.raster.types import OUTPUTS, Options, Texture
+from texgs.raster.inputs import SurfelTensors, View
+from texgs.raster.reference import rasterize as reference
+from texgs.raster.types import Options, Texture
 
 N = 200
 WRONG_SHAPES = {
     "means": torch.rand(3, N),
     "quats": torch.rand(N, 3),
-    "scales": torch.rand(N, 3),
+    "scales": torch.rand(N, 4),
     "opacities": torch.rand(N, 1),
     "features": torch.rand(N + 1, 3),
     "viewmat": torch.eye(3),
@@ -93,6 +97,56 @@ def test_texture_or_features():
         replace(scene, texture=None).render(rasterize)
 
 
+@pytest.mark.parametrize("render", [rasterize, reference])
+def test_what_gaussians_do_not_have(render):
+    scene = gaussians(random_scene())
+    with pytest.raises(
+        ArgumentError, match=r"texture: expected features for 3D Gaussians .* to draw surfels"
+    ):
+        replace(textured(random_scene()), scales=scene.scales).render(render)
+    with pytest.raises(ArgumentError, match=r"outputs: 3D Gaussians .* have no normal; leave it out"):
+        scene.render(render, ("depth", "normal"))
+
+
+@pytest.mark.parametrize("render", [rasterize, reference])
+@pytest.mark.parametrize("columns", [1, 4])
+def test_scales_of_nothing(render, columns):
+    scene = replace(random_scene(), scales=torch.rand(N, columns))
+    expected = r"scales: expected \[N, 2\] or \[N, 3\], got \[200, .*; 2 draw surfels, 3 draw 3D Gaussians"
+    with pytest.raises(ShapeError, match=expected):
+        scene.render(render)
+    with pytest.raises(
+        ShapeError, match=r"scales: expected \[200, 2\|3\], got \[3, 200\]; did you transpose"
+    ):
+        replace(scene, scales=torch.rand(3, N)).render(rasterize)
+
+
+def test_library_refuses_what_gaussians_do_not_have():
+    scene = gaussians(random_scene())
+    view = View(scene.viewmat, scene.K, 8, 8, None, None, None, frozenset(), Options())
+    geometry = (scene.means, scene.quats, scene.scales, scene.opacities)
+    handle = ctypes.c_void_p()
+
+    def forward(surfels, **images):
+        image = native.Image(**{name: native.address(x) for name, x in images.items()})
+        native.call(
+            "texgs_forward",
+            *view.structures(surfels),
+            image,
+            ctypes.byref(handle),
+            device=torch.device("cpu"),
+        )
+
+    texture = textured(random_scene()).texture
+    with pytest.raises(ArgumentError, match="texture: 3D Gaussians have none"):
+        forward(SurfelTensors(*geometry, base=texture.base, gain=texture.gain, texels=texture.texels))
+    with pytest.raises(ArgumentError, match="normal: 3D Gaussians have none"):
+        forward(SurfelTensors(*geometry, features=scene.features), normal=torch.zeros(3, 8, 8))
+    five = SurfelTensors(*geometry, features=scene.features)._replace(scales=torch.rand(N, 5))
+    with pytest.raises(ArgumentError, match="surfels: expected 2 scales of surfels or 3 of 3D Gaussians"):
+        forward(five)
+
+
 def test_wrong_device():
     scene = random_scene()
     with pytest.raises(DeviceError, match="features: expected device cpu"):
@@ -134,6 +188,9 @@ def test_unknown_output():
         {"low_pass": 0.0},
         {"low_pass": float("nan")},
         {"filter_sigma": -1.0},
+        {"dilation": 0.0},
+        {"dilation": -0.3},
+        {"dilation": float("nan")},
         {"near": 0.0},
         {"near": -1.0},
         {"near": 5.0, "far": 2.0},
@@ -145,12 +202,12 @@ def test_wrong_options(wrong):
         random_scene().render(rasterize, options=Options(**wrong))
 
 
-def test_memory_layout_does_not_matter(device):
-    scene = replace(random_scene(), shift=torch.rand(N, 2)).to(device)
+def test_memory_layout_does_not_matter(device, drawn):
+    scene = drawn(replace(random_scene(), shift=torch.rand(N, 2))).to(device)
     strided = scene.map(lambda x: x.repeat_interleave(2, 0)[::2] if x.ndim == 1 else x.T.contiguous().T)
     assert not strided.means.is_contiguous()
-    expected, found = (images(s.render(rasterize, OUTPUTS)) for s in (scene, strided))
-    cotangents = random_cotangents(scene, ("color", "normal", "depth"))
+    expected, found = (images(s.render(rasterize, scene.outputs)) for s in (scene, strided))
+    cotangents = random_cotangents(scene, names_of(scene))
     expected |= gradients(rasterize, scene, cotangents)
     found |= gradients(rasterize, strided, cotangents)
     for name, value in expected.items():

@@ -8,7 +8,7 @@ import torch
 from tests.raster.agreement import decided, dense
 from tests.raster.scenes import HARD_CASES, random_scene
 from texgs.raster.api import rasterize, splat
-from texgs.raster.reference.render import statistics
+from texgs.raster.reference.render import kind_of, statistics
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
 GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
@@ -17,16 +17,17 @@ GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
 def explicit(scene, options=DEFAULT_OPTIONS):
     """Blending weights [H W, N] by the definition, in the order of the inputs, and its statistics."""
     scene = scene.double()
-    surfels, _, weights, _ = dense(scene, options)
+    projected, _, weights, _ = dense(scene, options)
     n = len(scene.means)
     ordered = weights.new_zeros(len(weights), n)
-    ordered[:, surfels.index] = weights
-    return ordered, statistics(weights, surfels, n, (scene.width, scene.height), options)
+    ordered[:, projected.index] = weights
+    radii = kind_of(scene.scales).visible_radii(projected, (scene.width, scene.height), options)
+    return ordered, statistics(weights, radii, projected.index, n)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-def test_statistics(device, seed):
-    scene = random_scene(seed, n=300)
+def test_statistics(device, drawn, seed):
+    scene = drawn(random_scene(seed, n=300))
     expected = explicit(scene)[1]
     found = scene.to(device).render(rasterize, ("statistics",)).statistics
     unsure = int((~decided(scene)).sum())
@@ -40,8 +41,8 @@ def test_statistics(device, seed):
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_statistics_of_hard_cases(device, name):
-    scene = HARD_CASES[name]()
+def test_statistics_of_hard_cases(device, drawn, name):
+    scene = drawn(HARD_CASES[name]())
     render = scene.to(device).render(rasterize, ("statistics",))
     found = render.statistics
     for tensor in vars(found).values():
@@ -55,8 +56,8 @@ def test_statistics_of_hard_cases(device, name):
 
 
 @pytest.mark.parametrize("channels", [1, 3, 8, 32])
-def test_splat_sums_the_image_by_weight(device, channels):
-    scene = random_scene(2, n=250)
+def test_splat_sums_the_image_by_weight(device, drawn, channels):
+    scene = drawn(random_scene(2, n=250))
     image = torch.randn(scene.height, scene.width, channels, generator=torch.Generator().manual_seed(0))
     image = image * decided(scene)[..., None]
     weights, _ = explicit(scene)
@@ -67,9 +68,9 @@ def test_splat_sums_the_image_by_weight(device, channels):
     torch.testing.assert_close(total.cpu().double(), weights.sum(0), rtol=1e-4, atol=0.02)
 
 
-def test_splat_is_the_adjoint_of_rendering(device):
-    scene = replace(random_scene(3), background=None).to(device)
-    options = Options(low_pass=6.0, filter_sigma=1.0)
+def test_splat_is_the_adjoint_of_rendering(device, drawn):
+    scene = drawn(replace(random_scene(3), background=None)).to(device)
+    options = Options(low_pass=6.0, filter_sigma=1.0, dilation=0.5, antialiased=True)
     image = torch.randn(scene.height, scene.width, 3, generator=torch.Generator().manual_seed(0)).to(device)
     rendered = scene.render(rasterize, options=options).color
     sums, _ = splat(image, **{name: getattr(scene, name) for name in GEOMETRY}, options=options)
@@ -77,8 +78,8 @@ def test_splat_is_the_adjoint_of_rendering(device):
     assert float(forward) == pytest.approx(float(backward), rel=1e-5)
 
 
-def test_splat_of_ones_gives_the_weights(device):
-    scene = random_scene(4).to(device)
+def test_splat_of_ones_gives_the_weights(device, drawn):
+    scene = drawn(random_scene(4)).to(device)
     ones = torch.ones(scene.height, scene.width, 1, device=device)
     sums, weights = splat(ones, **{name: getattr(scene, name) for name in GEOMETRY})
     torch.testing.assert_close(sums[:, 0], weights, rtol=1e-5, atol=1e-6)

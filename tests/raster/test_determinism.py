@@ -6,24 +6,23 @@ import pytest
 import torch
 
 from benchmarks.scenes import camera, surfels
-from tests.raster.agreement import IMAGES, gradients, images, random_cotangents
-from tests.raster.scenes import Scene, random_scene, textured
+from tests.raster.agreement import gradients, images, names_of, random_cotangents
+from tests.raster.scenes import Scene, gaussians, random_scene, textured
 from tests.raster.threads import with_threads
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
-from texgs.raster.types import OUTPUTS
 
 
 def everything(scene):
     """All that the rasterizer computes for a scene, by name."""
-    render = scene.render(rasterize, OUTPUTS)
+    render = scene.render(rasterize, scene.outputs)
     found = images(render) | vars(render.statistics)
     image = torch.linspace(-1, 1, scene.height * scene.width * 2, device=scene.device)
     geometry = {
         name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
     }
     found["sums"], found["weights"] = splat(image.reshape(scene.height, scene.width, 2), **geometry)
-    cotangents = random_cotangents(scene, IMAGES)
+    cotangents = random_cotangents(scene, names_of(scene))
     return found | {f"gradient of {name}": x for name, x in gradients(rasterize, scene, cotangents).items()}
 
 
@@ -38,6 +37,8 @@ SCENES = {
     "plain": generated,
     "32 channels": lambda: replace(generated(3000), features=torch.rand(3000, 32)),
     "textured": lambda: textured(generated(3000)),
+    "gaussians": lambda: gaussians(generated()),
+    "gaussians, 32 channels": lambda: replace(gaussians(generated(3000)), features=torch.rand(3000, 32)),
     "small": random_scene,
 }
 
@@ -61,8 +62,8 @@ def test_runs(device, name):
         assert torch.equal(value, first[quantity]), quantity
 
 
-def test_more_pairs_of_surfels_and_tiles_than_in_the_view_before(device):
-    scene = random_scene(1, n=400, width=64, height=48).to(device)
+def test_more_pairs_of_surfels_and_tiles_than_in_the_view_before(device, drawn):
+    scene = drawn(random_scene(1, n=400, width=64, height=48)).to(device)
     native.release_memory(device.type)
     expected = everything(scene)
     native.release_memory(device.type)

@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from tests.raster.agreement import gradients, images, random_cotangents, relative
-from tests.raster.scenes import few, random_scene, textured
+from tests.raster.scenes import few, gaussians, random_scene, textured
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
 from texgs.raster.types import Options
@@ -61,13 +61,26 @@ def small(seed, n=8):
 
 
 @pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("names", [("color",), ("depth",), ("normal", "alpha")], ids=",".join)
-def test_images(device, seed, names):
-    check(small(seed), device, names)
+@pytest.mark.parametrize("names", [("color",), ("depth",)], ids=",".join)
+def test_images(device, drawn, seed, names):
+    check(drawn(small(seed)), device, names)
 
 
-def test_distortion(device):
-    check(small(2), device, ("distortion",), near=1.0, far=6.0)  # spreads the depths over the range of m
+@pytest.mark.parametrize("seed", [0, 1])
+def test_normal_and_alpha(device, seed):
+    check(small(seed), device, ("normal", "alpha"))
+
+
+def test_distortion(device, drawn):
+    check(
+        drawn(small(2)), device, ("distortion",), near=1.0, far=6.0
+    )  # spreads the depths over the range of m
+
+
+@pytest.mark.parametrize("dilation", [0.1, 2.0])
+def test_antialiased(device, dilation):
+    scene = gaussians(small(6))
+    check(replace(scene, scales=0.3 * scene.scales), device, ("color",), antialiased=True, dilation=dilation)
 
 
 @pytest.mark.parametrize("filter_sigma", [0.0, 1.0, 3.0])
@@ -81,8 +94,8 @@ def test_texture(device):
     check(scene, device, ("color",))
 
 
-def test_direction_in_a_larger_scene(device):
-    scene = random_scene(5, n=150)
+def test_direction_in_a_larger_scene(device, drawn):
+    scene = drawn(random_scene(5, n=150))
     scene = replace(scene, opacities=0.9 * scene.opacities, shift=torch.zeros(150, 2))
     cotangents = random_cotangents(scene, ("color", "depth"), visible(scene))
     found = gradients(rasterize, scene.to(device), cotangents, ALMOST_OFF)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import IMAGES, decided, images
-from tests.raster.scenes import TEXTURE_SIZES, random_scene, textured
+from tests.raster.agreement import decided, images, names_of
+from tests.raster.scenes import TEXTURE_SIZES, gaussians, random_scene, textured
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
 from texgs.raster.types import DEFAULT_OPTIONS, Options
@@ -18,15 +18,21 @@ TEXEL = 2e-6  # more for each texel that the textures span, as their random colo
 UNDECIDED = 0.15  # largest share of pixels that may sit on a threshold (or, textured, on a texel centre)
 
 
+def described(options):
+    """What of the options is no default, as the name of a test."""
+    changed = {name: value for name, value in vars(options).items() if value != vars(DEFAULT_OPTIONS)[name]}
+    return ",".join(f"{name}={value:g}" for name, value in changed.items())
+
+
 def check(scene, device, options=DEFAULT_OPTIONS):
     """Compare all images of a scene, pixel by pixel where the definition is sure."""
-    outputs = [name for name in IMAGES if name not in ("color", "alpha")]
+    outputs = [name for name in scene.outputs if name != "statistics"]
     found = images(scene.to(device).render(rasterize, outputs, options))
     expected = images(scene.double().render(reference.rasterize, outputs, options))
     sure = decided(scene, options)
     assert 1 - sure.double().mean() < UNDECIDED
     texels = 0 if scene.texture is None else int(scene.texture.sizes.max())
-    for name in IMAGES:
+    for name in names_of(scene):
         assert found[name].shape == expected[name].shape
         assert found[name].dtype == torch.float32
         error = (found[name].cpu() - expected[name]).abs()
@@ -38,8 +44,8 @@ def check(scene, device, options=DEFAULT_OPTIONS):
 @pytest.mark.parametrize(
     ("seed", "n", "width", "height"), [(0, 150, 53, 37), (1, 300, 64, 48), (2, 400, 33, 71), (3, 200, 17, 1)]
 )
-def test_random_scenes(device, seed, n, width, height):
-    check(random_scene(seed, n, width, height), device)
+def test_random_scenes(device, drawn, seed, n, width, height):
+    check(drawn(random_scene(seed, n, width, height)), device)
 
 
 @pytest.mark.parametrize(
@@ -55,17 +61,33 @@ def test_random_scenes(device, seed, n, width, height):
         Options(alpha_min=0.05),
         Options(transmittance_min=0.3),
     ],
-    ids=lambda options: ",".join(
-        f"{k}={v:g}" for k, v in vars(options).items() if v != vars(DEFAULT_OPTIONS)[k]
-    ),
+    ids=described,
 )
 def test_options(device, options):
     check(random_scene(4), device, options)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        Options(dilation=0.1),
+        Options(dilation=3.0),
+        Options(antialiased=True),
+        Options(antialiased=True, dilation=1.0),
+        Options(near=2.9),
+        Options(near=0.01, far=1e10),
+        Options(alpha_min=0.05),
+        Options(transmittance_min=0.3),
+    ],
+    ids=described,
+)
+def test_options_of_gaussians(device, options):
+    check(gaussians(random_scene(4)), device, options)
+
+
 @pytest.mark.parametrize("channels", [1, 3, 4, 7, 16, 32])
-def test_channels(device, channels):
-    check(random_scene(5, channels=channels), device)
+def test_channels(device, drawn, channels):
+    check(drawn(random_scene(5, channels=channels)), device)
 
 
 @pytest.mark.parametrize("sizes", [*([size] for size in TEXTURE_SIZES), TEXTURE_SIZES], ids=str)
@@ -77,21 +99,25 @@ def test_texture_on_unfiltered_and_narrow_surfels(device):
     check(textured(random_scene(7)), device, Options(low_pass=64.0, filter_sigma=1.0))
 
 
-def test_black_background_by_default(device):
-    check(replace(random_scene(8), background=None), device)
+def test_black_background_by_default(device, drawn):
+    check(drawn(replace(random_scene(8), background=None)), device)
+
+
+def test_black_background_of_textures(device):
     check(textured(replace(random_scene(8), background=None)), device)
 
 
-def test_shift(device):
+def test_shift(device, drawn):
     shift = 3 * torch.randn(200, 2, generator=torch.Generator().manual_seed(0))
-    check(replace(random_scene(9), shift=shift), device)
+    check(drawn(replace(random_scene(9), shift=shift)), device)
 
 
-def test_only_what_is_asked_for(device):
-    render = random_scene().to(device).render(rasterize)
+def test_only_what_is_asked_for(device, drawn):
+    scene = drawn(random_scene()).to(device)
+    render = scene.render(rasterize)
     assert render.depth is render.median is render.normal is render.distortion is render.statistics is None
-    alone = random_scene().to(device).render(rasterize, ("depth",))
-    together = random_scene().to(device).render(rasterize, IMAGES[2:])
+    alone = scene.render(rasterize, ("depth",))
+    together = scene.render(rasterize, scene.outputs)
     assert alone.normal is None
     torch.testing.assert_close(alone.depth, together.depth)
     torch.testing.assert_close(alone.color, together.color)

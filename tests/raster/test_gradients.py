@@ -5,8 +5,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import IMAGES, decided, gradients, random_cotangents, relative
-from tests.raster.scenes import random_scene, textured
+from tests.raster.agreement import IMAGES, decided, gradients, names_of, random_cotangents, relative
+from tests.raster.scenes import gaussians, random_scene, textured
+from tests.raster.test_forward import described
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
 from texgs.raster.types import DEFAULT_OPTIONS, Options
@@ -44,8 +45,8 @@ def check(scene, device, names=("color",), options=DEFAULT_OPTIONS, wanted=None)
 @pytest.mark.parametrize(
     ("seed", "n", "width", "height"), [(0, 150, 53, 37), (1, 300, 64, 48), (2, 400, 33, 71)]
 )
-def test_color(device, seed, n, width, height):
-    check(random_scene(seed, n, width, height), device)
+def test_color(device, drawn, seed, n, width, height):
+    check(drawn(random_scene(seed, n, width, height)), device)
 
 
 @pytest.mark.parametrize("name", [name for name in IMAGES if name != "color"])
@@ -53,13 +54,24 @@ def test_each_other_image(device, name):
     check(random_scene(3), device, (name,))
 
 
-def test_all_images_together(device):
-    check(random_scene(4), device, IMAGES)
+@pytest.mark.parametrize("name", [name for name in IMAGES if name not in ("color", "normal")])
+def test_each_other_image_of_gaussians(device, name):
+    check(gaussians(random_scene(3)), device, (name,))
+
+
+def test_all_images_together(device, drawn):
+    scene = drawn(random_scene(4))
+    check(scene, device, names_of(scene))
 
 
 @pytest.mark.parametrize("channels", [1, 4, 7, 16, 32])
-def test_channels(device, channels):
-    check(random_scene(5, channels=channels), device, ("color", "depth"))
+def test_channels(device, drawn, channels):
+    check(drawn(random_scene(5, channels=channels)), device, ("color", "depth"))
+
+
+@pytest.mark.parametrize("channels", [1, 2, 4, 5, 6])
+def test_channels_beside_no_depth(device, drawn, channels):
+    check(drawn(random_scene(5, channels=channels)), device)
 
 
 @pytest.mark.parametrize(
@@ -73,18 +85,32 @@ def test_channels(device, channels):
         Options(near=2.9),
         Options(transmittance_min=0.3),
     ],
-    ids=lambda options: ",".join(
-        f"{k}={v:g}" for k, v in vars(options).items() if v != vars(DEFAULT_OPTIONS)[k]
-    ),
+    ids=described,
 )
 def test_options(device, options):
     check(random_scene(6), device, ("color", "depth", "normal"), options)
 
 
-def test_shift(device):
+@pytest.mark.parametrize(
+    "options",
+    [
+        Options(dilation=0.1),
+        Options(dilation=3.0),
+        Options(antialiased=True),
+        Options(antialiased=True, dilation=1.0),
+        Options(near=2.9),
+        Options(transmittance_min=0.3),
+    ],
+    ids=described,
+)
+def test_options_of_gaussians(device, options):
+    check(gaussians(random_scene(6)), device, ("color", "depth"), options)
+
+
+def test_shift(device, drawn):
     shift = torch.randn(200, 2, generator=torch.Generator().manual_seed(0))
-    check(replace(random_scene(7), shift=shift), device, ("color", "depth"))
-    check(replace(random_scene(7), shift=torch.zeros(200, 2)), device)
+    check(drawn(replace(random_scene(7), shift=shift)), device, ("color", "depth"))
+    check(drawn(replace(random_scene(7), shift=torch.zeros(200, 2))), device)
 
 
 def test_textures(device):
@@ -104,8 +130,10 @@ def test_textures_and_all_images(device):
 @pytest.mark.parametrize(
     "wanted", [("features",), ("opacities",), ("means", "features"), ("quats", "scales")]
 )
-def test_some_gradients_only(device, wanted):
-    check(random_scene(11), device, ("color", "normal"), wanted=wanted)
+def test_some_gradients_only(device, drawn, wanted):
+    scene = drawn(random_scene(11))
+    names = [name for name in ("color", "normal") if name in names_of(scene)]
+    check(scene, device, names, wanted=wanted)
 
 
 @pytest.mark.parametrize("wanted", [("texels",), ("base", "gain"), ("gain", "texels", "opacities")])
@@ -113,14 +141,14 @@ def test_some_gradients_of_textures_only(device, wanted):
     check(textured(random_scene(12)), device, wanted=wanted)
 
 
-def test_surfels_that_are_not_drawn_among_others(device):
-    scene = random_scene(13)
+def test_surfels_that_are_not_drawn_among_others(device, drawn):
+    scene = drawn(random_scene(13))
     behind = scene.means - 10 * scene.viewmat[2, :3]
     check(replace(scene, means=torch.where(torch.arange(200)[:, None] % 3 == 0, behind, scene.means)), device)
 
 
-def test_two_uses_of_one_image_and_two_images_of_one_scene(device):
-    scene = random_scene(14).to(device)
+def test_two_uses_of_one_image_and_two_images_of_one_scene(device, drawn):
+    scene = drawn(random_scene(14)).to(device)
     means = scene.means.clone().requires_grad_()
     first = scene.with_leaves({"means": means}).render(rasterize)
     second = replace(scene.with_leaves({"means": means}), background=None).render(rasterize)

@@ -5,8 +5,16 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import IMAGES, decided, gradients, images, random_cotangents, relative
-from tests.raster.scenes import HARD_CASES, few, textured
+from tests.raster.agreement import (
+    IMAGES,
+    decided,
+    gradients,
+    images,
+    names_of,
+    random_cotangents,
+    relative,
+)
+from tests.raster.scenes import HARD_CASES, few, gaussians, textured
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
 from texgs.raster.types import OUTPUTS, Options
@@ -19,13 +27,13 @@ AMBIGUOUS = {"edge-on": {"normal"}}
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_images(device, name):
-    scene = HARD_CASES[name]()
-    found = images(scene.to(device).render(rasterize, OUTPUTS))
-    expected = images(scene.double().render(reference.rasterize, OUTPUTS))
+def test_images(device, drawn, name):
+    scene = drawn(HARD_CASES[name]())
+    found = images(scene.to(device).render(rasterize, scene.outputs))
+    expected = images(scene.double().render(reference.rasterize, scene.outputs))
     sure = decided(scene)
     assert sure.double().mean() > 0.85
-    for image in IMAGES:
+    for image in names_of(scene):
         assert found[image].isfinite().all()
         if image not in AMBIGUOUS.get(name, ()):
             error = (found[image].cpu() - expected[image]).abs()[sure]
@@ -34,10 +42,10 @@ def test_images(device, name):
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
-def test_gradients(device, name):
-    scene = HARD_CASES[name]()
+def test_gradients(device, drawn, name):
+    scene = drawn(HARD_CASES[name]())
     scene = replace(scene, shift=torch.zeros(len(scene.means), 2))
-    compared = set(IMAGES) - {"distortion"} - AMBIGUOUS.get(name, set())
+    compared = set(names_of(scene)) - {"distortion"} - AMBIGUOUS.get(name, set())
     cotangents = random_cotangents(scene, sorted(compared), decided(scene))
     found = gradients(rasterize, scene.to(device), cotangents)
     expected = gradients(reference.rasterize, scene.double(), cotangents)
@@ -78,11 +86,28 @@ def test_other_filters(device, name, options):
         assert float(error.max()) < TOLERANCE.get(name, 1e-3), image
 
 
-def test_every_surfel_at_one_pixel(device):
-    scene = few(n=3000, width=20, height=20)
+@pytest.mark.parametrize(
+    "name", ["far off the image", "smaller than a pixel", "larger than the image", "needles"]
+)
+def test_antialiased(device, name):
+    scene, options = gaussians(HARD_CASES[name]()), Options(antialiased=True)
+    found = images(scene.to(device).render(rasterize, scene.outputs, options))
+    expected = images(scene.double().render(reference.rasterize, scene.outputs, options))
+    sure = decided(scene, options)
+    for image in names_of(scene):
+        assert found[image].isfinite().all()
+        assert float((found[image].cpu() - expected[image]).abs()[sure].max()) < 1e-4, image
+    cotangents = random_cotangents(scene, ("color", "depth"), sure)
+    found = gradients(rasterize, scene.to(device), cotangents, options)
+    for tensor, gradient in gradients(reference.rasterize, scene.double(), cotangents, options).items():
+        assert relative(found[tensor], gradient) < 1e-3 or gradient.norm() < 1e-6, tensor
+
+
+def test_every_surfel_at_one_pixel(device, drawn):
+    scene = drawn(few(n=3000, width=20, height=20))
     scene = replace(scene, means=1e-3 * scene.means, opacities=0.01 * scene.opacities)
-    found = images(scene.to(device).render(rasterize, OUTPUTS))
-    expected = images(scene.double().render(reference.rasterize, OUTPUTS))
+    found = images(scene.to(device).render(rasterize, scene.outputs))
+    expected = images(scene.double().render(reference.rasterize, scene.outputs))
     error = (found["color"].cpu() - expected["color"]).abs()
     assert float(error.median()) < 1e-4  # depths differ by less than float32 resolves, so a few change places
     assert float(error.max()) < 0.05

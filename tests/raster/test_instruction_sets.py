@@ -8,7 +8,7 @@ from functools import cache
 import pytest
 import torch
 
-from tests.raster.scenes import random_scene, textured
+from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything
 from tests.raster.threads import with_threads
 from texgs.raster import native
@@ -24,6 +24,8 @@ SCENES = {
     "plain": random_scene(1, n=300),
     "textured": textured(random_scene(2)),
     "16 channels": random_scene(3, channels=16),
+    "gaussians": gaussians(random_scene(4, n=300)),
+    "gaussians, 7 channels": gaussians(random_scene(5, channels=7)),
 }
 
 

@@ -39,8 +39,8 @@ def test_a_million_surfels(device):
         assert native.peak_memory() < 4 * GB
 
 
-def test_memory_of_a_usual_scene():
-    scene = generated("opaque", 60_000, 800, 800)
+def test_memory_of_a_usual_scene(drawn):
+    scene = drawn(generated("opaque", 60_000, 800, 800))
     leaves = {name: leaf.requires_grad_() for name, leaf in scene.leaves().items()}
     native.release_memory()  # what larger views left
     native.peak_memory(reset=True)

@@ -1,15 +1,15 @@
-"""The definition against closed forms: one surfel."""
+"""The definition of surfels against closed forms: one of them."""
 
 import math
 
 import pytest
 import torch
 
-from tests.raster.closed_form import CENTRE, FOCAL, offsets, view
+from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
 from texgs.core.errors import ArgumentError
 from texgs.core.rotation import quats_to_matrices
-from texgs.raster.reference.projection import project
 from texgs.raster.reference.render import rasterize
+from texgs.raster.reference.surfels import project
 from texgs.raster.types import OUTPUTS, Options, Texture
 
 UNFILTERED = Options(low_pass=1e30)
@@ -90,7 +90,8 @@ def test_filter_sits_in_the_middle_of_the_projected_box(sigma):
     pixels = FOCAL * points[:, :2] / points[:, 2:] + torch.tensor(CENTRE).double()
     middle = (pixels.amin(0) + pixels.amax(0)) / 2
     names = ("means", "quats", "scales", "opacities", "viewmat", "K")
-    centre = project(*(tilted[name] for name in names), None, Options(filter_sigma=sigma)).centre[0]
+    options = Options(filter_sigma=sigma)
+    centre = project(*(tilted[name] for name in names), None, (WIDTH, HEIGHT), options).centre[0]
     torch.testing.assert_close(centre, middle, atol=1e-6, rtol=0)
 
 

@@ -38,6 +38,22 @@ CAMERA = {
 SIZE = {"width": WIDTH, "height": HEIGHT}
 
 
+@pytest.mark.parametrize("antialiased", [False, True])
+@pytest.mark.parametrize("output", ["color", "alpha", "depth", "distortion"])
+def test_gradients_of_every_output_of_gaussians(output, antialiased):
+    tensors = inputs()
+    thickness = 0.1 + torch.arange(N, dtype=torch.float64)[:, None] / 10
+    tensors["scales"] = torch.cat([tensors["scales"].detach(), thickness], 1).requires_grad_()
+    tensors["means"] = (tensors["means"].detach() + torch.tensor([0.0, 1.1, 0.0])).requires_grad_()
+    options = Options(alpha_min=0.0, transmittance_min=0.0, antialiased=antialiased, dilation=0.5)
+
+    def render(*values):
+        given = dict(zip(tensors, values, strict=True))
+        return getattr(rasterize(**CAMERA, **SIZE, **given, outputs=(output,), options=options), output)
+
+    torch.autograd.gradcheck(render, tuple(tensors.values()), fast_mode=True)
+
+
 @pytest.mark.parametrize("filter_sigma", [0.0, 1.0])
 @pytest.mark.parametrize("output", ["color", "alpha", "depth", "normal", "distortion"])
 def test_gradients_of_every_output(output, filter_sigma):

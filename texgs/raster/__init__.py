@@ -1,4 +1,4 @@
-"""Surfel rasterizer: one function renders, one splats back, on CPU and CUDA tensors alike."""
+"""Rasterizer of surfels and 3D Gaussians: one function renders, one splats back, on CPU and CUDA alike."""
 
 from texgs.raster.api import rasterize, splat
 from texgs.raster.types import Options, Render, Statistics, Texture

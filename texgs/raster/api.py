@@ -1,4 +1,4 @@
-"""Render surfels, and splat images back onto them."""
+"""Render surfels or 3D Gaussians, and splat images back onto them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from texgs.raster.types import DEFAULT_OPTIONS, Options, Render, Texture
 def rasterize(
     means: Tensor,  # [N, 3]
     quats: Tensor,  # [N, 4]
-    scales: Tensor,  # [N, 2]
+    scales: Tensor,  # [N, 2 or 3]
     opacities: Tensor,  # [N]
     viewmat: Tensor,  # [4, 4]
     K: Tensor,  # [3, 3]
@@ -30,30 +30,33 @@ def rasterize(
     outputs: Collection[str] = (),
     options: Options = DEFAULT_OPTIONS,
 ) -> Render:
-    """Composite surfels front to back into one view.
+    """Composite surfels, or 3D Gaussians, front to back into one view.
+
+    Two scales make a surfel: flat, textured if wanted, met by the ray of each pixel (Huang et al. 2024, 2DGS,
+    section 4). Three make a 3D Gaussian: an ellipse on screen with the depth of its mean (Kerbl et al. 2023,
+    3DGS, section 4), without texture and normal.
 
     Differentiable in means, quats, scales, opacities, shift, features and the texture's base, gain and
     texels; not in the camera or the background, which are refused where they require a gradient. Costs less
     where the geometry (the first four and `shift`) needs none. The result is the same, bit for bit, for any
-    number of threads. `texgs.raster.reference.rasterize` is the definition; the formulation is that of Huang
-    et al. 2024 (2DGS), section 4.
+    number of threads. `texgs.raster.reference.rasterize` is the definition.
 
     Args:
         means: [N, 3] world units.
         quats: [N, 4] wxyz, of any length but zero; the third axis is the normal.
-        scales: [N, 2] standard deviations along the first two axes, world units.
+        scales: [N, 2] standard deviations along the first two axes, or [N, 3] along all three, world units.
         opacities: [N] in [0, 1].
         viewmat: [4, 4] world to camera, OpenCV axes.
         K: [3, 3] intrinsics in pixels, without skew; pixel centres lie at +0.5.
         width: of the image in pixels, 1 to 2^20 - 16.
         height: of the image in pixels, likewise.
-        features: [N, C] one colour per surfel, C from 1 to 32; or else
+        features: [N, C] one colour per surfel or Gaussian, C from 1 to 32; or else
         texture: a colour that varies over the surfel, C = 3.
         background: [C], black by default.
-        shift: [N, 2] pixels added to the whole projection of a surfel. Pass zeros that require a gradient to
-            learn how the loss changes as surfels move on screen, as densification needs it.
+        shift: [N, 2] pixels added to the whole projection of a surfel or Gaussian. Pass zeros that require a
+            gradient to learn how the loss changes as they move on screen, as densification needs it.
         outputs: any of "depth", "median", "normal", "distortion", "statistics".
-        options: filter, thresholds and depth range.
+        options: filters, thresholds and depth range.
 
     Returns:
         Render with color [H, W, C], alpha [H, W], and the outputs asked for. Images are views of planar
@@ -87,7 +90,7 @@ def splat(
     *,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[Tensor, Tensor]:
-    """Splat an image back onto the surfels that show it: the adjoint of rendering features over black.
+    """Splat an image back onto what shows it: the adjoint of rendering features over black.
 
     Divided by the weights, the sums are the average of the image as each surfel sees it: votes of a
     segmentation, labels lifted from pixels to surfels. Not differentiable.
@@ -96,7 +99,7 @@ def splat(
         image: [H, W, C], C from 1 to 32.
         means: [N, 3] and the rest as in `rasterize`.
         quats: [N, 4].
-        scales: [N, 2].
+        scales: [N, 2] of surfels or [N, 3] of 3D Gaussians.
         opacities: [N].
         viewmat: [4, 4].
         K: [3, 3].

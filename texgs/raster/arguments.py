@@ -13,6 +13,7 @@ from texgs.core.errors import ArgumentError
 from texgs.raster import native
 from texgs.raster.atlas import check_texture
 from texgs.raster.inputs import SurfelTensors, View
+from texgs.raster.primitive import check_primitive
 from texgs.raster.types import OUTPUTS, Options, Texture
 
 MAX_CHANNELS = 32
@@ -22,7 +23,7 @@ BYTES_PER_SURFEL = 512  # records, footprints, sorting, a few tiles: what no sce
 AXES = {  # after N
     "means": "3",
     "quats": "4",
-    "scales": "2",
+    "scales": "2|3",  # surfels or 3D Gaussians
     "opacities": "",
     "shift": "2",
     "features": "C",
@@ -34,7 +35,7 @@ AXES = {  # after N
 def surfel_tensors(
     geometry: dict[str, Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
 ) -> SurfelTensors:
-    """All surfel tensors; `geometry` holds means, quats, scales and opacities.
+    """All tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities.
 
     Raises:
         ArgumentError, ShapeError, DeviceError: naming the argument at fault.
@@ -93,6 +94,7 @@ def view(
     wanted = frozenset(outputs)
     if unknown := sorted(wanted - set(OUTPUTS)):
         raise ArgumentError(f"outputs: expected any of {', '.join(OUTPUTS)}, got {unknown[0]!r}")
+    check_primitive(surfels.scales, texture is not None, wanted)
     try:
         width, height = (index(side) for side in size)
     except TypeError:

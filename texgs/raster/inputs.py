@@ -16,7 +16,7 @@ class SurfelTensors(NamedTuple):
 
     means: Tensor  # [N, 3]
     quats: Tensor  # [N, 4]
-    scales: Tensor  # [N, 2]
+    scales: Tensor  # [N, 2] of surfels, [N, 3] of 3D Gaussians
     opacities: Tensor  # [N]
     shift: Tensor | None = None  # [N, 2]
     features: Tensor | None = None  # [N, C], or a texture:
@@ -51,6 +51,7 @@ class View:
         o = self.options
         scene = native.Surfels(
             n=len(surfels.means),
+            axes=surfels.scales.shape[1],
             channels=surfels.channels,
             sizes=native.address(self.sizes),
             offsets=native.address(self.offsets),
@@ -62,6 +63,8 @@ class View:
             native.address(self.background),
             min(o.low_pass, 1e30),  # infinite: no filter; the library multiplies it by 0 at the centre
             o.filter_sigma,
+            o.dilation,
+            o.antialiased,
             o.alpha_min,
             o.transmittance_min,
             o.near,

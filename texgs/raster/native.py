@@ -22,7 +22,7 @@ from texgs.config.code import SUFFIX, built_from, library_sources
 from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
 
-ABI_VERSION = 2
+ABI_VERSION = 3
 FOLDER = Path(__file__).parent / "_native"
 CSRC = Path(__file__).parent / "csrc"
 INSTALL = "install texgs again (pip install .)"
@@ -39,6 +39,7 @@ class Surfels(Structure):
 
     _fields_ = [
         ("n", c_int64),
+        ("axes", c_int32),
         *_fields("means quats scales opacities shift", channels=c_int32),
         *_fields("features base gain texels sizes offsets", n_texels=c_int64),
     ]
@@ -55,8 +56,9 @@ class RenderOptions(Structure):
 
     _fields_ = [
         ("background", c_void_p),
-        *((name, c_float) for name in ("low_pass", "filter_sigma", "alpha_min", "transmittance_min")),
-        *((name, c_float) for name in ("near_plane", "far_plane")),
+        *((name, c_float) for name in ("low_pass", "filter_sigma", "dilation")),
+        ("antialiased", c_int32),
+        *((name, c_float) for name in ("alpha_min", "transmittance_min", "near_plane", "far_plane")),
     ]
 
 

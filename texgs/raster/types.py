@@ -11,10 +11,10 @@ OUTPUTS = ("depth", "median", "normal", "distortion", "statistics")
 
 @dataclass(frozen=True)
 class Options:
-    """How surfels become fragments; the defaults are those of 2DGS (Huang et al. 2024) and its successors.
+    """How surfels and 3D Gaussians become fragments.
 
-    The first two fields belong to the model: a scene fitted with one low-pass filter looks different under
-    another.
+    The defaults are those of 2DGS (Huang et al. 2024) and its successors, and of 3DGS (Kerbl et al. 2023).
+    The first four fields belong to the model: a scene fitted with one filter looks different under another.
     """
 
     low_pass: float = 2.0
@@ -23,14 +23,19 @@ class Options:
     filter_sigma: float = 0.0
     """Centre of the low-pass filter: the middle of the projected box of so many sigma. 0 is the projected
     mean, 1 what gsplat does, 3 what the release of 2DGS does."""
+    dilation: float = 0.3
+    """px^2 above 0, added to the variances of 3D Gaussians on screen: none looks narrower than a pixel."""
+    antialiased: bool = False
+    """Take as much from the opacity of 3D Gaussians as the dilation adds to their area on screen: thin ones
+    then look the same in images of every size (the antialiased variant of 3DGS, after Mip-Splatting)."""
     alpha_min: float = 1 / 255
     """Fragments with less alpha are skipped, and surfels with less opacity altogether. Above 0, except in the
     reference."""
     transmittance_min: float = 1e-4
     """A pixel ends before the fragment that would leave less light than this."""
     near: float = 0.2
-    """What is not farther than this camera z is skipped: surfels by their mean, fragments by their
-    intersection (the low-pass filter may still draw them). World units."""
+    """What is not farther than this camera z is skipped: surfels and 3D Gaussians by their mean, fragments of
+    surfels by their intersection (the low-pass filter may still draw them). World units."""
     far: float = 100.0
     """Camera z that maps to 1 in the normalised depth of the distortion; it clips nothing. World units."""
     check_finite: bool = False
@@ -89,7 +94,8 @@ class Render:
     alpha: Tensor
     """[H, W] in [0, 1], sum of the blending weights."""
     depth: Tensor | None = None
-    """[H, W] expected camera z of the ray-splat intersections, world units; 0 where alpha is 0."""
+    """[H, W] expected camera z of the ray-splat intersections, of 3D Gaussians that of their means, world
+    units; 0 where alpha is 0."""
     median: Tensor | None = None
     """[H, W] camera z of the last fragment that more than half of the light reaches; 0 where none is."""
     normal: Tensor | None = None

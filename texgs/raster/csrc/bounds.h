@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where on screen a surfel can reach alpha_min: an ellipse, a disc, their box and its tiles. Shared by every back end,
-// as maths.h is.
+// Where on screen a surfel or a Gaussian can reach alpha_min: an ellipse, a disc, their box and its tiles. Shared by
+// every back end, as maths.h is.
 //
-// Include it after a header that declares, besides what maths.h needs, fnma, min and max for F, and kTile.
+// Include it after a header that declares, besides what maths.h needs, fnma and log2 for F, and kTile.
 #pragma once
 #include <cmath>
 #include <cstdint>
 
-#include "maths.h"
-#include "texgs.h"
+#include "primitive.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -30,28 +29,22 @@ struct Bounds {
     Box<F> box;            // of ellipse and disc
 };
 
+// What of a projected primitive is on screen, and what its fragments have to look out for.
 template <class F>
-TEXGS_MATHS Mask<F> is_edge_on(const Projection<F>& r) {
-    return abs(r.scale) <= F(0.0f);
-}
+struct Outline {
+    Forms<F> forms;
+    F log2_opacity, cut;  // of rho: beyond it alpha is below alpha_min
+    Bounds<F> bounds;
+    Mask<F> visible;         // drawn at all
+    Mask<F> clipped;         // the near plane may cut it
+    Mask<F> never_filtered;  // the low-pass filter rules none of its fragments
+};
 
-// Forms of a surfel seen edge-on are so steep that rho_surfel never wins: it is its disc.
+// Whether something around (cx, cy) is drawn at all, where its box meets the image.
 template <class F>
-TEXGS_MATHS Forms<F> visible_forms(const Projection<F>& r, float low_pass) {
-    const Mask<F> edge_on = is_edge_on(r);
-    const F steep = F(1e4f) * sqrt(F(low_pass));
-    Forms<F> f = affine_forms(r);
-    f.ux = select(edge_on, steep, f.ux);
-    f.vy = select(edge_on, steep, f.vy);
-    f.zc = select(edge_on, r.p.z, f.zc);
-    return f;
-}
-
-// Whether a surfel around (cx, cy) is drawn at all, where its box meets the image.
-template <class F>
-TEXGS_MATHS Mask<F> is_visible(const Projection<F>& r, F opacity, F cx, F cy, const texgs_options& o) {
-    return (r.p.z > F(o.near_plane)) & (opacity >= F(o.alpha_min)) & (abs(cx) < F(1e7f)) & (abs(cy) < F(1e7f)) &
-           (r.inverse_norm < F(1e18f));
+TEXGS_MATHS Mask<F> is_visible(const Pose<F>& pose, F opacity, F cx, F cy, const texgs_options& o) {
+    return (pose.p.z > F(o.near_plane)) & (opacity >= F(o.alpha_min)) & (abs(cx) < F(1e7f)) & (abs(cy) < F(1e7f)) &
+           (pose.inverse_norm < F(1e18f));
 }
 
 // Fragments at this rho have alpha = alpha_min; a little more covers rounding.
@@ -60,18 +53,35 @@ TEXGS_MATHS F largest_rho(F log2_opacity, F log2_alpha_min) {
     return max(fma(2.0f * kLn2 * 1.0001f, log2_opacity - log2_alpha_min, 1e-3f), 1e-3f);
 }
 
+template <class F>
+TEXGS_MATHS Mask<F> is_edge_on(const SurfelProjection<F>& r) {
+    return abs(r.scale) <= F(0.0f);
+}
+
+// Forms of a surfel seen edge-on are so steep that rho_surfel never wins: it is its disc.
+template <class F>
+TEXGS_MATHS Forms<F> visible_forms(const SurfelProjection<F>& r, float low_pass) {
+    const Mask<F> edge_on = is_edge_on(r);
+    const F steep = F(1e4f) * sqrt(F(low_pass));
+    Forms<F> f = affine_forms(r);
+    f.ux = select(edge_on, steep, f.ux);
+    f.vy = select(edge_on, steep, f.vy);
+    f.zc = select(edge_on, r.pose.p.z, f.zc);
+    return f;
+}
+
 // Smallest depth of the plane where rho_surfel <= cut.
 template <class F>
-TEXGS_MATHS F nearest_depth(const Projection<F>& r, F cut) {
-    return r.p.z - sqrt(cut * fma(r.a.z, r.a.z, r.b.z * r.b.z));
+TEXGS_MATHS F nearest_depth(const SurfelProjection<F>& r, F cut) {
+    return r.pose.p.z - sqrt(cut * fma(r.a.z, r.a.z, r.b.z * r.b.z));
 }
 
 // Ellipse rho_surfel <= cut and disc rho_filter <= cut around (cx, cy), in pixels.
 template <class F>
-TEXGS_MATHS Bounds<F> bound(const Projection<F>& r, F cut, F cx, F cy, float low_pass) {
+TEXGS_MATHS Bounds<F> bound(const SurfelProjection<F>& r, F cut, F cx, F cy, float low_pass) {
     Bounds<F> b;
     const Conic<F> e = project_conic(cut, r.M);
-    b.behind = e.ww > F(-1e-3f) * r.p.z * r.p.z;
+    b.behind = e.ww > F(-1e-3f) * r.pose.p.z * r.pose.p.z;
     // A thin ellipse has an ill-conditioned inverse; growing it by a fraction of a pixel only adds candidates.
     const F grow = fma(1e-6f, e.xx + e.yy, 1e-2f);
     const Mask<F> disc_only = is_edge_on(r);
@@ -103,6 +113,39 @@ TEXGS_MATHS Mask<F> is_never_filtered(const Bounds<F>& b, const Forms<F>& f, con
     const F split = F(0.5f) * (xx - yy);
     const F steepest = F(0.5f) * (xx + yy) + sqrt(fma(split, split, xy * xy));
     return (b.disc < F(0.0f)) & (steepest < F(0.999f * o.low_pass));
+}
+
+template <class F>
+TEXGS_MATHS Outline<F> outline(const Surfel<F>& s, const SurfelProjection<F>& r, F cx, F cy, const texgs_options& o) {
+    Outline<F> out;
+    out.forms = visible_forms(r, o.low_pass);
+    out.log2_opacity = log2(max(s.opacity, 1e-30f));
+    out.cut = largest_rho(out.log2_opacity, log2(F(o.alpha_min)));
+    out.clipped = nearest_depth(r, out.cut) <= F(o.near_plane);
+    out.bounds = bound(r, out.cut, cx, cy, o.low_pass);
+    out.bounds.behind = out.bounds.behind & out.clipped;
+    out.visible = is_visible(r.pose, s.opacity, cx, cy, o);
+    out.never_filtered = is_never_filtered(out.bounds, out.forms, o);
+    return out;
+}
+
+// The ellipse rho <= cut alone, grown like that of a surfel.
+template <class F>
+TEXGS_MATHS Outline<F> outline(const Gaussian<F>&, const GaussianProjection<F>& r, F cx, F cy, const texgs_options& o) {
+    Outline<F> out;
+    out.forms = affine_forms(r);
+    out.log2_opacity = log2(max(r.opacity, 1e-30f));
+    out.cut = largest_rho(out.log2_opacity, log2(F(o.alpha_min)));
+    const F grow = fma(F(1e-6f) * out.cut, r.xx + r.yy, 1e-2f);
+    const F xx = fma(out.cut, r.xx, grow), yy = fma(out.cut, r.yy, grow), xy = out.cut * r.xy;
+    const F determinant = fma(out.cut * out.cut, r.area + r.growth, grow * (out.cut * (r.xx + r.yy) + grow));
+    const F inverse = F(1.0f) / determinant, sx = sqrt(xx), sy = sqrt(yy);
+    const Mask<F> none = F(0.0f) < F(0.0f), all = F(0.0f) <= F(0.0f);
+    out.bounds = {cx,           cy,    yy * inverse, -(xy * inverse),
+                  xx * inverse, -1.0f, none,         {cx - sx, cy - sy, cx + sx, cy + sy}};
+    out.visible = is_visible(r.pose, r.opacity, cx, cy, o) & (determinant < F(1e30f));
+    out.clipped = none, out.never_filtered = all;
+    return out;
 }
 
 // The plane p + u a + v b of one surfel, in the camera.

@@ -11,6 +11,8 @@ inline void check_surfels(const texgs_surfels& s) {
     require(!some || (s.means && s.quats && s.scales && s.opacities),
             "surfels: means, quats, scales and opacities are needed");
     require(!some || (s.features != nullptr) != (s.base != nullptr), "surfels: give either features or a texture");
+    require(s.axes == 2 || s.axes == 3, "surfels: expected 2 scales of surfels or 3 of 3D Gaussians");
+    require(s.axes == 2 || !s.base, "texture: 3D Gaussians have none");
     require(s.channels >= 1 && s.channels <= TEXGS_MAX_CHANNELS, "channels: expected 1 to 32");
     require(!s.base || (s.channels == 3 && s.gain && s.texels && s.sizes && s.offsets),
             "texture: base, gain, texels, sizes and offsets are needed, with 3 channels");
@@ -25,15 +27,17 @@ inline void check_camera(const texgs_camera& c) {
 inline void check_options(const texgs_options& o) {
     require(o.low_pass > 0, "low_pass: expected above 0");
     require(o.filter_sigma >= 0, "filter_sigma: expected 0 or more");
+    require(o.dilation > 0, "dilation: expected above 0");
     require(o.alpha_min > 0 && o.alpha_min < 1, "alpha_min: expected between 0 and 1, without them");
     require(o.transmittance_min >= 0 && o.transmittance_min < 1, "transmittance_min: expected 0 to 1, without 1");
     require(o.near_plane > 0 && o.far_plane > o.near_plane, "near, far: expected 0 < near < far");
 }
 
-inline void check_scene(const texgs_surfels& s, const texgs_camera& c, const texgs_options& o) {
+inline void check_scene(const texgs_surfels& s, const texgs_camera& c, const texgs_options& o, const texgs_image& i) {
     check_surfels(s);
     check_camera(c);
     check_options(o);
+    require(s.axes == 2 || !i.normal, "normal: 3D Gaussians have none");
 }
 
 // `with_normal`: whether the forward call rendered normals.

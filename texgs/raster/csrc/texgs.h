@@ -25,7 +25,7 @@
 extern "C" {
 #endif
 
-#define TEXGS_ABI_VERSION 2
+#define TEXGS_ABI_VERSION 3
 #ifndef TEXGS_SOURCES /* the build defines it, see texgs_sources() */
 #define TEXGS_SOURCES "unknown"
 #endif
@@ -39,12 +39,13 @@ typedef enum {
     TEXGS_DEVICE_ERROR = 3,
 } texgs_status;
 
-/* Surfels in world space. Exactly one of `features` and `base` is given. */
+/* Surfels or 3D Gaussians in world space. Exactly one of `features` and `base` is given. */
 typedef struct {
     int64_t n;
+    int32_t axes;           /* 2: surfels; 3: 3D Gaussians, which have neither texture nor normals */
     const float* means;     /* [N, 3] */
     const float* quats;     /* [N, 4] wxyz, any length but zero */
-    const float* scales;    /* [N, 2] standard deviations along the tangents, world units */
+    const float* scales;    /* [N, axes] standard deviations along the first axes, world units */
     const float* opacities; /* [N] in [0, 1] */
     const float* shift;     /* [N, 2] pixels added to the projection, or NULL */
     int32_t channels;       /* C, 1 to TEXGS_MAX_CHANNELS; 3 with a texture */
@@ -68,6 +69,8 @@ typedef struct {
     const float* background; /* [C] or NULL for black */
     float low_pass;          /* k in rho = min(rho_surfel, k |pixel - centre|^2) */
     float filter_sigma;      /* low-pass centre: middle of the projected box of so many sigma; 0: projected mean */
+    float dilation;          /* px^2 added to the variances of 3D Gaussians on screen; above 0 */
+    int32_t antialiased;     /* 3D Gaussians lose as much opacity as the dilation adds area; 0 or 1 */
     float alpha_min;         /* weaker fragments are skipped; above 0 */
     float transmittance_min; /* a pixel ends before the fragment that would leave less */
     float near_plane, far_plane;
@@ -76,7 +79,7 @@ typedef struct {
 typedef struct {
     float* color;      /* [C, H, W] with background */
     float* alpha;      /* [H, W] */
-    float* depth;      /* [H, W] expected ray-splat depth, 0 where alpha is 0 */
+    float* depth;      /* [H, W] expected depth of the fragments, 0 where alpha is 0 */
     float* median;     /* [H, W] depth of the last fragment that more than half of the light reaches, else 0 */
     float* normal;     /* [3, H, W] blended world normals, facing the camera */
     float* distortion; /* [H, W] sum over fragment pairs of w_i w_j (m_i - m_j)^2, m = NDC depth */

@@ -1,34 +1,25 @@
-"""The definition of the rasterizer: every surfel at every pixel, in plain torch.
+"""The definition of the rasterizer: every primitive at every pixel, in plain torch.
 
-Any floating-point type, every result differentiable by autograd, memory proportional to pixels times surfels.
+Any floating-point type, every result differentiable by autograd, memory proportional to pixels times
+primitives.
 The native rasterizers follow this file; tests compare them with it in float64.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from types import ModuleType
 
 import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.raster.reference.projection import Projected, project, visible_radii
+from texgs.raster.primitive import are_gaussians, check_primitive
+from texgs.raster.reference import gaussians, surfels
+from texgs.raster.reference.fragments import Fragments
 from texgs.raster.types import DEFAULT_OPTIONS, Options, Render, Statistics, Texture
 
-ALPHA_MAX = 0.99  # no fragment takes all light, so that those behind it still receive a gradient
 TEXTURE_SIGMA = 3.0  # a texture spans so many standard deviations to either side of the mean
-
-
-@dataclass(frozen=True)
-class Fragments:
-    """Each of the M surfels at each of the P pixels."""
-
-    u: Tensor  # [P, M] intersection in standard deviations along the first tangent
-    v: Tensor  # [P, M] ... the second
-    depth: Tensor  # [P, M] camera z; that of the mean where the low-pass filter wins
-    alpha: Tensor  # [P, M] 0 where skipped
 
 
 def rasterize(
@@ -48,16 +39,17 @@ def rasterize(
     outputs: Collection[str] = (),
     options: Options = DEFAULT_OPTIONS,
 ) -> Render:
-    """Composite surfels front to back into one view, as `texgs.raster.rasterize` does.
+    """Composite surfels or 3D Gaussians front to back into one view, as `texgs.raster.rasterize` does.
 
     Differentiable in every floating-point tensor, the camera included. `options.alpha_min = 0` and
     `options.transmittance_min = 0` switch the two thresholds off: what remains is smooth except where surfels
-    change order. Follows Huang et al. 2024 (2DGS), section 4.
+    change order. Follows Huang et al. 2024 (2DGS), section 4, and Kerbl et al. 2023 (3DGS), section 4.
 
     Args:
         means: [N, 3] world units.
         quats: [N, 4] wxyz, of any length but zero.
-        scales: [N, 2] standard deviations along the tangents, world units.
+        scales: [N, 2] standard deviations along the tangents of surfels, or [N, 3] along the axes of 3D
+            Gaussians, world units.
         opacities: [N] in [0, 1].
         viewmat: [4, 4] world to camera, OpenCV axes.
         K: [3, 3] intrinsics in pixels, without skew; pixel centres lie at +0.5.
@@ -72,12 +64,18 @@ def rasterize(
 
     Returns:
         Render with color [H, W, C], alpha [H, W], and the outputs asked for.
+
+    Raises:
+        ArgumentError: for colours of no kind or of two, and for textures or normals of 3D Gaussians.
+        ShapeError: for scales of another shape.
     """
-    surfels = project(means, quats, scales, opacities, viewmat, K, shift, options)
-    fragments = intersect(surfels, pixel_centres(width, height, means), options)
+    check_primitive(scales, texture is not None, outputs)
+    kind, size = kind_of(scales), (width, height)
+    projected = kind.project(means, quats, scales, opacities, viewmat, K, shift, size, options)
+    fragments = kind.intersect(projected, pixel_centres(width, height, means), options)
     weights, light = composite(fragments.alpha, options.transmittance_min)  # [P, M] each
     alpha = weights.sum(1)
-    color = blend(weights, fragments, surfels, features, texture)
+    color = blend(weights, fragments, projected.index, features, texture)
     if background is not None:
         color = color + (1 - alpha[:, None]) * background
 
@@ -87,12 +85,13 @@ def rasterize(
     if "median" in outputs:
         image["median"] = median_depth(weights, light, fragments.depth)
     if "normal" in outputs:
-        image["normal"] = weights @ surfels.normal
+        image["normal"] = weights @ projected.normal
     if "distortion" in outputs:
         image["distortion"] = distortion(weights, fragments.depth, options)
     contributions = None
     if "statistics" in outputs:
-        contributions = statistics(weights, surfels, len(means), (width, height), options)
+        radii = kind.visible_radii(projected, size, options)
+        contributions = statistics(weights, radii, projected.index, len(means))
     image = {name: x.reshape(height, width, *x.shape[1:]) for name, x in image.items()}
     return Render(image.pop("color"), image.pop("alpha"), **image, statistics=contributions)
 
@@ -108,17 +107,23 @@ def splat(
     *,
     options: Options = DEFAULT_OPTIONS,
 ) -> tuple[Tensor, Tensor]:
-    """Splat an image [H, W, C] back onto the surfels: the adjoint of rendering features over black.
+    """Splat an image [H, W, C] back onto what shows it: the adjoint of rendering features over black.
 
     Returns:
         Sums [N, C] over all pixels of blending weight times image, and the sums [N] of the weights.
     """
     height, width, channels = image.shape
-    surfels = project(means, quats, scales, opacities, viewmat, K, None, options)
-    fragments = intersect(surfels, pixel_centres(width, height, means), options)
+    kind = kind_of(scales)
+    projected = kind.project(means, quats, scales, opacities, viewmat, K, None, (width, height), options)
+    fragments = kind.intersect(projected, pixel_centres(width, height, means), options)
     weights, _ = composite(fragments.alpha, options.transmittance_min)
     sums = weights.T @ image.reshape(-1, channels)
-    return scatter(sums, surfels.index, len(means)), scatter(weights.sum(0), surfels.index, len(means))
+    return scatter(sums, projected.index, len(means)), scatter(weights.sum(0), projected.index, len(means))
+
+
+def kind_of(scales: Tensor) -> ModuleType:
+    """The module that defines what is drawn: `project`, `intersect` and `visible_radii`."""
+    return gaussians if are_gaussians(scales) else surfels
 
 
 def pixel_centres(width: int, height: int, like: Tensor) -> Tensor:
@@ -126,33 +131,6 @@ def pixel_centres(width: int, height: int, like: Tensor) -> Tensor:
     x = torch.arange(width, dtype=like.dtype, device=like.device) + 0.5
     y = torch.arange(height, dtype=like.dtype, device=like.device) + 0.5
     return torch.cartesian_prod(y, x).flip(1)
-
-
-def intersect(surfels: Projected, pixels: Tensor, options: Options) -> Fragments:
-    """Intersect the ray of each pixel [P, 2] with the plane of each surfel."""
-    Tu, Tv, Tw = surfels.homography.unbind(1)  # [M, 3] each
-    inverse = torch.stack(
-        [torch.linalg.cross(*pair) for pair in ((Tv, Tw), (Tw, Tu), (Tu, Tv))], 2
-    )  # [M, 3, 3]
-    homogeneous = torch.nn.functional.pad(pixels, (0, 1), value=1.0)  # [P, 3] (x, y, 1)
-    U, V, W = torch.einsum("mij,pj->ipm", inverse, homogeneous)  # [P, M] each
-    parallel = W.abs() < torch.finfo(W.dtype).tiny ** 0.25  # so that squares and gradients stay finite
-    W = torch.where(parallel, torch.ones_like(W), W)
-    u, v = U / W, V / W
-    z = surfels.depth + u * surfels.tangent_depth[:, 0] + v * surfels.tangent_depth[:, 1]
-
-    hit = (z > options.near) & ~parallel
-    rho_surfel = torch.where(hit, u**2 + v**2, math.inf)
-    rho_filter = options.low_pass * ((pixels[:, None, :] - surfels.centre) ** 2).sum(2)
-    filtered = rho_filter < rho_surfel
-    rho = torch.where(filtered, rho_filter, rho_surfel)
-    alpha = (surfels.opacity * torch.exp(-rho / 2)).clamp(max=ALPHA_MAX)
-    return Fragments(
-        u=u,
-        v=v,
-        depth=torch.where(filtered | ~hit, surfels.depth, z),
-        alpha=torch.where(alpha >= options.alpha_min, alpha, 0.0),
-    )
 
 
 def composite(alpha: Tensor, transmittance_min: float) -> tuple[Tensor, Tensor]:
@@ -165,15 +143,15 @@ def composite(alpha: Tensor, transmittance_min: float) -> tuple[Tensor, Tensor]:
 def blend(
     weights: Tensor,
     fragments: Fragments,
-    surfels: Projected,
+    index: Tensor,
     features: Tensor | None,
     texture: Texture | None,
 ) -> Tensor:
     """Sum over fragments [P, C] of weight times colour, without the background."""
     if features is not None and texture is None:
-        return weights @ features[surfels.index]
+        return weights @ features[index]
     if features is None and texture is not None:
-        return (weights[..., None] * texture_color(texture, surfels.index, fragments)).sum(1)
+        return (weights[..., None] * texture_color(texture, index, fragments)).sum(1)
     given = "both" if texture is not None else "neither"
     raise ArgumentError(f"rasterize: expected either features or texture, got {given}")
 
@@ -222,18 +200,15 @@ def distortion(weights: Tensor, depth: Tensor, options: Options) -> Tensor:
     return weights.sum(1) * (weights * m**2).sum(1) - (weights * m).sum(1) ** 2
 
 
-def statistics(
-    weights: Tensor, surfels: Projected, n: int, size: tuple[int, int], options: Options
-) -> Statistics:
-    """Contribution of each of the n surfels to an image of size (width, height)."""
+def statistics(weights: Tensor, radii: Tensor, index: Tensor, n: int) -> Statistics:
+    """Contribution of each of n primitives, from weights [P, M] and radii [M] of those at `index`."""
     weights = weights.detach()
     # the padding serves images without pixels
     highest = torch.nn.functional.pad(weights, (0, 0, 0, 1)).amax(0)
-    radii = visible_radii(surfels, *size, options).detach()
-    kept = (weights.sum(0), highest, (weights > 0).sum(0), radii)
-    return Statistics(*(scatter(x, surfels.index, n) for x in kept))
+    kept = (weights.sum(0), highest, (weights > 0).sum(0), radii.detach())
+    return Statistics(*(scatter(x, index, n) for x in kept))
 
 
 def scatter(values: Tensor, index: Tensor, n: int) -> Tensor:
-    """Values of the kept surfels at their places among all n; 0 elsewhere."""
+    """Values of what was kept at their places among all n; 0 elsewhere."""
     return values.new_zeros(n, *values.shape[1:]).index_copy(0, index, values)

@@ -60,7 +60,7 @@ int32_t texgs_require_memory(int64_t bytes) {
 int32_t texgs_forward(const texgs_surfels* surfels, const texgs_camera* camera, const texgs_options* options,
                       const texgs_image* image, texgs_frame** frame, void*) {
     return guarded([&] {
-        check_scene(*surfels, *camera, *options);
+        check_scene(*surfels, *camera, *options, *image);
         std::unique_ptr<texgs_frame> f = pool().take();
         f->bin(*surfels, *camera, *options, *image);
         if (image->color) f->render();

@@ -8,7 +8,7 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-constexpr int kCounts = 3;  // sum, largest, pixels; then the channels
+using Sums = ContributionSums;
 
 struct alignas(64) ContributeScratch {
     Chunk chunk;
@@ -19,13 +19,14 @@ struct alignas(64) ContributeScratch {
 };
 
 // Weights of the group's entries.
+template <class P>
 TEXGS_INLINE void blend_entries(ContributeScratch& s, const TilePixels& pixels, const Limits& limits) {
     for (int e = 0; e < s.group.entries; ++e)
         for (int part = 0; part < kParts; ++part) {
             const int place = s.group.surfel[e];
             const Pixels at = pixels.of(s.group.block[e], part);
             store(s.weight[e * kParts + part],
-                  evaluate(s.chunk.records[place], s.chunk.flags[place], at, limits).log2_alpha);
+                  evaluate<P>(s.chunk.records[place], s.chunk.flags[place], at, limits).log2_alpha);
         }
     for (int i = 0; i < s.group.entries * kParts; ++i) {
         const int pixel = s.group.block[i / kParts] * kBlockPixels + i % kParts * kLanes;
@@ -51,14 +52,15 @@ TEXGS_INLINE void add_surfel(const Raster& r, const ContributeScratch& s, int k)
         }
     float* slot = r.slots + int64_t(s.chunk.slots[s.group.place[k]]) * r.slot_stride;
     float only_lane[kLanes] = {largest(most)};  // its sum is the largest
-    vf line[16] = {sum_w, load(only_lane), pixels};
-    for (int c = kCounts; c < 16; ++c) line[c] = c < kCounts + N ? sums[c - kCounts] : vf(0.0f);
+    vf line[16];
+    line[Sums::kWeight] = sum_w, line[Sums::kLargest] = load(only_lane), line[Sums::kPixels] = pixels;
+    for (int c = 0; c < 16 - Sums::kChannels; ++c) line[Sums::kChannels + c] = c < N ? sums[c] : vf(0.0f);
     stream_sums(line, slot);
     stream_planes(s.group, begin, end, s.weight[0], s.image[N], r.contributions.channels - N, slot + 16);
 }
 
 void add_surfels(const Raster& r, const ContributeScratch& s) {
-    constexpr int most = 16 - kCounts;
+    constexpr int most = 16 - Sums::kChannels;
     const auto add = [&](auto first) {
         for (int k = 0; k < s.group.surfels; ++k) add_surfel<decltype(first)::value>(r, s, k);
     };
@@ -66,13 +68,9 @@ void add_surfels(const Raster& r, const ContributeScratch& s) {
     with_constant<most>(r.contributions.channels < most ? r.contributions.channels : most, add);
 }
 
-}  // namespace
-
-const int64_t kContributeScratch = sizeof(ContributeScratch);
-
-void contribute_tile(const Raster& r, int tile, void* scratch) {
+template <class P>
+void replay_tile(const Raster& r, int tile, ContributeScratch& s) {
     if (r.tile_begin[tile] == r.tile_begin[tile + 1]) return;
-    ContributeScratch& s = *static_cast<ContributeScratch*>(scratch);
     const TilePixels pixels(r, tile);
     const Limits limits(r.options);
     for (int c = 0; c < r.contributions.channels; ++c) {
@@ -90,7 +88,7 @@ void contribute_tile(const Raster& r, int tile, void* scratch) {
             next = s.group.fill(s.chunk, next, n, alive, [&](int place) {
                 stream_zeros(r.slots + int64_t(s.chunk.slots[place]) * r.slot_stride, r.slot_stride);
             });
-            blend_entries(s, pixels, limits);
+            blend_entries<P>(s, pixels, limits);
             add_surfels(r, s);
             alive = still_alive(r, s.transmittance, alive);
         }
@@ -99,20 +97,31 @@ void contribute_tile(const Raster& r, int tile, void* scratch) {
     stream_fence();
 }
 
+}  // namespace
+
+const int64_t kContributeScratch = sizeof(ContributeScratch);
+
+void contribute_tile(const Raster& r, int tile, void* scratch) {
+    with_primitive<vf>(r.surfels.axes, [&](auto primitive) {
+        replay_tile<typename decltype(primitive)::type>(r, tile, *static_cast<ContributeScratch*>(scratch));
+    });
+}
+
 void reduce_contributions(const Raster& r, int64_t begin, int64_t end) {
     const texgs_contributions& out = r.contributions;
     for (int64_t i = begin; i < end; ++i) {
-        alignas(64) float sums[kCounts + TEXGS_MAX_CHANNELS + 16] = {};
+        alignas(64) float sums[Sums::kChannels + TEXGS_MAX_CHANNELS + 16] = {};
         for (uint32_t slot = r.slot_begin[i]; slot < r.slot_begin[i + 1]; ++slot) {
             const float* from = r.slots + int64_t(slot) * r.slot_stride;
-            const float most = sums[1] > from[1] ? sums[1] : from[1];
+            const float most =
+                sums[Sums::kLargest] > from[Sums::kLargest] ? sums[Sums::kLargest] : from[Sums::kLargest];
             for (int k = 0; k < r.slot_stride; k += kLanes) store(sums + k, load(sums + k) + load(from + k));
-            sums[1] = most;
+            sums[Sums::kLargest] = most;
         }
-        if (out.weight_sum) out.weight_sum[i] = sums[0];
-        if (out.weight_max) out.weight_max[i] = sums[1];
-        if (out.pixels) out.pixels[i] = sums[2];
-        for (int c = 0; c < out.channels; ++c) out.sums[i * out.channels + c] = sums[kCounts + c];
+        if (out.weight_sum) out.weight_sum[i] = sums[Sums::kWeight];
+        if (out.weight_max) out.weight_max[i] = sums[Sums::kLargest];
+        if (out.pixels) out.pixels[i] = sums[Sums::kPixels];
+        for (int c = 0; c < out.channels; ++c) out.sums[i * out.channels + c] = sums[Sums::kChannels + c];
     }
 }
 

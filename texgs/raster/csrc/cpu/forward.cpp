@@ -31,13 +31,13 @@ struct Batch {
     int n;
 };
 
-template <bool Depth, bool Textured>
+template <class P, bool Depth, bool Textured>
 TEXGS_INLINE void intersect(ForwardScratch& s, Batch batch, Pixels at, const Limits& limits) {
     for (int j = 0; j < batch.n; ++j) {
         const Record& record = s.chunk.records[batch.list[j]];
-        const Fragments f = evaluate(record, s.chunk.flags[batch.list[j]], at, limits);
+        const Fragments f = evaluate<P>(record, s.chunk.flags[batch.list[j]], at, limits);
         store(s.weight[j], f.log2_alpha);
-        if constexpr (Depth) store(s.depth[j], depth_of(record, f));
+        if constexpr (Depth) store(s.depth[j], depth_of<P>(record, f));
         if constexpr (Textured) store(s.u[j], f.u), store(s.v[j], f.v);
     }
 }
@@ -148,12 +148,12 @@ TEXGS_INLINE void blend_texture(ForwardScratch& s, Batch batch, int pixel) {
 }
 
 // Blends the chunk's surfels into one vector of a block; returns whether any of its pixels goes on.
-template <bool Depth, bool Textured, int N>
+template <class P, bool Depth, bool Textured, int N>
 TEXGS_INLINE bool blend_part(const Raster& r, ForwardScratch& s, int n, Pixels at, int pixel, const Limits& limits) {
     bool alive = true;
     for (int j = 0; j < n && alive; j += kBatch) {
         const Batch batch{s.list + j, n - j < kBatch ? n - j : kBatch};
-        intersect<Depth, Textured>(s, batch, at, limits);
+        intersect<P, Depth, Textured>(s, batch, at, limits);
         [[maybe_unused]] const vf alpha_before = load(s.alpha + pixel);
         alive = weigh<N>(s, batch, pixel, limits);
         if constexpr (N == 0) blend_channels(r, s, batch, pixel);
@@ -164,7 +164,7 @@ TEXGS_INLINE bool blend_part(const Raster& r, ForwardScratch& s, int n, Pixels a
 }
 
 // N: the number of channels where the records hold them, else 0.
-template <bool Depth, bool Textured, int N>
+template <class P, bool Depth, bool Textured, int N>
 void blend_tile(const Raster& r, int tile, ForwardScratch& s) {
     const TilePixels pixels(r, tile);
     const Limits limits(r.options);
@@ -179,18 +179,18 @@ void blend_tile(const Raster& r, int tile, ForwardScratch& s) {
             const int members = list_block(s.chunk.masks, n, block, s.list);
             bool goes_on = false;
             for (int part = 0; part < kParts; ++part)
-                goes_on |= blend_part<Depth, Textured, N>(r, s, members, pixels.of(block, part),
-                                                          block * kBlockPixels + part * kLanes, limits);
+                goes_on |= blend_part<P, Depth, Textured, N>(r, s, members, pixels.of(block, part),
+                                                             block * kBlockPixels + part * kLanes, limits);
             if (!goes_on) alive &= ~(1u << block);
         }
     }
 }
 
-template <bool Depth, bool Textured>
+template <class P, bool Depth, bool Textured>
 void blend_tile_channels(const Raster& r, int tile, ForwardScratch& s) {
-    if (r.channels > kRecordChannels) return blend_tile<Depth, Textured, 0>(r, tile, s);
+    if (r.channels > kRecordChannels) return blend_tile<P, Depth, Textured, 0>(r, tile, s);
     with_constant<kRecordChannels>(r.channels,
-                                   [&](auto n) { blend_tile<Depth, Textured, decltype(n)::value>(r, tile, s); });
+                                   [&](auto n) { blend_tile<P, Depth, Textured, decltype(n)::value>(r, tile, s); });
 }
 
 // Composites over the background and writes the tile's part of the images.
@@ -231,11 +231,16 @@ void forward_tile(const Raster& r, int tile, void* scratch) {
     std::memset(s.alpha, 0, sizeof s.alpha);
     std::memset(s.color, 0, r.channels * sizeof s.color[0]);
     if (r.with_depth) std::memset(&s.z, 0, sizeof s.z);
-    const bool textured = r.surfels.base != nullptr;
-    if (r.with_depth && textured) blend_tile_channels<true, true>(r, tile, s);
-    if (r.with_depth && !textured) blend_tile_channels<true, false>(r, tile, s);
-    if (!r.with_depth && textured) blend_tile_channels<false, true>(r, tile, s);
-    if (!r.with_depth && !textured) blend_tile_channels<false, false>(r, tile, s);
+    with_primitive<vf>(r.surfels.axes, [&](auto primitive) {
+        using P = typename decltype(primitive)::type;
+        const bool textured = !P::kAffine && r.surfels.base;
+        if constexpr (!P::kAffine) {
+            if (r.with_depth && textured) blend_tile_channels<P, true, true>(r, tile, s);
+            if (!r.with_depth && textured) blend_tile_channels<P, false, true>(r, tile, s);
+        }
+        if (r.with_depth && !textured) blend_tile_channels<P, true, false>(r, tile, s);
+        if (!r.with_depth && !textured) blend_tile_channels<P, false, false>(r, tile, s);
+    });
     finish_color(r, tile, s);
     if (r.with_depth) finish_depth(r, tile, s);
 }

@@ -3,7 +3,7 @@
 // block.
 #pragma once
 #include "kernels.h"
-#include "surfels.h"
+#include "primitives.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -62,9 +62,9 @@ struct Limits {
           near_plane(o.near_plane) {}
 };
 
-// A surfel's fragments in a vector of pixels, before blending. Where they are and what alpha that gives are computed in
-// two loops, the second by alpha_of: in one, the chain of operations is too long for the machine to overlap enough of
-// them, and the whole takes 1.4 times as long.
+// A primitive's fragments in a vector of pixels, before blending. Where they are and what alpha that gives are computed
+// in two loops, the second by alpha_of: in one, the chain of operations is too long for the machine to overlap enough
+// of them, and the whole takes 1.4 times as long.
 struct Fragments {
     vf log2_alpha;  // before alpha_of
     vf u, v;        // intersection, standard deviations
@@ -72,8 +72,13 @@ struct Fragments {
     vf rho_surfel, rho;
 };
 
+template <class P>
 TEXGS_INLINE Fragments evaluate(const Record& s, unsigned flags, Pixels at, const Limits& limits) {
     const vf dx = at.x - vf(s.cx), dy = at.y - vf(s.cy);
+    if constexpr (P::kAffine) {
+        const vf u = fma(s.ux, dx, s.uy * dy), v = s.vy * dy, rho = fma(u, u, v * v);
+        return {fma(rho, -0.5f * kLog2E, s.log2_opacity), u, v, 1.0f, rho, rho};
+    }
     const vf W = fma(s.wx, dx, fma(s.wy, dy, 1.0f)), inverse_w = vf(1.0f) / W;
     const vf u = fma(s.ux, dx, fma(s.uy, dy, s.u)) * inverse_w;
     const vf v = fma(s.vx, dx, fma(s.vy, dy, s.v)) * inverse_w;
@@ -93,8 +98,11 @@ TEXGS_INLINE vf alpha_of(vf log2_alpha, const Limits& limits) {
     return zero_unless(alpha >= limits.alpha_min, alpha);
 }
 
-// Camera depth of fragments: of the ray-splat intersection, or of the surfel's mean where the low-pass filter rules.
+// Camera depth of fragments: of the ray-splat intersection, or of the mean where the low-pass filter rules, and of
+// Gaussians.
+template <class P>
 TEXGS_INLINE vf depth_of(const Record& s, const Fragments& f) {
+    if constexpr (P::kAffine) return s.zp;
     return select(f.rho_surfel <= f.rho, vf(s.zc) * f.inverse_w, s.zp);
 }
 

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "../slot.h"
 #include "../status.h"
 #include "parallel.h"
 
@@ -211,7 +212,7 @@ void texgs_frame::differentiate(const texgs_image& image, const texgs_image& gra
 
 void texgs_frame::geometry_gradients() {
     const bool depth = raster.grad.depth || raster.grad.median || raster.grad.distortion;
-    ensure_slots(raster.channels + (depth ? 13 : 11));
+    ensure_slots(first_channel(raster.surfels.axes, depth) + raster.channels);
     backward_pass([&](int tile, void* scratch, int) { kernels().backward(raster, tile, scratch); });
     reduce_pass([&](int64_t begin, int64_t end, int) { kernels().reduce(raster, begin, end); });
 }
@@ -234,7 +235,7 @@ void texgs_frame::feature_gradients() {
 void texgs_frame::contribute(const texgs_contributions& out) {
     raster.contributions = out;
     if (!out.image) raster.contributions.channels = 0;
-    ensure_slots(raster.contributions.channels + 3);
+    ensure_slots(ContributionSums::kChannels + raster.contributions.channels);
     backward_pass([&](int tile, void* scratch, int) { kernels().contribute(raster, tile, scratch); });
     reduce_pass([&](int64_t begin, int64_t end, int) { kernels().reduce_contributions(raster, begin, end); });
 }

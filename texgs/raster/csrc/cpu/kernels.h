@@ -17,9 +17,9 @@ constexpr int kBlockPixels = 16;  // 4 x 4
 constexpr int kRecordChannels = 3;
 constexpr int kSlotAlign = 16;  // floats in a cache line
 
-// A projected surfel as fragments need it (maths.h): one cache line.
+// A projected surfel or Gaussian as fragments need it (Forms, maths.h): one cache line.
 struct alignas(64) Record {
-    float cx, cy;                        // low-pass centre, pixels
+    float cx, cy;                        // low-pass centre, or mean, pixels
     float ux, uy, u, vx, vy, v, wx, wy;  // affine forms about it
     float log2_opacity;
     float zc, zp;                  // depth of the plane at the centre, depth of the mean
@@ -31,7 +31,8 @@ static_assert(sizeof(Record) == 64);
 constexpr uint16_t kClipped = 1;   // the near plane may cut it
 constexpr uint16_t kFiltered = 2;  // the low-pass filter may rule some of its fragments
 
-// Where a projected surfel is visible: an ellipse (centre, inverse covariance scaled to level 1) and a disc.
+// Where a projected surfel or Gaussian is visible: an ellipse (centre, inverse covariance scaled to level 1) and a
+// disc.
 struct alignas(64) Footprint {
     float ex, ey, xx, xy, yy;
     float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it

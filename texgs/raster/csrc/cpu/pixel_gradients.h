@@ -111,5 +111,30 @@ inline void prefetch_gradients(const Raster& r, int tile) {
     if (r.grad.depth) prefetch_planes(r, tile, r.image.depth, 1);
 }
 
+// Depth in normalised device coordinates, 0 at the near and 1 at the far plane, from `origin`.
+TEXGS_INLINE vf centred_ndc(const Raster& r, vf z, vf origin) {
+    const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
+    return fnma(vf(scale * r.options.near_plane), vf(1.0f) / z, scale) - origin;
+}
+
+// dL/dz of fragments, from distortion, median and expected depth.
+TEXGS_INLINE vf depth_gradient(const Raster& r, DepthGradients& d, int pixel, vf z, vf w) {
+    vf by_w = load(d.depth + pixel);
+    if (r.grad.distortion) {
+        const float scale = r.options.far_plane / (r.options.far_plane - r.options.near_plane);
+        const vf m = centred_ndc(r, z, load(d.origin + pixel));
+        const vf by_m = fma(vf(2.0f) * load(d.m2 + pixel), m, load(d.m + pixel));
+        by_w = fma(by_m, vf(scale * r.options.near_plane) / (z * z), by_w);
+    }
+    vf gz = w * by_w;
+    if (r.grad.median) {
+        // replayed bit for bit, the median is the fragment that brings alpha to where the forward pass took it
+        const vf before = load(d.alpha + pixel), after = before + w, stop = load(d.median_stop + pixel);
+        store(d.alpha + pixel, after);
+        gz = add_where((before < vf(0.5f)) & (after <= stop) & (after >= stop), gz, load(d.median + pixel));
+    }
+    return zero_unless(w > vf(0.0f), gz);
+}
+
 }  // namespace
 }  // namespace texgs::TEXGS_ISA

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projects surfels: record, footprint on screen, depth key. Many surfels at a time.
+// Projects surfels or Gaussians: record, footprint on screen, depth key. Many at a time.
 #include "isa.h"
 #include "kernels.h"
-#include "surfels.h"
+#include "primitives.h"
 
 #include "../bounds.h"
 
@@ -15,11 +15,12 @@ struct Lanes {
     float operator[](int i) const { return v[i]; }
 };
 
-// Low-pass centres in pixels.
+// Low-pass centres, or means, in pixels.
 struct Centres {
     vf x, y;
 };
-Centres shifted_centres(const Raster& r, const View& view, const Projection<vf>& q, int64_t first, int n) {
+template <class Projection>
+Centres shifted_centres(const Raster& r, const View& view, const Projection& q, int64_t first, int n) {
     Centres c{q.cx + vf(view.cx), q.cy + vf(view.cy)};
     if (r.surfels.shift) {
         c.x += load_strided(r.surfels.shift + 2 * first, 2, n);
@@ -52,9 +53,12 @@ BoundLanes bound_lanes(const Centres& c, const Bounds<vf>& b) {
     return {c.x, c.y, b.ex, b.ey, b.xx, b.xy, b.yy, b.disc, b.box.x0, b.box.y0, b.box.x1, b.box.y1};
 }
 
-Plane plane_of(const Projection<vf>& q, int i) {
+// The box of surfel i, which reaches behind the camera.
+Box<float> cut_box(const Raster& r, const View& view, const SurfelProjection<vf>& q, const Centres& c, vf cut, int i) {
     const auto lane = [&](const Vec3<vf>& a) -> Vec3<float> { return {Lanes(a.x)[i], Lanes(a.y)[i], Lanes(a.z)[i]}; };
-    return {lane(q.p), lane(q.a), lane(q.b)};
+    const Lanes x(c.x - q.cx), y(c.y - q.cy), cx(c.x), cy(c.y), cuts(cut);
+    const Plane plane{lane(q.pose.p), lane(q.a), lane(q.b)};
+    return clipped_box(view, x[i], y[i], plane, cx[i], cy[i], cuts[i], r.options);
 }
 
 void cull(const Raster& r, int64_t id) {
@@ -73,21 +77,17 @@ void store_normals(const Raster& r, const View& view, const Surfel<vf>& s, const
     }
 }
 
+template <class P>
 void project_lanes(const Raster& r, const View& view, float diagonal, int64_t first, int n) {
-    const texgs_options& o = r.options;
-    const Surfel<vf> s = load_surfels(r.surfels, first, n);
-    const Projection<vf> q = project(view, s, o.filter_sigma);
-    const Forms<vf> f = visible_forms(q, o.low_pass);
+    const P s = load_primitives<P>(r.surfels, first, n);
+    const auto q = project(view, s, r.camera, r.options);
     const Centres c = shifted_centres(r, view, q, first, n);
-    const vf log2_opacity = log2(max(s.opacity, 1e-30f));
-    const vf cut = largest_rho(log2_opacity, log2(vf(o.alpha_min)));
-    const vm clip = nearest_depth(q, cut) <= vf(o.near_plane);
-    const Bounds<vf> b = bound(q, cut, c.x, c.y, o.low_pass);
+    const Outline<vf> seen = outline(s, q, c.x, c.y, r.options);
 
-    const unsigned visible = bits(is_visible(q, s.opacity, c.x, c.y, o)), behind = bits(b.behind & clip);
-    const unsigned clipped = bits(clip), filtered = bits(clip | ~is_never_filtered(b, f, o));
-    const RecordLanes records = record_lanes(c, f, log2_opacity, q.p.z);
-    const BoundLanes bounds = bound_lanes(c, b);
+    const unsigned visible = bits(seen.visible), behind = bits(seen.bounds.behind), clipped = bits(seen.clipped);
+    const unsigned filtered = bits(seen.clipped | ~seen.never_filtered);
+    const RecordLanes records = record_lanes(c, seen.forms, seen.log2_opacity, q.pose.p.z);
+    const BoundLanes bounds = bound_lanes(c, seen.bounds);
     const float* colors = r.channels > kRecordChannels ? nullptr : surfel_channels(r);
     for (int i = 0; i < n; ++i) {
         const int64_t id = first + i;
@@ -101,16 +101,17 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
         const int flags = (clipped >> i & 1 ? kClipped : 0) | (filtered >> i & 1 ? kFiltered : 0);
         bounds.store(foot, i, static_cast<uint16_t>(flags));
         Box<float> box = bounds.box(i);
-        if (behind >> i & 1) {
-            const Lanes x(c.x - q.cx), y(c.y - q.cy), cuts(cut);
-            box = clipped_box(view, x[i], y[i], plane_of(q, i), foot.cx, foot.cy, cuts[i], o);
-            foot.xx = foot.xy = foot.yy = 0;  // no ellipse: every block of the box
-        }
+        if constexpr (!P::kAffine)
+            if (behind >> i & 1) {
+                box = cut_box(r, view, q, c, seen.cut, i);
+                foot.xx = foot.xy = foot.yy = 0;  // no ellipse: every block of the box
+            }
         if (!cover_tiles(box, r.tiles_x, r.tiles_y, foot)) continue;
         std::memcpy(&r.depth_keys[id], &record.zp, sizeof(float));  // positive floats sort as integers
         if (r.image.radii) r.image.radii[id] = half_extent(box, diagonal);
     }
-    if (r.with_normal) store_normals(r, view, s, q.axes, first, n);
+    if constexpr (!P::kAffine)
+        if (r.with_normal) store_normals(r, view, s, q.pose.axes, first, n);
 }
 
 }  // namespace
@@ -118,8 +119,11 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
 void project_surfels(const Raster& r, int64_t begin, int64_t end) {
     const View view = make_view(r.camera.viewmat, r.camera.K);
     const float diagonal = std::hypot(float(r.camera.width), float(r.camera.height));
-    for (int64_t i = begin; i < end; i += kLanes)
-        project_lanes(r, view, diagonal, i, static_cast<int>(end - i < kLanes ? end - i : kLanes));
+    with_primitive<vf>(r.surfels.axes, [&](auto primitive) {
+        for (int64_t i = begin; i < end; i += kLanes)
+            project_lanes<typename decltype(primitive)::type>(r, view, diagonal, i,
+                                                              static_cast<int>(end - i < kLanes ? end - i : kLanes));
+    });
 }
 
 }  // namespace texgs::TEXGS_ISA

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sums the slots of each surfel, in order, and carries the sums back through the projection. Many surfels at a time.
+// Sums the slots of each surfel or Gaussian, in order, and carries the sums back through the projection. Many at a
+// time.
 #include "isa.h"
 #include "kernels.h"
-#include "surfels.h"
+#include "primitives.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -36,49 +37,52 @@ void store_strided(float* p, int stride, int n, vf a) {
     for (int i = 0; i < n; ++i) p[stride * i] = lanes[i];
 }
 
-void store_gradients(const texgs_gradients& out, int64_t first, int n, const SurfelGradient<vf>& g) {
+// Which of n surfels are drawn: the others may have no finite projection.
+vm drawn(const Raster& r, int64_t first, int n) {
+    float visible[kLanes] = {};
+    for (int i = 0; i < n; ++i) visible[i] = r.slot_begin[first + i + 1] > r.slot_begin[first + i] ? 1.0f : 0.0f;
+    return load(visible) > vf(0.0f);
+}
+
+template <int N>
+void store_gradients(const texgs_gradients& out, int64_t first, int n, vm drawn, const Gradient<vf, N>& g) {
     const auto put = [&](float* to, int width, int k, vf value) {
-        if (to) store_strided(to + width * first + k, width, n, value);
+        if (to) store_strided(to + width * first + k, width, n, zero_unless(drawn, value));
     };
     put(out.means, 3, 0, g.mean.x), put(out.means, 3, 1, g.mean.y), put(out.means, 3, 2, g.mean.z);
     for (int k = 0; k < 4; ++k) put(out.quats, 4, k, g.quat[k]);
-    put(out.scales, 2, 0, g.su), put(out.scales, 2, 1, g.sv);
+    for (int k = 0; k < N; ++k) put(out.scales, N, k, g.scale[k]);
     put(out.opacities, 1, 0, g.opacity);
     put(out.shift, 2, 0, g.shift_x), put(out.shift, 2, 1, g.shift_y);
 }
 
-SurfelGradient<vf> visible_only(const Raster& r, int64_t first, int n, SurfelGradient<vf> g) {
-    float visible[kLanes] = {};  // a surfel that is not drawn may have no finite projection
-    for (int i = 0; i < n; ++i) visible[i] = r.slot_begin[first + i + 1] > r.slot_begin[first + i] ? 1.0f : 0.0f;
-    const vm keep = load(visible) > vf(0.0f);
-    vf* const all[] = {&g.mean.x,  &g.mean.y, &g.mean.z, &g.quat[0], &g.quat[1], &g.quat[2],
-                       &g.quat[3], &g.su,     &g.sv,     &g.opacity, &g.shift_x, &g.shift_y};
-    for (vf* x : all) *x = zero_unless(keep, *x);
-    return g;
-}
-
-}  // namespace
-
-void reduce_gradients(const Raster& r, int64_t begin, int64_t end) {
+template <class P>
+void reduce(const Raster& r, int64_t begin, int64_t end) {
     const View view = make_view(r.camera.viewmat, r.camera.K);
     const bool depth = r.grad.depth || r.grad.median || r.grad.distortion;
-    const int channels = depth ? 13 : 11, own = r.surfels.channels;
+    const int channels = depth ? P::Sums::kAll : P::Sums::kGeometry, own = r.surfels.channels;
     Rows s;
     for (int64_t first = begin; first < end; first += kLanes) {
         const int n = static_cast<int>(end - first < kLanes ? end - first : kLanes);
         s.gather(r, first, n);
         for (int c = 0; r.out.features && c < own; ++c)
             store_strided(r.out.features + own * first + c, own, n, s[channels + c]);
-        Moments<vf> m{s[0], s[1], s[2], s[3],  s[4], s[5], s[6],
-                      s[7], s[8], s[9], s[10], 0.0f, 0.0f, {0.0f, 0.0f, 0.0f}};
-        if (depth) m.zc = s[11], m.zp = s[12];
-        const int normal = channels + own;
-        if (r.with_normal) m.normal = {s[normal], s[normal + 1], s[normal + 2]};
-        const Surfel<vf> surfel = load_surfels(r.surfels, first, n);
-        const Projection<vf> q = project(view, surfel, r.options.filter_sigma);
-        store_gradients(r.out, first, n,
-                        visible_only(r, first, n, project_backward(view, surfel, q, m, r.options.low_pass)));
+        const P primitive = load_primitives<P>(r.surfels, first, n);
+        auto m = read_moments(primitive, s, depth);
+        if constexpr (!P::kAffine) {
+            const int normal = channels + own;
+            if (r.with_normal) m.normal = {s[normal], s[normal + 1], s[normal + 2]};
+        }
+        const auto q = project(view, primitive, r.camera, r.options);
+        store_gradients(r.out, first, n, drawn(r, first, n), project_backward(view, primitive, q, m, r.options));
     }
+}
+
+}  // namespace
+
+void reduce_gradients(const Raster& r, int64_t begin, int64_t end) {
+    with_primitive<vf>(r.surfels.axes,
+                       [&](auto primitive) { reduce<typename decltype(primitive)::type>(r, begin, end); });
 }
 
 }  // namespace texgs::TEXGS_ISA

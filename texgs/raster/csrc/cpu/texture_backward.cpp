@@ -32,7 +32,7 @@ TEXGS_INLINE void evaluate_entries(TextureScratch& s, const TilePixels& pixels, 
         for (int part = 0; part < kParts; ++part) {
             const int place = s.group.surfel[e], i = e * kParts + part;
             const Pixels pixel = pixels.of(s.group.block[e], part);
-            const Fragments f = evaluate(s.chunk.records[place], s.chunk.flags[place], pixel, limits);
+            const Fragments f = evaluate<Surfel<vf>>(s.chunk.records[place], s.chunk.flags[place], pixel, limits);
             const TexelCoordinates at = texel_coordinates(s.textures.of[place], f.u, f.v);
             store(s.alpha[i], f.log2_alpha);
             store(s.x[i], at.x), store(s.y[i], at.y);

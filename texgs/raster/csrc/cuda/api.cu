@@ -33,7 +33,7 @@ int32_t texgs_require_memory(int64_t bytes) {
 int32_t texgs_forward(const texgs_surfels* surfels, const texgs_camera* camera, const texgs_options* options,
                       const texgs_image* image, texgs_frame** frame, void* on) {
     return guarded([&] {
-        check_scene(*surfels, *camera, *options);
+        check_scene(*surfels, *camera, *options, *image);
         const auto stream = static_cast<cudaStream_t>(on);
         const int device = device_of(camera->viewmat);
         const DeviceScope scope(device);

@@ -11,11 +11,10 @@
 namespace texgs::cuda {
 namespace {
 
-// What a slot holds: Moments as far as they are wanted, channels, gradient of the gain.
-template <int C, bool Geometry, bool Depth, bool Textured>
+// What a slot holds: moments as far as they are wanted, channels, gradient of the gain.
+template <class P, int C, bool Geometry, bool Depth, bool Textured>
 struct Layout {
-    static constexpr int kGeometry = Geometry ? kGeometrySums : 0;
-    static constexpr int kChannels = kGeometry + (Depth ? kDepthSums : 0);
+    static constexpr int kChannels = !Geometry ? 0 : Depth ? P::Sums::kAll : P::Sums::kGeometry;
     static constexpr int kGain = kChannels + C;
     static constexpr int kWidth = kGain + (Textured ? 1 : 0);
 };
@@ -43,36 +42,50 @@ __device__ float weigh_texture(const TextureTable& t, const Fragment& f, const G
     return by_gain;
 }
 
-// Adds a fragment to the moments of its surfel (maths.h); e = alpha dL/dalpha, gz = dL/d(depth).
+// Adds a fragment to the moments of its surfel (surfel.h); e = alpha dL/dalpha, gz = dL/d(depth).
 template <bool Depth, int Width>
-__device__ __forceinline__ void add_geometry(const Record& record, const Fragment& f, float w, float e, float gz,
-                                             const Slope& slope, float (&sums)[Width]) {
+__device__ __forceinline__ void add_geometry(Type<Surfel<float>>, const Record& record, const Fragment& f, float w,
+                                             float e, float gz, const Slope& slope, float (&sums)[Width]) {
+    using K = SurfelSums;
     float gU = w * f.r * slope.u, gV = w * f.r * slope.v, gW = -fma(gU, f.u, gV * f.v);
     if (f.filtered) {
-        sums[8] = fma(e, f.dx, sums[8]);
-        sums[9] = fma(e, f.dy, sums[9]);
+        sums[K::kDiscDx] = fma(e, f.dx, sums[K::kDiscDx]);
+        sums[K::kDiscDy] = fma(e, f.dy, sums[K::kDiscDy]);
     } else {
         const float t = e * f.r;
         gU = fma(-t, f.u, gU), gV = fma(-t, f.v, gV), gW = fma(t, f.rho, gW);
     }
     if constexpr (Depth) {
         const float by_zc = f.filtered ? 0.0f : gz * f.r;
-        gW = fma(-by_zc, depth_of(record, f), gW);
-        sums[kGeometrySums] += by_zc;
-        sums[kGeometrySums + 1] += f.filtered ? gz : 0.0f;
+        gW = fma(-by_zc, depth_of<Surfel<float>>(record, f), gW);
+        sums[K::kZc] += by_zc;
+        sums[K::kZp] += f.filtered ? gz : 0.0f;
     }
-    sums[0] = fma(gU, f.dx, sums[0]), sums[1] = fma(gU, f.dy, sums[1]), sums[2] += gU;
-    sums[3] = fma(gV, f.dx, sums[3]), sums[4] = fma(gV, f.dy, sums[4]), sums[5] += gV;
-    sums[6] = fma(gW, f.dx, sums[6]), sums[7] = fma(gW, f.dy, sums[7]);
-    sums[10] += e;
+    sums[K::kUdx] = fma(gU, f.dx, sums[K::kUdx]), sums[K::kUdy] = fma(gU, f.dy, sums[K::kUdy]), sums[K::kU] += gU;
+    sums[K::kVdx] = fma(gV, f.dx, sums[K::kVdx]), sums[K::kVdy] = fma(gV, f.dy, sums[K::kVdy]), sums[K::kV] += gV;
+    sums[K::kWdx] = fma(gW, f.dx, sums[K::kWdx]), sums[K::kWdy] = fma(gW, f.dy, sums[K::kWdy]);
+    sums[K::kE] += e;
+}
+
+// Of its Gaussian (gaussian.h).
+template <bool Depth, int Width>
+__device__ __forceinline__ void add_geometry(Type<Gaussian<float>>, const Record&, const Fragment& f, float, float e,
+                                             float gz, const Slope&, float (&sums)[Width]) {
+    using K = GaussianSums;
+    const float by_u = e * f.u, by_v = e * f.v;
+    sums[K::kE] += e, sums[K::kU] += by_u, sums[K::kV] += by_v;
+    sums[K::kUU] = fma(by_u, f.u, sums[K::kUU]);
+    sums[K::kUV] = fma(by_u, f.v, sums[K::kUV]);
+    sums[K::kVV] = fma(by_v, f.v, sums[K::kVV]);
+    if constexpr (Depth) sums[K::kZ] += gz;
 }
 
 // A fragment of weight w that `before` of the light reaches.
-template <int C, bool Geometry, bool Depth, bool Textured, class Chunk>
+template <class P, int C, bool Geometry, bool Depth, bool Textured, class Chunk>
 __device__ __forceinline__ void add_fragment(const Raster& r, const Chunk& chunk, int place, const Fragment& f, float w,
                                              float before, PixelGradient<C, Depth>& g,
-                                             float (&sums)[Layout<C, Geometry, Depth, Textured>::kWidth]) {
-    using L = Layout<C, Geometry, Depth, Textured>;
+                                             float (&sums)[Layout<P, C, Geometry, Depth, Textured>::kWidth]) {
+    using L = Layout<P, C, Geometry, Depth, Textured>;
     const Record& record = chunk.records[place];
     float q = g.constant;
     Slope slope;
@@ -84,18 +97,18 @@ __device__ __forceinline__ void add_fragment(const Raster& r, const Chunk& chunk
 #pragma unroll
         for (int c = 0; c < C; ++c) q = fma(g.channels[c], channels[c], q);
         float gz = 0.0f;
-        if constexpr (Depth) gz = g.weigh_depth(r.options, depth_of(record, f), w, record.id, q);
+        if constexpr (Depth) gz = g.weigh_depth(r.options, depth_of<P>(record, f), w, record.id, q);
         g.remaining = fma(-w, q, g.remaining);
         // The clamp of alpha blocks the gradient.
         const float by_alpha = fma(before, q, -g.remaining * reciprocal(1.0f - f.alpha));
         const float e = f.alpha < kLargestAlpha ? f.alpha * by_alpha : 0.0f;
-        add_geometry<Depth>(record, f, w, e, gz, slope, sums);
+        add_geometry<Depth>(Type<P>{}, record, f, w, e, gz, slope, sums);
     }
 }
 
-template <int C, bool Geometry, bool Depth, bool Textured>
+template <class P, int C, bool Geometry, bool Depth, bool Textured>
 __global__ __launch_bounds__(kThreads, 1) void backward_kernel(const Raster r) {
-    using L = Layout<C, Geometry, Depth, Textured>;
+    using L = Layout<P, C, Geometry, Depth, Textured>;
     __shared__ Chunk<kSlotChunk, C, Textured> chunk;
     __shared__ SlotSums<L::kWidth> sums;
     const int tile = blockIdx.x;
@@ -114,11 +127,11 @@ __global__ __launch_bounds__(kThreads, 1) void backward_kernel(const Raster r) {
 #pragma unroll
         for (int p = 0; p < kPixels; ++p) {
             if (!(chunk.masks[place] & at.blocks[p])) continue;
-            const Fragment f = evaluate(chunk.records[place], at.x(), at.y(p), r.options);
+            const Fragment f = evaluate<P>(chunk.records[place], at.x(), at.y(p), r.options);
             const float before = transmittance[p], w = blend(f.alpha, limit, transmittance[p]);
             if (!(w > 0.0f)) continue;
             seen = true;
-            add_fragment<C, Geometry, Depth, Textured>(r, chunk, place, f, w, before, g[p], v);
+            add_fragment<P, C, Geometry, Depth, Textured>(r, chunk, place, f, w, before, g[p], v);
         }
         if (__any_sync(kAllLanes, seen)) sums.add(place, v);
     };
@@ -129,25 +142,29 @@ __global__ __launch_bounds__(kThreads, 1) void backward_kernel(const Raster r) {
 }
 
 // Calls visit(kernel, width of its slots) for the kernel that serves the gradients in `r`.
-template <int C, bool Textured, class Visit>
+template <class P, int C, bool Textured, class Visit>
 void choose(const Raster& r, Visit visit) {
     const bool depth = r.grad.depth || r.grad.median || r.grad.distortion;
     if (!r.geometry)
-        visit(backward_kernel<C, false, false, Textured>, Layout<C, false, false, Textured>::kWidth);
+        visit(backward_kernel<P, C, false, false, Textured>, Layout<P, C, false, false, Textured>::kWidth);
     else if (depth)
-        visit(backward_kernel<C, true, true, Textured>, Layout<C, true, true, Textured>::kWidth);
+        visit(backward_kernel<P, C, true, true, Textured>, Layout<P, C, true, true, Textured>::kWidth);
     else
-        visit(backward_kernel<C, true, false, Textured>, Layout<C, true, false, Textured>::kWidth);
+        visit(backward_kernel<P, C, true, false, Textured>, Layout<P, C, true, false, Textured>::kWidth);
 }
 
 template <class Visit>
 void choose(const Raster& r, Visit visit) {
     const int channels = r.surfels.channels + (r.geometry && r.grad.normal ? 3 : 0);
-    if (r.surfels.base) return channels <= 3 ? choose<3, true>(r, visit) : choose<6, true>(r, visit);
-    if (channels <= 3) return choose<3, false>(r, visit);
-    if (channels <= 6) return choose<6, false>(r, visit);
-    if (channels <= 16) return choose<16, false>(r, visit);
-    choose<TEXGS_MAX_CHANNELS + 3, false>(r, visit);
+    with_primitive<float>(r.surfels.axes, [&](auto primitive) {
+        using P = typename decltype(primitive)::type;
+        if constexpr (!P::kAffine)
+            if (r.surfels.base) return channels <= 3 ? choose<P, 3, true>(r, visit) : choose<P, 6, true>(r, visit);
+        if (channels <= 3) return choose<P, 3, false>(r, visit);
+        if (channels <= 6) return choose<P, 6, false>(r, visit);
+        if (channels <= 16) return choose<P, 16, false>(r, visit);
+        choose<P, TEXGS_MAX_CHANNELS + 3, false>(r, visit);
+    });
 }
 
 }  // namespace

@@ -6,12 +6,11 @@
 namespace texgs::cuda {
 namespace {
 
-constexpr int kCounts = 3;  // sum, largest, pixels; then the channels
-constexpr int kLargest = 1;
+using Sums = ContributionSums;
 
-template <int C>
+template <class P, int C>
 __global__ __launch_bounds__(kThreads, 1) void contribute_kernel(const Raster r) {
-    constexpr int kWidth = kCounts + C;
+    constexpr int kWidth = Sums::kChannels + C;
     __shared__ Chunk<kSlotChunk, 1, false> chunk;
     __shared__ SlotSums<kWidth> sums;
     const int tile = blockIdx.x;
@@ -32,31 +31,34 @@ __global__ __launch_bounds__(kThreads, 1) void contribute_kernel(const Raster r)
 #pragma unroll
         for (int p = 0; p < kPixels; ++p) {
             if (!(chunk.masks[place] & at.blocks[p])) continue;
-            const Fragment f = evaluate(chunk.records[place], at.x(), at.y(p), r.options);
+            const Fragment f = evaluate<P>(chunk.records[place], at.x(), at.y(p), r.options);
             const float w = blend(f.alpha, limit, transmittance[p]);
             if (!(w > 0.0f)) continue;
             most = fmaxf(most, w);
-            v[0] += w, v[2] += 1.0f;
+            v[Sums::kWeight] += w, v[Sums::kPixels] += 1.0f;
 #pragma unroll
-            for (int c = 0; c < C; ++c) v[kCounts + c] = fma(w, image[p][c], v[kCounts + c]);
+            for (int c = 0; c < C; ++c) v[Sums::kChannels + c] = fma(w, image[p][c], v[Sums::kChannels + c]);
         }
         most = warp_max(most);
         if (most == 0.0f) return;
-        if (lane_index() == 0) v[kLargest] = most;  // its sum is the largest
+        if (lane_index() == 0) v[Sums::kLargest] = most;  // its sum is the largest
         sums.add(place, v);
     };
     for_pairs(
-        r, tile, 0, kLargest, at, chunk, sums, [&] { return transmittance[0] >= limit || transmittance[1] >= limit; },
-        visit);
+        r, tile, 0, Sums::kLargest, at, chunk, sums,
+        [&] { return transmittance[0] >= limit || transmittance[1] >= limit; }, visit);
 }
 
 // Calls visit(kernel, width of its slots).
 template <class Visit>
 void choose(const Raster& r, Visit visit) {
-    const int channels = r.contributions.channels;
-    if (channels <= 1) return visit(contribute_kernel<1>, kCounts + 1);
-    if (channels <= 13) return visit(contribute_kernel<13>, kCounts + 13);
-    visit(contribute_kernel<TEXGS_MAX_CHANNELS>, kCounts + TEXGS_MAX_CHANNELS);
+    with_primitive<float>(r.surfels.axes, [&](auto primitive) {
+        using P = typename decltype(primitive)::type;
+        const int channels = r.contributions.channels;
+        if (channels <= 1) return visit(contribute_kernel<P, 1>, Sums::kChannels + 1);
+        if (channels <= 13) return visit(contribute_kernel<P, 13>, Sums::kChannels + 13);
+        visit(contribute_kernel<P, TEXGS_MAX_CHANNELS>, Sums::kChannels + TEXGS_MAX_CHANNELS);
+    });
 }
 
 }  // namespace
@@ -69,7 +71,7 @@ int contribute_slot_width(const Raster& r) {
 
 void contribute(const Raster& r, cudaStream_t stream) {
     choose(r, [&](auto kernel, int) { launch(kernel, r.tiles, kThreads, stream, r); });
-    sum_slots(r, kLargest, stream);
+    sum_slots(r, Sums::kLargest, stream);
     surfel_contributions(r, stream);
 }
 

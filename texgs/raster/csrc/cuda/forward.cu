@@ -22,9 +22,9 @@ struct Pixel {
 };
 
 // Moments of the distortion are taken about the first fragment: no cancellation.
-template <class Pixel>
+template <class P, class Pixel>
 __device__ void blend_depth(const texgs_options& o, const Record& record, const Fragment& f, float w, Pixel& pixel) {
-    const float z = depth_of(record, f);
+    const float z = depth_of<P>(record, f);
     const NormalizedDepth normalized(o, z);
     if (pixel.alpha == 0.0f) pixel.z.origin = normalized.m;
     const float m = normalized.m - pixel.z.origin;
@@ -42,7 +42,7 @@ __device__ void blend_texture(const TextureTable& t, const Fragment& f, float w,
 }
 
 // Blends the chunk's surfels into the thread's pixels; returns whether any of them goes on.
-template <int C, bool Depth, bool Textured>
+template <class P, int C, bool Depth, bool Textured>
 __device__ bool blend_chunk(const Raster& r, const Chunk<kSize, C, Textured>& chunk, int n, const Place& place,
                             Pixel<C, Depth> (&pixels)[kPixels]) {
     const float limit = r.options.transmittance_min;
@@ -55,14 +55,14 @@ __device__ bool blend_chunk(const Raster& r, const Chunk<kSize, C, Textured>& ch
             for (int p = 0; p < kPixels; ++p) {
                 if (!(mask & place.blocks[p])) continue;
                 Pixel<C, Depth>& pixel = pixels[p];
-                const Fragment f = evaluate(record, place.x(), place.y(p), r.options);
+                const Fragment f = evaluate<P>(record, place.x(), place.y(p), r.options);
                 const float w = blend(f.alpha, limit, pixel.transmittance);
                 if (!(w > 0.0f)) continue;
                 const float* channels = chunk.channels + i * C;
 #pragma unroll
                 for (int c = 0; c < C; ++c) pixel.color[c] = fma(w, channels[c], pixel.color[c]);
                 if constexpr (Textured) blend_texture(chunk.textures[i], f, w, pixel.color);
-                if constexpr (Depth) blend_depth(r.options, record, f, w, pixel);
+                if constexpr (Depth) blend_depth<P>(r.options, record, f, w, pixel);
                 pixel.alpha += w;
             }
         }
@@ -132,7 +132,7 @@ __device__ void finish_depth(const Raster& r, const Pixel<C, Depth>& pixel, int6
     }
 }
 
-template <int C, bool Depth, bool Textured>
+template <class P, int C, bool Depth, bool Textured>
 __global__ __launch_bounds__(kThreads, 1) void forward_kernel(const Raster r) {
     __shared__ Chunk<kSize, C, Textured> chunk;
     const int tile = blockIdx.x;
@@ -151,7 +151,7 @@ __global__ __launch_bounds__(kThreads, 1) void forward_kernel(const Raster r) {
         const int n = remaining.stage(r, tile, used, chunk);
         __syncthreads();
         // Not the thread's but the warp's: all lanes take part in votes.
-        if (__any_sync(kAllLanes, alive)) alive = blend_chunk<C, Depth, Textured>(r, chunk, n, place, pixels);
+        if (__any_sync(kAllLanes, alive)) alive = blend_chunk<P, C, Depth, Textured>(r, chunk, n, place, pixels);
     }
 #pragma unroll
     for (int p = 0; p < kPixels; ++p) {
@@ -161,15 +161,15 @@ __global__ __launch_bounds__(kThreads, 1) void forward_kernel(const Raster r) {
     }
 }
 
-template <int C>
+template <class P, int C>
 void forward_with(const Raster& r, cudaStream_t stream) {
-    if constexpr (C <= 6) {
+    if constexpr (C <= 6 && !P::kAffine) {
         if (r.surfels.base) {
-            const auto kernel = r.with_depth ? forward_kernel<C, true, true> : forward_kernel<C, false, true>;
+            const auto kernel = r.with_depth ? forward_kernel<P, C, true, true> : forward_kernel<P, C, false, true>;
             return launch(kernel, r.tiles, kThreads, stream, r);
         }
     }
-    const auto kernel = r.with_depth ? forward_kernel<C, true, false> : forward_kernel<C, false, false>;
+    const auto kernel = r.with_depth ? forward_kernel<P, C, true, false> : forward_kernel<P, C, false, false>;
     launch(kernel, r.tiles, kThreads, stream, r);
 }
 
@@ -177,11 +177,14 @@ void forward_with(const Raster& r, cudaStream_t stream) {
 
 // Compiled for colours, colours and normals, a material, and all that there may be.
 void forward(const Raster& r, cudaStream_t stream) {
-    const int channels = r.surfels.channels + (r.with_normal ? 3 : 0);
-    if (channels <= 3) return forward_with<3>(r, stream);
-    if (channels <= 6) return forward_with<6>(r, stream);
-    if (channels <= 16) return forward_with<16>(r, stream);
-    forward_with<TEXGS_MAX_CHANNELS + 3>(r, stream);
+    with_primitive<float>(r.surfels.axes, [&](auto primitive) {
+        using P = typename decltype(primitive)::type;
+        const int channels = r.surfels.channels + (r.with_normal ? 3 : 0);
+        if (channels <= 3) return forward_with<P, 3>(r, stream);
+        if (channels <= 6) return forward_with<P, 6>(r, stream);
+        if (channels <= 16) return forward_with<P, 16>(r, stream);
+        forward_with<P, TEXGS_MAX_CHANNELS + 3>(r, stream);
+    });
 }
 
 }  // namespace texgs::cuda

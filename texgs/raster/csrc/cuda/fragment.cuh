@@ -41,9 +41,23 @@ struct Fragment {
     bool filtered;               // the low-pass filter rules
 };
 
-__device__ inline Fragment evaluate(const Record& s, float x, float y, const texgs_options& o) {
+// Opacity that falls with rho: 0 where below alpha_min.
+__device__ inline float alpha_of(const Record& s, float rho, const texgs_options& o) {
+    const float alpha = fminf(exp2f(fma(rho, -0.5f * kLog2E, s.log2_opacity)), kLargestAlpha);
+    return alpha >= o.alpha_min ? alpha : 0.0f;
+}
+
+template <class P>
+__device__ Fragment evaluate(const Record& s, float x, float y, const texgs_options& o) {
     Fragment f;
     f.dx = x - s.cx, f.dy = y - s.cy;
+    if constexpr (P::kAffine) {
+        f.r = 1.0f, f.filtered = false;
+        f.u = fma(s.ux, f.dx, __fmul_rn(s.uy, f.dy)), f.v = __fmul_rn(s.vy, f.dy);
+        f.rho = fma(f.u, f.u, __fmul_rn(f.v, f.v));
+        f.alpha = alpha_of(s, f.rho, o);
+        return f;
+    }
     const float W = fma(s.wx, f.dx, fma(s.wy, f.dy, 1.0f));
     f.r = reciprocal(W);
     f.u = __fmul_rn(fma(s.ux, f.dx, fma(s.uy, f.dy, s.u)), f.r);
@@ -52,13 +66,15 @@ __device__ inline Fragment evaluate(const Record& s, float x, float y, const tex
     if (s.clip != 0.0f && !(W > 0.0f && __fmul_rn(W, o.near_plane) < s.zc)) rho_surfel = 1e30f;
     f.rho = fminf(rho_surfel, __fmul_rn(o.low_pass, fma(f.dx, f.dx, __fmul_rn(f.dy, f.dy))));
     f.filtered = !(rho_surfel <= f.rho);
-    const float alpha = fminf(exp2f(fma(f.rho, -0.5f * kLog2E, s.log2_opacity)), kLargestAlpha);
-    f.alpha = alpha >= o.alpha_min ? alpha : 0.0f;
+    f.alpha = alpha_of(s, f.rho, o);
     return f;
 }
 
-// Camera depth of a fragment: of the ray-splat intersection, or of the surfel's mean where the low-pass filter rules.
-__device__ inline float depth_of(const Record& s, const Fragment& f) {
+// Camera depth of a fragment: of the ray-splat intersection, or of the mean where the low-pass filter rules, and of
+// Gaussians.
+template <class P>
+__device__ float depth_of(const Record& s, const Fragment& f) {
+    if constexpr (P::kAffine) return s.zp;
     return f.filtered ? s.zp : __fmul_rn(s.zc, f.r);
 }
 

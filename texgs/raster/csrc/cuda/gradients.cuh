@@ -6,9 +6,6 @@
 namespace texgs::cuda {
 namespace {
 
-constexpr int kGeometrySums = 11;  // Moments without zc, zp and normal
-constexpr int kDepthSums = 2;      // zc, zp
-
 template <int C, bool Depth>
 struct PixelGradient {
     float channels[C] = {};

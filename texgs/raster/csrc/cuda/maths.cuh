@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shared geometry with one surfel per thread.
+// The shared geometry with one surfel or Gaussian per thread.
 #pragma once
 #include <cuda_runtime.h>
 
@@ -10,6 +10,7 @@ namespace texgs::cuda {
 __host__ __device__ inline float fma(float a, float b, float c) { return ::fmaf(a, b, c); }
 __host__ __device__ inline float fnma(float a, float b, float c) { return ::fmaf(-a, b, c); }
 __host__ __device__ inline float sqrt(float a) { return ::sqrtf(a); }
+__host__ __device__ inline float log2(float a) { return ::log2f(a); }
 __host__ __device__ inline float abs(float a) { return ::fabsf(a); }
 __host__ __device__ inline float select(bool condition, float yes, float no) { return condition ? yes : no; }
 __device__ inline float clamp(float a, float low, float high) { return fminf(fmaxf(a, low), high); }
@@ -17,4 +18,4 @@ using ::max, ::min;  // of every type: functions for float here would hide those
 
 }  // namespace texgs::cuda
 
-#include "../maths.h"
+#include "../primitive.h"

@@ -18,9 +18,9 @@ constexpr int kWarps = kThreads / kWarp;
 constexpr int kPixels = 2;  // of a thread
 constexpr uint32_t kCulled = 0xffffffffu;
 
-// A projected surfel as fragments need it (maths.h): 64 bytes, read as four vectors.
+// A projected surfel or Gaussian as fragments need it (Forms, maths.h): 64 bytes, read as four vectors.
 struct alignas(16) Record {
-    float cx, cy;                        // low-pass centre, pixels
+    float cx, cy;                        // low-pass centre, or mean, pixels
     float ux, uy, u, vx, vy, v, wx, wy;  // affine forms about it
     float log2_opacity;
     float zc, zp;  // depth of the plane at the centre, depth of the mean
@@ -29,7 +29,8 @@ struct alignas(16) Record {
     float reserved;
 };
 
-// Where a projected surfel is visible: an ellipse (centre, inverse covariance scaled to level 1) and a disc.
+// Where a projected surfel or Gaussian is visible: an ellipse (centre, inverse covariance scaled to level 1) and a
+// disc.
 struct Footprint {
     float ex, ey, xx, xy, yy;
     float cx, cy, disc;       // disc: squared radius, negative where the ellipse covers it

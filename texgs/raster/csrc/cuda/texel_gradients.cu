@@ -101,7 +101,7 @@ __global__ __launch_bounds__(kThreads) void texel_kernel(const Raster r) {
 #pragma unroll
         for (int p = 0; p < kPixels; ++p) {
             if (!(chunk.masks[place] & at.blocks[p])) continue;
-            const Fragment f = evaluate(chunk.records[place], at.x(), at.y(p), r.options);
+            const Fragment f = evaluate<Surfel<float>>(chunk.records[place], at.x(), at.y(p), r.options);
             const float w = blend(f.alpha, limit, transmittance[p]);
             if (!(w > 0.0f && known)) continue;
             seen = true;

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-// Surfel tensors as vectors: a lane per surfel.
+// Tensors of surfels or 3D Gaussians as vectors: a lane for each.
 #pragma once
 #include "kernels.h"
 #include "simd.h"
 
-#include "../maths.h"
+#include "../primitive.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -22,16 +22,15 @@ inline vf load_strided(const float* p, int stride, int64_t n) {
     return load(lanes);
 }
 
-inline Surfel<vf> load_surfels(const texgs_surfels& s, int64_t first, int64_t n) {
-    const float *mean = s.means + 3 * first, *quat = s.quats + 4 * first, *scale = s.scales + 2 * first;
-    return {{load_strided(mean, 3, n), load_strided(mean + 1, 3, n), load_strided(mean + 2, 3, n)},
-            load_strided(quat, 4, n),
-            load_strided(quat + 1, 4, n),
-            load_strided(quat + 2, 4, n),
-            load_strided(quat + 3, 4, n),
-            load_strided(scale, 2, n),
-            load_strided(scale + 1, 2, n),
-            load_strided(s.opacities + first, 1, n)};
+template <class P>
+P load_primitives(const texgs_surfels& s, int64_t first, int64_t n) {
+    const float *mean = s.means + 3 * first, *quat = s.quats + 4 * first, *scale = s.scales + P::kScales * first;
+    P p;
+    p.mean = {load_strided(mean, 3, n), load_strided(mean + 1, 3, n), load_strided(mean + 2, 3, n)};
+    for (int k = 0; k < 4; ++k) p.quat[k] = load_strided(quat + k, 4, n);
+    for (int k = 0; k < P::kScales; ++k) p.scale[k] = load_strided(scale + k, P::kScales, n);
+    p.opacity = load_strided(s.opacities + first, 1, n);
+    return p;
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-"""Surfels on the screen: which are seen, in which order, and how their planes map to pixels."""
+"""The definition of surfels (Huang et al. 2024): how their planes map to pixels, and where rays meet them."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.rotation import quats_to_matrices
+from texgs.raster.reference.fragments import Fragments, alpha_of, depth_order, half_extents, largest_rho
 from texgs.raster.types import Options
 
 
@@ -33,15 +34,12 @@ def project(
     viewmat: Tensor,
     K: Tensor,
     shift: Tensor | None,
+    size: tuple[int, int],  # as 3D Gaussians need it
     options: Options,
 ) -> Projected:
     """Keep the surfels beyond the near plane that can be seen at all, sort them by depth, project them."""
     R_cw, t_cw = viewmat[:3, :3], viewmat[:3, 3]
-    depth = means @ R_cw[2] + t_cw[2]  # [N]
-    kept = (depth > options.near) & (opacities >= options.alpha_min)
-    order = torch.argsort(depth, stable=True)  # equal depths keep the order of the inputs
-    index = order[kept[order]]
-
+    index = depth_order(means @ R_cw[2] + t_cw[2], opacities, options)
     axes = quats_to_matrices(quats[index])  # [M, 3, 3] columns: first tangent, second tangent, normal
     tangents = R_cw @ axes[:, :, :2] * scales[index][:, None, :]  # [M, 3, 2] camera axes
     mean = means[index] @ R_cw.T + t_cw  # [M, 3] camera axes
@@ -84,17 +82,39 @@ def box(homography: Tensor, rho: Tensor | float) -> tuple[Tensor, Tensor, Tensor
     return torch.where(before[:, None], middle, mean), squared, before
 
 
-def visible_radii(surfels: Projected, width: int, height: int, options: Options) -> Tensor:
+def intersect(surfels: Projected, pixels: Tensor, options: Options) -> Fragments:
+    """Intersect the ray of each pixel [P, 2] with the plane of each surfel.
+
+    The depth of a fragment is that of the mean where the low-pass filter wins.
+    """
+    Tu, Tv, Tw = surfels.homography.unbind(1)  # [M, 3] each
+    inverse = torch.stack(
+        [torch.linalg.cross(*pair) for pair in ((Tv, Tw), (Tw, Tu), (Tu, Tv))], 2
+    )  # [M, 3, 3]
+    homogeneous = torch.nn.functional.pad(pixels, (0, 1), value=1.0)  # [P, 3] (x, y, 1)
+    U, V, W = torch.einsum("mij,pj->ipm", inverse, homogeneous)  # [P, M] each
+    parallel = W.abs() < torch.finfo(W.dtype).tiny ** 0.25  # so that squares and gradients stay finite
+    W = torch.where(parallel, torch.ones_like(W), W)
+    u, v = U / W, V / W
+    z = surfels.depth + u * surfels.tangent_depth[:, 0] + v * surfels.tangent_depth[:, 1]
+
+    hit = (z > options.near) & ~parallel
+    rho_surfel = torch.where(hit, u**2 + v**2, math.inf)
+    rho_filter = options.low_pass * ((pixels[:, None, :] - surfels.centre) ** 2).sum(2)
+    filtered = rho_filter < rho_surfel
+    rho = torch.where(filtered, rho_filter, rho_surfel)
+    depth = torch.where(filtered | ~hit, surfels.depth, z)
+    return Fragments(u, v, depth, alpha_of(surfels.opacity, rho, options))
+
+
+def visible_radii(surfels: Projected, size: tuple[int, int], options: Options) -> Tensor:
     """Half of the longer side [M] of the box in which alpha can reach alpha_min, see `Statistics.radii`."""
-    diagonal = math.hypot(width, height)
     if options.alpha_min == 0:
-        return torch.full_like(surfels.depth, diagonal)
-    rho = 2 * torch.log(surfels.opacity / options.alpha_min).clamp(min=0)
+        return torch.full_like(surfels.depth, math.hypot(*size))
+    rho = largest_rho(surfels.opacity, options)
     middle, squared, before = box(surfels.homography, rho)
     reach = torch.where(before[:, None], squared.clamp(min=0).sqrt(), math.inf)  # [M, 2]
     disc = (rho / options.low_pass).sqrt()[:, None]
     low = torch.minimum(middle - reach, surfels.centre - disc)
     high = torch.maximum(middle + reach, surfels.centre + disc)
-    size = torch.tensor([width, height], device=low.device)
-    on_screen = ((high > 0) & (low < size)).all(1)
-    return torch.where(on_screen, ((high - low) / 2).amax(1).clamp(max=diagonal), 0.0)
+    return half_extents(low, high, size)

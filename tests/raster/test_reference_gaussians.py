@@ -1,0 +1,144 @@
+"""The definition of 3D Gaussians against closed forms, numerical derivatives and sampled points."""
+
+import math
+
+import pytest
+import torch
+
+from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
+from texgs.core.rotation import quats_to_matrices
+from texgs.raster.reference.gaussians import derivative, project
+from texgs.raster.reference.render import rasterize
+from texgs.raster.types import Options
+
+OUTPUTS = ("depth", "median", "distortion", "statistics")
+SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
+NAMES = ("means", "quats", "scales", "opacities", "viewmat", "K")
+
+
+def projected(options=SMOOTH, **gaussians):
+    """What `project` makes of Gaussians before the unmoved camera."""
+    arguments = view(**gaussians)
+    return project(*(arguments[name] for name in NAMES), None, (WIDTH, HEIGHT), options)
+
+
+def test_gaussian_on_the_axis():
+    x, y = offsets()
+    xx, yy = (
+        (FOCAL * 0.2 / 2) ** 2 + 0.3,
+        (FOCAL * 0.1 / 2) ** 2 + 0.3,
+    )  # the third scale points at the camera
+    alpha = 0.8 * torch.exp(-0.5 * (x**2 / xx + y**2 / yy))
+    alpha = torch.where(alpha >= 1 / 255, alpha, 0)
+    color, background = torch.tensor([0.2, 0.5, 0.9]).double(), torch.tensor([1.0, 0.0, 0.5]).double()
+    image = rasterize(
+        **view(means=[[0, 0, 2]], scales=[[0.2, 0.1, 0.3]], opacities=[0.8]),
+        features=color[None],
+        background=background,
+        outputs=OUTPUTS,
+    )
+    torch.testing.assert_close(image.alpha, alpha)
+    torch.testing.assert_close(image.color, alpha[..., None] * color + (1 - alpha[..., None]) * background)
+    torch.testing.assert_close(image.depth, 2 * (alpha > 0).double())
+    torch.testing.assert_close(image.median, 2 * (alpha > 0).double())
+    torch.testing.assert_close(image.distortion, torch.zeros_like(alpha))
+    assert image.normal is None
+    counted = image.statistics
+    torch.testing.assert_close(counted.weight_sum, alpha.sum()[None])
+    assert counted.pixels.item() == (alpha > 0).sum()
+    torch.testing.assert_close(counted.radii, torch.tensor([2 * math.log(0.8 * 255) * xx]).double().sqrt())
+
+
+def test_covariance_is_that_of_projected_points():
+    """Of a small Gaussian, whose extent the perspective projection maps almost linearly."""
+    quats, scales, mean = [[0.8, 0.3, 0.5, 0.1]], [[3e-3, 1e-3, 2e-3]], [[0.4, -0.3, 2.0]]
+    found = projected(means=mean, quats=quats, scales=scales, opacities=[0.8]).covariance[0]
+    normal = torch.randn(400_000, 3, generator=torch.Generator().manual_seed(0)).double()
+    axes = quats_to_matrices(torch.tensor(quats).double())[0] * torch.tensor(scales).double()
+    points = torch.tensor(mean).double() + normal @ axes.T
+    pixels = FOCAL * points[:, :2] / points[:, 2:] + torch.tensor(CENTRE).double()
+    expected = torch.cov(pixels.T) + 0.3 * torch.eye(2)
+    # an estimate of n samples is off by sqrt(2 / n)
+    torch.testing.assert_close(
+        found - 0.3 * torch.eye(2), expected - 0.3 * torch.eye(2), rtol=0.01, atol=1e-5
+    )
+
+
+def test_derivative_of_the_projection():
+    K = view(means=[[0, 0, 2]])["K"]
+    points = torch.tensor([[0.1, 0.2, 1.0], [-0.5, 0.3, 2.0], [0.4, -0.3, 1.1]]).double()
+    expected = torch.func.vmap(torch.func.jacrev(lambda p: (K @ p)[:2] / p[2]))(points)
+    torch.testing.assert_close(derivative(points, K, (WIDTH, HEIGHT)), expected)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_derivative_far_outside_is_that_at_the_edge_of_a_wider_view(side):
+    K = view(means=[[0, 0, 2]])["K"]
+    edge = (
+        1.3 * torch.tensor([WIDTH, HEIGHT]).double() / (2 * FOCAL)
+    )  # 1.3 tan(fov / 2), the view being centred
+    at_edge = torch.tensor([[side * edge[0], side * edge[1], 1.0]]).double()
+    beyond = at_edge * torch.tensor([7.0, 3.0, 1.0]).double()
+    size = (WIDTH, HEIGHT)
+    torch.testing.assert_close(derivative(2 * beyond, K, size), derivative(2 * at_edge, K, size))
+
+
+def test_view_around_another_point_reaches_as_far_as_its_edges():
+    K = view(means=[[0, 0, 2]])["K"]
+    K[:2, 2] = torch.tensor([3.0, 20.0])
+    margin = 0.3 * WIDTH / (2 * FOCAL)
+    for side, slope in ((-1, -3.0 / FOCAL - margin), (1, (WIDTH - 3.0) / FOCAL + margin)):
+        J = derivative(torch.tensor([[9.0 * side, 0.0, 1.0]]).double(), K, (WIDTH, HEIGHT))
+        assert J[0, 0, 2].item() == pytest.approx(-FOCAL * slope)
+
+
+@pytest.mark.parametrize("dilation", [0.3, 1.0])
+def test_dilation_widens_a_gaussian_smaller_than_a_pixel(dilation):
+    x, y = offsets()
+    alpha = 0.8 * torch.exp(-0.5 * (x**2 + y**2) / dilation)
+    tiny = view(means=[[0, 0, 2]], scales=[[1e-5, 1e-5, 1e-5]], opacities=[0.8])
+    ones = torch.ones(1, 1).double()
+    image = rasterize(**tiny, features=ones, options=Options(dilation=dilation))
+    torch.testing.assert_close(image.alpha, torch.where(alpha >= 1 / 255, alpha, 0), atol=1e-6, rtol=0)
+
+
+def test_antialiased_gaussians_keep_their_amount_of_light():
+    """Opacity times area on screen is what it is without the dilation."""
+    gaussian = {"means": [[0, 0, 2]], "scales": [[0.02, 0.04, 0.01]], "opacities": [0.6]}
+    for dilation in (1e-6, 0.3, 1.0):
+        found = projected(Options(antialiased=True, dilation=dilation), **gaussian)
+        amount = found.opacity[0] * torch.linalg.det(found.covariance[0]).sqrt()
+        assert amount.item() == pytest.approx(0.6 * (FOCAL / 2) ** 2 * 0.02 * 0.04, rel=1e-3)
+    point = projected(Options(antialiased=True), **gaussian | {"scales": [[1e-9, 1e-9, 1e-9]]})
+    assert point.opacity.item() == pytest.approx(0.6 * 0.005)  # the least factor, as in 3DGS
+
+
+def test_alpha_is_capped_and_the_cap_blocks_the_gradient():
+    gaussian = view(means=[[0, 0, 2]], scales=[[0.2, 0.2, 0.2]], opacities=[1.0])
+    gaussian["opacities"].requires_grad_()
+    alpha = rasterize(**gaussian, features=torch.ones(1, 1).double()).alpha[12, 15]
+    assert alpha == 0.99
+    assert torch.autograd.grad(alpha, gaussian["opacities"])[0] == 0
+
+
+def test_shift_moves_the_projection():
+    gaussians = view(
+        means=[[0.1, 0, 2]], scales=[[0.3, 0.1, 0.2]], opacities=[0.8], quats=[[0.8, 0.3, 0.5, 0.1]]
+    )
+    ones, pixels = torch.ones(1, 1).double(), torch.tensor([1.5, -0.75]).double()
+    shifted = rasterize(**gaussians, features=ones, shift=pixels[None], outputs=OUTPUTS)
+    gaussians["K"][:2, 2] += pixels
+    moved = rasterize(**gaussians, features=ones, outputs=OUTPUTS)
+    for name in ("color", "alpha", "depth", "median", "distortion"):
+        torch.testing.assert_close(getattr(shifted, name), getattr(moved, name))
+
+
+def test_gaussians_too_near_or_too_weak_are_skipped():
+    gaussians = view(
+        means=[[0, 0, 0.2], [0, 0, -2], [0, 0, 2], [0, 0, 2]],
+        scales=[[0.2, 0.2, 0.2]] * 4,
+        opacities=[0.9, 0.9, 0.0, 0.003],
+    )
+    image = rasterize(**gaussians, features=torch.ones(4, 1).double(), outputs=OUTPUTS)
+    assert image.alpha.count_nonzero() == 0
+    assert image.statistics.radii.count_nonzero() == 0

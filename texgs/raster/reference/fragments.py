@@ -1,0 +1,47 @@
+"""What the definitions of surfels and of 3D Gaussians have in common."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from texgs.raster.types import Options
+
+ALPHA_MAX = 0.99  # no fragment takes all light, so that those behind it still receive a gradient (3DGS, 2DGS)
+
+
+@dataclass(frozen=True)
+class Fragments:
+    """Each of the M primitives at each of the P pixels."""
+
+    u: Tensor  # [P, M] place in standard deviations along the first axis of the primitive
+    v: Tensor  # [P, M] ... the second
+    depth: Tensor  # [P, M] camera z
+    alpha: Tensor  # [P, M] 0 where skipped
+
+
+def depth_order(depth: Tensor, opacities: Tensor, options: Options) -> Tensor:
+    """Indices [M] of what a view keeps of N primitives, front to back; equal depths keep their order."""
+    kept = (depth > options.near) & (opacities >= options.alpha_min)
+    order = torch.argsort(depth, stable=True)
+    return order[kept[order]]
+
+
+def alpha_of(opacity: Tensor, rho: Tensor, options: Options) -> Tensor:
+    """Alpha [P, M] at squared distances rho [P, M] in standard deviations; 0 below alpha_min."""
+    alpha = (opacity * torch.exp(-rho / 2)).clamp(max=ALPHA_MAX)
+    return torch.where(alpha >= options.alpha_min, alpha, 0.0)
+
+
+def largest_rho(opacity: Tensor, options: Options) -> Tensor:
+    """The rho [M] at which alpha falls to alpha_min."""
+    return 2 * torch.log(opacity / options.alpha_min).clamp(min=0)
+
+
+def half_extents(low: Tensor, high: Tensor, size: tuple[int, int]) -> Tensor:
+    """Half of the longer side [M] of boxes with corners [M, 2], at most the diagonal; 0 where off screen."""
+    on_screen = ((high > 0) & (low < torch.tensor(size, device=low.device))).all(1)
+    return torch.where(on_screen, ((high - low) / 2).amax(1).clamp(max=math.hypot(*size)), 0.0)
