@@ -7,6 +7,7 @@
 #include "../checks.h"
 #include "dispatch.h"
 #include "frame.h"
+#include "grid_samples.h"
 
 using namespace texgs;
 
@@ -97,5 +98,5 @@ void texgs_release(texgs_frame* frame) {
 }
 
 void texgs_trim(void) {
-    guarded([] { pool().clear(); });
+    guarded([] { pool().clear(), clear_grid_pool(); });
 }

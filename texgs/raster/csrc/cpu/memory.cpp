@@ -4,6 +4,7 @@
 #include <atomic>
 #include <cstdio>
 #include <new>
+#include <utility>
 
 #include "../status.h"
 
@@ -72,6 +73,11 @@ void Buffer::reset() {
     held -= capacity_;
     data_ = nullptr;
     capacity_ = 0;
+}
+
+void Buffer::swap(Buffer& other) {
+    std::swap(data_, other.data_);
+    std::swap(capacity_, other.capacity_);
 }
 
 void Buffer::reserve(int64_t bytes) {

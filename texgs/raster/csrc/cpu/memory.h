@@ -20,6 +20,8 @@ public:
         return static_cast<T*>(data_);
     }
 
+    void swap(Buffer& other);
+
 private:
     void reserve(int64_t bytes);
     void reset();

@@ -34,6 +34,9 @@ TEXGS_INLINE void store_part(float* p, vf a, int n) {
     if (n == 8) return store(p, a);  // masked stores are slow
     _mm256_maskstore_ps(p, first_lanes(n), a.v);
 }
+TEXGS_INLINE vf load_quad(const float* p) { return _mm256_zextps128_ps256(_mm_loadu_ps(p)); }
+TEXGS_INLINE void store_quad(float* p, vf a) { _mm_storeu_ps(p, _mm256_castps256_ps128(a.v)); }
+TEXGS_INLINE vf permute_quad(const float* p, const int32_t* index) { return _mm256_permutevar8x32_ps(load_quad(p).v, load(index).v); }
 
 TEXGS_INLINE vf operator+(vf a, vf b) { return _mm256_add_ps(a.v, b.v); }
 TEXGS_INLINE vf operator-(vf a, vf b) { return _mm256_sub_ps(a.v, b.v); }

@@ -34,6 +34,10 @@ TEXGS_INLINE void store_part(float* p, vf a, int n) {
     if (n == 16) return store(p, a);  // masked stores are slow
     _mm512_mask_storeu_ps(p, static_cast<__mmask16>((1u << n) - 1), a.v);
 }
+// Four floats in the lowest lanes, the others 0; and lane i = p[index[i]] for indices 0 to 3.
+TEXGS_INLINE vf load_quad(const float* p) { return _mm512_zextps128_ps512(_mm_loadu_ps(p)); }
+TEXGS_INLINE void store_quad(float* p, vf a) { _mm_storeu_ps(p, _mm512_castps512_ps128(a.v)); }
+TEXGS_INLINE vf permute_quad(const float* p, const int32_t* index) { return _mm512_permutexvar_ps(load(index).v, load_quad(p).v); }
 
 TEXGS_INLINE vf operator+(vf a, vf b) { return _mm512_add_ps(a.v, b.v); }
 TEXGS_INLINE vf operator-(vf a, vf b) { return _mm512_sub_ps(a.v, b.v); }

@@ -58,6 +58,9 @@ TEXGS_INLINE void store(int32_t* p, vi a) { std::memcpy(p, &a.v, sizeof a.v); }
 // The first n lanes, 0 <= n <= kLanes; the rest of the vector is 0.
 TEXGS_INLINE vf load_part(const float* p, int n) { vf r = 0.0f; std::memcpy(&r.v, p, n * sizeof(float)); return r; }
 TEXGS_INLINE void store_part(float* p, vf a, int n) { std::memcpy(p, &a.v, n * sizeof(float)); }
+TEXGS_INLINE vf load_quad(const float* p) { return load(p); }
+TEXGS_INLINE void store_quad(float* p, vf a) { store(p, a); }
+TEXGS_INLINE vf permute_quad(const float* p, const int32_t* index) { vf r; TEXGS_EACH r.v[i] = p[index[i]]; return r; }
 
 TEXGS_INLINE vf operator+(vf a, vf b) { return a.v + b.v; }
 TEXGS_INLINE vf operator-(vf a, vf b) { return a.v - b.v; }

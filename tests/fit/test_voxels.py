@@ -1,0 +1,178 @@
+"""The fit of a voxel grid to a small ball, and each of its parts."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.fit.scenes import RADIUS, ball_images, ball_planes, cameras, images_of
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, FitError
+from texgs.fit.voxel_rays import AROUND, curve, training_rays, widened
+from texgs.fit.voxel_settings import PLENOXELS, Decay, Stage, VoxelSettings
+from texgs.fit.voxel_shape import hull_box, hull_grid, refined, seen_voxels
+from texgs.fit.voxels import VoxelFit
+from texgs.metrics.image import psnr
+from texgs.raster.voxel_grid import interpolate_rows
+from texgs.raster.voxels import March, camera_rays, render_view
+
+SETTINGS = VoxelSettings(
+    stages=(Stage(16, 40), Stage(32, 80)), degree=1, half_size=0.6, rays=512, density=Decay(40.0, 2.0, 10)
+)
+
+
+@pytest.fixture(scope="module")
+def images():
+    return ball_images(count=8)
+
+
+@pytest.fixture(scope="module")
+def fit(images):
+    found = VoxelFit(images, SETTINGS)
+    found.progress = list(found.run())
+    return found
+
+
+@torch.no_grad()
+def quality(fit, images):
+    """Mean PSNR over views."""
+    found = []
+    for index, camera in enumerate(images.cameras):
+        color = render_view(fit.grid, camera, fit.march).color
+        found.append(psnr(color, images.target(index).color))
+    return sum(found) / len(found)
+
+
+def test_the_ball_is_found(fit, images):
+    assert [done.step for done in fit.progress] == list(range(1, 121))
+    assert fit.progress[99].loss < 0.01
+    assert quality(fit, images) > 25
+    unseen = orbit(20, 10, 1.5, 50, 32, 32)
+    assert quality(fit, images_of([ball_planes(unseen)], [unseen])) > 20
+
+
+def test_what_is_outside_of_the_ball_stays_empty(fit):
+    distance = fit.grid.points().norm(dim=1)
+    far = distance > RADIUS + 4 * fit.grid.spacing
+    assert fit.grid.density[1:][far].clamp_min(0).sum() < 0.05 * fit.grid.density[1:].clamp_min(0).sum()
+
+
+def test_the_same_seed_gives_the_same_grid(fit, images):
+    again = VoxelFit(images, SETTINGS)
+    for _ in again.run():
+        pass
+    assert torch.equal(again.grid.rows, fit.grid.rows)
+
+
+@pytest.mark.parametrize(("optimizer", "rate"), [("rmsprop", 40.0), ("adam", 5.0)])
+def test_optimisers_without_total_variation(images, optimizer, rate):
+    stages = (Stage(16, 80, total_variation=False),)
+    density = Decay(rate, 1.0, 10)
+    fit = VoxelFit(images, replace(SETTINGS, stages=stages, optimizer=optimizer, density=density))
+    for _ in fit.run():
+        pass
+    assert quality(fit, images) > 18
+
+
+def test_training_rays_pass_through_their_pixels(images):
+    rays = training_rays(images)
+    ids = torch.arange(len(rays))
+    found, colors = rays.take(ids)
+    start = int((rays.views == 0).sum())
+    near = widened(images.planes[1, 3], AROUND)
+    inside = rays.views[start:] == 1
+    assert int(inside.sum()) == int(near.sum())
+    expected = torch.cat([camera_rays(images.cameras[1])[near], images.target(1).color[near]], dim=1)
+    of_view = torch.cat([found, colors], dim=1)[rays.views == 1]
+    assert torch.equal(of_view[sorting(of_view)], expected[sorting(expected)])
+
+
+def sorting(rays):
+    """An order of rays [n, 9] by direction."""
+    return (rays[:, 3:6] @ torch.tensor([1.0, 10.0, 100.0])).argsort()
+
+
+def test_runs_are_neighbours(images):
+    rays = training_rays(images)
+    drawn, _ = rays.draw(64, 8, torch.Generator().manual_seed(0))
+    again, _ = rays.draw(64, 8, torch.Generator().manual_seed(0))
+    assert drawn.shape == (64, 6)
+    assert torch.equal(drawn, again)
+    places = {tuple(ray.tolist()): i for i, ray in enumerate(rays.take(torch.arange(len(rays)))[0])}
+    for run in drawn.reshape(8, 8, 6):
+        first = places[tuple(run[0].tolist())]
+        assert [places[tuple(ray.tolist())] for ray in run] == list(range(first, first + 8))
+
+
+def test_the_curve_visits_squares():
+    order = curve(8, 8)
+    assert torch.equal(order.sort().values, torch.arange(64))
+    for size in (2, 4):
+        for part in order.reshape(-1, size * size):
+            assert int((part // 8).max() - (part // 8).min()) == size - 1
+            assert int((part % 8).max() - (part % 8).min()) == size - 1
+    assert sorted(curve(5, 3).tolist()) == list(range(15))
+
+
+def test_the_hull_holds_the_ball(images):
+    low, high = hull_box(images, 0.6)
+    assert (low < -RADIUS).all()
+    assert (high > RADIUS).all()
+    grid = hull_grid(images, 16, 0.6, 1, 0.5)
+    assert max(grid.size) in (16, 24)
+    points = 0.95 * RADIUS * torch.nn.functional.normalize(torch.randn(200, 3), dim=1)
+    assert (interpolate_rows(grid, points)[:, 3] > 0.45).all()
+    assert len(grid) < torch.tensor(grid.size).prod()
+
+
+def test_views_that_show_nothing():
+    blank = images_of([torch.cat([torch.ones(3, 32, 32), torch.zeros(1, 32, 32)])] * 3, cameras(3))
+    with pytest.raises(ArgumentError, match="visual hull: expected points that every view shows"):
+        hull_box(blank, 0.6)
+    with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
+        VoxelFit(blank, SETTINGS)
+
+
+def test_refining_keeps_the_field(fit):
+    finer = refined(fit.grid, torch.ones(fit.grid.size, dtype=torch.bool))
+    assert finer.spacing == fit.grid.spacing / 2
+    coarse, fine = (grid.rows[grid.links().long()] for grid in (fit.grid, finer))
+    # float32 places, times densities of hundreds
+    torch.testing.assert_close(fine[::2, ::2, ::2], coarse, rtol=1e-4, atol=1e-2)
+    between = (coarse[:-1] + coarse[1:]) / 2
+    torch.testing.assert_close(fine[1:-1:2, ::2, ::2], between, rtol=1e-4, atol=1e-2)
+
+
+def test_seen_voxels_are_near_the_surface(fit, images):
+    rays = training_rays(images)
+    seen = seen_voxels(fit.grid, rays, March(), 0.01, 1.0)
+    some = seen_voxels(fit.grid, rays, March(), 0.01, 0.25)
+    assert not (some & ~seen).any()
+    assert 0 < int(seen.sum()) < len(fit.grid)
+    distance = fit.grid.points().norm(dim=1)[fit.grid.links()[seen].long() - 1]
+    assert distance.median() > 0.6 * RADIUS
+
+
+def test_schedules():
+    rate = Decay(100.0, 1.0, 10)
+    assert rate.at(0, 100) == pytest.approx(1.0)
+    assert rate.at(50, 100) == pytest.approx(10.0)
+    assert rate.at(100, 100) == pytest.approx(1.0)
+    # The published schedule: log-linear over 250,000 steps, with a ramp of 15,000.
+    assert PLENOXELS.rates(125_000).density == pytest.approx(30 * (0.05 / 30) ** 0.5, rel=1e-3)
+    assert PLENOXELS.rates(125_000).sh == pytest.approx(1e-2 * (5e-6 / 1e-2) ** 0.5, rel=1e-3)
+    assert PLENOXELS.steps == 128_000
+
+
+def test_errors(images):
+    with pytest.raises(ArgumentError, match=r"stages: expected sides that double .* got \[16, 48\]"):
+        VoxelFit(images, replace(SETTINGS, stages=(Stage(16, 1), Stage(48, 1))))
+    pruned = VoxelFit(images, replace(SETTINGS, prune_weight=1.0))
+    with pytest.raises(
+        FitError, match="expected some that show in the views, found none; lower prune_weight"
+    ):
+        pruned.refine()
+    broken = VoxelFit(images, replace(SETTINGS, stages=(Stage(16, 100),)))
+    broken.grid.rows[1:, 0] = float("nan")
+    with pytest.raises(FitError, match=r"iteration 100: .*: expected finite values, got .* NaN"):
+        list(broken.run())

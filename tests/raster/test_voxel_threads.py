@@ -1,0 +1,71 @@
+"""Voxel grids give the same bits for any number of threads, and the same values on every instruction set."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import torch
+
+from tests.raster.threads import with_threads
+from tests.raster.voxel_scenes import voxel_scene
+from texgs.raster import native
+from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates
+from texgs.raster.voxels import Samples, render_rays
+
+FILES = [str(Path(__file__).with_name(f"test_{name}.py")) for name in ("voxels", "voxel_optimizer")]
+
+
+def everything(degree):
+    """A rendering, its gradient, the largest weights and a step of the optimiser."""
+    scene = voxel_scene(size=(64, 40, 36), degree=degree, n_rays=20_000)
+    rows = scene.grid.rows.requires_grad_()
+    found = render_rays(scene.grid, scene.rays, scene.march)
+    gradient = torch.autograd.grad(found.color.square().sum() + found.alpha.sum(), rows)[0]
+    weights = torch.zeros(len(rows))
+    Samples(scene.grid, scene.march, scene.rays).mark(weights)
+    rows.requires_grad_(False)
+    optimizer = VoxelOptimizer(scene.grid, "adam")
+    Samples(scene.grid, scene.march, scene.rays).add_gradient(found.color, None, optimizer.gradient)
+    optimizer.step(VoxelRates(1.0, 0.1, 0.1))
+    scene.grid.refresh_occupancy()
+    return [*found, gradient, weights, rows.clone(), scene.grid.occupied, scene.grid.distance]
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+def test_threads(degree):
+    alone = with_threads(1, everything, degree)
+    for count in (2, 7):
+        for a, b in zip(with_threads(count, everything, degree), alone, strict=True):
+            assert torch.equal(a, b)
+
+
+def test_runs():
+    for a, b in zip(everything(1), everything(1), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_memory_is_given_back():
+    everything(0)
+    native.release_memory()
+    native.peak_memory(reset=True)
+    assert native.peak_memory() == 0
+
+
+@pytest.mark.parametrize("instruction_set", ["portable", "avx2", "avx512"])
+def test_on(instruction_set):
+    if instruction_set == native.instruction_set():
+        pytest.skip("the tests themselves run on it")
+    child = subprocess.run(
+        [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", *FILES],
+        env={**os.environ, "TEXGS_ISA": instruction_set},
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+    if "this machine does not have it" in child.stdout:
+        pytest.skip(f"this machine has no {instruction_set}")
+    assert child.returncode == 0, child.stdout[-4000:]

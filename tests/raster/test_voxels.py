@@ -1,0 +1,243 @@
+"""Voxel grids against the dense definition: images, gradients, memory, errors."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.raster.voxel_scenes import LOWER, SPACING, voxel_scene
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from texgs.raster import voxels
+from texgs.raster.reference.voxels import interpolate
+from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
+from texgs.raster.voxels import March, RowGradient, Samples, camera_rays, render_rays, render_view
+
+
+def gradients(scene, outputs, inputs, seed=1):
+    """Gradients of a random combination of colour and alpha."""
+    generator = torch.Generator().manual_seed(seed)
+    cotangents = [torch.randn(x.shape, generator=generator).to(x.dtype) for x in outputs[:2]]
+    return torch.autograd.grad(outputs[:2], inputs, cotangents)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 2])
+@pytest.mark.parametrize("transmittance_min", [0.0, 0.05])
+def test_image_and_gradient(degree, transmittance_min):
+    scene = voxel_scene(degree, degree=degree, transmittance_min=transmittance_min)
+    rows = scene.grid.rows.requires_grad_()
+    found = render_rays(scene.grid, scene.rays, scene.march)
+    leaves = [scene.density.double().requires_grad_(), scene.sh.double().requires_grad_()]
+    expected = scene.definition(*leaves)
+    for name, a, b in zip(found._fields, found, expected, strict=True):
+        torch.testing.assert_close(a.double(), b, rtol=1e-4, atol=2e-5, msg=name)  # float32 places in cells
+    (gradient,) = gradients(scene, found, [rows])
+    density, sh = unpack_rows(gradient[1:])
+    for a, b in zip((density, sh), gradients(scene, expected, leaves), strict=True):
+        assert (a - b).norm() <= 2e-5 * b.norm()  # float32
+    assert not gradient[0].any()
+
+
+def test_definition_by_finite_differences():
+    scene = voxel_scene(size=(8, 8, 8), degree=1, n_rays=8)
+    scene.rays = scene.rays.double()
+    leaves = (scene.density.double().requires_grad_(), scene.sh.double().requires_grad_())
+    assert torch.autograd.gradcheck(lambda d, s: scene.definition(d, s)[:2], leaves, fast_mode=True)
+
+
+def test_a_slab_by_hand():
+    grid = voxel_grid(torch.ones(8, 8, 8, dtype=torch.bool), (0, 0, 0), 0.5)
+    sh = torch.zeros(512, 9, 3)
+    sh[:, 0] = torch.tensor([0.0, 1.0, -5.0])
+    grid = grid.with_rows(torch.cat([torch.zeros(1, 32), pack_rows(torch.full((512,), 0.3), sh)]))
+    out = render_rays(grid, torch.tensor([[1.7, 2.1, -3.0, 0.0, 0.0, 2.0], [9.0, 9.0, 9.0, 1.0, 0.0, 0.0]]))
+    alpha = 1 - torch.exp(torch.tensor(-0.3 * 3.5))  # seven cells of half a unit
+    color = torch.tensor([0.5, 0.5 + 0.28209479, 0.0])
+    torch.testing.assert_close(out.alpha, torch.stack([alpha, torch.tensor(0.0)]))
+    torch.testing.assert_close(out.color, torch.stack([alpha * color + 1 - alpha, torch.ones(3)]))
+    assert 3.0 < out.depth[0] < 4.75  # in front of the middle of the slab: nearer samples weigh more
+    assert out.depth[1] == 0
+
+
+def test_samples_kept_or_marched_again(monkeypatch):
+    scene = voxel_scene()
+    rows = scene.grid.rows.requires_grad_()
+    kept = gradients(scene, render_rays(scene.grid, scene.rays, scene.march), [rows])[0]
+    monkeypatch.setattr(voxels, "PIECE", 77)
+    again = gradients(scene, render_rays(scene.grid, scene.rays, scene.march, keep=False), [rows])[0]
+    torch.testing.assert_close(again, kept, rtol=1e-4, atol=1e-5)  # another order of sums
+
+
+def test_a_retained_graph_gives_the_same_gradient_twice():
+    scene = voxel_scene()
+    rows = scene.grid.rows.requires_grad_()
+    color = render_rays(scene.grid, scene.rays, scene.march).color
+    first = torch.autograd.grad(color.sum(), rows, retain_graph=True)[0]
+    assert torch.equal(torch.autograd.grad(color.sum(), rows)[0], first)
+
+
+def test_gradient_into_a_buffer():
+    scene = voxel_scene()
+    rows = scene.grid.rows.requires_grad_()
+    into = RowGradient(scene.grid)
+    render_rays(scene.grid, scene.rays, scene.march, into=into).color.sum().backward()
+    assert rows.grad is None
+    render_rays(scene.grid, scene.rays, scene.march).color.sum().backward()
+    torch.testing.assert_close(into.rows, rows.grad)
+    blocks = scene.grid.links().unfold(0, 4, 4).unfold(1, 4, 4).unfold(2, 4, 4).reshape(-1, 64).long()
+    has_gradient = (rows.grad[blocks] != 0).any(-1).any(-1)
+    assert not (has_gradient & ~into.touched.bool()).any()
+
+
+def test_rows_without_gradient_keep_nothing():
+    scene = voxel_scene()
+    assert not render_rays(scene.grid, scene.rays, scene.march).color.requires_grad
+    with torch.no_grad():
+        scene.grid.rows.requires_grad_()
+        assert not render_rays(scene.grid, scene.rays, scene.march).color.requires_grad
+
+
+def test_largest_weights():
+    scene = voxel_scene(n_rays=40)
+    weights = torch.zeros(len(scene.grid.rows))
+    Samples(scene.grid, scene.march, scene.rays).mark(weights)
+    alone = torch.zeros(len(scene.grid.rows))
+    for ray in scene.rays:  # the first of all samples of a ray that only one sample has a large weight of
+        one = torch.zeros_like(alone)
+        Samples(scene.grid, scene.march, ray[None]).mark(one)
+        alone = alone.maximum(one)
+        alpha = render_rays(scene.grid, ray[None], scene.march).alpha
+        assert one.max() <= alpha + 1e-6
+        assert bool(one.any()) == bool(alpha > 0)
+    assert torch.equal(weights, alone)
+
+
+def test_largest_weight_of_a_single_cell():
+    mask = torch.zeros(8, 8, 8, dtype=torch.bool)
+    mask[3:5, 3:5, 3:5] = True
+    grid = voxel_grid(mask, (0, 0, 0), 1.0, 0)
+    grid = grid.with_rows(torch.cat([torch.zeros(1, 4), torch.tensor([[0.0, 0, 0, 2]]).expand(8, 4)]))
+    weights = torch.zeros(9)
+    rays = torch.tensor([[3.5, 3.5, -2.0, 0.0, 0.0, 1.0]])
+    Samples(grid, March(step=0.5), rays).mark(weights)
+    # Samples a quarter and three quarters into the cells from 2 to 5 have densities .5, 1.5, 2, 2, 1.5, .5.
+    light = torch.exp(-0.5 * torch.tensor([0, 0.5, 2.0, 4.0]))
+    _, front, behind = light[:-1] - light[1:]
+    links = grid.links()[3:5, 3:5, 3:5].long()
+    torch.testing.assert_close(weights[links], torch.stack([front, behind]).expand(2, 2, 2))
+
+
+def test_rays_of_a_camera():
+    camera = orbit(30, 20, 4.0, 30, 7, 5)
+    rays = camera_rays(camera)
+    in_camera = (rays[..., :3] + rays[..., 3:]) @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
+    pixels = in_camera @ camera.K.T
+    expected = torch.stack(torch.meshgrid(torch.arange(7) + 0.5, torch.arange(5) + 0.5, indexing="xy"), -1)
+    torch.testing.assert_close(pixels[..., :2], expected, rtol=0, atol=1e-4)
+    torch.testing.assert_close(pixels[..., 2], torch.ones(5, 7))
+
+
+def test_a_view_is_its_rays():
+    scene = voxel_scene()
+    camera = orbit(30, 20, 4.0, 30, 9, 7)
+    view = render_view(scene.grid, camera, scene.march)
+    rays = render_rays(scene.grid, camera_rays(camera).reshape(-1, 6), scene.march)
+    assert torch.equal(view.color, rays.color.reshape(7, 9, 3))
+    assert torch.equal(view.alpha, rays.alpha.reshape(7, 9))
+    y, x = divmod(int(view.alpha.argmax()), 9)
+    ray = camera_rays(camera)[y, x]
+    point = ray[:3] + rays.depth[9 * y + x] * ray[3:] / ray[3:].norm()
+    depth = (camera.viewmat[:3, :3] @ point + camera.viewmat[:3, 3])[2]
+    torch.testing.assert_close(view.depth[y, x], depth)
+
+
+def test_rows_are_packed_and_unpacked():
+    for count in (1, 4, 9):
+        density, sh = torch.rand(5), torch.rand(5, count, 3)
+        for a, b in zip(unpack_rows(pack_rows(density, sh)), (density, sh), strict=True):
+            assert torch.equal(a, b)
+
+
+def test_links_and_points_agree_with_the_mask():
+    mask = torch.rand(8, 12, 16, generator=torch.Generator().manual_seed(0)) < 0.3
+    grid = voxel_grid(mask, LOWER, SPACING)
+    links = grid.links()
+    assert torch.equal(links > 0, mask)
+    assert torch.equal(links[mask].sort().values, torch.arange(1, len(grid) + 1, dtype=torch.int32))
+    places = ((grid.points() - torch.tensor(LOWER)) / SPACING).round().long()
+    assert torch.equal(links[tuple(places.T)], torch.arange(1, len(grid) + 1, dtype=torch.int32))
+
+
+def test_interpolated_rows():
+    scene = voxel_scene()
+    grid = scene.grid
+    at = torch.rand(50, 3) * (torch.tensor(grid.size) - 1)
+    points = torch.tensor(LOWER) + SPACING * at
+    expected = interpolate(grid.rows[grid.links().long()], at[None])[0]
+    torch.testing.assert_close(interpolate_rows(grid, points), expected, rtol=1e-4, atol=1e-5)
+    assert not interpolate_rows(grid, torch.tensor([[9.0, 9.0, 9.0]])).any()
+
+
+def test_occupied_cells_and_distances():
+    scene = voxel_scene(size=(32, 8, 16), filled=0.003)
+    grid = scene.grid
+    dense = (grid.density[grid.links().long()] > 0).double()
+    cells = torch.nn.functional.max_pool3d(torch.nn.functional.pad(dense, (0, 1) * 3)[None], 2, 1)[0] > 0
+    assert torch.equal(voxel_grid(cells, LOWER, SPACING).masks, grid.occupied)
+    some = (grid.occupied != 0).nonzero()
+    place = torch.stack(torch.meshgrid(*map(torch.arange, grid.masks.shape), indexing="ij"), -1)
+    distance = (place[..., None, :] - some).abs().amax(-1).amin(-1)
+    assert torch.equal(grid.distance, distance.to(torch.uint8))
+
+
+def test_an_empty_grid_shows_the_background():
+    grid = voxel_grid(torch.zeros(8, 8, 8, dtype=torch.bool), LOWER, SPACING)
+    rays = torch.tensor([[-0.5, -0.3, -9.0, 0.0, 0.0, 1.0]])
+    out = render_rays(grid, rays, March((0.1, 0.2, 0.3)))
+    assert torch.equal(out.color, torch.tensor([[0.1, 0.2, 0.3]]))
+    assert render_rays(grid, rays[:0]).color.shape == (0, 3)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
+def test_rays_that_are_not_finite_bring_back_the_background(value):
+    scene = voxel_scene()
+    for column in range(6):
+        rays = scene.rays[:6].clone()
+        rays[:, column] = value
+        color = render_rays(scene.grid, rays, scene.march).color
+        assert torch.equal(color, torch.tensor(scene.march.background).expand(6, 3))
+
+
+def test_errors_name_the_argument():
+    scene = voxel_scene()
+    grid, rays = scene.grid, scene.rays
+    with pytest.raises(ShapeError, match=r"rays: expected \[N, 6\], got \[6, 300\]; did you transpose"):
+        render_rays(grid, rays.T)
+    with pytest.raises(ArgumentError, match="rays: expected float32, got float64"):
+        render_rays(grid, rays.double())
+    with pytest.raises(ArgumentError, match="rays: not differentiable here"):
+        render_rays(grid, rays.clone().requires_grad_())
+    with pytest.raises(ArgumentError, match=r"step: expected 0\.1 to 8 spacings"):
+        render_rays(grid, rays, March(step=0.01))
+    with pytest.raises(ArgumentError, match="transmittance_min: expected 0 to 1, without 1"):
+        render_rays(grid, rays, March(transmittance_min=1.0))
+    with pytest.raises(DeviceError, match="rows: expected device meta as rays, got cpu"):
+        render_rays(grid, rays.to("meta"))
+    with pytest.raises(DeviceError, match=r"voxel grid: expected tensors on the cpu, got meta; .* move"):
+        render_rays(replace(grid, rows=grid.rows.to("meta")), rays.to("meta"))
+    with pytest.raises(ShapeError, match=r"rows: expected \[\d+, K\], got \[3, 32\]"):
+        grid.with_rows(torch.zeros(3, 32))
+    with pytest.raises(ShapeError, match="rows: expected 4, 16 or 32 floats"):
+        grid.with_rows(torch.zeros(len(grid.rows), 8))
+
+
+def test_grids_that_cannot_be():
+    mask = torch.ones(8, 8, 8, dtype=torch.bool)
+    with pytest.raises(ShapeError, match=r"multiples of 4 from 8 to 1024, got \[8, 6, 8\] bool; pad it"):
+        voxel_grid(mask[:, :6], LOWER, SPACING)
+    with pytest.raises(ShapeError, match="expected bool"):
+        voxel_grid(mask.float(), LOWER, SPACING)
+    with pytest.raises(ArgumentError, match="degree: expected 0, 1 or 2, got 3"):
+        voxel_grid(mask, LOWER, SPACING, 3)
+    with pytest.raises(ArgumentError, match="spacing: expected more than 0, got 0"):
+        voxel_grid(mask, LOWER, 0)

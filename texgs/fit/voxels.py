@@ -1,0 +1,116 @@
+"""The fit of a sparse voxel grid to views: random rays, coarse to fine (Fridovich-Keil et al. 2022)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import torch
+
+from texgs.core.errors import ArgumentError, FitError
+from texgs.fit.loop import require_finite
+from texgs.fit.voxel_rays import training_rays
+from texgs.fit.voxel_settings import Stage, VoxelSettings
+from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
+from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster.voxel_optimizer import VoxelOptimizer, add_total_variation
+from texgs.raster.voxels import March, Rays, Samples
+from texgs.scene.images import Images
+
+CHECKED_EVERY = 100  # steps between looks at the loss
+
+
+@dataclass(frozen=True)
+class VoxelProgress:
+    """Where a fit is."""
+
+    step: int  # done, from 1
+    n_voxels: int
+    loss: float | None  # mean squared error of the step's rays, where it was looked at
+
+
+class VoxelFit:
+    """A grid on one set of views.
+
+    Args:
+        images: training views with alpha, over white.
+        settings: what to do.
+        seed: of rays and blocks; with the same one, machine and versions results are equal.
+
+    Raises:
+        ArgumentError: if the stages do not double, or the views show nothing.
+    """
+
+    def __init__(self, images: Images, settings: VoxelSettings, seed: int = 0) -> None:
+        sides = [stage.side for stage in settings.stages]
+        if not sides or any(b != 2 * a for a, b in pairwise(sides)):
+            raise ArgumentError(f"stages: expected sides that double from one to the next, got {sides}")
+        self.settings = settings
+        self.march = March(step=settings.step, transmittance_min=settings.transmittance_min)
+        self.rays = training_rays(images)
+        self.generator = torch.Generator().manual_seed(seed)
+        self.step_count = 0
+        self._begin(hull_grid(images, sides[0], settings.half_size, settings.degree, settings.start_density))
+
+    def _begin(self, grid: VoxelGrid) -> None:
+        """Go on with another grid; the optimiser starts anew."""
+        self.grid = grid
+        self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
+        self.filled_blocks = grid.masks.flatten().nonzero()[:, 0].int()
+
+    def run(self) -> Iterator[VoxelProgress]:
+        """All stages.
+
+        Raises:
+            FitError: if the loss or a row is no longer finite, or no voxel shows.
+        """
+        for index, stage in enumerate(self.settings.stages):
+            if index:
+                self.refine()
+            for _ in range(stage.steps):
+                yield self.step(stage)
+            self.grid.refresh_occupancy()
+
+    def refine(self) -> None:
+        """Remove what no ray sees, and halve the spacing."""
+        s = self.settings
+        kept = seen_voxels(self.grid, self.rays, self.march, s.prune_weight, s.prune_share)
+        if not kept.any():
+            raise FitError("voxels: expected some that show in the views, found none; lower prune_weight")
+        self._begin(refined(self.grid, kept))
+
+    @torch.no_grad()
+    def step(self, stage: Stage) -> VoxelProgress:
+        """Rays, their mean squared error, a step of the optimiser.
+
+        Raises:
+            FitError: if the loss or a row is no longer finite, where they are looked at.
+        """
+        s = self.settings
+        if self.step_count % s.occupy_every == 0:
+            self.grid.refresh_occupancy()
+        rays, target = self.rays.draw(s.rays, s.run, self.generator)
+        out = Rays(torch.empty_like(target), *target.new_empty(2, len(rays)))
+        samples = Samples(self.grid, self.march, rays, out)
+        error = out.color - target
+        samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
+        if stage.total_variation:
+            self._smooth()
+        self.optimizer.step(s.rates(self.step_count))
+        self.step_count += 1
+        is_looked_at = self.step_count % CHECKED_EVERY == 0 or self.step_count == s.steps
+        loss = error.square().mean() if is_looked_at else None
+        if loss is not None:  # rows that are not finite show nothing, so that the loss alone does not tell
+            require_finite(self.step_count, {"loss": loss, "rows": self.grid.rows})
+        return VoxelProgress(self.step_count, len(self.grid), None if loss is None else float(loss))
+
+    def _smooth(self) -> None:
+        """The gradient of total variation in some random blocks."""
+        s, blocks = self.settings, self.filled_blocks
+        count = max(round(s.tv_share * len(blocks)), 1)
+        drawn = blocks[torch.randint(len(blocks), (count,), generator=self.generator)]
+        voxels = count * len(self.grid) / len(blocks)  # on average: weights do not depend on what is drawn
+        add_total_variation(
+            self.grid, drawn, s.tv_density / voxels, s.tv_sh / voxels, self.optimizer.gradient
+        )

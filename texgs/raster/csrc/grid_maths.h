@@ -1,0 +1,216 @@
+// SPDX-License-Identifier: Apache-2.0
+// The geometry of a sparse voxel grid, shared by every back end: rays through the lattice, the rows around a point,
+// spherical harmonics. Plain floats; each instance has internal linkage in namespace texgs::TEXGS_ISA.
+//
+// Lattice coordinates: voxel (0, 0, 0) is the origin and spacing 1. A cell is the cube between eight voxels, named by
+// its lowest one.
+#pragma once
+#include <cmath>
+#include <cstdint>
+
+#include "texgs_grid.h"
+
+#if defined(_MSC_VER) && !defined(__clang__) && !defined(__CUDACC__)
+#include <intrin.h>
+#endif
+#ifndef TEXGS_MATHS
+#ifdef __CUDACC__
+#define TEXGS_MATHS __host__ __device__ inline
+#else
+#define TEXGS_MATHS inline
+#endif
+#endif
+#ifdef __CUDACC__
+#define TEXGS_LOOP __device__ inline
+#else
+#define TEXGS_LOOP inline
+#endif
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr int kBlockSide = 4;
+
+TEXGS_MATHS int popcount(uint64_t bits) {
+#if defined(__CUDA_ARCH__)
+    return __popcll(bits);
+#elif defined(_MSC_VER) && !defined(__clang__)
+    return static_cast<int>(__popcnt64(bits));
+#else
+    return __builtin_popcountll(bits);
+#endif
+}
+
+// -- Voxels and cells ------------------------------------------------------------------------------------------------
+
+struct Cell {
+    int x, y, z;
+};
+TEXGS_MATHS uint32_t pack(Cell c) { return static_cast<uint32_t>(c.x << 20 | c.y << 10 | c.z); }
+TEXGS_MATHS Cell unpack(uint32_t p) {
+    return {static_cast<int>(p >> 20), static_cast<int>(p >> 10 & 1023), static_cast<int>(p & 1023)};
+}
+
+TEXGS_MATHS int block_of(const texgs_grid& g, Cell c) {
+    return ((c.x >> 2) * (g.size[1] >> 2) + (c.y >> 2)) * (g.size[2] >> 2) + (c.z >> 2);
+}
+TEXGS_MATHS int bit_of(Cell c) { return (c.x & 3) << 4 | (c.y & 3) << 2 | (c.z & 3); }
+
+// The blocks and rows of a cell's eight corners, in the order of corner_weights(); row 0 where there is none.
+struct Corners {
+    int block[8];
+    int32_t row[8];
+};
+TEXGS_MATHS Corners corners_of(const texgs_grid& g, Cell c) {
+    const int by = g.size[2] >> 2, bx = (g.size[1] >> 2) * by;
+    const int base[3][2] = {
+        {(c.x >> 2) * bx, ((c.x + 1) >> 2) * bx}, {(c.y >> 2) * by, ((c.y + 1) >> 2) * by}, {c.z >> 2, (c.z + 1) >> 2}};
+    const int bit[3][2] = {
+        {(c.x & 3) << 4, ((c.x + 1) & 3) << 4}, {(c.y & 3) << 2, ((c.y + 1) & 3) << 2}, {c.z & 3, (c.z + 1) & 3}};
+    Corners found;
+    for (int i = 0; i < 8; ++i) {
+        const int block = base[0][i >> 2] + base[1][i >> 1 & 1] + base[2][i & 1];
+        const uint64_t mask = g.masks[block], own = uint64_t(1)
+                                                    << (bit[0][i >> 2] | bit[1][i >> 1 & 1] | bit[2][i & 1]);
+        const int32_t row = g.first[block] + popcount(mask & (own - 1));
+        found.block[i] = block;
+        found.row[i] = mask & own ? row : 0;
+    }
+    return found;
+}
+
+// Trilinear weights of a point's eight corners; the last axis is the fastest.
+TEXGS_MATHS void corner_weights(const float f[3], float w[8]) {
+    const float x0 = 1.0f - f[0], y0 = 1.0f - f[1], z0 = 1.0f - f[2];
+    const float a = x0 * y0, b = x0 * f[1], c = f[0] * y0, d = f[0] * f[1];
+    w[0] = a * z0, w[1] = a * f[2], w[2] = b * z0, w[3] = b * f[2];
+    w[4] = c * z0, w[5] = c * f[2], w[6] = d * z0, w[7] = d * f[2];
+}
+
+// -- Rays ------------------------------------------------------------------------------------------------------------
+
+// The part of a ray inside the lattice; sample k lies at entry + (k + 0.5) step direction.
+struct Ray {
+    float entry[3], direction[3];  // lattice coordinates; unit length
+    float near;                    // distance of the entry from the origin, spacings
+    int samples;
+};
+
+TEXGS_MATHS Ray enter(const texgs_grid& g, const float* given, float step) {
+    Ray ray;
+    const float* d = given + 3;
+    const float over = 1.0f / std::sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2]);
+    float near = 0.0f, far = 1e30f;
+    for (int a = 0; a < 3; ++a) {
+        const float direction = d[a] * over, origin = (given[a] - g.lower[a]) / g.spacing;
+        const float high = static_cast<float>(g.size[a] - 1);
+        ray.direction[a] = direction;
+        ray.entry[a] = origin;
+        if (std::fabs(direction) < 1e-12f) {
+            if (!(origin >= 0.0f && origin <= high)) far = -1.0f;
+            continue;
+        }
+        const float t0 = -origin / direction, t1 = (high - origin) / direction;
+        const float first = t0 < t1 ? t0 : t1, last = t0 < t1 ? t1 : t0;
+        if (!(first <= last)) far = -1.0f;  // not a number
+        near = first > near ? first : near;
+        far = last < far ? last : far;
+    }
+    for (int a = 0; a < 3; ++a) ray.entry[a] += near * ray.direction[a];
+    ray.near = near;
+    const float length = far - near, longest = static_cast<float>(g.size[0] + g.size[1] + g.size[2]);
+    ray.samples = length > 0.0f && length <= longest ? static_cast<int>(length / step + 0.5f) : 0;
+    return ray;
+}
+
+struct Point {
+    Cell cell;
+    float f[3];  // place inside the cell, 0 to 1
+};
+TEXGS_MATHS Point sample_point(const texgs_grid& g, const Ray& ray, int k, float step) {
+    const float t = (static_cast<float>(k) + 0.5f) * step;
+    Point p;
+    int c[3];
+    for (int a = 0; a < 3; ++a) {
+        const float at = ray.entry[a] + t * ray.direction[a];
+        const int cell = static_cast<int>(at), last = g.size[a] - 2;  // rounding may lead out of the lattice
+        c[a] = cell < last ? cell : last;
+        p.f[a] = at - static_cast<float>(c[a]);
+    }
+    p.cell = {c[0], c[1], c[2]};
+    return p;
+}
+
+// How many samples on the first one lies that leaves the empty blocks around a point: those nearer than `distance`.
+TEXGS_MATHS int skipped(const Ray& ray, const Point& p, int distance, float step) {
+    const int c[3] = {p.cell.x, p.cell.y, p.cell.z};
+    float leave = 1e30f;
+    for (int a = 0; a < 3; ++a) {
+        const int block = c[a] >> 2;
+        const float d = ray.direction[a];
+        const int face = kBlockSide * (d > 0.0f ? block + distance : block - distance + 1);
+        const float length = (static_cast<float>(face - c[a]) - p.f[a]) / d;
+        leave = d != 0.0f && length < leave ? length : leave;
+    }
+    return leave < 1e9f ? static_cast<int>(leave / step) + 1 : 1 << 30;
+}
+
+struct Sample {
+    Point point;
+    Corners corners;
+    float weight, behind;  // in the ray's colour; light that passes on
+    float distance;        // from the origin, spacings
+};
+
+// Calls body(sample) where there is any density along a ray, front to back; returns the light that is left.
+template <class Body>
+TEXGS_LOOP float march(const texgs_grid& grid, const texgs_march& how, const Ray& ray, const Body& body) {
+    const float step = how.step;
+    float light = 1.0f;
+    for (int k = 0; k < ray.samples;) {
+        const Point p = sample_point(grid, ray, k, step);
+        const int block = block_of(grid, p.cell);
+        if (const int distance = grid.distance[block]) {
+            k += skipped(ray, p, distance, step);
+            continue;
+        }
+        ++k;
+        if (!(grid.occupied[block] >> bit_of(p.cell) & 1)) continue;
+        const Corners corners = corners_of(grid, p.cell);
+        float w[8], density = 0.0f;
+        corner_weights(p.f, w);
+        for (int i = 0; i < 8; ++i) density += w[i] * grid.density[corners.row[i]];
+        if (!(density > 0.0f)) continue;
+        const float behind = light * ::expf(-density * step * grid.spacing);
+        body(Sample{p, corners, light - behind, behind, ray.near + (static_cast<float>(k) - 0.5f) * step});
+        light = behind;
+        if (light < how.transmittance_min) break;
+    }
+    return light;
+}
+
+// -- Spherical harmonics ---------------------------------------------------------------------------------------------
+
+// The values that the floats of a row are multiplied with in the direction of a ray; those of extras are 0 but for the
+// ninth coefficient's, and that of density, which is 1. Order and signs are those of 3DGS.
+TEXGS_MATHS void row_basis(int degree, const float d[3], float* out) {
+    constexpr float y0 = 0.28209479f, y1 = 0.48860251f, y2[3] = {1.09254843f, 0.31539157f, 0.54627422f};
+    const float x = d[0], y = d[1], z = d[2];
+    const float basis[8] = {y0,
+                            -y1 * y,
+                            y1 * z,
+                            -y1 * x,
+                            y2[0] * x * y,
+                            -y2[0] * y * z,
+                            y2[1] * (2.0f * z * z - x * x - y * y),
+                            -y2[0] * x * z};
+    const float ninth = degree == 2 ? y2[2] * (x * x - y * y) : 0.0f;
+    const int quads = degree == 2 ? 8 : degree == 1 ? 4 : 1;
+    for (int k = 0; k < quads; ++k) {
+        for (int c = 0; c < 3; ++c) out[4 * k + c] = basis[k];
+        out[4 * k + 3] = k == 0 ? 1.0f : k < 4 ? ninth : 0.0f;
+    }
+}
+
+}  // namespace
+}  // namespace texgs::TEXGS_ISA

@@ -1,0 +1,71 @@
+"""The definition of rendering a voxel grid in plain torch: dense, any float type, gradients by autograd."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from torch import Tensor
+from torch.nn.functional import grid_sample, normalize
+
+from texgs.raster.reference.shading import harmonics
+
+
+def render_rays(
+    density: Tensor,
+    sh: Tensor,
+    lower: Sequence[float],
+    spacing: float,
+    rays: Tensor,
+    background: Sequence[float] = (1.0, 1.0, 1.0),
+    step: float = 0.5,
+    transmittance_min: float = 1e-3,
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Colour [N, 3] over the background, alpha [N] and expected distance [N] (Fridovich-Keil et al. 2022).
+
+    Args:
+        density: [X, Y, Z] at the lattice points.
+        sh: [X, Y, Z, k, 3] coefficients, k = 1, 4 or 9.
+        lower: world position of voxel (0, 0, 0).
+        spacing: of voxels, world units.
+        rays: [N, 6] origin and direction.
+        background: behind everything.
+        step: between samples, in spacings.
+        transmittance_min: a ray ends with the sample that leaves less.
+    """
+    direction = normalize(rays[:, 3:], dim=1)
+    origin = (rays[:, :3] - rays.new_tensor(lower)) / spacing
+    near, count = crossing(origin, direction, rays.new_tensor(density.shape) - 1, step)
+    k = torch.arange(max(int(count.max()), 1), dtype=rays.dtype)  # [S]
+    distance = near[:, None] + (k + 0.5) * step  # [N, S]
+    points = origin[:, None] + distance[..., None] * direction[:, None]  # [N, S, 3]
+
+    sigma = interpolate(density[..., None], points)[..., 0].clamp_min(0) * (k < count[:, None])
+    coefficients = interpolate(sh.flatten(3), points).unflatten(-1, sh.shape[3:])  # [N, S, k, 3]
+    basis = harmonics(direction)[:, : sh.shape[3]]
+    color = (0.5 + torch.einsum("nk,nskc->nsc", basis, coefficients)).clamp_min(0)
+
+    alpha = 1 - torch.exp(-sigma * step * spacing)
+    after = torch.cumprod(1 - alpha, dim=1)
+    before = torch.cat([torch.ones_like(after[:, :1]), after[:, :-1]], dim=1)
+    weight = before * alpha * (before >= transmittance_min)  # [N, S]
+    covered = weight.sum(1)
+    blended = torch.einsum("ns,nsc->nc", weight, color) + (1 - covered)[:, None] * rays.new_tensor(background)
+    depth = (weight * distance).sum(1) * spacing / covered.clamp_min(1e-30)
+    return blended, covered, depth
+
+
+def crossing(origin: Tensor, direction: Tensor, high: Tensor, step: float) -> tuple[Tensor, Tensor]:
+    """Distance at which rays enter the box from 0 to `high`, and their number of samples in it, [N] each."""
+    faces = torch.stack([-origin / direction, (high - origin) / direction])  # [2, N, 3]
+    near = faces.amin(0).amax(1).clamp_min(0)
+    far = faces.amax(0).amin(1)
+    return near, ((far - near) / step + 0.5).floor().clamp_min(0)
+
+
+def interpolate(lattice: Tensor, points: Tensor) -> Tensor:
+    """Trilinear values [N, S, C] of [X, Y, Z, C] at lattice coordinates [N, S, 3]."""
+    high = points.new_tensor(lattice.shape[:3]) - 1
+    places = (2 * points / high - 1).flip(-1)[None, :, :, None]  # grid_sample wants z, y, x for [X, Y, Z]
+    volume = lattice.permute(3, 0, 1, 2)[None]
+    return grid_sample(volume, places, align_corners=True)[0, ..., 0].permute(1, 2, 0)

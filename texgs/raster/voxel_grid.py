@@ -1,0 +1,205 @@
+"""A sparse grid of voxels with density and spherical harmonics: its layout in memory and its rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+from torch.nn.functional import embedding_bag
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.raster import grid_abi, native
+
+FLOATS = {0: 4, 1: 16, 2: 32}  # of a row, by degree of the spherical harmonics
+DEGREES = {floats: degree for degree, floats in FLOATS.items()}
+SIDES = range(8, 1025, 4)  # voxels along an axis
+EMPTY = 1  # rows before those of voxels: that of all others
+
+
+@dataclass(frozen=True, eq=False)
+class VoxelGrid:
+    """Density and colour at the points of a lattice, where there is any (Fridovich-Keil et al. 2022).
+
+    Voxels lie in blocks of 4 x 4 x 4. A block's mask has a bit for each voxel that has a row; rows follow
+    each other as their voxels do, z fastest within a block and between blocks. A row holds what `pack_rows`
+    says; the first one is that of all voxels without one, with density 0. `density`, `occupied` and
+    `distance` follow from masks and rows: call `refresh` after changing rows.
+    """
+
+    lower: tuple[float, float, float]  # world position of voxel (0, 0, 0)
+    spacing: float  # of voxels, world units
+    masks: Tensor  # [X / 4, Y / 4, Z / 4] int64
+    first: Tensor  # [X / 4, Y / 4, Z / 4] int32: row of a block's first voxel
+    rows: Tensor  # [n, 4, 16 or 32]; the first is that of voxels without one
+    density: Tensor  # [n] as in the rows
+    occupied: Tensor  # [X / 4, Y / 4, Z / 4] int64: cells that can show something, by their lowest voxel
+    distance: Tensor  # [X / 4, Y / 4, Z / 4] uint8: blocks to the next such cell
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Voxels along x, y and z, with a row or without."""
+        x, y, z = (4 * side for side in self.masks.shape)
+        return x, y, z
+
+    @property
+    def degree(self) -> int:
+        """Degree of the spherical harmonics, 0 to 2."""
+        return DEGREES[self.rows.shape[1]]
+
+    def __len__(self) -> int:
+        """Number of voxels with a row."""
+        return len(self.rows) - EMPTY
+
+    def structure(self) -> grid_abi.Grid:
+        """The grid as the library takes it."""
+        return grid_abi.Grid(
+            self.size,
+            self.lower,
+            self.spacing,
+            self.degree,
+            len(self.rows),
+            *map(
+                native.address,
+                (self.masks, self.first, self.occupied, self.distance, self.rows, self.density),
+            ),
+        )
+
+    @torch.no_grad()
+    def refresh(self) -> None:
+        """Bring density and occupancy up to date with the rows."""
+        self.density.copy_(self.rows[:, 3])
+        self.refresh_occupancy()
+
+    def refresh_occupancy(self) -> None:
+        """Find the cells that can show something, where the density is up to date."""
+        grid_abi.call(
+            "texgs_grid_occupy", self.structure(), self.occupied, self.distance, device=self.rows.device
+        )
+
+    def with_rows(self, rows: Tensor) -> VoxelGrid:
+        """The same voxels with other rows, [n, 4, 16 or 32]."""
+        check.shape("rows", rows, "n K", n=len(self.rows))
+        check.floating("rows", rows)
+        if rows.shape[1] not in DEGREES:
+            raise ShapeError(f"rows: expected 4, 16 or 32 floats, got {list(rows.shape)}")
+        grid = replace(
+            self,
+            rows=rows.contiguous(),
+            density=rows.new_empty(len(rows)),
+            occupied=torch.empty_like(self.occupied),
+            distance=torch.empty_like(self.distance),
+        )
+        grid.refresh()
+        return grid
+
+    def links(self) -> Tensor:
+        """[X, Y, Z] int32: the row of each voxel, 0 where it has none."""
+        bits = _unpacked(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
+        rows = self.first[..., None] + bits.cumsum(-1, dtype=torch.int32) - 1
+        return _lattice((rows * bits).int())
+
+    def points(self) -> Tensor:
+        """World positions [n - 1, 3] of the voxels that have a row, in their order."""
+        block, bit = _unpacked(self.masks).flatten(0, 2).nonzero().unbind(1)
+        _, columns, depth = self.masks.shape
+        corner = torch.stack([block // (columns * depth), block // depth % columns, block % depth], dim=1)
+        inside = torch.stack([bit // 16, bit // 4 % 4, bit % 4], dim=1)
+        return torch.tensor(self.lower) + self.spacing * (4 * corner + inside)
+
+
+def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int = 2) -> VoxelGrid:
+    """A grid whose rows are 0: no density, and grey.
+
+    Args:
+        mask: [X, Y, Z] bool, voxels that have a row; sides are multiples of 4 from 8 to 1024.
+        lower: world position of voxel (0, 0, 0), 3 numbers.
+        spacing: of voxels, world units.
+        degree: of the spherical harmonics, 0 to 2.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    check.shape("mask", mask, "X Y Z")
+    grid_abi.require_cpu(mask.device)
+    if mask.dtype != torch.bool or any(side not in SIDES for side in mask.shape):
+        raise ShapeError(
+            f"mask: expected bool [X, Y, Z] with multiples of 4 from 8 to 1024, got {list(mask.shape)} "
+            f"{str(mask.dtype).removeprefix('torch.')}; pad it with False"
+        )
+    if degree not in FLOATS:
+        raise ArgumentError(f"degree: expected 0, 1 or 2, got {degree}")
+    if not spacing > 0:
+        raise ArgumentError(f"spacing: expected more than 0, got {spacing}")
+    bits = _blocks(mask)  # [X / 4, Y / 4, Z / 4, 64]
+    masks = (bits.long() << torch.arange(64)).sum(-1)
+    counts = bits.sum(-1)
+    first = (counts.flatten().cumsum(0).reshape(counts.shape) - counts + EMPTY).int()
+    x, y, z = map(float, lower)
+    rows = torch.zeros(int(counts.sum()) + EMPTY, FLOATS[degree])
+    empty = torch.zeros_like(masks)
+    grid = VoxelGrid(
+        (x, y, z), float(spacing), masks, first, rows, rows.new_zeros(len(rows)), empty, empty.to(torch.uint8)
+    )
+    grid.refresh()
+    return grid
+
+
+def pack_rows(density: Tensor, sh: Tensor) -> Tensor:
+    """Rows [n, 4, 16 or 32] of densities [n] and coefficients [n, 1, 4 or 9, 3].
+
+    A row is quadruples (red, green, blue, extra), one a coefficient. The first extra is the density; those of
+    the second, third and fourth are the ninth coefficient.
+    """
+    n, count = sh.shape[:2]
+    rows = sh.new_zeros(n, min(count, 8), 4)
+    rows[:, :, :3] = sh[:, :8]
+    rows[:, 0, 3] = density
+    if count == 9:
+        rows[:, 1:4, 3] = sh[:, 8]
+    return rows.flatten(1)
+
+
+def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
+    """Densities [n] and coefficients [n, 1, 4 or 9, 3] of rows: what `pack_rows` has put together."""
+    quads = rows.unflatten(1, (-1, 4))  # [n, K / 4, 4]
+    sh = quads[:, :, :3]
+    if quads.shape[1] == 8:
+        sh = torch.cat([sh, quads[:, None, 1:4, 3]], dim=1)
+    return quads[:, 0, 3], sh
+
+
+def interpolate_rows(grid: VoxelGrid, points: Tensor) -> Tensor:
+    """Trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one."""
+    at = (points - points.new_tensor(grid.lower)) / grid.spacing
+    cell = at.floor().int()
+    links, size = grid.links(), torch.tensor(grid.size, dtype=torch.int32)
+    corners, weights = [], []
+    for offset in torch.cartesian_prod(*[torch.tensor([0, 1], dtype=torch.int32)] * 3):
+        place = cell + offset  # [m, 3]
+        inside = ((place >= 0) & (place < size)).all(1)
+        x, y, z = place.clamp_min(0).minimum(size - 1).long().unbind(1)
+        corners.append(links[x, y, z] * inside)
+        weights.append((1 - (at - place).abs()).prod(1))
+    return embedding_bag(
+        torch.stack(corners, 1), grid.rows.detach(), per_sample_weights=torch.stack(weights, 1), mode="sum"
+    )
+
+
+def _blocks(lattice: Tensor) -> Tensor:
+    """[X, Y, Z] as [X / 4, Y / 4, Z / 4, 64]."""
+    x, y, z = (side // 4 for side in lattice.shape)
+    return lattice.reshape(x, 4, y, 4, z, 4).permute(0, 2, 4, 1, 3, 5).reshape(x, y, z, 64)
+
+
+def _lattice(blocks: Tensor) -> Tensor:
+    """[X / 4, Y / 4, Z / 4, 64] as [X, Y, Z]."""
+    x, y, z = blocks.shape[:3]
+    return blocks.reshape(x, y, z, 4, 4, 4).permute(0, 3, 1, 4, 2, 5).reshape(4 * x, 4 * y, 4 * z)
+
+
+def _unpacked(masks: Tensor) -> Tensor:
+    """The bits of int64 masks [...], [..., 64] bool."""
+    return (masks[..., None] >> torch.arange(64) & 1).bool()

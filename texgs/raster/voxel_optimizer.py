@@ -1,0 +1,93 @@
+"""What changes the rows of a voxel grid: lazy optimisers and total variation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.raster import grid_abi
+from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster.voxels import RowGradient
+
+EPSILON = 1e-8
+BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}
+
+
+@dataclass(frozen=True)
+class VoxelRates:
+    """Learning rates of one step."""
+
+    density: float
+    base: float  # of the zeroth spherical harmonic
+    sh: float  # of the others
+
+
+class VoxelOptimizer:
+    """RMSProp as in Plenoxels, or Adam, on the rows that have a gradient; all others stay as they are.
+
+    Running means start at the first gradient of a row and its square, so that the first step of each float
+    is its rate, and no correction is needed.
+
+    Args:
+        grid: whose rows are changed in place; its density follows them, its occupancy does not.
+        kind: "rmsprop" or "adam".
+        betas: of the means of gradients and of their squares; the first is not used by "rmsprop".
+
+    Raises:
+        ArgumentError: if the kind is unknown.
+    """
+
+    def __init__(
+        self,
+        grid: VoxelGrid,
+        kind: Literal["rmsprop", "adam"] = "rmsprop",
+        betas: tuple[float, float] | None = None,
+    ) -> None:
+        if kind not in BETAS:
+            raise ArgumentError(f"optimizer: expected {' or '.join(BETAS)}, got {kind!r}")
+        self.grid = grid
+        self.betas = betas or BETAS[kind]
+        self.gradient = RowGradient(grid)
+        self.first = torch.zeros_like(grid.rows) if kind == "adam" else None
+        self.second = torch.zeros_like(grid.rows)
+
+    def step(self, rates: VoxelRates) -> None:
+        """Move the rows that have a gradient, and forget it."""
+        rule = grid_abi.Rule(rates.density, rates.base, rates.sh, *self.betas, EPSILON)
+        state = (self.gradient.rows, self.gradient.touched, self.first, self.second)
+        grid_abi.call("texgs_grid_step", self.grid.structure(), rule, *state, device=self.grid.rows.device)
+
+
+def add_total_variation(
+    grid: VoxelGrid, blocks: Tensor, density: float, sh: float, into: RowGradient
+) -> None:
+    """Add the gradient of total variation over the voxels of some blocks.
+
+    For every float of a row, weight * sqrt(1e-9 + sum over x, y, z of (next voxel - voxel)^2); a voxel
+    without a row counts as equal.
+
+    Args:
+        grid: any.
+        blocks: [m] int32, places in the flattened `grid.masks`.
+        density: weight of the density's variation.
+        sh: weight of the coefficients'.
+        into: where the gradient is added.
+    """
+    blocks = blocks.int().contiguous()
+    if len(blocks) and not 0 <= int(blocks.min()) <= int(blocks.max()) < grid.masks.numel():
+        raise ArgumentError(f"blocks: expected places from 0 to {grid.masks.numel() - 1}, got others")
+    grid_abi.call(
+        "texgs_grid_total_variation",
+        grid.structure(),
+        len(blocks),
+        blocks,
+        density,
+        sh,
+        into.rows,
+        into.touched,
+        device=grid.rows.device,
+    )
