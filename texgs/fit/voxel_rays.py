@@ -10,7 +10,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.raster.voxels import camera_rays
-from texgs.scene.images import Images
+from texgs.volume.images import Images
 
 AROUND = 6  # pixels around what is visible; the visual hull keeps all others empty
 

@@ -13,7 +13,7 @@ from texgs.fit.hull import Box, is_covered
 from texgs.fit.voxel_rays import TrainingRays, widened
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxels import March, Samples
-from texgs.scene.images import Images
+from texgs.volume.images import Images
 
 SEARCHED = 64  # voxels along a side of the cube that is searched for the object
 PIECE = 16_384  # rays at a time

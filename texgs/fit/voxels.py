@@ -16,7 +16,7 @@ from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import VoxelGrid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, add_total_variation
 from texgs.raster.voxels import March, Rays, Samples
-from texgs.scene.images import Images
+from texgs.volume.images import Images
 
 CHECKED_EVERY = 100  # steps between looks at the loss
 
