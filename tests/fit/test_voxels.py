@@ -6,18 +6,24 @@ import pytest
 import torch
 
 from tests.fit.scenes import RADIUS, ball_images, ball_planes, cameras, images_of
+from texgs.config.compose import compose
+from texgs.config.typed import typed
+from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fit.voxel_rays import AROUND, curve, training_rays, widened
-from texgs.fit.voxel_settings import PLENOXELS, Decay, Stage, VoxelSettings
 from texgs.fit.voxel_shape import hull_box, hull_grid, refined, seen_voxels
 from texgs.fit.voxels import VoxelFit
 from texgs.metrics.image import psnr
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays, render_view
 
-SETTINGS = VoxelSettings(
-    stages=(Stage(16, 40), Stage(32, 80)), degree=1, half_size=0.6, rays=512, density=Decay(40.0, 2.0, 10)
+SETTINGS = VoxelKeys(
+    stages=[GridStage(16, 40), GridStage(32, 80)],
+    degree=1,
+    half_size=0.6,
+    rays=512,
+    density=Decay(40.0, 2.0, 10),
 )
 
 
@@ -66,7 +72,7 @@ def test_the_same_seed_gives_the_same_grid(fit, images):
 
 @pytest.mark.parametrize(("optimizer", "rate"), [("rmsprop", 40.0), ("adam", 5.0)])
 def test_optimisers_without_total_variation(images, optimizer, rate):
-    stages = (Stage(16, 80, total_variation=False),)
+    stages = [GridStage(16, 80, total_variation=False)]
     density = Decay(rate, 1.0, 10)
     fit = VoxelFit(images, replace(SETTINGS, stages=stages, optimizer=optimizer, density=density))
     for _ in fit.run():
@@ -159,20 +165,22 @@ def test_schedules():
     assert rate.at(50, 100) == pytest.approx(10.0)
     assert rate.at(100, 100) == pytest.approx(1.0)
     # The published schedule: log-linear over 250,000 steps, with a ramp of 15,000.
-    assert PLENOXELS.rates(125_000).density == pytest.approx(30 * (0.05 / 30) ** 0.5, rel=1e-3)
-    assert PLENOXELS.rates(125_000).sh == pytest.approx(1e-2 * (5e-6 / 1e-2) ** 0.5, rel=1e-3)
-    assert PLENOXELS.steps == 128_000
+    whole = typed(VoxelKeys, compose(("fit=plenoxels",)).fit.voxels)
+    assert whole.steps == 128_000
+    half = 125_000, whole.steps
+    assert whole.density.at(*half) == pytest.approx(30 * (0.05 / 30) ** 0.5, rel=1e-3)
+    assert whole.sh.at(*half) == pytest.approx(1e-2 * (5e-6 / 1e-2) ** 0.5, rel=1e-3)
 
 
 def test_errors(images):
     with pytest.raises(ArgumentError, match=r"stages: expected sides that double .* got \[16, 48\]"):
-        VoxelFit(images, replace(SETTINGS, stages=(Stage(16, 1), Stage(48, 1))))
+        VoxelFit(images, replace(SETTINGS, stages=[GridStage(16, 1), GridStage(48, 1)]))
     pruned = VoxelFit(images, replace(SETTINGS, prune_weight=1.0))
     with pytest.raises(
         FitError, match="expected some that show in the views, found none; lower prune_weight"
     ):
         pruned.refine()
-    broken = VoxelFit(images, replace(SETTINGS, stages=(Stage(16, 100),)))
+    broken = VoxelFit(images, replace(SETTINGS, stages=[GridStage(16, 100)]))
     broken.grid.rows[1:, 0] = float("nan")
     with pytest.raises(FitError, match=r"iteration 100: .*: expected finite values, got .* NaN"):
         list(broken.run())

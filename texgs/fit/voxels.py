@@ -8,13 +8,13 @@ from itertools import pairwise
 
 import torch
 
+from texgs.config.voxel_fit import GridStage, VoxelKeys
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fit.loop import require_finite
 from texgs.fit.voxel_rays import training_rays
-from texgs.fit.voxel_settings import Stage, VoxelSettings
 from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import VoxelGrid
-from texgs.raster.voxel_optimizer import VoxelOptimizer, add_total_variation
+from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_total_variation
 from texgs.raster.voxels import March, Rays, Samples
 from texgs.volume.images import Images
 
@@ -42,7 +42,7 @@ class VoxelFit:
         ArgumentError: if the stages do not double, or the views show nothing.
     """
 
-    def __init__(self, images: Images, settings: VoxelSettings, seed: int = 0) -> None:
+    def __init__(self, images: Images, settings: VoxelKeys, seed: int = 0) -> None:
         sides = [stage.side for stage in settings.stages]
         if not sides or any(b != 2 * a for a, b in pairwise(sides)):
             raise ArgumentError(f"stages: expected sides that double from one to the next, got {sides}")
@@ -81,7 +81,7 @@ class VoxelFit:
         self._begin(refined(self.grid, kept))
 
     @torch.no_grad()
-    def step(self, stage: Stage) -> VoxelProgress:
+    def step(self, stage: GridStage) -> VoxelProgress:
         """Rays, their mean squared error, a step of the optimiser.
 
         Raises:
@@ -97,13 +97,19 @@ class VoxelFit:
         samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
         if stage.total_variation:
             self._smooth()
-        self.optimizer.step(s.rates(self.step_count))
+        self.optimizer.step(self.rates())
         self.step_count += 1
         is_looked_at = self.step_count % CHECKED_EVERY == 0 or self.step_count == s.steps
         loss = error.square().mean() if is_looked_at else None
         if loss is not None:  # rows that are not finite show nothing, so that the loss alone does not tell
             require_finite(self.step_count, {"loss": loss, "rows": self.grid.rows})
         return VoxelProgress(self.step_count, len(self.grid), None if loss is None else float(loss))
+
+    def rates(self) -> VoxelRates:
+        """Learning rates of the step to come."""
+        s = self.settings
+        sh = s.sh.at(self.step_count, s.steps)
+        return VoxelRates(s.density.at(self.step_count, s.steps), sh, sh)
 
     def _smooth(self) -> None:
         """The gradient of total variation in some random blocks."""

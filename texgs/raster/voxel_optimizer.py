@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import torch
 from torch import Tensor
@@ -44,7 +43,7 @@ class VoxelOptimizer:
     def __init__(
         self,
         grid: VoxelGrid,
-        kind: Literal["rmsprop", "adam"] = "rmsprop",
+        kind: str = "rmsprop",
         betas: tuple[float, float] | None = None,
     ) -> None:
         if kind not in BETAS:

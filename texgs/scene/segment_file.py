@@ -78,7 +78,7 @@ def _anchors(model: Surfels) -> Tensor:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    found = read_tensor_file(path, FORMAT)
+    found, _ = read_tensor_file(path, FORMAT)
     mask, anchors = found.get("mask"), found.get("anchors")
     is_whole = mask is not None and anchors is not None and mask.dtype == torch.bool and mask.ndim == 1
     if not is_whole or bool((mask.view(torch.uint8) > 1).any()):  # type: ignore[union-attr]

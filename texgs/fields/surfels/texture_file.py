@@ -67,7 +67,7 @@ def with_texture(model: Surfels, path: str | Path) -> Surfels:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    found = read_tensor_file(path, FORMAT)
+    found, _ = read_tensor_file(path, FORMAT)
     shapes = [found[name].shape[1:] for name in ("texels", "sizes") if name in found]
     if shapes != [(3,), (2,)] or len(found["texels"]) != int(found["sizes"].long().prod(1).sum()):
         raise ArgumentError(f"{path}: expected texels and sizes that fit each other; make it again")

@@ -1,0 +1,135 @@
+"""Voxels as a field: rendering, files, scenes of several."""
+
+import json
+from dataclasses import replace
+
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.fields.files import open_field
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.voxels.composition import VoxelScene, merged
+from texgs.fields.voxels.file import read_voxels, write_voxels
+from texgs.fields.voxels.model import Voxels
+from texgs.raster.voxel_grid import pack_rows, unpack_rows, voxel_grid
+
+CAMERA = orbit(30, 20, 4.0, 30.0, 48, 40)
+
+
+def ball(center=(0.0, 0.0, 0.0), color=0.4, density=60.0, side=32, spacing=0.02, degree=1):
+    """A ball of one colour in a lattice around it."""
+    lower = torch.tensor(center) - 0.5 * spacing * (side - 1)
+    steps = spacing * torch.arange(side) - 0.5 * spacing * (side - 1)
+    distance = torch.stack(torch.meshgrid(steps, steps, steps, indexing="ij")).norm(dim=0)
+    grid = voxel_grid(distance < 0.22, lower.tolist(), spacing, degree)
+    near = (grid.points() - torch.tensor(center)).norm(dim=1) < 0.18
+    sh = torch.zeros(len(grid), (degree + 1) ** 2, 3)
+    sh[:, 0] = color
+    rows = torch.cat([grid.rows[:1], pack_rows(density * near.float(), sh)])
+    return Voxels(grid.with_rows(rows), metadata={"tf": "TF01"})
+
+
+def test_files_give_the_same_bits_and_are_known_by_their_header(tmp_path):
+    field = ball(degree=2)
+    path = write_voxels(tmp_path / "model.safetensors", field)
+    found = open_field(path)
+    assert isinstance(found, Voxels)
+    assert torch.equal(found.grid.rows, field.grid.rows)
+    assert torch.equal(found.grid.masks, field.grid.masks)
+    assert found.metadata == field.metadata
+    assert torch.equal(found.render(CAMERA).color, field.render(CAMERA).color)
+    assert write_voxels(tmp_path / "again", found).read_bytes() == path.read_bytes()
+    assert path.stat().st_size == pytest.approx(found.sizes()["stored_total_mib"] * 2**20, abs=2000)
+
+
+def test_sizes_are_those_that_the_paper_counts():
+    field = ball(degree=2)
+    sizes, n = field.sizes(), len(field)
+    assert sizes["total_mib"] * 2**20 == 4 * 32**3 + n * (4 + 2 * 27)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t, h: t.pop("sh"), "expected a grid and its lattice"),
+        (lambda t, h: t.update(density=t["density"][:-1]), "expected .* got"),
+        (lambda t, h: t.update(masks=torch.zeros_like(t["masks"])), "masks: expected the bits of"),
+        (
+            lambda t, h: t.update(density=torch.full_like(t["density"], torch.nan)),
+            "density: .*finite|NaN",
+        ),
+        (lambda t, h: t.update(sh=t["sh"][:, :3]), "expected a grid and its lattice"),
+        (lambda t, h: h.update(spacing=0), "spacing: expected more than 0"),
+        (lambda t, h: h.update(lower=[0, 0]), "expected a grid and its lattice"),
+        (lambda t, h: h.update(version=2), "expected version 1"),
+        (lambda t, h: h.pop("step"), "expected a grid and its lattice"),
+    ],
+)
+def test_damaged_files_are_named(tmp_path, change, message):
+    path = write_voxels(tmp_path / "m.safetensors", ball())
+    tensors = load_file(path)
+    header = {"version": 1, "lower": [0.0, 0.0, 0.0], "spacing": 0.02, "step": 0.5}
+    header |= {"transmittance_min": 1e-3, "metadata": {}}
+    change(tensors, header)
+    save_file(
+        {name: x.contiguous() for name, x in tensors.items()}, path, {"texgs-voxels": json.dumps(header)}
+    )
+    with pytest.raises(TexgsError, match=message) as caught:
+        read_voxels(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_scene_of_one_is_the_field():
+    field = ball()
+    scene = VoxelScene([field])
+    assert torch.equal(scene.render(CAMERA).color, field.render(CAMERA).color)
+    assert len(scene) == len(field)
+
+
+def test_two_apart_are_seen_as_each_alone():
+    left, right = ball((-0.4, 0.0, 0.0)), ball((0.4, 0.0, 0.0), color=-0.8)
+    together = VoxelScene([left, right]).render(CAMERA, outputs=("depth",))
+    alone = [field.render(CAMERA) for field in (left, right)]
+    expected = alone[0].alpha + alone[1].alpha
+    assert (together.alpha - expected).abs().mean() < 2e-3, "they are interpolated, but for the first one"
+    assert together.alpha.max() > 0.9
+    assert (together.color - (alone[0].color + alone[1].color - 1)).abs().mean() < 2e-3
+
+
+def test_densities_add_up_where_grids_overlap():
+    one, other = ball(density=10.0, color=1.0), ball(density=30.0, color=-1.0)
+    grid = merged([one.grid, other.grid])
+    density, sh = unpack_rows(grid.rows)
+    inside = grid.points().norm(dim=1) < 0.1
+    torch.testing.assert_close(density[1:][inside], torch.full_like(density[1:][inside], 40.0))
+    torch.testing.assert_close(sh[1:, 0][inside], torch.full_like(sh[1:, 0][inside], -0.5))
+
+
+def test_edits_of_opacity_and_visibility():
+    fields = [ball((-0.4, 0.0, 0.0), density=8.0), ball((0.4, 0.0, 0.0), density=8.0)]
+    scene = VoxelScene(fields)
+    hidden = scene.render(CAMERA, edits=[PartEdit(visible=False), PartEdit()])
+    assert (hidden.alpha - fields[1].render(CAMERA).alpha).abs().max() < 0.2
+    thin = VoxelScene(fields[:1]).render(CAMERA, edits=[PartEdit(opacity=0.5)]).alpha
+    exact = fields[0].grid.with_rows(
+        pack_rows(0.5 * unpack_rows(fields[0].grid.rows)[0], unpack_rows(fields[0].grid.rows)[1])
+    )
+    assert torch.equal(thin, replace(fields[0], grid=exact).render(CAMERA).alpha)
+
+
+@pytest.mark.parametrize(
+    ("render", "message"),
+    [
+        (lambda s: s.render(CAMERA, edits=[]), "edits: expected one for each of 1 models, got 0"),
+        (lambda s: s.render(CAMERA, edits=[PartEdit(diffuse=2)]), "expected visible and opacity of voxels"),
+        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded of voxels, got ambient"),
+        (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of voxels, got normal"),
+        (lambda s: VoxelScene([]), "models: expected at least one"),
+    ],
+)
+def test_what_voxels_cannot_show(render, message):
+    with pytest.raises(ArgumentError, match=message):
+        render(VoxelScene([ball()]))

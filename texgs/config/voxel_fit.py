@@ -1,0 +1,69 @@
+"""Settings of the fit of a voxel grid, and the schedule of its rates."""
+
+from dataclasses import dataclass, field
+from math import pi, sin
+
+from texgs.config.keys import key
+
+
+@dataclass
+class GridStage:
+    """Part of a fit at one resolution."""
+
+    side: int = key(64, "voxels along the longest side of the box; twice those of the stage before", least=8)
+    steps: int = key(100, "at this resolution", least=0)
+    total_variation: bool = key(True, "whether total variation is held down")
+
+
+@dataclass
+class Decay:
+    """A rate that falls log-linearly over the fit, after a sine ramp that starts at a hundredth."""
+
+    start: float = key(1.0, "at first", above=0)
+    final: float = key(0.1, "at the end", above=0)
+    ramp: int = key(0, "steps of the ramp", least=0)
+
+    def at(self, step: int, steps: int) -> float:
+        """The rate of a step, 0 to steps - 1."""
+        rate = self.start * (self.final / self.start) ** (step / steps)
+        if step >= self.ramp:
+            return rate
+        return rate * (0.01 + 0.99 * sin(0.5 * pi * step / self.ramp))
+
+
+def _stages() -> list[GridStage]:
+    return [GridStage(64, 60), GridStage(128, 300), GridStage(256, 800)]
+
+
+@dataclass
+class VoxelKeys:
+    """How a grid is fitted. The defaults are meant for two cores of a CPU and a minute."""
+
+    stages: list[GridStage] = field(
+        default_factory=_stages, metadata={"help": "resolutions, one after the other"}
+    )
+    degree: int = key(2, "of the spherical harmonics", least=0, most=2)
+    half_size: float = key(1.3, "half the side of the cube that is searched", "world units", above=0)
+    rays: int = key(8192, "a step", least=1)
+    run: int = key(2, "rays that are neighbours: longer runs take less time a step, and more steps", least=1)
+    optimizer: str = key("rmsprop", "which", choices=("rmsprop", "adam"))
+    density: Decay = field(
+        default_factory=lambda: Decay(40.0, 1.0, 50), metadata={"help": "rate of densities, per world unit"}
+    )
+    sh: Decay = field(
+        default_factory=lambda: Decay(4e-2, 4e-3), metadata={"help": "rate of spherical harmonics"}
+    )
+    tv_density: float = key(1e-5, "weight of total variation of densities", least=0)
+    tv_sh: float = key(2e-4, "weight of that of spherical harmonics", least=0)
+    tv_share: float = key(0.01, "of all blocks that it looks at in a step", above=0, most=1)
+    start_density: float = key(0.1, "of all voxels at first, per world unit", above=0)
+    prune_weight: float = key(2e-3, "voxels whose largest blending weight is below are removed", least=0)
+    prune_share: float = key(0.1, "of the training rays that pruning looks at", above=0, most=1)
+    occupy_every: int = key(50, "steps between looks at which cells show anything", least=1)
+    step: float = key(0.5, "between samples", "voxels", above=0)
+    transmittance_min: float = key(1e-3, "a ray ends where less is left", least=0, below=1)
+
+    @property
+    def steps(self) -> int:
+        """Of all stages."""
+        return sum(stage.steps for stage in self.stages)

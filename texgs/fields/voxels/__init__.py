@@ -1,0 +1,1 @@
+"""Sparse grids of voxels."""

@@ -1,0 +1,145 @@
+"""Voxel grids as one scene: merged into one grid, in which densities add up."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from math import ceil
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.field import Look
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.voxels.model import Voxels
+from texgs.raster import Render
+from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, unpack_rows, voxel_grid
+
+PIECE = 1 << 18  # voxels at a time
+SIDE = 8  # voxels that sides of a lattice are multiples of
+
+
+class VoxelScene:
+    """Grids that are drawn together; edits of opacity and visibility make another merged grid.
+
+    Args:
+        fields: at least one, on the CPU.
+
+    Raises:
+        ArgumentError: if there is none.
+    """
+
+    def __init__(self, fields: Sequence[Voxels]) -> None:
+        if not fields:
+            raise ArgumentError("models: expected at least one, got none")
+        self.fields = list(fields)
+        self._merged: tuple[tuple[float, ...], Voxels] | None = None
+
+    def __len__(self) -> int:
+        return sum(map(len, self.fields))
+
+    @property
+    def device(self) -> torch.device:
+        """Where the rows are."""
+        return self.fields[0].device
+
+    @property
+    def palettes(self) -> list[tuple[float, ...]]:
+        """Grids have none."""
+        return [(0.0, 0.0, 0.0)] * len(self.fields)
+
+    @torch.no_grad()
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        edits: Sequence[PartEdit] | None = None,
+        *,
+        look: Look = "shaded",
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render all visible grids.
+
+        Args:
+            camera: from where.
+            light: changes nothing.
+            edits: one for each grid; opacity is a factor on densities.
+            look: "shaded", as fitted.
+            background: [3]; white by default.
+            outputs: "depth".
+
+        Raises:
+            ArgumentError: if there are not as many edits as grids, or one cannot be shown.
+        """
+        if look != "shaded":
+            raise ArgumentError(f"look: expected shaded of voxels, got {look}")
+        edits = [PartEdit()] * len(self.fields) if edits is None else edits
+        if len(edits) != len(self.fields):
+            raise ArgumentError(
+                f"edits: expected one for each of {len(self.fields)} models, got {len(edits)}"
+            )
+        for edit in edits:
+            if replace(edit, visible=True, opacity=1.0) != PartEdit():
+                raise ArgumentError("edits: expected visible and opacity of voxels, got others")
+        factors = tuple(edit.opacity if edit.visible else 0.0 for edit in edits)
+        if self._merged is None or self._merged[0] != factors:
+            self._merged = (factors, self._merge(factors))
+        return self._merged[1].render(camera, light, background=background, outputs=outputs)
+
+    def _merge(self, factors: tuple[float, ...]) -> Voxels:
+        first, grids = self.fields[0], []
+        for field, factor in zip(self.fields, factors, strict=True):
+            density, sh = unpack_rows(field.grid.rows)
+            grids.append(field.grid.with_rows(pack_rows(density * factor, sh)))
+        return replace(first, grid=grids[0] if len(grids) == 1 else merged(grids))
+
+
+def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
+    """One grid in which densities of several add up, and colours are means weighted by them.
+
+    It has the finest of their spacings. Grids that have another lattice are interpolated at its voxels, which
+    blurs them by less than one.
+
+    Raises:
+        ShapeError: if the grids lie so far apart that a lattice around them has too many voxels.
+    """
+    spacing = min(grid.spacing for grid in grids)
+    lower = torch.tensor([grid.lower for grid in grids]).amin(0)
+    upper = torch.stack([_upper(grid) for grid in grids]).amax(0)
+    size = [SIDE * ceil((float(extent) / spacing + 1) / SIDE) for extent in upper - lower]
+    mask = torch.zeros(size, dtype=torch.bool)
+    for grid in grids:
+        _mark(mask, (grid.points() - lower) / spacing)
+    degree = max(grid.degree for grid in grids)
+    whole = voxel_grid(mask, lower.tolist(), spacing, degree)
+    points = whole.points()
+    rows = [_blended(grids, piece, degree) for piece in points.split(PIECE)]
+    return whole.with_rows(torch.cat([whole.rows[:1], *rows]))
+
+
+def _upper(grid: VoxelGrid) -> Tensor:
+    return torch.tensor(grid.lower) + grid.spacing * (torch.tensor(grid.size) - 1)
+
+
+def _mark(mask: Tensor, places: Tensor) -> None:
+    """Set the eight voxels around places [n, 3] in a lattice."""
+    cell, most = places.floor().long(), torch.tensor(mask.shape) - 1
+    for offset in torch.cartesian_prod(*[torch.tensor([0, 1])] * 3):
+        x, y, z = (cell + offset).clamp_min(0).minimum(most).unbind(1)
+        mask[x, y, z] = True
+
+
+def _blended(grids: Sequence[VoxelGrid], points: Tensor, degree: int) -> Tensor:
+    """Rows [m, K] at points [m, 3]."""
+    total = points.new_zeros(len(points))
+    color = points.new_zeros(len(points), (degree + 1) ** 2, 3)
+    for grid in grids:
+        density, sh = unpack_rows(interpolate_rows(grid, points))
+        weight = density.clamp_min(0)
+        total += weight
+        color[:, : sh.shape[1]] += weight[:, None, None] * sh
+    return pack_rows(total, color / total.clamp_min(1e-12)[:, None, None])
