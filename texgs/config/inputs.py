@@ -83,6 +83,11 @@ def scene_settings(config: DictConfig) -> dict[str, Any]:
     }
 
 
+def lens(config: DictConfig) -> dict[str, float]:
+    """Distance and field of view of the views, which pictures of scenes share."""
+    return {"radius": config.views.radius, "fov_y": config.views.fov_y}
+
+
 def fit_label(config: DictConfig) -> dict[str, Any]:
     """Which fit this is, and what it runs on."""
     return {
@@ -159,4 +164,5 @@ def edit_settings(config: DictConfig) -> dict[str, Any]:
     """What jobs of edits read: what all edits have, and the keys of this one's method."""
     keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
     edit = {name: config.edit[name] for name in keys}
-    return {"edit": edit, **fit_label(config), "reduce": config.fit.reduce, "clip": config.metric.clip}
+    given = {"reduce": config.fit.reduce, "clip": config.metric.clip, "lens": lens(config)}
+    return {"edit": edit, **fit_label(config), **given}

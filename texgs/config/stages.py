@@ -10,6 +10,7 @@ from texgs.config.inputs import (
     edit_settings,
     edited_scene,
     fit_label,
+    lens,
     model_of,
     models,
     prepared_volume,
@@ -167,7 +168,11 @@ ROWS = (
     Stage(
         "compose",
         "texgs.cli.stages.compose",
-        select=lambda config: {"image": config.dataset.image, **fit_label(config)},
+        select=lambda config: {
+            "image": config.dataset.image,
+            "lens": lens(config),
+            **fit_label(config),
+        },
         inputs=all_models,
         place="compose",
         needs=tuple(kind.phases[-1] for kind in kinds().values()),

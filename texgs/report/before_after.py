@@ -25,24 +25,25 @@ TURN, TURN_SIZE = 36, 320  # frames of the turntable, and pixels of each half
 
 
 def write_before_and_after(
-    before: Scene, after: Scene, output: Path, device: torch.device, title: str
+    before: Scene, after: Scene, lens: Lens, output: Path, device: torch.device, title: str
 ) -> None:
     """Write edit.png, views of both under the scene's light and under another, and turntable.mp4 of both.
 
     Args:
         before: the scene.
         after: the same scene, edited.
+        lens: of the cameras, but for the size of images.
         output: folder.
         device: that renders.
         title: of the progress bar.
     """
-    cameras = orbit_path(SHOWN, POLAR, *Lens().square(SIZE))
+    cameras = orbit_path(SHOWN, POLAR, *lens.square(SIZE))
     lights = [before.light] * SHOWN + [SIDE]
     titles = [f"view {index + 1}" for index in range(SHOWN)] + ["light from the side"]
     scenes = {"before": before, "after": after}
     rows = {name: pictures(scene, [*cameras, cameras[0]], lights, device) for name, scene in scenes.items()}
     write_strip(output / "edit.png", rows, titles)
-    turn = orbit_path(TURN, POLAR, *Lens().square(TURN_SIZE))
+    turn = orbit_path(TURN, POLAR, *lens.square(TURN_SIZE))
     halves = [pictures(scene, turn, [scene.light] * TURN, device) for scene in scenes.values()]
     frames = [np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True)]
     write_frames(output / "turntable.mp4", progress(frames, title=f"{title}, turntable", unit="frame"))

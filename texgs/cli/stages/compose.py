@@ -27,7 +27,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     scene = Scene({name: SceneModel(path) for name, path in inputs.items()})
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings["fit"]["device"]))
-    camera = orbit(AZIMUTH, POLAR, *Lens().square(settings["image"]))
+    camera = orbit(AZIMUTH, POLAR, *Lens(**settings["lens"]).square(settings["image"]))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
     return Outcome(SceneResult(len(scene.models), len(composition)), {"scene.png": SHOWN})

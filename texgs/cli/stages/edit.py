@@ -8,6 +8,7 @@ from texgs.config.edit import EditKeys
 from texgs.config.methods import method_of
 from texgs.config.typed import typed
 from texgs.core.device import torch_device
+from texgs.core.lens import Lens
 from texgs.edit.task import Task
 from texgs.report.before_after import write_before_and_after
 from texgs.report.results import EditResult
@@ -44,7 +45,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     write_scene(output / "scene.yaml", edited.scene)
     pictures = dict(edited.pictures)
     if method.is_look:
-        write_before_and_after(before, edited.scene, output, device, title)
+        write_before_and_after(before, edited.scene, Lens(**settings["lens"]), output, device, title)
         pictures["edit.png"] = SHOWN
     result = EditResult(
         task.edit.name, method.name, edited.how, edited.seconds, edited.lambda_s, dict(edited.notes)
