@@ -100,7 +100,7 @@ def test_harmonics_first_as_in_the_paper(viewed):
 
 
 def test_a_material_per_surfel_on_request(seeded):
-    main(["shading", *TINY, "fit.material=surfel", "fit.shading.losses.smoothness=0.01"])
+    main(["shading", *TINY, "fit.materials=surfel", "fit.shading.losses.smoothness=0.01"])
     ambient = read_model(seeded / "shading" / "model.safetensors").parameters["ambient"]
     assert len(ambient) == 400
     assert ambient.std() > 0.01

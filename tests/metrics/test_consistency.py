@@ -12,7 +12,7 @@ from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
 from texgs.fields.surfels.composition import Composition
-from texgs.metrics.consistency import Frame, consistency, frames_of, warp
+from texgs.metrics.consistency import SeenFrame, consistency, frames_of, warp
 
 SIZE = 64
 
@@ -40,7 +40,7 @@ def plane(view, half=0.4):
     places = view.position.double() + depth[..., None] * (rays @ R)
     alpha = (places[..., :2].abs() < half).all(-1)
     image = torch.where(alpha[..., None], color(places), 1.0)
-    return Frame(image.float(), torch.where(alpha, depth, 0).float(), alpha.float(), view)
+    return SeenFrame(image.float(), torch.where(alpha, depth, 0).float(), alpha.float(), view)
 
 
 def test_a_textured_plane_is_consistent():
@@ -107,7 +107,7 @@ def test_rendered_views_of_surfels_are_consistent_with_themselves():
     scene = random_scene(0, n=50)
     view = Camera(scene.viewmat, scene.K, scene.width, scene.height)
     depth = torch.full((scene.height, scene.width), 2.0)
-    frame = Frame(torch.rand(scene.height, scene.width, 3), depth, torch.ones_like(depth), view)
+    frame = SeenFrame(torch.rand(scene.height, scene.width, 3), depth, torch.ones_like(depth), view)
     found = consistency([frame, frame])
     assert found.rmse < 1e-5
     assert found.covered > 0.9

@@ -1,9 +1,9 @@
-"""Views of nothing in particular, for guidances."""
+"""EditViews of nothing in particular, for guidances."""
 
 import torch
 
 from texgs.core.camera import orbit
-from texgs.models.guidance import Views
+from texgs.models.guidance import EditViews
 
 
 def random_views(count=2, height=24, width=32, seed=0, cameras=None):
@@ -18,4 +18,4 @@ def random_views(count=2, height=24, width=32, seed=0, cameras=None):
     turns = [camera.viewmat[:3, :3] * torch.tensor([[1.0], [-1.0], [-1.0]]) for camera in cameras]
     points = torch.stack([0.5 * local @ turn for turn in turns])
     images = images * alphas[..., None] + 1 - alphas[..., None]
-    return Views(images, images, alphas, points, points * 2, cameras)
+    return EditViews(images, images, alphas, points, points * 2, cameras)

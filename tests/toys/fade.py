@@ -15,13 +15,13 @@ class FadeKeys:
 
 def run(task):
     """Let all models fade."""
-    from texgs.edit.task import Edited
+    from texgs.edit.task import EditedScene
     from texgs.scene.session import Session
 
     session = Session(task.scene)
     for model in task.scene.models:
         session.set(model, "opacity", task.settings.opacity)
-    return Edited(session.scene, "a toy", seconds=0.5)
+    return EditedScene(session.scene, "a toy", seconds=0.5)
 
 
 METHOD = Method(

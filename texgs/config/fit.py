@@ -90,7 +90,7 @@ class Material:
 
 
 @dataclass
-class Texture:
+class TextureKeys:
     """Texels: how many, and how they are found."""
 
     texels: int | None = key(None, "in all; default where they are seen, about one per pixel")
@@ -114,13 +114,15 @@ class FitKeys:
     facing: bool = key(
         True, "lights shine on the side that faces the viewer; false: on both, as in the paper"
     )
-    material: str = key("shared", "one material for all, or one per surfel", choices=("shared", "surfel"))
-    activation: str = key("bounded", "range of material factors", choices=("bounded", "paper"))
+    materials: str = key("shared", "one material for all, or one per surfel", choices=("shared", "surfel"))
+    material_range: str = key(
+        "bounded", "of its factors: bounded, or as wide as in the paper", choices=("bounded", "paper")
+    )
     first_material: Material = key(Material, "before the shading phase")
     seeds: Seeds = key(Seeds, "where surfels start")
     surfels: Phase = key(Phase, "phase 1, with spherical harmonics")
     shading: Phase = key(Phase, "phase 2, with Blinn-Phong")
-    texture: Texture = key(Texture, "phase 3")
+    texture: TextureKeys = key(TextureKeys, "phase 3")
 
 
 def _with_kinds() -> Any:

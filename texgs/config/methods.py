@@ -30,7 +30,7 @@ class Method(Generic[Settings]):
     settings: type[Settings]
     """Dataclass of its keys, `edit.NAME` in the configuration."""
     run: Callable[[Any], Any]
-    """Edits a scene: from a `Task[Settings]` of texgs/edit/task.py to an `Edited`."""
+    """Edits a scene: from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`."""
     check: Callable[[Settings], None]
     """Raises an ArgumentError for what is wrong with its settings, without scene and weights."""
     weights: Callable[[Settings, str], Mapping[str, bool]]

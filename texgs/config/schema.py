@@ -86,7 +86,7 @@ class CameraPath:
 
 
 @dataclass
-class Light:
+class LightKeys:
     """A light: at the camera, or from a direction given as for cameras on the test path."""
 
     kind: str = key("headlight", "kind", choices=("headlight", "directional"))
@@ -105,7 +105,7 @@ class Shading:
 
 
 @dataclass
-class Views:
+class ViewKeys:
     """Training and test views of a volume."""
 
     name: str = key("views", "of their folder; a sweep over views has several")
@@ -117,11 +117,11 @@ class Views:
     radius: float = key(
         LENS.radius, "distance of cameras; the volume's longest side is 1", "world units", above=0
     )
-    lights: list[Light] = field(
-        default_factory=lambda: [Light()],
+    lights: list[LightKeys] = field(
+        default_factory=lambda: [LightKeys()],
         metadata={"help": "view i is lit by light i modulo their number"},
     )
-    test_lights: list[Light] = field(
+    test_lights: list[LightKeys] = field(
         default_factory=list,
         metadata={"help": "the same for test views; default those of `lights`"},
     )
@@ -179,7 +179,7 @@ class Config:
     dataset: Dataset = key(Dataset, "the data set")
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
-    views: Views = key(Views, "training and test views")
+    views: ViewKeys = key(ViewKeys, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")
     fits: list[str] = key([], "recipes of a whole experiment, files of conf/fit; default the one of `fit`")
     edit: Edit = key(Edit, "a new look for the scene")

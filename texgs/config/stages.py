@@ -120,7 +120,7 @@ ROWS = (
         "surfels",
         "texgs.cli.stages.surfels",
         select=lambda config: {
-            **recipe("low_pass", "facing", "activation", "seeds")(config),
+            **recipe("low_pass", "facing", "material_range", "seeds")(config),
             "phase": config.fit.surfels,
         },
         inputs=seeded,
@@ -132,7 +132,7 @@ ROWS = (
         "shading",
         "texgs.cli.stages.shading",
         select=lambda config: {
-            **recipe("activation", "material", "first_material")(config),
+            **recipe("material_range", "materials", "first_material")(config),
             "phase": config.fit.shading,
         },
         inputs=model_of("surfels"),

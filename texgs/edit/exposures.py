@@ -13,7 +13,7 @@ from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.edit.target_views import light_on
 from texgs.fields.surfels.model import Surfels, geometry
-from texgs.models.guidance import Views
+from texgs.models.guidance import EditViews
 from texgs.raster import Options, Texture, rasterize
 
 MARGIN = 11  # pixels around content: a window of SSIM
@@ -64,7 +64,7 @@ class Exposure:
 
 def expose(
     model: Surfels,
-    views: Views,
+    views: EditViews,
     edited: Tensor,
     light: Light | None,
     opacities: Sequence[float],

@@ -74,7 +74,7 @@ def lift(
         ArgumentError: if a click is outside of the view or on the background, or no surfel is selected.
     """
     prompts, camera = prompts_at(model, clicks), clicks.camera
-    views = Views(model, light, masks)
+    views = ViewMasks(model, light, masks)
     reference = views.mask(clicks)
     votes = votes_of(vote, model, threshold)
     so_far = votes if isinstance(votes, ContributionVotes) else ContributionVotes(model, rounds=0)
@@ -99,7 +99,7 @@ def lift(
     return Lifted(selected, reference, used, 1 + len(cameras) - used)
 
 
-class Views:
+class ViewMasks:
     """Images of a model as the mask model sees them: cut out around what they show, which then is larger."""
 
     def __init__(self, model: Surfels, light: Light, masks: MaskModel) -> None:
@@ -128,7 +128,7 @@ def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:
     return sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
 
 
-def _mask(views: Views, so_far: ContributionVotes, prompts: Prompts, camera: Camera) -> Tensor | None:
+def _mask(views: ViewMasks, so_far: ContributionVotes, prompts: Prompts, camera: Camera) -> Tensor | None:
     """The mask of a view, or None where it sees nothing of the object or contradicts the views before."""
     model = views.model
     values = torch.stack([so_far.seen.float(), so_far.shares], dim=1)

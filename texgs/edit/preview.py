@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.core.light import Light
 from texgs.edit.clicks import Clicks, prompts_at
-from texgs.edit.lift import HEADLIGHT, Views
+from texgs.edit.lift import HEADLIGHT, ViewMasks
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 
@@ -34,7 +34,7 @@ def preview(
         ArgumentError: if a click is outside of the view or on the background.
     """
     prompts_at(model, clicks)
-    mask = Views(model, light, masks).mask(clicks)
+    mask = ViewMasks(model, light, masks).mask(clicks)
     image = model.render(clicks.camera, light).color.clamp(0, 1)
     return mask, overlay(image, mask, clicks.points, clicks.positive)
 

@@ -18,7 +18,7 @@ from texgs.edit.followers import AdamFollower, Follower, SolveFollower
 from texgs.edit.target_views import render_views, require_texture
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
-from texgs.models.guidance import Guidance, Views, require_edited, require_instruction
+from texgs.models.guidance import EditViews, Guidance, require_edited, require_instruction
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Edited:
 
     model: Surfels
     """With new texels and offsets of surfels; the rest is that of the model edited, bit for bit."""
-    views: Views
+    views: EditViews
     """As the guidance saw them, the last time each."""
     images: Tensor
     """[V, H, W, 3] as the guidance edited them, the last time each."""
@@ -127,10 +127,12 @@ class _Targets:
 
     def __init__(self, opacities: int) -> None:
         self.opacities = opacities
-        self.latest: dict[int, tuple[Views, int, Tensor]] = {}
+        self.latest: dict[int, tuple[EditViews, int, Tensor]] = {}
         self.exposures: dict[int, list[Exposure]] = {}
 
-    def put(self, ids: Sequence[int], views: Views, edited: Tensor, exposures: list[list[Exposure]]) -> None:
+    def put(
+        self, ids: Sequence[int], views: EditViews, edited: Tensor, exposures: list[list[Exposure]]
+    ) -> None:
         """Replace those of some views."""
         for place, index in enumerate(ids):
             self.latest[index] = (views, place, edited[place])
@@ -142,14 +144,14 @@ class _Targets:
         return torch.stack([self.latest[index][2] for index in sorted(self.latest)])
 
     @property
-    def views(self) -> Views:
+    def views(self) -> EditViews:
         """What was edited, in the order of views."""
         found = [self.latest[index][:2] for index in sorted(self.latest)]
         tensors = {
             name: torch.stack([getattr(views, name)[place] for views, place in found])
             for name in ("images", "conditions", "alphas", "points", "normals")
         }
-        return Views(**tensors, cameras=[views.cameras[place] for views, place in found])
+        return EditViews(**tensors, cameras=[views.cameras[place] for views, place in found])
 
     @property
     def rows(self) -> list[list[Exposure]]:
@@ -173,7 +175,7 @@ def _follower(model: Surfels, policy: Policy, generator: torch.Generator) -> Fol
 
 
 def _group(round_: int, size: int | None, count: int) -> list[int]:
-    """Views of a round: the next ones in turn."""
+    """EditViews of a round: the next ones in turn."""
     if size is None or size >= count:
         return list(range(count))
     return [(round_ * size + k) % count for k in range(size)]

@@ -12,7 +12,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.shading import light_direction, material, viewer
-from texgs.models.guidance import Views
+from texgs.models.guidance import EditViews
 from texgs.raster import Texture, rasterize
 from texgs.raster.shading import blinn_phong_texture
 
@@ -61,7 +61,7 @@ def render_views(
     cameras: Sequence[Camera],
     light: Light | None,
     conditions: Tensor | None = None,
-) -> Views:
+) -> EditViews:
     """Render a model with other colours of its texels for a guidance.
 
     Args:
@@ -97,7 +97,7 @@ def render_views(
         points.append(unproject(seen.depth, camera))  # type: ignore[arg-type]
         normals.append(seen.normal)
     shown = torch.stack(images)
-    return Views(
+    return EditViews(
         shown,
         shown if conditions is None else conditions,
         torch.stack(alphas),

@@ -62,7 +62,7 @@ class Task(Generic[Settings]):
 
 
 @dataclass(frozen=True, eq=False)
-class Edited:
+class EditedScene:
     """A scene with a new look or a new part."""
 
     scene: Scene

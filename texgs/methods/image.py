@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from texgs.edit.recipe import Recipe
     from texgs.edit.style_picture import StylePicture
-    from texgs.edit.task import Edited, Task
+    from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.view_set import View
 
@@ -48,12 +48,12 @@ class ImageKeys(StyleKeys):
     textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
 
 
-def run(task: Task[ImageKeys]) -> Edited:
+def run(task: Task[ImageKeys]) -> EditedScene:
     """Give the parts the style; write style.png and convergence.png."""
     from texgs.core.image import write_png
     from texgs.edit.clip_loss import ClipLoss
     from texgs.edit.stylize import stylize
-    from texgs.edit.task import Edited
+    from texgs.edit.task import EditedScene
     from texgs.models.clip import Clip
     from texgs.models.vgg import Vgg
     from texgs.report.convergence import write_convergence
@@ -87,7 +87,7 @@ def run(task: Task[ImageKeys]) -> Edited:
     scene = task.each_part(one)
     write_png(task.output / "style.png", pixels)
     write_convergence(task.output / "convergence.png", curves)
-    return Edited(
+    return EditedScene(
         scene,
         how(recipe, wanted),
         sum(each["all"] for each in seconds.values()),

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from texgs.core.camera import Camera
     from texgs.edit.clicks import Clicks
     from texgs.edit.lift import Lifted
-    from texgs.edit.task import Edited, Task
+    from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
     from texgs.scene.scene_file import Scene
 
@@ -54,11 +54,11 @@ class SegmentKeys:
     size: int = key(512, "of these views", "pixels", least=32)
 
 
-def run(task: Task[SegmentKeys]) -> Edited:
+def run(task: Task[SegmentKeys]) -> EditedScene:
     """Make the segment; write its file, and edit.png with the clicks, their mask and the segment."""
     from texgs.core.names import part_file
     from texgs.edit.lift import lift
-    from texgs.edit.task import Edited
+    from texgs.edit.task import EditedScene
     from texgs.models.by_name import mask_model
     from texgs.scene.parts import require_new
     from texgs.scene.session import Session
@@ -87,7 +87,7 @@ def run(task: Task[SegmentKeys]) -> Edited:
     session = Session(scene)
     session.make_segment(part, lifted.mask, file, asdict(settings))
     show(task, model, clicks, lifted)
-    return Edited(
+    return EditedScene(
         session.scene,
         f"{settings.masks}, {settings.vote}",
         seconds,

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import torch
     from torch import Tensor
 
-    from texgs.edit.task import Edited, Task
+    from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
     from texgs.models.guidance import Guidance
     from texgs.volume.view_set import View
@@ -45,9 +45,9 @@ class TextKeys:
     epipolar: bool = key(False, "views are edited together, along epipolar lines")
 
 
-def run(task: Task[TextKeys]) -> Edited:
+def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
-    from texgs.edit.task import Edited
+    from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.report.strip import write_strip
     from texgs.volume.reduced import smaller
@@ -78,7 +78,7 @@ def run(task: Task[TextKeys]) -> Edited:
     scene = task.each_part(one)
     titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]
     write_strip(task.output / "views.png", rows, titles)
-    return Edited(
+    return EditedScene(
         scene,
         f"{guidance.name}, {settings.recipe}",
         sum(seconds.values()),

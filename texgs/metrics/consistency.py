@@ -25,7 +25,7 @@ Perceptual = Callable[[Tensor, Tensor], float]  # of two images [H, W, 3], such 
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class SeenFrame:
     """One rendered view."""
 
     image: Tensor  # [H, W, 3] in [0, 1]
@@ -35,7 +35,7 @@ class Frame:
 
 
 @dataclass(frozen=True)
-class Consistency:
+class ViewConsistency:
     """How much pairs of views differ where they see the same."""
 
     rmse: float
@@ -48,11 +48,11 @@ class Consistency:
 
 
 def consistency(
-    frames: Sequence[Frame],
+    frames: Sequence[SeenFrame],
     apart: int = SHORT,
     perceptual: Perceptual | None = None,
     tolerance: float = TOLERANCE,
-) -> Consistency:
+) -> ViewConsistency:
     """Compare each view with the one `apart` views later, warped into it.
 
     What depends on the place of the viewer counts as inconsistent, highlights and headlights too: render
@@ -82,7 +82,7 @@ def consistency(
     if not squares:
         raise ArgumentError("frames: expected pairs that see the same, got none; use views closer together")
     mean_distance = fmean(distances) if distances else None
-    return Consistency(sqrt(fmean(squares)), mean_distance, fmean(shares), len(squares))
+    return ViewConsistency(sqrt(fmean(squares)), mean_distance, fmean(shares), len(squares))
 
 
 def frames_of(
@@ -91,7 +91,7 @@ def frames_of(
     light: Light,
     edits: Sequence[PartEdit] | None = None,
     look: Look = "shaded",
-) -> Iterator[Frame]:
+) -> Iterator[SeenFrame]:
     """Views of a scene with what `consistency` needs.
 
     Args:
@@ -103,11 +103,11 @@ def frames_of(
     """
     for camera in cameras:
         shown = scene.render(camera, light, edits, look=look, outputs=("median",))
-        yield Frame(shown.color.clamp(0, 1), shown.median, shown.alpha, camera)  # type: ignore[arg-type]
+        yield SeenFrame(shown.color.clamp(0, 1), shown.median, shown.alpha, camera)  # type: ignore[arg-type]
 
 
 @torch.no_grad()
-def warp(source: Frame, target: Frame, tolerance: float = TOLERANCE) -> tuple[Tensor, Tensor]:
+def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> tuple[Tensor, Tensor]:
     """Colours of one view at the pixels of another, and where both see the same point.
 
     A pixel of the target is compared where it is opaque, its point is inside of the source, and the four
@@ -145,7 +145,7 @@ def warp(source: Frame, target: Frame, tolerance: float = TOLERANCE) -> tuple[Te
     return found[0].permute(1, 2, 0), same
 
 
-def reprojected(frame: Frame, camera: Camera) -> tuple[Tensor, Tensor]:
+def reprojected(frame: SeenFrame, camera: Camera) -> tuple[Tensor, Tensor]:
     """Where another camera sees the points of a view's pixels: pixels [H, W, 2] and camera z [H, W]."""
     from kornia.geometry import depth_to_3d_v2, project_points, transform_points
 

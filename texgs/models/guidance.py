@@ -15,8 +15,8 @@ from texgs.core.errors import ArgumentError
 
 
 @dataclass(frozen=True, eq=False)
-class Views:
-    """Views of one scene to be edited together; all of one size, on one device, over white."""
+class EditViews:
+    """EditViews of one scene to be edited together; all of one size, on one device, over white."""
 
     images: Tensor
     """[V, H, W, 3] the scene as it looks now, in [0, 1]."""
@@ -51,7 +51,7 @@ class Guidance(Protocol):
     lit: bool
     """Whether it wants to see the scene with light, or the bare colours that light falls on."""
 
-    def __call__(self, views: Views, instruction: str, generator: torch.Generator) -> Tensor:
+    def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Edit the views.
 
         Args:
@@ -80,7 +80,7 @@ def require_instruction(instruction: str) -> str:
     return instruction.strip()
 
 
-def require_edited(edited: Tensor, views: Views, name: str) -> Tensor:
+def require_edited(edited: Tensor, views: EditViews, name: str) -> Tensor:
     """Edited images, clamped to [0, 1] on the views' device.
 
     Raises:

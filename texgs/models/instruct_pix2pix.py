@@ -12,7 +12,7 @@ from torch.nn.functional import interpolate, pad
 from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.progress import progress
 from texgs.models.epipolar import Consistency
-from texgs.models.guidance import Views, require_instruction
+from texgs.models.guidance import EditViews, require_instruction
 
 PARTS = ("unet", "vae", "text_encoder", "tokenizer", "scheduler")  # folders of the file format
 LONGEST = 512  # pixels: the size the model was trained at
@@ -109,7 +109,7 @@ class InstructPix2Pix:
         return cls(modules, scheduler.alphas_cumprod, **options)
 
     @torch.no_grad()
-    def __call__(self, views: Views, instruction: str, generator: torch.Generator) -> Tensor:
+    def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Edit the views; see `Guidance`. Any size: views are scaled to 512 pixels and back."""
         texts = self.embed(require_instruction(instruction))
         images, conditions = (fit(x.permute(0, 3, 1, 2)) for x in (views.images, views.conditions))

@@ -67,7 +67,7 @@ class Panel:
 
 
 @dataclass(frozen=True, eq=False)
-class Row:
+class PanelRow:
     """Panels side by side."""
 
     name: str
@@ -115,11 +115,11 @@ def write_fit_figure(
             f"and {len(views)} views"
         )
     compared = [compare(models, view, reduce) for view in views.values()]
-    rows = [Row(name, panels) for name, (panels, _) in zip(views, compared, strict=True)]
+    rows = [PanelRow(name, panels) for name, (panels, _) in zip(views, compared, strict=True)]
     name, view = next(iter(views.items()))
-    rows.append(Row(name, maps(last, view, reduce)))
+    rows.append(PanelRow(name, maps(last, view, reduce)))
     box = frame(torch.stack([visible for _, visible in compared]).any(dim=0))
-    return draw(path, [Row(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
+    return draw(path, [PanelRow(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
 
 
 def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
@@ -203,7 +203,7 @@ def crop(panel: Panel, box: tuple[slice, slice]) -> Panel:
     return panel if panel.pixels is None else replace(panel, pixels=panel.pixels[box])
 
 
-def draw(path: str | Path, rows: list[Row], title: str) -> Path:
+def draw(path: str | Path, rows: list[PanelRow], title: str) -> Path:
     """Lay out rows of panels, whose pictures are of one size, and write them as PNG."""
     from matplotlib.figure import Figure  # slow to import
 

@@ -17,7 +17,7 @@ BLOCK = 4  # cells along the edge of a block that is known to be transparent or 
 
 
 @dataclass(frozen=True)
-class Field:
+class SampledField:
     """A volume as tensors; points are in [-1, 1]^3."""
 
     values: Tensor  # [1, 1, Z, Y, X] float32
@@ -27,13 +27,13 @@ class Field:
     visible: Tensor  # [z, y, x] bool: blocks with something to see in them or next to them
 
     @staticmethod
-    def of(grid: Grid, tf: TransferFunction) -> Field:
+    def of(grid: Grid, tf: TransferFunction) -> SampledField:
         """Float samples are not copied."""
         with warnings.catch_warnings():  # torch dislikes maps of files, which cannot be written
             warnings.simplefilter("ignore", UserWarning)
             values = torch.from_numpy(np.asarray(grid.values, np.float32))
         cells = torch.tensor(grid.dims) - 1
-        return Field(values[None, None], torch.tensor(grid.aabb[1]), cells, tf, _visible(values, tf))
+        return SampledField(values[None, None], torch.tensor(grid.aabb[1]), cells, tf, _visible(values, tf))
 
     @property
     def voxel(self) -> float:

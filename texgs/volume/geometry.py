@@ -16,7 +16,7 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
-from texgs.volume.field import BLOCK, Field
+from texgs.volume.field import BLOCK, SampledField
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.vtk_camera import directions
@@ -93,7 +93,7 @@ def march(
     height, width = camera.height, camera.width
     mask = torch.ones(height, width, dtype=torch.bool) if mask is None else mask.cpu().bool()
     check.shape("mask", mask, "H W", H=height, W=width)
-    field = Field.of(grid, tf)
+    field = SampledField.of(grid, tf)
     shading = None
     if light is not None:
         to_viewer, to_light = (torch.from_numpy(vector).float() for vector in directions(camera, light))
@@ -160,7 +160,7 @@ def _rays(camera: Camera, pixels: Tensor, half: Tensor) -> _Rays:
     return _Rays(*(x.float() for x in (origin, direction, world.norm(dim=1), near, far)))
 
 
-def _stretches(field: Field, rays: _Rays, stretch: Tensor) -> tuple[Tensor, Tensor]:
+def _stretches(field: SampledField, rays: _Rays, stretch: Tensor) -> tuple[Tensor, Tensor]:
     """Middles z [n, k] of stretches of length [n] along the rays, and in which something may be seen."""
     count = int(((rays.far - rays.near) / stretch).max().clamp_min(0).ceil())
     middles = rays.near[:, None] + (torch.arange(count) + 0.5) * stretch[:, None]
@@ -169,7 +169,10 @@ def _stretches(field: Field, rays: _Rays, stretch: Tensor) -> tuple[Tensor, Tens
 
 
 def _accumulate(
-    field: Field, rays: _Rays, appearance: Appearance, shading: tuple[Tensor, Tensor, Appearance] | None
+    field: SampledField,
+    rays: _Rays,
+    appearance: Appearance,
+    shading: tuple[Tensor, Tensor, Appearance] | None,
 ) -> Tensor:
     """Sums over the samples of rays [n, 8]: colour, weight, weighted depth and normal.
 

@@ -15,7 +15,7 @@ from texgs.models.filters.material import GOLD, tint
 from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
 from texgs.models.filters.surface import Surface, surface_of
 from texgs.models.filters.vocabulary import FILTERS
-from texgs.models.guidance import Views
+from texgs.models.guidance import EditViews
 
 GENERATOR = torch.Generator()
 
@@ -58,7 +58,7 @@ def test_the_same_place_looks_the_same_in_another_view(name):
     def shuffled(x):
         return torch.stack([x[0], x[0].flatten(0, 1)[order].reshape(x[0].shape)])
 
-    pair = Views(
+    pair = EditViews(
         *(shuffled(x) for x in (views.images, views.conditions, views.alphas, views.points, views.normals)),
         cameras=views.cameras,
     )

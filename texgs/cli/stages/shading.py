@@ -32,8 +32,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     images = load(views.train, fit["reduce"])
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}
     start["colors"] = base_color(before.parameters["sh"])
-    first = raw_material(**fit["first_material"], kind=fit["activation"])
-    rows = 1 if fit["material"] == "shared" else len(before)
+    first = raw_material(**fit["first_material"], kind=fit["material_range"])
+    rows = 1 if fit["materials"] == "shared" else len(before)
     start |= {name: value.to(device).repeat(rows) for name, value in first.items()}
     phase = phase_from(settings["phase"])
     model, seconds, losses = run_phase(start, before.shading, images, phase, fit["seed"], output, title)

@@ -33,7 +33,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     images = load(views.train, fit["reduce"])
     rendered = views.metadata.get("shading") or {}
     local_viewer = bool(rendered.get("local_viewer", True))
-    shading = ShadingModel(fit["low_pass"], fit["activation"], local_viewer, fit["facing"])
+    shading = ShadingModel(fit["low_pass"], fit["material_range"], local_viewer, fit["facing"])
     phase = phase_from(settings["phase"])
     volume = open_grid(inputs["volume"]) if "volume" in inputs else None
     parameters, colors = seed_surfels(images, views, **fit["seeds"], seed=fit["seed"], volume=volume)

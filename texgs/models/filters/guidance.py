@@ -8,7 +8,7 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.models.filters.surface import surface_of
 from texgs.models.filters.vocabulary import understand
-from texgs.models.guidance import Views
+from texgs.models.guidance import EditViews
 
 
 class ProceduralFilters:
@@ -36,7 +36,7 @@ class ProceduralFilters:
         self.scale, self.seed = scale, seed
 
     @torch.no_grad()
-    def __call__(self, views: Views, instruction: str, generator: torch.Generator) -> Tensor:
+    def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Edit the views; see `Guidance`.
 
         Raises:

@@ -7,7 +7,7 @@ from math import log2
 
 from torch import Tensor
 
-from texgs.models.guidance import Views
+from texgs.models.guidance import EditViews
 
 CELLS = 26.0  # patterns along the longest side of the scene, for scale 1
 KEY_LIGHT = (-0.45, 0.75, 0.48)  # direction of the light that a drawing's tone is made by, fixed in the world
@@ -32,7 +32,7 @@ class Surface:
         return (0.5 - distance / max(self.pixel, 1e-6)).clamp(0, 1)
 
 
-def surface_of(views: Views, scale: float, seed: int) -> tuple[Surface, Tensor]:
+def surface_of(views: EditViews, scale: float, seed: int) -> tuple[Surface, Tensor]:
     """The points that views show, and where they are [V, H, W].
 
     Args:
@@ -68,7 +68,7 @@ def _side(points: Tensor) -> float:
     return float(2 ** (round(2 * log2(max(side, 1e-6))) / 2))
 
 
-def _pixel(views: Views, points: Tensor) -> float:
+def _pixel(views: EditViews, points: Tensor) -> float:
     """Side of a pixel at the middle of the scene, world units."""
     if not len(points):
         return 1.0
