@@ -49,7 +49,7 @@ class RowGradient:
 
     def __init__(self, grid: VoxelGrid) -> None:
         self.rows = torch.zeros_like(grid.rows)  # [n, K]
-        self.touched = torch.zeros(grid.masks.numel(), dtype=torch.uint8)  # blocks with a gradient
+        self.touched = torch.zeros_like(grid.distance).flatten()  # blocks with a gradient
 
 
 class Samples:
@@ -113,7 +113,6 @@ def render_rays(
     check.floating("rays", rays)
     check.constant(rays=rays)
     check.same_device(rays=rays, rows=grid.rows)
-    grid_abi.require_cpu(rays.device)
     keep = keep and grid.rows.requires_grad and torch.is_grad_enabled()
     return Rays(*_Render.apply(grid, march or March(), rays.contiguous(), into, keep, grid.rows))
 
@@ -144,8 +143,9 @@ def render_view(
 
 def camera_rays(camera: Camera) -> Tensor:
     """Rays [H, W, 6] through the pixel centres of a camera; directions have length 1 along its axis."""
-    y, x = torch.meshgrid(torch.arange(camera.height), torch.arange(camera.width), indexing="ij")
     K, R_cw = camera.K, camera.viewmat[:3, :3]
+    sides = (torch.arange(side, device=K.device) for side in (camera.height, camera.width))
+    y, x = torch.meshgrid(*sides, indexing="ij")
     right, down = (x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1]
     direction = torch.stack([right, down, torch.ones_like(right)], dim=-1) @ R_cw
     return torch.cat([camera.position.expand_as(direction), direction], dim=-1)
