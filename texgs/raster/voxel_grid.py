@@ -17,6 +17,7 @@ from texgs.raster import grid_abi, native
 FLOATS = {0: 4, 1: 16, 2: 32}  # of a row, by degree of the spherical harmonics
 DEGREES = {floats: degree for degree, floats in FLOATS.items()}
 SIDES = range(8, 1025, 4)  # voxels along an axis
+PIECE = 1 << 17  # points that are interpolated at a time
 EMPTY = 1  # rows before those of voxels: that of all others
 
 
@@ -180,9 +181,15 @@ def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
 
 def interpolate_rows(grid: VoxelGrid, points: Tensor) -> Tensor:
     """Trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one."""
+    links = grid.links()
+    return torch.cat([_interpolated(grid, links, part) for part in points.split(PIECE)])
+
+
+def _interpolated(grid: VoxelGrid, links: Tensor, points: Tensor) -> Tensor:
+    """The same for some points, with the rows of all voxels [X, Y, Z]."""
     at = (points - points.new_tensor(grid.lower)) / grid.spacing
     cell = at.floor().int()
-    links, size = grid.links(), cell.new_tensor(grid.size)
+    size = cell.new_tensor(grid.size)
     corners, weights = [], []
     for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
         place = cell + offset  # [m, 3]

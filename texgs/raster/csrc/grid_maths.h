@@ -92,6 +92,7 @@ TEXGS_MATHS void corner_weights(const float f[3], float w[8]) {
 // The part of a ray inside the lattice; sample k lies at entry + (k + 0.5) step direction.
 struct Ray {
     float entry[3], direction[3];  // lattice coordinates; unit length
+    float inverse[3];              // of the direction, finite
     float near;                    // distance of the entry from the origin, spacings
     int samples;
 };
@@ -106,11 +107,12 @@ TEXGS_MATHS Ray enter(const texgs_grid& g, const float* given, float step) {
         const float high = static_cast<float>(g.size[a] - 1);
         ray.direction[a] = direction;
         ray.entry[a] = origin;
-        if (std::fabs(direction) < 1e-12f) {
+        ray.inverse[a] = std::fabs(direction) < 1e-12f ? 1e12f : 1.0f / direction;
+        if (ray.inverse[a] == 1e12f) {
             if (!(origin >= 0.0f && origin <= high)) far = -1.0f;
             continue;
         }
-        const float t0 = -origin / direction, t1 = (high - origin) / direction;
+        const float t0 = -origin * ray.inverse[a], t1 = (high - origin) * ray.inverse[a];
         const float first = t0 < t1 ? t0 : t1, last = t0 < t1 ? t1 : t0;
         if (!(first <= last)) far = -1.0f;  // not a number
         near = first > near ? first : near;
@@ -144,15 +146,13 @@ TEXGS_MATHS Point sample_point(const texgs_grid& g, const Ray& ray, int k, float
 // How many samples on the first one lies that leaves the empty blocks around a point: those nearer than `distance`.
 TEXGS_MATHS int skipped(const Ray& ray, const Point& p, int distance, float step) {
     const int c[3] = {p.cell.x, p.cell.y, p.cell.z};
-    float leave = 1e30f;
+    float leave = 1e6f;
     for (int a = 0; a < 3; ++a) {
-        const int block = c[a] >> 2;
-        const float d = ray.direction[a];
-        const int face = kBlockSide * (d > 0.0f ? block + distance : block - distance + 1);
-        const float length = (static_cast<float>(face - c[a]) - p.f[a]) / d;
-        leave = d != 0.0f && length < leave ? length : leave;
+        const int face = (c[a] & ~3) + kBlockSide * (ray.inverse[a] > 0.0f ? distance : 1 - distance);
+        const float length = (static_cast<float>(face - c[a]) - p.f[a]) * ray.inverse[a];
+        leave = length < leave ? length : leave;
     }
-    return leave < 1e9f ? static_cast<int>(leave / step) + 1 : 1 << 30;
+    return static_cast<int>(leave / step) + 1;
 }
 
 struct Sample {
