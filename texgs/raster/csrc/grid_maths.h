@@ -62,19 +62,23 @@ struct Corners {
     int32_t row[8];
 };
 TEXGS_MATHS Corners corners_of(const texgs_grid& g, Cell c) {
-    const int by = g.size[2] >> 2, bx = (g.size[1] >> 2) * by;
-    const int base[3][2] = {
-        {(c.x >> 2) * bx, ((c.x + 1) >> 2) * bx}, {(c.y >> 2) * by, ((c.y + 1) >> 2) * by}, {c.z >> 2, (c.z + 1) >> 2}};
-    const int bit[3][2] = {
-        {(c.x & 3) << 4, ((c.x + 1) & 3) << 4}, {(c.y & 3) << 2, ((c.y + 1) & 3) << 2}, {c.z & 3, (c.z + 1) & 3}};
+    const int depth = g.size[2] >> 2, plane = (g.size[1] >> 2) * depth, z = c.z & 3;
     Corners found;
-    for (int i = 0; i < 8; ++i) {
-        const int block = base[0][i >> 2] + base[1][i >> 1 & 1] + base[2][i & 1];
-        const uint64_t mask = g.masks[block], own = uint64_t(1)
-                                                    << (bit[0][i >> 2] | bit[1][i >> 1 & 1] | bit[2][i & 1]);
-        const int32_t row = g.first[block] + popcount(mask & (own - 1));
-        found.block[i] = block;
-        found.row[i] = mask & own ? row : 0;
+    for (int i = 0; i < 8; i += 2) {  // two corners along z at a time: mostly of one block
+        const int x = c.x + (i >> 2), y = c.y + (i >> 1 & 1), column = (x & 3) << 4 | (y & 3) << 2;
+        const int block = (x >> 2) * plane + (y >> 2) * depth + (c.z >> 2);
+        const uint64_t from = g.masks[block] >> (column | z);
+        const int32_t row = g.first[block] + popcount(g.masks[block]) - popcount(from);
+        found.block[i] = found.block[i + 1] = block;
+        found.row[i] = from & 1 ? row : 0;
+        if (z < 3) {
+            found.row[i + 1] = from & 2 ? row + static_cast<int32_t>(from & 1) : 0;
+        } else {
+            const uint64_t next = g.masks[block + 1];
+            const uint64_t own = uint64_t(1) << column;
+            found.block[i + 1] = block + 1;
+            found.row[i + 1] = next & own ? g.first[block + 1] + popcount(next & (own - 1)) : 0;
+        }
     }
     return found;
 }
