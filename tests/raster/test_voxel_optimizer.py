@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.raster.voxel_scenes import voxel_scene
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster.voxel_optimizer import EPSILON, VoxelOptimizer, VoxelRates, add_total_variation
 from texgs.raster.voxels import RowGradient
 
@@ -113,5 +113,8 @@ def test_errors_name_the_argument():
         VoxelOptimizer(grid, "sgd")
     with pytest.raises(ArgumentError, match="betas: expected 0 to 1, without 1"):
         VoxelOptimizer(grid, "adam", (1.0, 0.9)).step(RATES)
+    other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
+    with pytest.raises(ShapeError, match=r"into: expected the gradient of .* make a new one for each grid"):
+        add_total_variation(grid, torch.tensor([0]), 1.0, 1.0, other)
     with pytest.raises(ArgumentError, match="blocks: expected places from 0 to"):
         add_total_variation(grid, torch.tensor([-1]), 1.0, 1.0, RowGradient(grid))

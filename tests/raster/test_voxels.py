@@ -229,6 +229,20 @@ def test_errors_name_the_argument():
         render_rays(grid, rays.to("meta"))
     with pytest.raises(DeviceError, match="expected tensors on cpu or cuda, got meta; move them"):
         render_rays(replace(grid, rows=grid.rows.to("meta")), rays.to("meta"))
+    other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
+    with pytest.raises(
+        ShapeError, match=r"into: expected the gradient of \[\d+, 32\] rows in 60 blocks, got"
+    ):
+        render_rays(grid, rays, into=other)
+    samples = Samples(grid, scene.march, rays)
+    with pytest.raises(ShapeError, match="into: expected the gradient of"):
+        samples.add_gradient(None, None, other)
+    with pytest.raises(ShapeError, match=r"color: expected \[300, 3\], got \[299, 3\]"):
+        samples.add_gradient(rays[1:, :3], None, RowGradient(grid))
+    with pytest.raises(ArgumentError, match="alpha: expected float32, got float64"):
+        samples.add_gradient(None, rays[:, 0].double(), RowGradient(grid))
+    with pytest.raises(ShapeError, match=r"weights: expected \[\d+\], got \[3\]"):
+        samples.mark(torch.zeros(3))
     with pytest.raises(ShapeError, match=r"rows: expected \[\d+, K\], got \[3, 32\]"):
         grid.with_rows(torch.zeros(3, 32))
     with pytest.raises(ShapeError, match="rows: expected 4, 16 or 32 floats"):
