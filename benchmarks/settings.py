@@ -24,6 +24,7 @@ SECTIONS = (
     "scene",
     "style",
     "segment",
+    "voxels",
 )
 ROUNDS = 5  # visits to each case, see timing.py
 

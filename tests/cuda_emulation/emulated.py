@@ -18,7 +18,7 @@ import torch
 from filelock import FileLock
 
 from texgs.config.code import library_sources
-from texgs.raster import losses_abi, native
+from texgs.raster import grid_abi, losses_abi, native
 
 SOURCE = Path(__file__).parent
 BUILD = SOURCE.parents[1] / "build" / "cuda_emulation"
@@ -61,6 +61,7 @@ def library() -> ctypes.CDLL:
         lib = native.library.__wrapped__("cuda")
     with patch.object(native, "library", lambda device_type="cpu": lib):
         losses_abi._describe.__wrapped__("cpu")
+        grid_abi._describe.__wrapped__("cpu")
     describe(lib)
     return lib
 
@@ -97,5 +98,6 @@ def emulated_cuda(seed: int) -> Iterator[None]:
         patch.object(native, "library", lambda device_type="cpu": lib),
         patch.object(native, "call", _call),
         patch.object(losses_abi, "_describe", lambda device_type: None),
+        patch.object(grid_abi, "_describe", lambda device_type: None),
     ):
         yield

@@ -7,6 +7,7 @@ from tests.cuda_emulation import emulated
 from tests.raster import test_normals, test_shading, test_smoothness, test_ssim
 from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything
+from tests.raster.test_voxel_threads import everything as voxels
 from texgs.raster.normals import normal_consistency
 from texgs.raster.shading import blinn_phong_texture
 from texgs.raster.smoothness import bilateral_smoothness
@@ -37,6 +38,7 @@ COMPUTED = {
     "gaussians": lambda: everything(gaussians(random_scene(3, n=150))),
     "textured surfels": lambda: everything(textured(random_scene(2, n=150))),
     "losses": losses,
+    "voxels": lambda: dict(enumerate(voxels(2, size=(16, 12, 16), n_rays=400))),
 }
 
 

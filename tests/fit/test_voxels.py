@@ -12,7 +12,7 @@ from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fit.voxel_rays import AROUND, curve, training_rays, widened
-from texgs.fit.voxel_shape import hull_box, hull_grid, refined, seen_voxels
+from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
 from texgs.fit.voxels import VoxelFit
 from texgs.metrics.image import psnr
 from texgs.raster.voxel_grid import interpolate_rows
@@ -147,6 +147,12 @@ def test_refining_keeps_the_field(fit):
     torch.testing.assert_close(fine[::2, ::2, ::2], coarse, rtol=1e-4, atol=1e-2)
     between = (coarse[:-1] + coarse[1:]) / 2
     torch.testing.assert_close(fine[1:-1:2, ::2, ::2], between, rtol=1e-4, atol=1e-2)
+
+
+def test_a_grown_mask():
+    mask = torch.rand(9, 10, 11, generator=torch.Generator().manual_seed(0)) < 0.02
+    expected = torch.nn.functional.max_pool3d(mask[None].float(), 3, 1, 1)[0] > 0
+    assert torch.equal(grown(mask), expected)
 
 
 def test_seen_voxels_are_near_the_surface(fit, images):

@@ -14,16 +14,17 @@ OFFSET = torch.tensor([0.1, 0.3, -0.05])
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
-def test_an_affine_map_of_colours(degree):
-    scene = voxel_scene(degree=degree)
+def test_an_affine_map_of_colours(degree, device):
+    scene = voxel_scene(degree=degree).to(device)
     grid = scene.grid
     quads = grid.rows.unflatten(1, (-1, 4))
     quads[:, :, :3] *= 0.1  # colours near 0.5, that no map clamps
     quads[:, 1:4, 3] *= 0.1
-    changed = recolored(grid, MATRIX, OFFSET)
+    matrix, offset = MATRIX.to(device), OFFSET.to(device)
+    changed = recolored(grid, matrix, offset)
     before = render_rays(grid, scene.rays, March((0.0, 0.0, 0.0)))
     after = render_rays(changed, scene.rays, March((0.0, 0.0, 0.0)))
-    expected = before.color @ MATRIX.T + before.alpha[:, None] * OFFSET
+    expected = before.color @ matrix.T + before.alpha[:, None] * offset
     assert before.alpha.max() > 0.9
     torch.testing.assert_close(after.color, expected, rtol=1e-5, atol=2e-6)
     assert torch.equal(after.alpha, before.alpha)

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from tests.raster.voxel_scenes import voxel_scene
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster.voxel_optimizer import EPSILON, VoxelOptimizer, VoxelRates, add_total_variation
 from texgs.raster.voxels import RowGradient
 
@@ -30,14 +30,14 @@ def sparse_gradient(grid, seed):
 
 @pytest.mark.parametrize("kind", ["rmsprop", "adam"])
 @pytest.mark.parametrize("degree", [0, 1, 2])
-def test_steps(kind, degree):
-    grid = voxel_scene(degree=degree).grid
+def test_steps(kind, degree, device):
+    grid = voxel_scene(degree=degree).grid.to(device)
     expected = grid.rows.double()
     optimizer = VoxelOptimizer(grid, kind)
     beta1, beta2 = optimizer.betas
     first, second = torch.zeros_like(expected), torch.zeros_like(expected)
     for seed in range(3):
-        gradient = sparse_gradient(grid, seed)
+        gradient = sparse_gradient(grid, seed).to(device)
         optimizer.gradient.rows.copy_(gradient)
         optimizer.gradient.touched.fill_(1)
         optimizer.step(RATES)
@@ -46,7 +46,7 @@ def test_steps(kind, degree):
         first = torch.where(moved, torch.where(fresh, g, beta1 * first + (1 - beta1) * g), first)
         second = torch.where(moved, torch.where(fresh, g**2, beta2 * second + (1 - beta2) * g**2), second)
         towards = first if kind == "adam" else g
-        step = rate_row(grid.rows.shape[1]) * towards / (second.sqrt() + EPSILON)
+        step = rate_row(grid.rows.shape[1]).to(device) * towards / (second.sqrt() + EPSILON)
         expected = expected - torch.where(moved, step, 0)
     torch.testing.assert_close(grid.rows.double(), expected, rtol=1e-5, atol=1e-5)
     assert torch.equal(grid.density, grid.rows[:, 3])
@@ -54,8 +54,8 @@ def test_steps(kind, degree):
     assert not optimizer.gradient.touched.any()
 
 
-def test_blocks_that_were_not_touched_stay():
-    grid = voxel_scene().grid
+def test_blocks_that_were_not_touched_stay(device):
+    grid = voxel_scene().grid.to(device)
     before = grid.rows.clone()
     optimizer = VoxelOptimizer(grid)
     optimizer.gradient.rows.fill_(1.0)
@@ -68,8 +68,8 @@ def test_blocks_that_were_not_touched_stay():
     assert torch.equal(grid.rows, before)
 
 
-def test_a_gradient_that_is_not_finite_is_not_hidden():
-    grid = voxel_scene().grid
+def test_a_gradient_that_is_not_finite_is_not_hidden(device):
+    grid = voxel_scene().grid.to(device)
     optimizer = VoxelOptimizer(grid)
     optimizer.gradient.rows[5, 2] = float("nan")
     optimizer.gradient.touched.fill_(1)
@@ -78,11 +78,12 @@ def test_a_gradient_that_is_not_finite_is_not_hidden():
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
-def test_total_variation(degree):
+def test_total_variation(degree, device):
     grid = voxel_scene(degree=degree).grid
     blocks = torch.tensor([0, 7, 3])
-    into = RowGradient(grid)
-    add_total_variation(grid, blocks, 0.3, 0.7, into)
+    there = grid.to(device)
+    into = RowGradient(there)
+    add_total_variation(there, blocks.to(device), 0.3, 0.7, into)
 
     rows = grid.rows.double().requires_grad_()
     links = grid.links().long()
@@ -100,10 +101,10 @@ def test_total_variation(degree):
     weights = torch.full((grid.rows.shape[1],), 0.7).double()
     weights[3] = 0.3
     (total.sqrt() * weights).sum().backward()
-    assert (into.rows - rows.grad).norm() <= 1e-5 * rows.grad.norm()
+    assert (into.rows.cpu() - rows.grad).norm() <= 1e-5 * rows.grad.norm()
     rows_of_blocks = links.unfold(0, 4, 4).unfold(1, 4, 4).unfold(2, 4, 4).reshape(-1, 64)
     changed = (rows.grad[rows_of_blocks] != 0).any(-1).any(-1)
-    assert not (changed & ~into.touched.bool()).any()
+    assert not (changed & ~into.touched.bool().cpu()).any()
 
 
 def test_errors_name_the_argument():
@@ -112,5 +113,8 @@ def test_errors_name_the_argument():
         VoxelOptimizer(grid, "sgd")
     with pytest.raises(ArgumentError, match="betas: expected 0 to 1, without 1"):
         VoxelOptimizer(grid, "adam", (1.0, 0.9)).step(RATES)
+    other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
+    with pytest.raises(ShapeError, match=r"into: expected the gradient of .* make a new one for each grid"):
+        add_total_variation(grid, torch.tensor([0]), 1.0, 1.0, other)
     with pytest.raises(ArgumentError, match="blocks: expected places from 0 to"):
         add_total_variation(grid, torch.tensor([-1]), 1.0, 1.0, RowGradient(grid))

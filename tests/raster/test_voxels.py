@@ -11,20 +11,20 @@ from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster import voxels
 from texgs.raster.reference.voxels import interpolate
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
-from texgs.raster.voxels import March, RowGradient, Samples, camera_rays, render_rays, render_view
+from texgs.raster.voxels import March, Rays, RowGradient, Samples, camera_rays, render_rays, render_view
 
 
 def gradients(scene, outputs, inputs, seed=1):
     """Gradients of a random combination of colour and alpha."""
     generator = torch.Generator().manual_seed(seed)
-    cotangents = [torch.randn(x.shape, generator=generator).to(x.dtype) for x in outputs[:2]]
+    cotangents = [torch.randn(x.shape, generator=generator).to(x) for x in outputs[:2]]
     return torch.autograd.grad(outputs[:2], inputs, cotangents)
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2])
 @pytest.mark.parametrize("transmittance_min", [0.0, 0.05])
-def test_image_and_gradient(degree, transmittance_min):
-    scene = voxel_scene(degree, degree=degree, transmittance_min=transmittance_min)
+def test_image_and_gradient(degree, transmittance_min, device):
+    scene = voxel_scene(degree, degree=degree, transmittance_min=transmittance_min).to(device)
     rows = scene.grid.rows.requires_grad_()
     found = render_rays(scene.grid, scene.rays, scene.march)
     leaves = [scene.density.double().requires_grad_(), scene.sh.double().requires_grad_()]
@@ -45,12 +45,13 @@ def test_definition_by_finite_differences():
     assert torch.autograd.gradcheck(lambda d, s: scene.definition(d, s)[:2], leaves, fast_mode=True)
 
 
-def test_a_slab_by_hand():
+def test_a_slab_by_hand(device):
     grid = voxel_grid(torch.ones(8, 8, 8, dtype=torch.bool), (0, 0, 0), 0.5)
     sh = torch.zeros(512, 9, 3)
     sh[:, 0] = torch.tensor([0.0, 1.0, -5.0])
     grid = grid.with_rows(torch.cat([torch.zeros(1, 32), pack_rows(torch.full((512,), 0.3), sh)]))
-    out = render_rays(grid, torch.tensor([[1.7, 2.1, -3.0, 0.0, 0.0, 2.0], [9.0, 9.0, 9.0, 1.0, 0.0, 0.0]]))
+    rays = torch.tensor([[1.7, 2.1, -3.0, 0.0, 0.0, 2.0], [9.0, 9.0, 9.0, 1.0, 0.0, 0.0]])
+    out = Rays(*(x.cpu() for x in render_rays(grid.to(device), rays.to(device))))
     alpha = 1 - torch.exp(torch.tensor(-0.3 * 3.5))  # seven cells of half a unit
     color = torch.tensor([0.5, 0.5 + 0.28209479, 0.0])
     torch.testing.assert_close(out.alpha, torch.stack([alpha, torch.tensor(0.0)]))
@@ -59,8 +60,8 @@ def test_a_slab_by_hand():
     assert out.depth[1] == 0
 
 
-def test_samples_kept_or_marched_again(monkeypatch):
-    scene = voxel_scene()
+def test_samples_kept_or_marched_again(monkeypatch, device):
+    scene = voxel_scene().to(device)
     rows = scene.grid.rows.requires_grad_()
     kept = gradients(scene, render_rays(scene.grid, scene.rays, scene.march), [rows])[0]
     monkeypatch.setattr(voxels, "PIECE", 77)
@@ -68,16 +69,16 @@ def test_samples_kept_or_marched_again(monkeypatch):
     torch.testing.assert_close(again, kept, rtol=1e-4, atol=1e-5)  # another order of sums
 
 
-def test_a_retained_graph_gives_the_same_gradient_twice():
-    scene = voxel_scene()
+def test_a_retained_graph_gives_the_same_gradient_twice(device):
+    scene = voxel_scene().to(device)
     rows = scene.grid.rows.requires_grad_()
     color = render_rays(scene.grid, scene.rays, scene.march).color
     first = torch.autograd.grad(color.sum(), rows, retain_graph=True)[0]
     assert torch.equal(torch.autograd.grad(color.sum(), rows)[0], first)
 
 
-def test_gradient_into_a_buffer():
-    scene = voxel_scene()
+def test_gradient_into_a_buffer(device):
+    scene = voxel_scene().to(device)
     rows = scene.grid.rows.requires_grad_()
     into = RowGradient(scene.grid)
     render_rays(scene.grid, scene.rays, scene.march, into=into).color.sum().backward()
@@ -97,12 +98,12 @@ def test_rows_without_gradient_keep_nothing():
         assert not render_rays(scene.grid, scene.rays, scene.march).color.requires_grad
 
 
-def test_largest_weights():
-    scene = voxel_scene(n_rays=40)
-    weights = torch.zeros(len(scene.grid.rows))
+def test_largest_weights(device):
+    scene = voxel_scene(n_rays=40).to(device)
+    weights = torch.zeros(len(scene.grid.rows), device=device)
     Samples(scene.grid, scene.march, scene.rays).mark(weights)
-    alone = torch.zeros(len(scene.grid.rows))
-    for ray in scene.rays:  # the first of all samples of a ray that only one sample has a large weight of
+    alone = torch.zeros_like(weights)
+    for ray in scene.rays:
         one = torch.zeros_like(alone)
         Samples(scene.grid, scene.march, ray[None]).mark(one)
         alone = alone.maximum(one)
@@ -178,9 +179,10 @@ def test_interpolated_rows():
     assert not interpolate_rows(grid, torch.tensor([[9.0, 9.0, 9.0]])).any()
 
 
-def test_occupied_cells_and_distances():
-    scene = voxel_scene(size=(32, 8, 16), filled=0.003)
-    grid = scene.grid
+def test_occupied_cells_and_distances(device):
+    grid = voxel_scene(size=(32, 8, 16), filled=0.003).grid.to(device)
+    grid.refresh_occupancy()
+    grid = grid.to("cpu")
     dense = (grid.density[grid.links().long()] > 0).double()
     cells = torch.nn.functional.max_pool3d(torch.nn.functional.pad(dense, (0, 1) * 3)[None], 2, 1)[0] > 0
     assert torch.equal(voxel_grid(cells, LOWER, SPACING).masks, grid.occupied)
@@ -190,22 +192,24 @@ def test_occupied_cells_and_distances():
     assert torch.equal(grid.distance, distance.to(torch.uint8))
 
 
-def test_an_empty_grid_shows_the_background():
-    grid = voxel_grid(torch.zeros(8, 8, 8, dtype=torch.bool), LOWER, SPACING)
-    rays = torch.tensor([[-0.5, -0.3, -9.0, 0.0, 0.0, 1.0]])
+def test_an_empty_grid_shows_the_background(device):
+    grid = voxel_grid(torch.zeros(8, 8, 8, dtype=torch.bool, device=device), LOWER, SPACING)
+    grid.rows.requires_grad_()
+    rays = torch.tensor([[-0.5, -0.3, -9.0, 0.0, 0.0, 1.0]], device=device)
     out = render_rays(grid, rays, March((0.1, 0.2, 0.3)))
-    assert torch.equal(out.color, torch.tensor([[0.1, 0.2, 0.3]]))
+    assert torch.equal(out.color.cpu(), torch.tensor([[0.1, 0.2, 0.3]]))
+    assert not torch.autograd.grad(out.color.sum(), grid.rows)[0].any()
     assert render_rays(grid, rays[:0]).color.shape == (0, 3)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
-def test_rays_that_are_not_finite_bring_back_the_background(value):
-    scene = voxel_scene()
+def test_rays_that_are_not_finite_bring_back_the_background(value, device):
+    scene = voxel_scene().to(device)
     for column in range(6):
         rays = scene.rays[:6].clone()
         rays[:, column] = value
         color = render_rays(scene.grid, rays, scene.march).color
-        assert torch.equal(color, torch.tensor(scene.march.background).expand(6, 3))
+        assert torch.equal(color.cpu(), torch.tensor(scene.march.background).expand(6, 3))
 
 
 def test_errors_name_the_argument():
@@ -223,8 +227,22 @@ def test_errors_name_the_argument():
         render_rays(grid, rays, March(transmittance_min=1.0))
     with pytest.raises(DeviceError, match="rows: expected device meta as rays, got cpu"):
         render_rays(grid, rays.to("meta"))
-    with pytest.raises(DeviceError, match=r"voxel grid: expected tensors on the cpu, got meta; .* move"):
+    with pytest.raises(DeviceError, match="expected tensors on cpu or cuda, got meta; move them"):
         render_rays(replace(grid, rows=grid.rows.to("meta")), rays.to("meta"))
+    other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
+    with pytest.raises(
+        ShapeError, match=r"into: expected the gradient of \[\d+, 32\] rows in 60 blocks, got"
+    ):
+        render_rays(grid, rays, into=other)
+    samples = Samples(grid, scene.march, rays)
+    with pytest.raises(ShapeError, match="into: expected the gradient of"):
+        samples.add_gradient(None, None, other)
+    with pytest.raises(ShapeError, match=r"color: expected \[300, 3\], got \[299, 3\]"):
+        samples.add_gradient(rays[1:, :3], None, RowGradient(grid))
+    with pytest.raises(ArgumentError, match="alpha: expected float32, got float64"):
+        samples.add_gradient(None, rays[:, 0].double(), RowGradient(grid))
+    with pytest.raises(ShapeError, match=r"weights: expected \[\d+\], got \[3\]"):
+        samples.mark(torch.zeros(3))
     with pytest.raises(ShapeError, match=r"rows: expected \[\d+, K\], got \[3, 32\]"):
         grid.with_rows(torch.zeros(3, 32))
     with pytest.raises(ShapeError, match="rows: expected 4, 16 or 32 floats"):

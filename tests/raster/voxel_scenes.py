@@ -1,6 +1,6 @@
 """Small voxel grids, and the same as dense lattices for the definition."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 
@@ -20,6 +20,11 @@ class VoxelScene:
     sh: torch.Tensor  # [n - 1, k, 3]
     rays: torch.Tensor  # [N, 6]
     march: March
+
+    def to(self, device):
+        """The same on another device."""
+        rest = {name: getattr(self, name).to(device) for name in ("grid", "density", "sh", "rays")}
+        return replace(self, **rest)
 
     def definition(self, density, sh):
         """Colour, alpha and depth by the definition, in float64."""

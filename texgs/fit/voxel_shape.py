@@ -6,7 +6,6 @@ from math import ceil
 
 import torch
 from torch import Tensor
-from torch.nn.functional import max_pool3d
 
 from texgs.core.errors import ArgumentError
 from texgs.fit.hull import Box, is_covered
@@ -98,6 +97,14 @@ def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     mask = kept
     for axis in range(3):
         mask = mask.repeat_interleave(2, axis)
-    mask = max_pool3d(mask[None].float(), 3, 1, 1)[0] > 0
-    finer = voxel_grid(mask, grid.lower, grid.spacing / 2, grid.degree)
+    finer = voxel_grid(grown(mask), grid.lower, grid.spacing / 2, grid.degree)
     return finer.with_rows(torch.cat([grid.rows[:1], interpolate_rows(grid, finer.points())]))
+
+
+def grown(mask: Tensor) -> Tensor:
+    """A mask [X, Y, Z] with all 26 neighbours of what is in it."""
+    for axis, side in enumerate(mask.shape):
+        before, mask = mask, mask.clone()
+        mask.narrow(axis, 0, side - 1).logical_or_(before.narrow(axis, 1, side - 1))
+        mask.narrow(axis, 1, side - 1).logical_or_(before.narrow(axis, 0, side - 1))
+    return mask

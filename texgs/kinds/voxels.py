@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from texgs.config.fields import Kind
 from texgs.config.voxel_fit import VoxelKeys
+from texgs.core.errors import DeviceError
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -40,14 +41,18 @@ def compose(fields: Sequence[Voxels], segments: Sequence[Sequence[Tensor]]) -> V
 
 
 def fit(task: FitTask[VoxelKeys]) -> Fitted:
-    """Fit a grid to random rays, coarse to fine."""
+    """Fit a grid to random rays, coarse to fine.
+
+    Raises:
+        DeviceError: for another device than the CPU.
+    """
     from texgs.core.progress import progress
     from texgs.fields.voxels.model import Voxels
     from texgs.fit.task import Fitted
     from texgs.fit.voxels import VoxelFit
-    from texgs.raster.grid_abi import require_cpu
 
-    require_cpu(task.device)
+    if task.device.type != "cpu":
+        raise DeviceError(f"device: expected cpu, got {task.device}; voxels are fitted on the CPU")
     start = time.monotonic()
     run, losses = VoxelFit(task.images, task.settings, task.seed), []
     for done in progress(run.run(), task.settings.steps, title=task.title, unit="step"):

@@ -8,7 +8,6 @@ from functools import cache
 import torch
 from torch import Tensor
 
-from texgs.core.errors import DeviceError
 from texgs.raster import native
 
 
@@ -79,23 +78,8 @@ def call(name: str, *arguments: object, device: torch.device) -> None:
     """Call a function on structures, dense tensors (NULL for None) and numbers.
 
     Raises:
-        DeviceError: for tensors that are not on the CPU.
         TexgsError: with the library's own sentence.
     """
-    require_cpu(device)
     _describe(device.type)
     plain = [x.data_ptr() if isinstance(x, Tensor) else x for x in arguments]
     native.call(name, *plain, device=device)
-
-
-def require_cpu(device: torch.device) -> None:
-    """Refuse other devices.
-
-    Raises:
-        DeviceError: naming the device.
-    """
-    if device.type != "cpu":
-        raise DeviceError(
-            f"voxel grid: expected tensors on the cpu, got {device}; the kernels of grids are for CPUs, move "
-            "the grid with .to('cpu')"
-        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -16,6 +17,7 @@ from texgs.raster import grid_abi, native
 FLOATS = {0: 4, 1: 16, 2: 32}  # of a row, by degree of the spherical harmonics
 DEGREES = {floats: degree for degree, floats in FLOATS.items()}
 SIDES = range(8, 1025, 4)  # voxels along an axis
+PIECE = 1 << 17  # points that are interpolated at a time
 EMPTY = 1  # rows before those of voxels: that of all others
 
 
@@ -95,6 +97,13 @@ class VoxelGrid:
         grid.refresh()
         return grid
 
+    def to(self, device: torch.device | str) -> VoxelGrid:
+        """The same grid on another device."""
+        tensors: dict[str, Any] = {
+            name: x.to(device) for name, x in vars(self).items() if isinstance(x, Tensor)
+        }
+        return replace(self, **tensors)
+
     def links(self) -> Tensor:
         """[X, Y, Z] int32: the row of each voxel, 0 where it has none."""
         bits = _unpacked(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
@@ -107,7 +116,7 @@ class VoxelGrid:
         _, columns, depth = self.masks.shape
         corner = torch.stack([block // (columns * depth), block // depth % columns, block % depth], dim=1)
         inside = torch.stack([bit // 16, bit // 4 % 4, bit % 4], dim=1)
-        return torch.tensor(self.lower) + self.spacing * (4 * corner + inside)
+        return corner.new_tensor(self.lower, dtype=torch.float32) + self.spacing * (4 * corner + inside)
 
 
 def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int = 2) -> VoxelGrid:
@@ -123,7 +132,6 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
         ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     check.shape("mask", mask, "X Y Z")
-    grid_abi.require_cpu(mask.device)
     if mask.dtype != torch.bool or any(side not in SIDES for side in mask.shape):
         raise ShapeError(
             f"mask: expected bool [X, Y, Z] with multiples of 4 from 8 to 1024, got {list(mask.shape)} "
@@ -134,11 +142,11 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
     if not spacing > 0:
         raise ArgumentError(f"spacing: expected more than 0, got {spacing}")
     bits = _blocks(mask)  # [X / 4, Y / 4, Z / 4, 64]
-    masks = (bits.long() << torch.arange(64)).sum(-1)
+    masks = (bits.long() << torch.arange(64, device=mask.device)).sum(-1)
     counts = bits.sum(-1)
     first = (counts.flatten().cumsum(0).reshape(counts.shape) - counts + EMPTY).int()
     x, y, z = map(float, lower)
-    rows = torch.zeros(int(counts.sum()) + EMPTY, FLOATS[degree])
+    rows = torch.zeros(int(counts.sum()) + EMPTY, FLOATS[degree], device=mask.device)
     empty = torch.zeros_like(masks)
     grid = VoxelGrid(
         (x, y, z), float(spacing), masks, first, rows, rows.new_zeros(len(rows)), empty, empty.to(torch.uint8)
@@ -173,11 +181,17 @@ def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
 
 def interpolate_rows(grid: VoxelGrid, points: Tensor) -> Tensor:
     """Trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one."""
+    links = grid.links()
+    return torch.cat([_interpolated(grid, links, part) for part in points.split(PIECE)])
+
+
+def _interpolated(grid: VoxelGrid, links: Tensor, points: Tensor) -> Tensor:
+    """The same for some points, with the rows of all voxels [X, Y, Z]."""
     at = (points - points.new_tensor(grid.lower)) / grid.spacing
     cell = at.floor().int()
-    links, size = grid.links(), torch.tensor(grid.size, dtype=torch.int32)
+    size = cell.new_tensor(grid.size)
     corners, weights = [], []
-    for offset in torch.cartesian_prod(*[torch.tensor([0, 1], dtype=torch.int32)] * 3):
+    for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
         place = cell + offset  # [m, 3]
         inside = ((place >= 0) & (place < size)).all(1)
         x, y, z = place.clamp_min(0).minimum(size - 1).long().unbind(1)
@@ -202,4 +216,4 @@ def _lattice(blocks: Tensor) -> Tensor:
 
 def _unpacked(masks: Tensor) -> Tensor:
     """The bits of int64 masks [...], [..., 64] bool."""
-    return (masks[..., None] >> torch.arange(64) & 1).bool()
+    return (masks[..., None] >> torch.arange(64, device=masks.device) & 1).bool()

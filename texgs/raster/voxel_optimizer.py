@@ -75,7 +75,11 @@ def add_total_variation(
         density: weight of the density's variation.
         sh: weight of the coefficients'.
         into: where the gradient is added.
+
+    Raises:
+        ArgumentError, ShapeError: naming the argument at fault.
     """
+    into.check(grid)
     blocks = blocks.int().contiguous()
     if len(blocks) and not 0 <= int(blocks.min()) <= int(blocks.max()) < grid.masks.numel():
         raise ArgumentError(f"blocks: expected places from 0 to {grid.masks.numel() - 1}, got others")

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera
+from texgs.core.errors import ShapeError
 from texgs.raster import grid_abi, native
 from texgs.raster.voxel_grid import VoxelGrid
 
@@ -49,38 +50,76 @@ class RowGradient:
 
     def __init__(self, grid: VoxelGrid) -> None:
         self.rows = torch.zeros_like(grid.rows)  # [n, K]
-        self.touched = torch.zeros(grid.masks.numel(), dtype=torch.uint8)  # blocks with a gradient
+        self.touched = torch.zeros_like(grid.distance).flatten()  # blocks with a gradient
+
+    def check(self, grid: VoxelGrid) -> None:
+        """Require a grid of the same layout.
+
+        Raises:
+            ShapeError: naming both sizes.
+        """
+        found, expected = (
+            (list(self.rows.shape), len(self.touched)),
+            (list(grid.rows.shape), grid.masks.numel()),
+        )
+        if found != expected:
+            raise ShapeError(
+                f"into: expected the gradient of {expected[0]} rows in {expected[1]} blocks, got one of "
+                f"{found[0]} in {found[1]}; make a new one for each grid"
+            )
 
 
 class Samples:
-    """The samples of rays in the library: marched once, then gathered as often as wanted."""
+    """The samples of rays in the library: marched once, then gathered as often as wanted.
 
-    def __init__(
-        self, grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None = None, keep: bool = True
-    ) -> None:
+    Args:
+        grid: its density and occupancy up to date.
+        march: how rays are sampled.
+        rays: [N, 6] dense.
+        out: where colour, alpha and depth are written, dense; None: nowhere.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
+    """
+
+    def __init__(self, grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None = None) -> None:
         self.grid, self.march, self.rays = grid, march, rays
         handle = ctypes.c_void_p()
-        outputs = (None,) * 3 if out is None else out
-        kept = ctypes.addressof(handle) if keep else None
-        self._call("texgs_grid_render", *self._structures(), *outputs, kept)
+        _march(grid, march, rays, out, ctypes.addressof(handle))
         self.handle = handle.value
-        if keep:
-            weakref.finalize(self, native.library(rays.device.type).texgs_grid_release, handle.value)
+        weakref.finalize(self, native.library(rays.device.type).texgs_grid_release, handle.value)
 
     def add_gradient(self, color: Tensor | None, alpha: Tensor | None, into: RowGradient) -> None:
         """Add the gradient of rows from those of colours [N, 3] and alphas [N]."""
-        structures = self._structures()
-        self._call("texgs_grid_backward", self.handle, *structures, color, alpha, into.rows, into.touched)
+        into.check(self.grid)
+        color = None if color is None else _gradient("color", color, "N 3", self.rays)
+        alpha = None if alpha is None else _gradient("alpha", alpha, "N", self.rays)
+        self._call("texgs_grid_backward", color, alpha, into.rows, into.touched)
 
     def mark(self, weights: Tensor) -> None:
         """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel."""
-        self._call("texgs_grid_mark", self.handle, *self._structures(), weights)
+        check.shape("weights", weights, "n", n=len(self.grid.rows))
+        self._call("texgs_grid_mark", weights)
 
-    def _structures(self) -> tuple[grid_abi.Grid, grid_abi.March]:
-        return self.grid.structure(), self.march.structure(self.rays)
+    def _call(self, name: str, *arguments: Tensor | None) -> None:
+        structures = self.grid.structure(), self.march.structure(self.rays)
+        grid_abi.call(name, self.handle, *structures, *arguments, device=self.rays.device)
 
-    def _call(self, name: str, *arguments: object) -> None:
-        grid_abi.call(name, *arguments, device=self.rays.device)
+
+def _gradient(name: str, gradient: Tensor, spec: str, rays: Tensor) -> Tensor:
+    """A dense gradient of what rays brought back, checked."""
+    check.shape(name, gradient, spec, N=len(rays))
+    check.floating(name, gradient)
+    return gradient.contiguous()
+
+
+def _march(grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None, samples: int | None) -> None:
+    """Render into `out`, and keep the samples where an address for them is given."""
+    check.shape("rays", rays, "N 6")
+    check.floating("rays", rays)
+    check.same_device(rays=rays, rows=grid.rows)
+    structures, outputs = (grid.structure(), march.structure(rays)), out or (None,) * 3
+    grid_abi.call("texgs_grid_render", *structures, *outputs, samples, device=rays.device)
 
 
 def render_rays(
@@ -109,11 +148,9 @@ def render_rays(
     Raises:
         ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
     """
-    check.shape("rays", rays, "N 6")
-    check.floating("rays", rays)
     check.constant(rays=rays)
-    check.same_device(rays=rays, rows=grid.rows)
-    grid_abi.require_cpu(rays.device)
+    if into:
+        into.check(grid)
     keep = keep and grid.rows.requires_grad and torch.is_grad_enabled()
     return Rays(*_Render.apply(grid, march or March(), rays.contiguous(), into, keep, grid.rows))
 
@@ -144,8 +181,9 @@ def render_view(
 
 def camera_rays(camera: Camera) -> Tensor:
     """Rays [H, W, 6] through the pixel centres of a camera; directions have length 1 along its axis."""
-    y, x = torch.meshgrid(torch.arange(camera.height), torch.arange(camera.width), indexing="ij")
     K, R_cw = camera.K, camera.viewmat[:3, :3]
+    sides = (torch.arange(side, device=K.device) for side in (camera.height, camera.width))
+    y, x = torch.meshgrid(*sides, indexing="ij")
     right, down = (x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1]
     direction = torch.stack([right, down, torch.ones_like(right)], dim=-1) @ R_cw
     return torch.cat([camera.position.expand_as(direction), direction], dim=-1)
@@ -163,8 +201,9 @@ class _Render(torch.autograd.Function):
         rows: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor]:
         out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
-        samples = Samples(grid, march, rays, out, keep)
-        ctx.samples = samples if keep else None
+        ctx.samples = Samples(grid, march, rays, out) if keep else None
+        if not keep:
+            _march(grid, march, rays, out, None)
         ctx.grid, ctx.march, ctx.rays, ctx.into = grid, march, rays, into
         ctx.save_for_backward(rows)  # autograd refuses a backward pass after they were changed
         ctx.mark_non_differentiable(out.depth)
@@ -176,8 +215,6 @@ class _Render(torch.autograd.Function):
     def backward(ctx: Any, color: Tensor | None, alpha: Tensor | None, _: Any) -> tuple[Tensor | None, ...]:
         (_rows,) = ctx.saved_tensors
         into = ctx.into or RowGradient(ctx.grid)
-        color = None if color is None else color.contiguous()
-        alpha = None if alpha is None else alpha.contiguous()
         if ctx.samples:
             ctx.samples.add_gradient(color, alpha, into)
         else:

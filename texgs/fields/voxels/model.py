@@ -14,7 +14,6 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Role
 from texgs.raster import Render
-from texgs.raster.grid_abi import require_cpu
 from texgs.raster.voxel_grid import VoxelGrid, unpack_rows
 from texgs.raster.voxels import March, render_view
 
@@ -41,13 +40,8 @@ class Voxels:
         return self.grid.rows.device
 
     def to(self, device: torch.device | str) -> Voxels:
-        """The same field on the CPU.
-
-        Raises:
-            DeviceError: for another device.
-        """
-        require_cpu(torch.device(device))
-        return self
+        """The same field on another device."""
+        return replace(self, grid=self.grid.to(device))
 
     def tensors(self, role: Role) -> dict[str, Tensor]:
         """Densities [n], or spherical harmonics [n, 1, 4 or 9, 3]."""

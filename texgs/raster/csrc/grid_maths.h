@@ -62,19 +62,23 @@ struct Corners {
     int32_t row[8];
 };
 TEXGS_MATHS Corners corners_of(const texgs_grid& g, Cell c) {
-    const int by = g.size[2] >> 2, bx = (g.size[1] >> 2) * by;
-    const int base[3][2] = {
-        {(c.x >> 2) * bx, ((c.x + 1) >> 2) * bx}, {(c.y >> 2) * by, ((c.y + 1) >> 2) * by}, {c.z >> 2, (c.z + 1) >> 2}};
-    const int bit[3][2] = {
-        {(c.x & 3) << 4, ((c.x + 1) & 3) << 4}, {(c.y & 3) << 2, ((c.y + 1) & 3) << 2}, {c.z & 3, (c.z + 1) & 3}};
+    const int depth = g.size[2] >> 2, plane = (g.size[1] >> 2) * depth, z = c.z & 3;
     Corners found;
-    for (int i = 0; i < 8; ++i) {
-        const int block = base[0][i >> 2] + base[1][i >> 1 & 1] + base[2][i & 1];
-        const uint64_t mask = g.masks[block], own = uint64_t(1)
-                                                    << (bit[0][i >> 2] | bit[1][i >> 1 & 1] | bit[2][i & 1]);
-        const int32_t row = g.first[block] + popcount(mask & (own - 1));
-        found.block[i] = block;
-        found.row[i] = mask & own ? row : 0;
+    for (int i = 0; i < 8; i += 2) {  // two corners along z at a time: mostly of one block
+        const int x = c.x + (i >> 2), y = c.y + (i >> 1 & 1), column = (x & 3) << 4 | (y & 3) << 2;
+        const int block = (x >> 2) * plane + (y >> 2) * depth + (c.z >> 2);
+        const uint64_t from = g.masks[block] >> (column | z);
+        const int32_t row = g.first[block] + popcount(g.masks[block]) - popcount(from);
+        found.block[i] = found.block[i + 1] = block;
+        found.row[i] = from & 1 ? row : 0;
+        if (z < 3) {
+            found.row[i + 1] = from & 2 ? row + static_cast<int32_t>(from & 1) : 0;
+        } else {
+            const uint64_t next = g.masks[block + 1];
+            const uint64_t own = uint64_t(1) << column;
+            found.block[i + 1] = block + 1;
+            found.row[i + 1] = next & own ? g.first[block + 1] + popcount(next & (own - 1)) : 0;
+        }
     }
     return found;
 }
@@ -92,6 +96,7 @@ TEXGS_MATHS void corner_weights(const float f[3], float w[8]) {
 // The part of a ray inside the lattice; sample k lies at entry + (k + 0.5) step direction.
 struct Ray {
     float entry[3], direction[3];  // lattice coordinates; unit length
+    float inverse[3];              // of the direction, finite
     float near;                    // distance of the entry from the origin, spacings
     int samples;
 };
@@ -106,11 +111,12 @@ TEXGS_MATHS Ray enter(const texgs_grid& g, const float* given, float step) {
         const float high = static_cast<float>(g.size[a] - 1);
         ray.direction[a] = direction;
         ray.entry[a] = origin;
-        if (std::fabs(direction) < 1e-12f) {
+        ray.inverse[a] = std::fabs(direction) < 1e-12f ? 1e12f : 1.0f / direction;
+        if (ray.inverse[a] == 1e12f) {
             if (!(origin >= 0.0f && origin <= high)) far = -1.0f;
             continue;
         }
-        const float t0 = -origin / direction, t1 = (high - origin) / direction;
+        const float t0 = -origin * ray.inverse[a], t1 = (high - origin) * ray.inverse[a];
         const float first = t0 < t1 ? t0 : t1, last = t0 < t1 ? t1 : t0;
         if (!(first <= last)) far = -1.0f;  // not a number
         near = first > near ? first : near;
@@ -144,15 +150,13 @@ TEXGS_MATHS Point sample_point(const texgs_grid& g, const Ray& ray, int k, float
 // How many samples on the first one lies that leaves the empty blocks around a point: those nearer than `distance`.
 TEXGS_MATHS int skipped(const Ray& ray, const Point& p, int distance, float step) {
     const int c[3] = {p.cell.x, p.cell.y, p.cell.z};
-    float leave = 1e30f;
+    float leave = 1e6f;
     for (int a = 0; a < 3; ++a) {
-        const int block = c[a] >> 2;
-        const float d = ray.direction[a];
-        const int face = kBlockSide * (d > 0.0f ? block + distance : block - distance + 1);
-        const float length = (static_cast<float>(face - c[a]) - p.f[a]) / d;
-        leave = d != 0.0f && length < leave ? length : leave;
+        const int face = (c[a] & ~3) + kBlockSide * (ray.inverse[a] > 0.0f ? distance : 1 - distance);
+        const float length = (static_cast<float>(face - c[a]) - p.f[a]) * ray.inverse[a];
+        leave = length < leave ? length : leave;
     }
-    return leave < 1e9f ? static_cast<int>(leave / step) + 1 : 1 << 30;
+    return static_cast<int>(leave / step) + 1;
 }
 
 struct Sample {

@@ -35,7 +35,7 @@ private:
 
 namespace texgs {
 
-// Samples that wait to be used again; a few are enough, more would only hold memory.
+// Frees the memory of samples that wait to be used again.
 void clear_grid_pool();
 
 }  // namespace texgs

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From the gradients of rays to those of rows. Each sample becomes a record, sorted by brick (grid.cpp); then the
-// records of a brick find the rows that they add to in the cache.
+// From the gradients of rays to those of rows. Each sample becomes a record, sorted by brick (grid_samples.cpp); then
+// the records of a brick find the rows that they add to in the cache.
 #include "grid_kernels.h"
 #include "grid_row.h"
 

@@ -4,6 +4,7 @@
 
 #include "../checks.h"
 #include "frame.cuh"
+#include "grid.cuh"
 #include "pool.cuh"
 
 using namespace texgs;
@@ -82,5 +83,5 @@ void texgs_release(texgs_frame* frame) {
 }
 
 void texgs_trim(void) {
-    guarded([] { pool<texgs_frame>().clear(); });
+    guarded([] { pool<texgs_frame>().clear(), clear_grid_pool(); });
 }
