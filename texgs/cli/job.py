@@ -149,10 +149,10 @@ def series(numbers: Mapping[str, Any]) -> Iterator[dict[str, float]]:
 
 def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
     """The entries that are single numbers, also those of tables in them, but for notes."""
-    found: dict[str, float] = {}
+    single: dict[str, float] = {}
     for key, value in numbers.items():
         if isinstance(value, int | float):
-            found[key] = float(value)
+            single[key] = float(value)
         elif isinstance(value, dict) and key != "notes":
-            found |= scalars(value)
-    return found
+            single |= scalars(value)
+    return single

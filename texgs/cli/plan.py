@@ -103,16 +103,16 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     config, checksums = compose(words), Checksums.load()
     by_sweep = experiments(words)
     configs = [each for some in by_sweep.values() for each in some]
-    found: dict[str, Job] = {}
+    jobs: dict[str, Job] = {}
     missing: list[str] = []
-    sweeps = {sweep: add_jobs(some, checksums, found, missing) for sweep, some in by_sweep.items()}
+    sweeps = {sweep: add_jobs(some, checksums, jobs, missing) for sweep, some in by_sweep.items()}
     plan = Plan(
         config.results,
         config.tracking.uri,
         config.tracking.experiment,
         int(config.device.mapper == "gpu"),
         int(config.device.name == "cuda"),
-        {folder: plain(job, config.results) for folder, job in found.items()},
+        {folder: plain(job, config.results) for folder, job in jobs.items()},
         sweeps,
         downloads(configs),
         {
@@ -143,17 +143,17 @@ def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
             raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
     sets = [(*words, f"dataset={name}") for name in base.datasets] or [words]
     names = [(*each, f"fit={name}") for each in sets for name in base.fits] or sets
-    found: dict[str, list[DictConfig]] = {}
+    by_sweep: dict[str, list[DictConfig]] = {}
     for each in names:
         config = compose(each)
         name = config.sweep.name if config.sweep.variants else ""
-        found.setdefault(name, []).extend(compose(variant) for variant in variants((*each, "edit=none")))
+        by_sweep.setdefault(name, []).extend(compose(variant) for variant in variants((*each, "edit=none")))
         if not name:
-            found[name] += [edit for edit in map(compose, edits(each)) if is_possible(edit, base.fits)]
+            by_sweep[name] += [edit for edit in map(compose, edits(each)) if is_possible(edit, base.fits)]
     for name, dataset in base.sweeps.items():
         of_sweep = (*words, f"dataset={dataset}", f"sweep={name}", "edit=none")
-        found[name] = [compose(variant) for variant in variants(of_sweep)]
-    return found
+        by_sweep[name] = [compose(variant) for variant in variants(of_sweep)]
+    return by_sweep
 
 
 def is_possible(config: DictConfig, several: Sequence[str]) -> bool:

@@ -110,7 +110,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.preview:
         print(write_png(arguments.preview, preview(model, clicks, masks, scene.light)[1]))
         return 0
-    found = lift(
+    lifted = lift(
         *(model, clicks, around, masks),
         light=scene.light,
         vote=arguments.vote,
@@ -121,9 +121,9 @@ def run(arguments: argparse.Namespace) -> int:
     keys = ("view", "point", "other", "masks", "vote", "connected")
     facts = {key: getattr(arguments, key) for key in keys}
     file = arguments.output.with_name(part_file("--name", arguments.output.stem, name, arguments.name))
-    sys.stderr.write(f"{name}/{arguments.name}: {found.basis}\n")
+    sys.stderr.write(f"{name}/{arguments.name}: {lifted.basis}\n")
     session = Session(scene)
-    session.make_segment(f"{name}/{arguments.name}", found.mask, file, facts)
+    session.make_segment(f"{name}/{arguments.name}", lifted.mask, file, facts)
     print(session.save(arguments.output), file, sep="\n")
     return 0
 

@@ -79,8 +79,8 @@ def weights_of(stage: Stage, config: DictConfig, checksums: Checksums) -> dict[s
 def _short(name: str, checksums: Checksums) -> str | None:
     from texgs.models.weights import checksum
 
-    found = checksum(name, checksums)
-    return found and found[:SHOWN]
+    digest = checksum(name, checksums)
+    return digest and digest[:SHOWN]
 
 
 def require_same(recorded: Mapping[str, str | None]) -> None:
@@ -91,10 +91,10 @@ def require_same(recorded: Mapping[str, str | None]) -> None:
     """
     checksums = Checksums.load()
     for name, expected in recorded.items():
-        if (found := _short(name, checksums)) != expected:
+        if (present := _short(name, checksums)) != expected:
             raise MissingDataError(
                 f"weights of {name}: expected {expected or 'none'}, as when the job was planned, "
-                f"got {found or 'none'}; run the same command again"
+                f"got {present or 'none'}; run the same command again"
             )
 
 

@@ -24,11 +24,11 @@ def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     if not config.edits and config.edit.method == NO_METHOD:
         return []
     given = [(*words, f"edit={name}") for name in config.edits] or [words]
-    found: dict[str, tuple[str, ...]] = {}
+    by_name: dict[str, tuple[str, ...]] = {}
     for each in given:
         for name, ancestor in lineage(each):
-            found.setdefault(name, ancestor)
-    return list(found.values())
+            by_name.setdefault(name, ancestor)
+    return list(by_name.values())
 
 
 def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
@@ -39,17 +39,17 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     Raises:
         ConfigError: if it starts from itself or from what is not there, or changes a part that is not there.
     """
-    found: list[tuple[str, tuple[str, ...]]] = []
+    chain: list[tuple[str, tuple[str, ...]]] = []
     following: tuple[str, ...] | None = words
     while following is not None:
         edit = compose(following).edit
-        if edit.name in [name for name, _ in found]:
+        if edit.name in [name for name, _ in chain]:
             raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
-        found.append((edit.name, following))
+        chain.append((edit.name, following))
         rest = [word for word in words if not word.startswith(OF_ONE)]
         following = None if edit.base is None or is_made(following) else (*rest, f"edit={edit.base}")
-    require_parts(found[::-1])
-    return found[::-1]
+    require_parts(chain[::-1])
+    return chain[::-1]
 
 
 def is_made(words: tuple[str, ...]) -> bool:

@@ -18,5 +18,5 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
     """
     folder = import_module(package).__path__
     modules = (import_module(f"{package}.{entry.name}") for entry in pkgutil.iter_modules(folder))
-    found = [getattr(module, attribute) for module in modules if hasattr(module, attribute)]
-    return {specification.name: specification for specification in found}
+    defined = [getattr(module, attribute) for module in modules if hasattr(module, attribute)]
+    return {specification.name: specification for specification in defined}

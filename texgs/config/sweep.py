@@ -17,7 +17,7 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
         return [words]
     if not sweep.seeds:
         raise ConfigError("sweep.seeds: expected at least one, got none")
-    found = []
+    expanded = []
     for name, changes in sweep.variants.items():
         if not name:
             raise ConfigError("sweep.variants: expected a name for each variant, got an empty one")
@@ -32,5 +32,5 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
         has_views = any(key.startswith("views") for key in keys) and "views.name" not in keys
         folder = (f"views.name=views-{name}",) if has_views else ()
         for seed in sweep.seeds:
-            found.append((*words, *changes, *folder, f"variant={name}", f"fit.seed={seed}"))
-    return found
+            expanded.append((*words, *changes, *folder, f"variant={name}", f"fit.seed={seed}"))
+    return expanded

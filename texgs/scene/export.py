@@ -33,8 +33,8 @@ def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
     Raises:
         ArgumentError: if nothing is visible, or the number of edits is not that of parts and segments.
     """
-    found = [_surfels(part, own) for part, own in zip(parts, by_part(parts, edits), strict=True)]
-    together = {name: torch.cat([each[name] for each in found]) for name in found[0]}
+    surfels = [_surfels(part, own) for part, own in zip(parts, by_part(parts, edits), strict=True)]
+    together = {name: torch.cat([each[name] for each in surfels]) for name in surfels[0]}
     if not len(together["means"]):
         raise ArgumentError("models: expected at least one visible surfel, got none; show a model")
     return Surfels(together, parts[0].model.shading)
@@ -86,9 +86,9 @@ def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
     if "texels" in p:
         colors = colors + mean_texels(p)
     opacities = part.opacity(edits)
-    found = {
+    surfels = {
         **{name: p[name] for name in ("means", "quats", "scales")},
         "opacities": opacities.clamp_max(MOST_OPAQUE).logit(),
         "sh": ((colors - 0.5) / Y00).float()[:, None],
     }
-    return {name: x[opacities > 0] for name, x in found.items()}
+    return {name: x[opacities > 0] for name, x in surfels.items()}

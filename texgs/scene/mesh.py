@@ -63,13 +63,15 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     for camera in progress(cameras, title="fuse", unit="view"):
         with torch.no_grad():
             seen |= _integrate(o3d, volume, camera, show(camera))
-    found = volume.extract_triangle_mesh(weight_threshold=LEAST_VIEWS) if seen else None
-    if found is None or not len(found.vertex.positions):
+    triangles = volume.extract_triangle_mesh(weight_threshold=LEAST_VIEWS) if seen else None
+    if triangles is None or not len(triangles.vertex.positions):
         raise ArgumentError(
             "mesh: expected a surface that lets less than half of the light through, got none"
         )
-    colors = found.vertex.colors.numpy().clip(0, 255).round().astype(np.uint8)
-    return Mesh(found.vertex.positions.numpy(), found.triangle.indices.numpy().astype(np.int32), colors)
+    colors = triangles.vertex.colors.numpy().clip(0, 255).round().astype(np.uint8)
+    return Mesh(
+        triangles.vertex.positions.numpy(), triangles.triangle.indices.numpy().astype(np.int32), colors
+    )
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> Path:

@@ -63,10 +63,10 @@ class SceneModel:
     @property
     def files(self) -> list[Path | None]:
         """All that `open` reads."""
-        found = [self.file, self.texture]
+        paths = [self.file, self.texture]
         for segment in self.segments.values():
-            found += [segment.file, segment.texture]
-        return found
+            paths += [segment.file, segment.texture]
+        return paths
 
     def open(self) -> tuple[Field, list[Tensor]]:
         """The field, of surfels with the texels of all variants, and the masks [N] of its segments.

@@ -57,8 +57,8 @@ def read_segment(path: str | Path, model: Surfels) -> Tensor:
     Raises:
         ArgumentError: if the file is missing, of another kind, or of another model.
     """
-    found = _read(Path(path))
-    mask, anchors, expected = found["mask"], found["anchors"], _anchors(model)
+    tensors = _read(Path(path))
+    mask, anchors, expected = tensors["mask"], tensors["anchors"], _anchors(model)
     # A model without surfels has no places; segments of it are empty, and refused when they are written.
     extent = float((expected.amax(0) - expected.amin(0)).max()) if len(expected) else 0.0
     belongs = len(mask) == len(model) and anchors.shape == expected.shape
@@ -78,9 +78,9 @@ def _anchors(model: Surfels) -> Tensor:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    found, _ = read_tensor_file(path, FORMAT)
-    mask, anchors = found.get("mask"), found.get("anchors")
+    tensors, _ = read_tensor_file(path, FORMAT)
+    mask, anchors = tensors.get("mask"), tensors.get("anchors")
     is_whole = mask is not None and anchors is not None and mask.dtype == torch.bool and mask.ndim == 1
     if not is_whole or bool((mask.view(torch.uint8) > 1).any()):  # type: ignore[union-attr]
-        raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(found)}; make it again")
-    return found
+        raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(tensors)}; make it again")
+    return tensors

@@ -100,16 +100,16 @@ def agreement(
     if weights["vgg16"] and weights["lpips_vgg"]:
         lpips = Lpips.load(device=composition.device)
         perceptual = lambda one, two: float(lpips.distance(one, two))  # noqa: E731
-    found: dict[str, float | None] = {}
+    measures: dict[str, float | None] = {}
     for name, apart in (("short", SHORT), ("long", LONG)):
         if len(frames) > apart:
             try:
                 measured = consistency(frames, apart, perceptual)
             except ArgumentError:
-                found |= {f"{name}_rmse": None, f"{name}_lpips": None}
+                measures |= {f"{name}_rmse": None, f"{name}_lpips": None}
                 continue
-            found |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
-    return found
+            measures |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
+    return measures
 
 
 def style_distance(
@@ -126,7 +126,7 @@ def style_distance(
         return {}
     vgg = Vgg.load(device=device)
     style = method.style(method.of(edit)).scaled(max(cameras[0].width, cameras[0].height))
-    found = [
+    likenesses = [
         likeness(
             scene.models[part.model].open()[0].to(device),
             cameras,
@@ -139,8 +139,8 @@ def style_distance(
         for part in parts
     ]
     return {
-        "style_nnfm": fmean(each.nnfm for each in found),
-        "style_gram": fmean(each.gram for each in found),
+        "style_nnfm": fmean(each.nnfm for each in likenesses),
+        "style_gram": fmean(each.gram for each in likenesses),
     }
 
 

@@ -116,7 +116,7 @@ def compared(
     step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
     """PSNR and SSIM against the volume over some views, and the first of these [H, W, 3] from each."""
-    found: dict[str, list[float]] = {"psnr": [], "ssim": []}
+    scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
     background = torch.tensor(step.scene.background, device=composition.device)
     for camera in cameras if volume else cameras[:1]:
@@ -131,9 +131,9 @@ def compared(
             )
             truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
-            found["psnr"].append(psnr(image, truth))
-            found["ssim"].append(ssim(image, truth))
-    means = {name: fmean(values) for name, values in found.items() if values}
+            scores["psnr"].append(psnr(image, truth))
+            scores["ssim"].append(ssim(image, truth))
+    means = {name: fmean(values) for name, values in scores.items() if values}
     return Comparison(step.title, **means), shown
 
 

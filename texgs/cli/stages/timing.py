@@ -62,11 +62,11 @@ def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], 
     """Milliseconds of each frame, the first ones not counted."""
     for camera in cameras[:WARM]:
         render(camera)
-    found = []
+    times = []
     for camera in progress(cameras, title=title, unit="frame"):
         start = time.perf_counter()
         render(camera)
         if torch.cuda.is_available():
             torch.cuda.synchronize()
-        found.append(1e3 * (time.perf_counter() - start))
-    return found
+        times.append(1e3 * (time.perf_counter() - start))
+    return times

@@ -1,0 +1,77 @@
+"""Scenes of fields that are no surfels: what goes, and what is refused in one sentence."""
+
+import numpy as np
+import pytest
+
+from tests.fields.surfels.test_composition import CAMERA
+from tests.fields.surfels.test_composition import ball as surfels
+from tests.fields.voxels.test_voxels import ball as voxels
+from texgs.cli.main import main
+from texgs.core.errors import ArgumentError
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.voxels.composition import VoxelScene
+from texgs.fields.voxels.file import write_voxels
+from texgs.scene.scene_file import Scene, SceneModel, write_scene
+from texgs.scene.session import Session
+
+
+@pytest.fixture
+def grid(tmp_path):
+    """The file of a voxel grid."""
+    return write_voxels(tmp_path / "grid.safetensors", voxels())
+
+
+def test_a_scene_of_voxels_is_rendered_and_made_thinner(grid, tmp_path):
+    session = Session(Scene({"TF01": SceneModel(grid)}))
+    assert isinstance(session.composition, VoxelScene)
+    before = session.frame(CAMERA)
+    assert before.min() < 200
+    session.set("TF01", "opacity", 0.02)
+    assert session.frame(CAMERA).astype(int).sum() > before.astype(int).sum()
+    session.set("TF01", "visible", False)
+    assert np.array_equal(session.frame(CAMERA), np.full_like(before, 255))
+    scene = session.save(tmp_path / "scene.yaml")
+    words = ["--width", "32", "--mode", "depth", "--output", str(tmp_path / "a.png")]
+    assert main(["render", str(scene), *words]) == 0
+
+
+def test_fields_of_two_kinds_make_no_scene(grid, tmp_path):
+    other = write_model(tmp_path / "surfels.safetensors", surfels(1))
+    with pytest.raises(ArgumentError, match="models: expected fields of one kind, got surfels and voxels"):
+        Scene({"a": SceneModel(grid), "b": SceneModel(other)}).open()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda s, grid: s.set_texture("TF01", grid), "models.TF01: .*expected surfels, got voxels"),
+        (lambda s, grid: s.add_segment("TF01/part", grid), "models.TF01: .*expected surfels, got voxels"),
+        (lambda s, grid: s.pick(CAMERA, 20, 20), "pick: expected a scene of surfels"),
+    ],
+)
+def test_what_only_surfels_can(grid, change, message):
+    session = Session(Scene({"TF01": SceneModel(grid)}))
+    with pytest.raises(ArgumentError, match=message):
+        change(session, grid)
+    assert not session.undo()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["render", "--mode", "unshaded", "--output", "a.png"], "look: expected shaded of voxels"),
+        (["export", "--to", "a.ply"], "export: expected a scene of surfels, got fields of another kind"),
+        (["edit", "TF01.palette=#ff0000", "--output", "b.yaml"], None),
+    ],
+)
+def test_the_command_line_says_so(grid, tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    write_scene("scene.yaml", Scene({"TF01": SceneModel(grid)}))
+    verb, *rest = words
+    if message is None:  # edits are data: a frame refuses them
+        assert main([verb, "scene.yaml", *rest]) == 0
+        verb, rest, message = "render", ["--output", "a.png"], "expected visible and opacity of voxels"
+        assert main([verb, "b.yaml", *rest]) == 2
+    else:
+        assert main([verb, "scene.yaml", *rest]) == 2
+    assert message in capsys.readouterr().err
