@@ -100,7 +100,7 @@ def gradients(rasterize, scene, cotangents, options=DEFAULT_OPTIONS, wanted=None
 def random_cotangents(scene, names, mask=None, seed=0):
     """Random gradients of the images `names`, zero outside the mask [H, W]."""
     generator = torch.Generator().manual_seed(seed)
-    channels = {"color": (3 if scene.features is None else scene.features.shape[1],), "normal": (3,)}
+    channels = {"color": (scene.channels,), "normal": (3,)}
     found = {}
     for name in names:
         shape = (scene.height, scene.width, *channels.get(name, ()))

@@ -38,6 +38,12 @@ class Scene:
         """All outputs that the scene has: 3D Gaussians have no normal."""
         return tuple(name for name in OUTPUTS if name != "normal" or self.scales.shape[1] == 2)
 
+    @property
+    def channels(self) -> int:
+        """Channels of the colour."""
+        plain = 0 if self.features is None else self.features.shape[1]
+        return plain + (0 if self.texture is None else 3)
+
     def arguments(self) -> dict:
         """Keyword arguments of rasterize."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -145,6 +151,14 @@ def textured(scene: Scene, sizes=TEXTURE_SIZES, seed: int = 0) -> Scene:
     )
     background = None if scene.background is None else scene.background[:3]
     return replace(scene, features=None, texture=texture, background=background)
+
+
+def textured_with_features(scene: Scene, channels: int, seed: int = 0) -> Scene:
+    """The scene with textures and so many features beside them."""
+    generator = torch.Generator().manual_seed(seed)
+    features = torch.rand(len(scene.means), channels, generator=generator)
+    background = torch.rand(3 + channels, generator=generator)
+    return replace(textured(scene), features=features, background=background)
 
 
 def few(seed: int = 0, n: int = 12, **changes) -> Scene:

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
-from tests.raster.scenes import gaussians, random_scene, textured
+from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
@@ -89,12 +89,21 @@ def test_camera_and_background_are_constants(device, name):
         scene.render(rasterize)
 
 
-def test_texture_or_features():
-    scene = textured(random_scene())
-    with pytest.raises(ArgumentError, match="either features or texture, got both"):
-        replace(scene, features=torch.rand(N, 3)).render(rasterize)
-    with pytest.raises(ArgumentError, match="either features or texture, got neither"):
-        replace(scene, texture=None).render(rasterize)
+def test_a_colour_is_needed():
+    with pytest.raises(ArgumentError, match="expected features, a texture or both, got neither"):
+        replace(random_scene(), features=None).render(rasterize)
+
+
+@pytest.mark.parametrize("channels", [0, 30])
+def test_wrong_number_of_features_beside_a_texture(channels):
+    with pytest.raises(ArgumentError, match=f"features: expected 1 to 29 channels, got {channels}"):
+        textured_with_features(random_scene(), channels).render(rasterize)
+
+
+def test_background_of_a_texture_with_features():
+    scene = textured_with_features(random_scene(), 2)
+    with pytest.raises(ShapeError, match=r"background: expected \[5\], got \[3\]"):
+        replace(scene, background=torch.rand(3)).render(rasterize)
 
 
 @pytest.mark.parametrize("render", [rasterize, reference])

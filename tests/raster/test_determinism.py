@@ -7,7 +7,7 @@ import torch
 
 from benchmarks.scenes import camera, surfels
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
-from tests.raster.scenes import Scene, gaussians, random_scene, textured
+from tests.raster.scenes import Scene, gaussians, random_scene, textured, textured_with_features
 from tests.raster.threads import with_threads
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
@@ -37,6 +37,7 @@ SCENES = {
     "plain": generated,
     "32 channels": lambda: replace(generated(3000), features=torch.rand(3000, 32)),
     "textured": lambda: textured(generated(3000)),
+    "textured, with features": lambda: textured_with_features(generated(3000), 5),
     "gaussians": lambda: gaussians(generated()),
     "gaussians, 32 channels": lambda: replace(gaussians(generated(3000)), features=torch.rand(3000, 32)),
     "small": random_scene,

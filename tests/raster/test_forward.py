@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from tests.raster.agreement import decided, images, names_of
-from tests.raster.scenes import TEXTURE_SIZES, gaussians, random_scene, textured
+from tests.raster.scenes import TEXTURE_SIZES, gaussians, random_scene, textured, textured_with_features
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
 from texgs.raster.types import DEFAULT_OPTIONS, Options
@@ -93,6 +93,15 @@ def test_channels(device, drawn, channels):
 @pytest.mark.parametrize("sizes", [*([size] for size in TEXTURE_SIZES), TEXTURE_SIZES], ids=str)
 def test_textures(device, sizes):
     check(textured(random_scene(6), sizes), device)
+
+
+@pytest.mark.parametrize("channels", [1, 3, 4, 13, 29])
+def test_textures_and_features(device, channels):
+    scene = textured_with_features(random_scene(6), channels)
+    check(scene, device)
+    alone = replace(scene, features=None, background=scene.background[:3]).to(device).render(rasterize)
+    beside = scene.to(device).render(rasterize)
+    torch.testing.assert_close(beside.color[..., :3], alone.color, rtol=0, atol=1e-6)
 
 
 def test_texture_on_unfiltered_and_narrow_surfels(device):

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from tests.raster.agreement import IMAGES, decided, gradients, names_of, random_cotangents, relative
-from tests.raster.scenes import gaussians, random_scene, textured
+from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
 from tests.raster.test_forward import described
 from texgs.raster.api import rasterize
 from texgs.raster.reference import render as reference
@@ -125,6 +125,18 @@ def test_one_texture_size(device, size):
 def test_textures_and_all_images(device):
     scene = textured(random_scene(10))
     check(replace(scene, shift=torch.zeros(200, 2)), device, IMAGES)
+
+
+@pytest.mark.parametrize("channels", [1, 4, 29])
+def test_textures_and_features(device, channels):
+    scene = textured_with_features(random_scene(10), channels)
+    check(scene, device)
+    check(scene, device, ("color", "normal", "depth"))
+
+
+@pytest.mark.parametrize("wanted", [("features",), ("texels",), ("features", "texels"), ("base", "features")])
+def test_textures_and_features_on_frozen_geometry(device, wanted):
+    check(textured_with_features(random_scene(12), 2), device, wanted=wanted)
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,13 @@
 """The definition of surfels against closed forms: one of them."""
 
 import math
+from dataclasses import replace
 
 import pytest
 import torch
 
 from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
+from tests.raster.scenes import random_scene, textured_with_features
 from texgs.core.errors import ArgumentError
 from texgs.core.rotation import quats_to_matrices
 from texgs.raster.reference.render import rasterize
@@ -163,7 +165,16 @@ def test_edge_on_surfel_is_drawn_by_the_low_pass_filter_alone():
         assert gradient.isfinite().all()
 
 
-@pytest.mark.parametrize("color", [{}, {"features": torch.ones(1, 3), "texture": "a texture"}])
-def test_exactly_one_kind_of_colour(color):
-    with pytest.raises(ArgumentError, match=r"either features or texture, got (both|neither)"):
-        rasterize(**view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[0.8]), **color)
+def test_a_colour_is_needed():
+    with pytest.raises(ArgumentError, match="expected features, a texture or both, got neither"):
+        rasterize(**view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[0.8]))
+
+
+def test_features_beside_a_texture_follow_it():
+    scene = textured_with_features(random_scene(n=20, width=12, height=9), 2).double()
+    both = scene.render(rasterize, ("depth",))
+    background = scene.background
+    texture = replace(scene, features=None, background=background[:3]).render(rasterize, ("depth",))
+    features = replace(scene, texture=None, background=background[3:]).render(rasterize)
+    torch.testing.assert_close(both.color, torch.cat([texture.color, features.color], -1))
+    torch.testing.assert_close(both.depth, texture.depth)

@@ -57,11 +57,10 @@ def paint(
     else:
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
-    found = splatted(model, part, opacity, texture=texture)
-    share = None
-    if chosen is not None:
-        share = splatted(model, part, opacity, features=chosen.to(texels)[:, None]).color[..., 0]
-    return Canvas(found.color.permute(2, 0, 1), found.alpha, share)
+    features = None if chosen is None else chosen.to(texels)[:, None]  # blended, they are the share
+    found = splatted(model, part, opacity, texture=texture, features=features)
+    color = found.color.permute(2, 0, 1)
+    return Canvas(color[:3], found.alpha, None if chosen is None else color[3].detach())
 
 
 def around(model: Surfels, camera: Camera) -> Camera:

@@ -23,7 +23,7 @@ def rasterize(
     width: int,
     height: int,
     *,
-    features: Tensor | None = None,  # [N, C]
+    features: Tensor | None = None,  # [N, F]
     texture: Texture | None = None,
     background: Tensor | None = None,  # [C]
     shift: Tensor | None = None,  # [N, 2]
@@ -50,8 +50,9 @@ def rasterize(
         K: [3, 3] intrinsics in pixels, without skew; pixel centres lie at +0.5.
         width: of the image in pixels, 1 to 2^20 - 16.
         height: of the image in pixels, likewise.
-        features: [N, C] one colour per surfel or Gaussian, C from 1 to 32; or else
-        texture: a colour that varies over the surfel, C = 3.
+        features: [N, F] one colour per surfel or Gaussian.
+        texture: a colour that varies over the surfel. With both, the colour has the three channels of the
+            texture and then those of the features: C = 3 + F, 32 at most.
         background: [C], black by default.
         shift: [N, 2] pixels added to the whole projection of a surfel or Gaussian. Pass zeros that require a
             gradient to learn how the loss changes as they move on screen, as densification needs it.

@@ -17,6 +17,7 @@ from texgs.raster.primitive import check_primitive
 from texgs.raster.types import OUTPUTS, Options, Texture
 
 MAX_CHANNELS = 32
+TEXTURE_CHANNELS = 3
 MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
 ROUNDING = 1e-4  # of a matrix that was inverted or multiplied
 BYTES_PER_SURFEL = 512  # records, footprints, sorting, a few tiles: what no scene stays below
@@ -50,8 +51,8 @@ def surfel_tensors(
             sizes |= check.shape(name, tensors[name], f"N {axes}", **sizes)
     if texture is not None:
         check_texture(texture, sizes["N"])
-    else:
-        channels("features", sizes["C"])
+    if features is not None:
+        channels("features", sizes["C"], MAX_CHANNELS - (0 if texture is None else TEXTURE_CHANNELS))
     for name, tensor in tensors.items():
         check.floating(name, tensor)
     device = check.same_device(**tensors)
@@ -60,18 +61,18 @@ def surfel_tensors(
 
 
 def _colors(features: Tensor | None, texture: Texture | None) -> dict[str, Tensor]:
-    if features is not None and texture is None:
-        return {"features": features}
-    if features is None and texture is not None:
-        return {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
-    given = "both" if texture is not None else "neither"
-    raise ArgumentError(f"rasterize: expected either features or texture, got {given}")
+    if features is None and texture is None:
+        raise ArgumentError("rasterize: expected features, a texture or both, got neither")
+    found = {} if features is None else {"features": features}
+    if texture is not None:
+        found |= {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
+    return found
 
 
-def channels(name: str, n: int) -> None:
+def channels(name: str, n: int, most: int = MAX_CHANNELS) -> None:
     """Require a number of channels that the library can blend."""
-    if not 1 <= n <= MAX_CHANNELS:
-        raise ArgumentError(f"{name}: expected 1 to {MAX_CHANNELS} channels, got {n}")
+    if not 1 <= n <= most:
+        raise ArgumentError(f"{name}: expected 1 to {most} channels, got {n}")
 
 
 def view(

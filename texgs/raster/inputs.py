@@ -19,15 +19,16 @@ class SurfelTensors(NamedTuple):
     scales: Tensor  # [N, 2] of surfels, [N, 3] of 3D Gaussians
     opacities: Tensor  # [N]
     shift: Tensor | None = None  # [N, 2]
-    features: Tensor | None = None  # [N, C], or a texture:
+    features: Tensor | None = None  # [N, C], or [N, C - 3] beside a texture:
     base: Tensor | None = None  # [N, 3]
     gain: Tensor | None = None  # [N]
     texels: Tensor | None = None  # [T, 3]
 
     @property
     def channels(self) -> int:
-        """Channels C of the colour."""
-        return 3 if self.features is None else self.features.shape[1]
+        """Channels C of the colour: those of the texture, then those of the features."""
+        plain = 0 if self.features is None else self.features.shape[1]
+        return plain if self.base is None else 3 + plain
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,14 @@ inline void check_surfels(const texgs_surfels& s) {
     const bool some = s.n > 0;  // memory of no elements may have no address
     require(!some || (s.means && s.quats && s.scales && s.opacities),
             "surfels: means, quats, scales and opacities are needed");
-    require(!some || (s.features != nullptr) != (s.base != nullptr), "surfels: give either features or a texture");
+    require(!some || s.features || s.base, "surfels: features or a texture are needed");
     require(s.axes == 2 || s.axes == 3, "surfels: expected 2 scales of surfels or 3 of 3D Gaussians");
     require(s.axes == 2 || !s.base, "texture: 3D Gaussians have none");
     require(s.channels >= 1 && s.channels <= TEXGS_MAX_CHANNELS, "channels: expected 1 to 32");
-    require(!s.base || (s.channels == 3 && s.gain && s.texels && s.sizes && s.offsets),
-            "texture: base, gain, texels, sizes and offsets are needed, with 3 channels");
+    require(!s.base || (s.channels >= 3 && s.gain && s.texels && s.sizes && s.offsets),
+            "texture: base, gain, texels, sizes and offsets are needed, with 3 channels at least");
+    require(!s.base || !some || (s.channels > 3) == (s.features != nullptr),
+            "features: expected C - 3 beside a texture");
 }
 
 inline void check_camera(const texgs_camera& c) {

@@ -39,7 +39,8 @@ typedef enum {
     TEXGS_DEVICE_ERROR = 3,
 } texgs_status;
 
-/* Surfels or 3D Gaussians in world space. Exactly one of `features` and `base` is given. */
+/* Surfels or 3D Gaussians in world space. Their colour has the three channels of a texture, where `base` is given, and
+ * then those of `features`. */
 typedef struct {
     int64_t n;
     int32_t axes;           /* 2: surfels; 3: 3D Gaussians, which have neither texture nor normals */
@@ -48,8 +49,8 @@ typedef struct {
     const float* scales;    /* [N, axes] standard deviations along the first axes, world units */
     const float* opacities; /* [N] in [0, 1] */
     const float* shift;     /* [N, 2] pixels added to the projection, or NULL */
-    int32_t channels;       /* C, 1 to TEXGS_MAX_CHANNELS; 3 with a texture */
-    const float* features;  /* [N, C] */
+    int32_t channels;       /* C of the colour, 1 to TEXGS_MAX_CHANNELS */
+    const float* features;  /* [N, C], or [N, C - 3] beside a texture, NULL where that leaves none */
     const float* base;      /* [N, 3]; fragment colour = base + gain * bilinear(texel) */
     const float* gain;      /* [N] */
     const float* texels;    /* [T, 3]; no two surfels share one */

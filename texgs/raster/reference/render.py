@@ -55,8 +55,8 @@ def rasterize(
         K: [3, 3] intrinsics in pixels, without skew; pixel centres lie at +0.5.
         width: of the image in pixels.
         height: of the image in pixels.
-        features: [N, C] one colour per surfel; or else
-        texture: a colour that varies over the surfel.
+        features: [N, F] one colour per surfel or Gaussian.
+        texture: a colour that varies over the surfel; with both, first its three channels, then the features.
         background: [C], black by default.
         shift: [N, 2] pixels added to the whole projection of a surfel, zero by default.
         outputs: any of "depth", "median", "normal", "distortion", "statistics".
@@ -66,7 +66,7 @@ def rasterize(
         Render with color [H, W, C], alpha [H, W], and the outputs asked for.
 
     Raises:
-        ArgumentError: for colours of no kind or of two, and for textures or normals of 3D Gaussians.
+        ArgumentError: where there is no colour, and for textures or normals of 3D Gaussians.
         ShapeError: for scales of another shape.
     """
     check_primitive(scales, texture is not None, outputs)
@@ -148,12 +148,14 @@ def blend(
     texture: Texture | None,
 ) -> Tensor:
     """Sum over fragments [P, C] of weight times colour, without the background."""
-    if features is not None and texture is None:
-        return weights @ features[index]
-    if features is None and texture is not None:
-        return (weights[..., None] * texture_color(texture, index, fragments)).sum(1)
-    given = "both" if texture is not None else "neither"
-    raise ArgumentError(f"rasterize: expected either features or texture, got {given}")
+    if features is None and texture is None:
+        raise ArgumentError("rasterize: expected features, a texture or both, got neither")
+    colors = []
+    if texture is not None:
+        colors.append((weights[..., None] * texture_color(texture, index, fragments)).sum(1))
+    if features is not None:
+        colors.append(weights @ features[index])
+    return torch.cat(colors, 1)
 
 
 def texture_color(texture: Texture, index: Tensor, fragments: Fragments) -> Tensor:

@@ -106,6 +106,32 @@ TEXGS_INLINE vf depth_of(const Record& s, const Fragments& f) {
     return select(f.rho_surfel <= f.rho, vf(s.zc) * f.inverse_w, s.zp);
 }
 
+// What is blended of each primitive, constant over it: base and features, then the normal.
+struct ChannelSources {
+    const float *base, *features, *normals;
+    int textured, plain, all;  // channels of the base, of base and features, and with the normal
+
+    explicit ChannelSources(const Raster& r)
+        : base(r.surfels.base),
+          features(r.surfels.features),
+          normals(r.normals),
+          textured(r.surfels.base ? 3 : 0),
+          plain(r.surfels.channels),
+          all(r.channels) {}
+
+    const float* features_of(int64_t id) const { return features + id * (plain - textured); }
+    TEXGS_INLINE void copy(int64_t id, float* to) const {
+        for (int c = 0; c < textured; ++c) to[c] = base[3 * id + c];
+        for (int c = textured; c < plain; ++c) to[c] = features_of(id)[c - textured];
+        for (int c = plain; c < all; ++c) to[c] = normals[3 * id + c - plain];
+    }
+    TEXGS_INLINE void ask_for(int64_t id) const {
+        if (textured) prefetch(base + 3 * id);
+        if (plain > textured) prefetch(features_of(id));
+        if (all > plain) prefetch(normals + 3 * id);
+    }
+};
+
 // A part of a tile's list, copied so that the passes over its blocks read a few contiguous kilobytes.
 struct alignas(64) Chunk {
     Record records[kChunk];
@@ -139,21 +165,13 @@ struct alignas(64) Chunk {
 
 private:
     void stage_channels(const Raster& r, uint32_t begin, int n) {
-        const int own = r.surfels.channels;
+        const ChannelSources from(r);
         const uint32_t all = r.tile_begin[r.tiles_x * r.tiles_y];
-        const float* from = surfel_channels(r);
         channels = many_channels;
         stride = r.channels;
         for (int i = 0; i < n; ++i) {
-            if (begin + i + kChunk < all) {
-                const int64_t later = r.pairs[begin + i + kChunk].surfel;
-                prefetch(from + later * own);
-                if (r.with_normal) prefetch(r.normals + 3 * later);
-            }
-            const int64_t id = surfels[i];
-            float* to = many_channels + i * stride;
-            for (int c = 0; c < own; ++c) to[c] = from[id * own + c];
-            for (int c = own; c < stride; ++c) to[c] = r.normals[3 * id + c - own];
+            if (begin + i + kChunk < all) from.ask_for(r.pairs[begin + i + kChunk].surfel);
+            from.copy(surfels[i], many_channels + i * stride);
         }
     }
 };

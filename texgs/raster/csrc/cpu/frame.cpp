@@ -219,12 +219,12 @@ void texgs_frame::geometry_gradients() {
 
 // With the geometry frozen, features are what the gradient image splats onto.
 void texgs_frame::feature_gradients() {
-    const int channels = raster.surfels.channels;
+    const int textured = raster.surfels.base ? 3 : 0, channels = raster.surfels.channels - textured;
     if (!raster.grad.color) {
         std::memset(raster.out.features, 0, raster.surfels.n * channels * sizeof(float));
         return;
     }
-    contribute({.image = raster.grad.color,
+    contribute({.image = raster.grad.color + int64_t(textured) * raster.camera.width * raster.camera.height,
                 .channels = channels,
                 .sums = raster.out.features,
                 .weight_sum = nullptr,

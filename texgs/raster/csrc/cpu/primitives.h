@@ -9,9 +9,6 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-// What is blended of a surfel besides its normal, [N, surfels.channels].
-inline const float* surfel_channels(const Raster& r) { return r.surfels.base ? r.surfels.base : r.surfels.features; }
-
 // Lanes p[0], p[stride], ...; beyond n the last one is repeated.
 inline vf load_strided(const float* p, int stride, int64_t n) {
     float lanes[kLanes];

@@ -88,7 +88,9 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
     const unsigned filtered = bits(seen.clipped | ~seen.never_filtered);
     const RecordLanes records = record_lanes(c, seen.forms, seen.log2_opacity, q.pose.p.z);
     const BoundLanes bounds = bound_lanes(c, seen.bounds);
-    const float* colors = r.channels > kRecordChannels ? nullptr : surfel_channels(r);
+    // So few channels have one source.
+    const float* few = r.surfels.base ? r.surfels.base : r.surfels.features;
+    const float* colors = r.channels > kRecordChannels ? nullptr : few;
     for (int i = 0; i < n; ++i) {
         const int64_t id = first + i;
         Record& record = r.records[id];

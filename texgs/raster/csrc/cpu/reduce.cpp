@@ -61,12 +61,13 @@ void reduce(const Raster& r, int64_t begin, int64_t end) {
     const View view = make_view(r.camera.viewmat, r.camera.K);
     const bool depth = r.grad.depth || r.grad.median || r.grad.distortion;
     const int channels = depth ? P::Sums::kAll : P::Sums::kGeometry, own = r.surfels.channels;
+    const int textured = r.surfels.base ? 3 : 0, plain = own - textured;  // the texture's gradients are another pass
     Rows s;
     for (int64_t first = begin; first < end; first += kLanes) {
         const int n = static_cast<int>(end - first < kLanes ? end - first : kLanes);
         s.gather(r, first, n);
-        for (int c = 0; r.out.features && c < own; ++c)
-            store_strided(r.out.features + own * first + c, own, n, s[channels + c]);
+        for (int c = 0; r.out.features && c < plain; ++c)
+            store_strided(r.out.features + plain * first + c, plain, n, s[channels + textured + c]);
         const P primitive = load_primitives<P>(r.surfels, first, n);
         auto m = read_moments(primitive, s, depth);
         if constexpr (!P::kAffine) {

@@ -153,17 +153,22 @@ void choose(const Raster& r, Visit visit) {
         visit(backward_kernel<P, C, true, false, Textured>, Layout<P, C, true, false, Textured>::kWidth);
 }
 
-template <class Visit>
+template <class P, bool Textured, class Visit>
 void choose(const Raster& r, Visit visit) {
     const int channels = r.surfels.channels + (r.geometry && r.grad.normal ? 3 : 0);
+    if (channels <= 3) return choose<P, 3, Textured>(r, visit);
+    if (channels <= 6) return choose<P, 6, Textured>(r, visit);
+    if (channels <= 16) return choose<P, 16, Textured>(r, visit);
+    choose<P, TEXGS_MAX_CHANNELS + 3, Textured>(r, visit);
+}
+
+template <class Visit>
+void choose(const Raster& r, Visit visit) {
     with_primitive<float>(r.surfels.axes, [&](auto primitive) {
         using P = typename decltype(primitive)::type;
         if constexpr (!P::kAffine)
-            if (r.surfels.base) return channels <= 3 ? choose<P, 3, true>(r, visit) : choose<P, 6, true>(r, visit);
-        if (channels <= 3) return choose<P, 3, false>(r, visit);
-        if (channels <= 6) return choose<P, 6, false>(r, visit);
-        if (channels <= 16) return choose<P, 16, false>(r, visit);
-        choose<P, TEXGS_MAX_CHANNELS + 3, false>(r, visit);
+            if (r.surfels.base) return choose<P, true>(r, visit);
+        choose<P, false>(r, visit);
     });
 }
 

@@ -46,12 +46,13 @@ private:
         for (int k = share; k < 4; k += sharers) reinterpret_cast<float4*>(records + place)[k] = from[k];
     }
     __device__ void copy_channels(const Raster& r, int64_t surfel, int place, int share, int sharers, int used) {
-        const int own = r.surfels.channels;
-        const float* features = r.surfels.base ? r.surfels.base : r.surfels.features;
+        const int own = r.surfels.channels, textured = r.surfels.base ? 3 : 0;
         for (int c = share; c < C; c += sharers) {
             float value = 0.0f;
-            if (c < own)
-                value = features[surfel * own + c];
+            if (c < textured)
+                value = r.surfels.base[3 * surfel + c];
+            else if (c < own)
+                value = r.surfels.features[surfel * (own - textured) + c - textured];
             else if (c < used)
                 value = r.normals[3 * surfel + c - own];
             channels[place * C + c] = value;

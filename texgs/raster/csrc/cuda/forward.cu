@@ -163,7 +163,7 @@ __global__ __launch_bounds__(kThreads, 1) void forward_kernel(const Raster r) {
 
 template <class P, int C>
 void forward_with(const Raster& r, cudaStream_t stream) {
-    if constexpr (C <= 6 && !P::kAffine) {
+    if constexpr (!P::kAffine) {
         if (r.surfels.base) {
             const auto kernel = r.with_depth ? forward_kernel<P, C, true, true> : forward_kernel<P, C, false, true>;
             return launch(kernel, r.tiles, kThreads, stream, r);

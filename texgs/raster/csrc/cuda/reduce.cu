@@ -37,9 +37,9 @@ __device__ void store_geometry(const texgs_gradients& out, int64_t i, const Grad
 }
 
 __device__ void store_channels(const Raster& r, int64_t i, const float* sums, int first) {
-    const int own = r.surfels.channels;
-    float* channels = r.surfels.base ? r.out.base : r.out.features;
-    for (int c = 0; channels && c < own; ++c) channels[i * own + c] = sums[first + c];
+    const int textured = r.surfels.base ? 3 : 0, plain = r.surfels.channels - textured;
+    for (int c = 0; r.out.base && c < textured; ++c) r.out.base[3 * i + c] = sums[first + c];
+    for (int c = 0; r.out.features && c < plain; ++c) r.out.features[i * plain + c] = sums[first + textured + c];
     if (r.out.gain) r.out.gain[i] = sums[r.slot_width - 1];
 }
 
