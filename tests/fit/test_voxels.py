@@ -6,15 +6,18 @@ import pytest
 import torch
 
 from tests.fit.scenes import RADIUS, ball_images, ball_planes, cameras, images_of
+from tests.real_data import real_data
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fit.voxel_rays import AROUND, curve, training_rays, widened
-from texgs.fit.voxel_settings import PLENOXELS, Decay, Stage, VoxelSettings
+from texgs.fit.voxel_settings import PLENOXELS, QUICK, Decay, Stage, VoxelSettings
 from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
 from texgs.fit.voxels import VoxelFit
 from texgs.metrics.image import psnr
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays, render_view
+from texgs.scene.images import load
+from texgs.volume.view_set import read_views
 
 SETTINGS = VoxelSettings(
     stages=(Stage(16, 40), Stage(32, 80)), degree=1, half_size=0.6, rays=512, density=Decay(40.0, 2.0, 10)
@@ -49,6 +52,16 @@ def test_the_ball_is_found(fit, images):
     assert quality(fit, images) > 25
     unseen = orbit(20, 10, 1.5, 50, 32, 32)
     assert quality(fit, images_of([ball_planes(unseen)], [unseen])) > 20
+
+
+def test_published_views():
+    views = read_views(real_data("vortex/TF04_400"))
+    fit = VoxelFit(
+        load(views.train, reduce=4), replace(QUICK, stages=(Stage(32, 60), Stage(64, 120)), rays=2048)
+    )
+    for _ in fit.run():
+        pass
+    assert quality(fit, load(views.test[::30], reduce=4)) > 27
 
 
 def test_what_is_outside_of_the_ball_stays_empty(fit):
