@@ -77,6 +77,20 @@ def test_the_same_seed_gives_the_same_grid(fit, images):
     assert torch.equal(again.grid.rows, fit.grid.rows)
 
 
+@pytest.mark.parametrize("optimizer", ["rmsprop", "adam"])
+@pytest.mark.parametrize("stop", [25, 40, 70])
+def test_a_resumed_run_is_as_if_it_had_never_stopped(images, optimizer, stop):
+    settings = replace(SETTINGS, optimizer=optimizer, density=Decay(5.0, 1.0), occupy_every=15)
+    whole = VoxelFit(images, settings)
+    for done in whole.run():
+        if done.step == stop:
+            state = {name: x.clone() for name, x in whole.state().items()}
+    resumed = VoxelFit(images, settings, seed=1)
+    resumed.restore(state)
+    assert [done.step for done in resumed.run()] == list(range(stop + 1, 121))
+    assert torch.equal(resumed.grid.rows, whole.grid.rows)
+
+
 @pytest.mark.parametrize(("optimizer", "rate"), [("rmsprop", 40.0), ("adam", 5.0)])
 def test_optimisers_without_total_variation(images, optimizer, rate):
     stages = (Stage(16, 80, total_variation=False),)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import torch
+from torch import Tensor
 
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fit.loop import require_finite
@@ -60,25 +61,50 @@ class VoxelFit:
         self.filled_blocks = grid.masks.flatten().nonzero()[:, 0].int()
 
     def run(self) -> Iterator[VoxelProgress]:
-        """All stages.
+        """All stages, or what is left of them.
 
         Raises:
             FitError: if the loss or a row is no longer finite, or no voxel shows.
         """
+        start = 0
         for index, stage in enumerate(self.settings.stages):
-            if index:
+            if index and self.step_count == start:
                 self.refine()
-            for _ in range(stage.steps):
+            start += stage.steps
+            while self.step_count < start:
                 yield self.step(stage)
-            self.grid.refresh_occupancy()
+        self.grid.refresh_occupancy()
 
     def refine(self) -> None:
         """Remove what no ray sees, and halve the spacing."""
         s = self.settings
+        self.grid.refresh_occupancy()
         kept = seen_voxels(self.grid, self.rays, self.march, s.prune_weight, s.prune_share)
         if not kept.any():
             raise FitError("voxels: expected some that show in the views, found none; lower prune_weight")
         self._begin(refined(self.grid, kept))
+
+    def state(self) -> dict[str, Tensor]:
+        """Everything a resumed run needs, as tensors, between two steps."""
+        grid = {
+            f"grid.{name}": torch.as_tensor(value, dtype=None if isinstance(value, Tensor) else torch.float64)
+            for name, value in vars(self.grid).items()
+        }
+        moments = {"second": self.optimizer.second, "first": self.optimizer.first}
+        kept = {f"optimizer.{name}": x for name, x in moments.items() if x is not None}
+        clock = {"step": torch.tensor(self.step_count), "random": self.generator.get_state()}
+        return {**grid, **kept, **clock}
+
+    def restore(self, state: Mapping[str, Tensor]) -> None:
+        """Go on from what `state` returned, as if the run had never stopped."""
+        tensors = {f.name: state[f"grid.{f.name}"].clone() for f in fields(VoxelGrid)}
+        lower, spacing = tensors.pop("lower").tolist(), tensors.pop("spacing").item()
+        self._begin(VoxelGrid(tuple(lower), spacing, **tensors))
+        self.optimizer.second.copy_(state["optimizer.second"])
+        if self.optimizer.first is not None:
+            self.optimizer.first.copy_(state["optimizer.first"])
+        self.step_count = int(state["step"])
+        self.generator.set_state(state["random"])
 
     @torch.no_grad()
     def step(self, stage: Stage) -> VoxelProgress:
