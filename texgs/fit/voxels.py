@@ -64,7 +64,7 @@ class VoxelFit:
         """All stages, or what is left of them.
 
         Raises:
-            FitError: if the loss or a row is no longer finite, or no voxel shows.
+            FitError: if the loss or a density is no longer finite, or no voxel shows.
         """
         start = 0
         for index, stage in enumerate(self.settings.stages):
@@ -111,7 +111,7 @@ class VoxelFit:
         """Rays, their mean squared error, a step of the optimiser.
 
         Raises:
-            FitError: if the loss or a row is no longer finite, where they are looked at.
+            FitError: if the loss or a density is no longer finite, where they are looked at.
         """
         s = self.settings
         if self.step_count % s.occupy_every == 0:
@@ -127,8 +127,10 @@ class VoxelFit:
         self.step_count += 1
         is_looked_at = self.step_count % CHECKED_EVERY == 0 or self.step_count == s.steps
         loss = error.square().mean() if is_looked_at else None
-        if loss is not None:  # rows that are not finite show nothing, so that the loss alone does not tell
-            require_finite(self.step_count, {"loss": loss, "rows": self.grid.rows})
+        if (
+            loss is not None
+        ):  # densities that are not finite show nothing, so that the loss alone does not tell
+            require_finite(self.step_count, {"loss": loss, "density": self.grid.density})
         return VoxelProgress(self.step_count, len(self.grid), None if loss is None else float(loss))
 
     def _smooth(self) -> None:
