@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from tests.fit.scenes import RADIUS, ball_images, ball_planes, cameras, images_of
+from tests.real_data import real_data
 from texgs.config.compose import compose
 from texgs.config.typed import typed
 from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
@@ -17,6 +18,8 @@ from texgs.fit.voxels import VoxelFit
 from texgs.metrics.image import psnr
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays, render_view
+from texgs.volume.images import load
+from texgs.volume.view_set import read_views
 
 SETTINGS = VoxelKeys(
     stages=[GridStage(16, 40), GridStage(32, 80)],
@@ -57,6 +60,16 @@ def test_the_ball_is_found(fit, images):
     assert quality(fit, images_of([ball_planes(unseen)], [unseen])) > 20
 
 
+def test_published_views():
+    views = read_views(real_data("vortex/TF04_400"))
+    fit = VoxelFit(
+        load(views.train, reduce=4), VoxelKeys(stages=[GridStage(32, 60), GridStage(64, 120)], rays=2048)
+    )
+    for _ in fit.run():
+        pass
+    assert quality(fit, load(views.test[::30], reduce=4)) > 27
+
+
 def test_what_is_outside_of_the_ball_stays_empty(fit):
     distance = fit.grid.points().norm(dim=1)
     far = distance > RADIUS + 4 * fit.grid.spacing
@@ -68,6 +81,20 @@ def test_the_same_seed_gives_the_same_grid(fit, images):
     for _ in again.run():
         pass
     assert torch.equal(again.grid.rows, fit.grid.rows)
+
+
+@pytest.mark.parametrize("optimizer", ["rmsprop", "adam"])
+@pytest.mark.parametrize("stop", [25, 40, 70])
+def test_a_resumed_run_is_as_if_it_had_never_stopped(images, optimizer, stop):
+    settings = replace(SETTINGS, optimizer=optimizer, density=Decay(5.0, 1.0), occupy_every=15)
+    whole = VoxelFit(images, settings)
+    for done in whole.run():
+        if done.step == stop:
+            state = {name: x.clone() for name, x in whole.state().items()}
+    resumed = VoxelFit(images, settings, seed=1)
+    resumed.restore(state)
+    assert [done.step for done in resumed.run()] == list(range(stop + 1, 121))
+    assert torch.equal(resumed.grid.rows, whole.grid.rows)
 
 
 @pytest.mark.parametrize(("optimizer", "rate"), [("rmsprop", 40.0), ("adam", 5.0)])

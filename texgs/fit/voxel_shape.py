@@ -98,7 +98,10 @@ def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
     for axis in range(3):
         mask = mask.repeat_interleave(2, axis)
     finer = voxel_grid(grown(mask), grid.lower, grid.spacing / 2, grid.degree)
-    return finer.with_rows(torch.cat([grid.rows[:1], interpolate_rows(grid, finer.points())]))
+    finer.rows[0] = grid.rows[0]
+    interpolate_rows(grid, finer.points(), out=finer.rows[1:])
+    finer.refresh()
+    return finer
 
 
 def grown(mask: Tensor) -> Tensor:

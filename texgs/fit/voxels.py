@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from itertools import pairwise
 
 import torch
+from torch import Tensor
 
 from texgs.config.voxel_fit import GridStage, VoxelKeys
 from texgs.core.errors import ArgumentError, FitError
@@ -60,32 +61,57 @@ class VoxelFit:
         self.filled_blocks = grid.masks.flatten().nonzero()[:, 0].int()
 
     def run(self) -> Iterator[VoxelProgress]:
-        """All stages.
+        """All stages, or what is left of them.
 
         Raises:
-            FitError: if the loss or a row is no longer finite, or no voxel shows.
+            FitError: if the loss or a density is no longer finite, or no voxel shows.
         """
+        start = 0
         for index, stage in enumerate(self.settings.stages):
-            if index:
+            if index and self.step_count == start:
                 self.refine()
-            for _ in range(stage.steps):
+            start += stage.steps
+            while self.step_count < start:
                 yield self.step(stage)
-            self.grid.refresh_occupancy()
+        self.grid.refresh_occupancy()
 
     def refine(self) -> None:
         """Remove what no ray sees, and halve the spacing."""
         s = self.settings
+        self.grid.refresh_occupancy()
         kept = seen_voxels(self.grid, self.rays, self.march, s.prune_weight, s.prune_share)
         if not kept.any():
             raise FitError("voxels: expected some that show in the views, found none; lower prune_weight")
         self._begin(refined(self.grid, kept))
+
+    def state(self) -> dict[str, Tensor]:
+        """Everything a resumed run needs, as tensors, between two steps."""
+        grid = {
+            f"grid.{name}": torch.as_tensor(value, dtype=None if isinstance(value, Tensor) else torch.float64)
+            for name, value in vars(self.grid).items()
+        }
+        moments = {"second": self.optimizer.second, "first": self.optimizer.first}
+        kept = {f"optimizer.{name}": x for name, x in moments.items() if x is not None}
+        clock = {"step": torch.tensor(self.step_count), "random": self.generator.get_state()}
+        return {**grid, **kept, **clock}
+
+    def restore(self, state: Mapping[str, Tensor]) -> None:
+        """Go on from what `state` returned, as if the run had never stopped."""
+        tensors = {f.name: state[f"grid.{f.name}"].clone() for f in fields(VoxelGrid)}
+        lower, spacing = tensors.pop("lower").tolist(), tensors.pop("spacing").item()
+        self._begin(VoxelGrid(tuple(lower), spacing, **tensors))
+        self.optimizer.second.copy_(state["optimizer.second"])
+        if self.optimizer.first is not None:
+            self.optimizer.first.copy_(state["optimizer.first"])
+        self.step_count = int(state["step"])
+        self.generator.set_state(state["random"])
 
     @torch.no_grad()
     def step(self, stage: GridStage) -> VoxelProgress:
         """Rays, their mean squared error, a step of the optimiser.
 
         Raises:
-            FitError: if the loss or a row is no longer finite, where they are looked at.
+            FitError: if the loss or a density is no longer finite, where they are looked at.
         """
         s = self.settings
         if self.step_count % s.occupy_every == 0:
@@ -101,8 +127,10 @@ class VoxelFit:
         self.step_count += 1
         is_looked_at = self.step_count % CHECKED_EVERY == 0 or self.step_count == s.steps
         loss = error.square().mean() if is_looked_at else None
-        if loss is not None:  # rows that are not finite show nothing, so that the loss alone does not tell
-            require_finite(self.step_count, {"loss": loss, "rows": self.grid.rows})
+        if (
+            loss is not None
+        ):  # densities that are not finite show nothing, so that the loss alone does not tell
+            require_finite(self.step_count, {"loss": loss, "density": self.grid.density})
         return VoxelProgress(self.step_count, len(self.grid), None if loss is None else float(loss))
 
     def rates(self) -> VoxelRates:

@@ -179,10 +179,19 @@ def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
     return quads[:, 0, 3], sh
 
 
-def interpolate_rows(grid: VoxelGrid, points: Tensor) -> Tensor:
-    """Trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one."""
+def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None) -> Tensor:
+    """Trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one.
+
+    Args:
+        grid: any.
+        points: in any number.
+        out: where to write them.
+    """
     links = grid.links()
-    return torch.cat([_interpolated(grid, links, part) for part in points.split(PIECE)])
+    out = points.new_empty(len(points), grid.rows.shape[1]) if out is None else out
+    for rows, part in zip(out.split(PIECE), points.split(PIECE), strict=True):
+        rows.copy_(_interpolated(grid, links, part))
+    return out
 
 
 def _interpolated(grid: VoxelGrid, links: Tensor, points: Tensor) -> Tensor:
