@@ -11,7 +11,7 @@ from benchmarks import scenes
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import Light

@@ -4,7 +4,7 @@ import math
 
 import torch
 
-from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.fields.surfels.shading import ShadingModel, raw_material

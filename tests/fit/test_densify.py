@@ -3,7 +3,7 @@ import math
 import pytest
 import torch
 
-from texgs.config.fit import Densify
+from texgs.config.phase import Densify
 from texgs.fit.densify import RESET_OPACITY, SHRINK, DensityControl
 from texgs.fit.optimizer import Optimizer, Rate
 

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from texgs.config.fit import Densify, Losses, Rates
+from texgs.config.phase import Densify, Losses, Rates
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png

@@ -5,7 +5,7 @@ import torch
 from torch.testing import assert_close
 
 from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
-from texgs.config.fit import Losses
+from texgs.config.phase import Losses
 from texgs.fields.surfels.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material
@@ -125,7 +125,7 @@ def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
     planes[3] = 0
     planes[:, 40:52, 70:80] = 0.5
     images = images_of([planes], [camera])
-    part, whole = visible_part(images, 0, p, ShadingModel()), images.target(0)
+    part, whole = visible_part(images, 0, p, ShadingModel().options), images.target(0)
     assert part.share < 0.6
     found = []
     for target in (part, whole):

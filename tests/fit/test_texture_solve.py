@@ -7,10 +7,10 @@ import torch
 from torch.testing import assert_close
 
 from tests.fit.scenes import HEADLIGHT, ball_images, ball_planes, ball_seeds, cameras, images_of, new_fit, run
-from texgs.config.fit import Densify
+from texgs.config.phase import Densify
 from texgs.core.errors import FitError
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import ShadingModel, raw_material, shaded
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.texels import textured
 from texgs.fit.texture_adam import refine, without_texture
 from texgs.fit.texture_layout import look, sizes_for_budget
@@ -96,7 +96,7 @@ def test_solve_agrees_with_dense_least_squares():
 def test_curvature_is_that_of_the_dense_matrix_among_other_surfels():
     model, _, images = one_surfel()
     A = dense(model, images).reshape(len(images), -1, 16)
-    gains = [shaded(model.parameters, model.shading, c, HEADLIGHT).gain.item() for c in images.cameras]
+    gains = [model.shading.colors(model.parameters, c, HEADLIGHT).gain.item() for c in images.cameras]
     exact = torch.stack([a.sum(dim=0) * gain for a, gain in zip(A, gains, strict=True)])  # [V, T]
     typical = exact.square().sum(dim=0) / exact.sum(dim=0)
     found = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()

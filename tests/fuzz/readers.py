@@ -13,12 +13,16 @@ import numpy as np
 import torch
 from PIL import Image
 
+from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.edit.style_picture import read_style
+from texgs.fields.gaussians.model_file import read_gaussians, write_gaussians
+from texgs.fields.gaussians.ply import read_ply as read_gaussian_ply
+from texgs.fields.gaussians.ply import write_ply as write_gaussian_ply
 from texgs.fields.surfels.compact import open_model, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
@@ -231,6 +235,10 @@ READERS: dict[str, Reader] = {
     "model": Reader(model, read_model),
     "compact": Reader(compact, open_model),
     "compact inside": Reader(compact, open_model, None, unpacked_compact, packed_compact),
+    "gaussians": Reader(lambda folder: write_gaussians(folder / "g", gaussians()), read_gaussians),
+    "gaussians.ply": Reader(
+        lambda folder: write_gaussian_ply(folder / "g.ply", gaussians()), read_gaussian_ply
+    ),
     "texture": Reader(lambda folder: write_texture(folder / "t", sample()), read_texture_file),
     "segment": Reader(
         lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3), read_segment_file

@@ -5,78 +5,7 @@ from typing import Any
 
 from texgs.config.fields import kinds
 from texgs.config.keys import key
-
-
-@dataclass
-class Rates:
-    """Learning rates of Adam at the start of a phase."""
-
-    means: float = key(1.6e-4, "of means, times the extent of the cameras", "world units", least=0)
-    quats: float = key(0.004, "of quaternions", least=0)
-    scales: float = key(0.02, "of the logarithm of scales", least=0)
-    opacities: float = key(0.2, "of the logit of opacities", least=0)
-    sh: float = key(0.01, "of the zeroth spherical harmonic", least=0)
-    sh_rest: float = key(0.0005, "of the other spherical harmonics", least=0)
-    colors: float = key(0.01, "of surfel colours", least=0)
-    material: float = key(0.02, "of raw ambient, diffuse, specular and shininess", least=0)
-    means_final: float = key(0.01, "rate of means at the end, relative to the start", least=0)
-    final: float = key(0.05, "the other rates at the end, relative to the start", least=0)
-
-
-@dataclass
-class Losses:
-    """Weights of the losses."""
-
-    dssim: float = key(0.2, "lambda of D-SSIM against L1, of colour and of alpha", least=0)
-    alpha: float = key(0.1, "of L1 + D-SSIM of alpha", least=0)
-    alpha_l1: bool = key(True, "alpha's L1 has a gradient; in the release only its D-SSIM has")
-    normal: float = key(0.0, "of normal consistency", least=0)
-    normal_from: int = key(0, "iteration from which normals count", least=0)
-    smoothness: float = key(0.0, "of bilateral smoothness, of each map of a per-surfel material", least=0)
-
-
-@dataclass
-class Densify:
-    """Adaptive density control."""
-
-    start: int = key(100, "first iteration", least=0)
-    stop: int = key(1300, "last iteration", least=0)
-    every: int = key(50, "iterations between steps", least=1)
-    threshold: float = key(
-        2e-4, "mean screen-space gradient, half image widths, that clones or splits", least=0
-    )
-    size: float = key(0.01, "scale, in extents, above which a surfel is split, not cloned", least=0)
-    cap: int = key(30000, "surfels at most", least=1)
-    prune_opacity: float = key(0.005, "surfels with less opacity are removed", least=0)
-    prune_size: float = key(0.1, "surfels of a larger scale, in extents, are removed", least=0)
-    reset_every: int = key(0, "iterations between opacity resets; 0: never", least=0)
-
-
-@dataclass
-class Phase:
-    """One run of the loop."""
-
-    iterations: int = key(0, "views, one each", least=0)
-    sh_degree: int = key(3, "of spherical harmonics, in the phase without shading", least=0)
-    sh_every: int = key(1000, "iterations between degrees", least=1)
-    turns_normals: bool = key(True, "shading has gradients into normals; in the release it has none")
-    rates: Rates = key(Rates, "learning rates")
-    losses: Losses = key(Losses, "weights")
-    densify: Densify = key(Densify, "density control")
-
-
-@dataclass
-class Seeds:
-    """Where surfels start."""
-
-    kind: str = key(
-        "auto",
-        "points of the views if there are any, else what is visible",
-        choices=("auto", "points", "visible", "voxels", "hull", "random"),
-    )
-    count: int = key(10000, "surfels at the start; given points are taken as they are", least=1)
-    opacity: float = key(0.1, "of each", least=0)
-    half_size: float = key(0.55, "half the side of the box, where views do not say", "world units", least=0)
+from texgs.config.phase import Phase, Seeds
 
 
 @dataclass

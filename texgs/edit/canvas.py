@@ -11,7 +11,6 @@ from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.bounds import surfel_box
 from texgs.fields.surfels.model import Surfels, geometry
-from texgs.fields.surfels.shading import shaded
 from texgs.raster import Render, Texture, rasterize
 
 SEEN = 0.02  # of alpha: less is not looked at
@@ -53,7 +52,7 @@ def paint(
     p = {**model.parameters, "texels": texels}
     part = around(model, camera) if cropped else camera
     if is_lit:
-        texture = shaded(p, model.shading, part, light)
+        texture = model.shading.colors(p, part, light)
     else:
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
@@ -65,7 +64,7 @@ def paint(
 
 def around(model: Surfels, camera: Camera) -> Camera:
     """The camera of the part of a view that surfels can be seen in; one pixel of it at least."""
-    box = surfel_box(model.parameters, model.shading, camera)
+    box = surfel_box(model.parameters, model.shading.options, camera)
     left, top = min(max(box.left, 0), camera.width - 1), min(max(box.top, 0), camera.height - 1)
     right, bottom = min(box.right, camera.width), min(box.bottom, camera.height)
     return camera.crop(left, top, max(right, left + 1), max(bottom, top + 1))

@@ -109,7 +109,7 @@ class ViewMasks:
     def mask(self, clicks: Clicks) -> Tensor:
         """The mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
         camera = clicks.camera
-        box = surfel_box(self.model.parameters, self.model.shading, camera).within(
+        box = surfel_box(self.model.parameters, self.model.shading.options, camera).within(
             camera.width, camera.height
         )
         cut = camera.crop(*box)

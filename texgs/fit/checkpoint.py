@@ -13,6 +13,7 @@ from texgs.core.reading import reading
 from texgs.fit.loop import Fit, require_finite
 
 NAME = "checkpoint.safetensors"
+FOLDER = "checkpoint"  # beside the result, there until it is written
 
 
 def save(folder: str | Path, fit: Fit) -> Path:

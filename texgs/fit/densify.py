@@ -1,11 +1,11 @@
-"""Adaptive density control: surfels with large gradients are cloned or split, invisible ones removed."""
+"""Adaptive density control of surfels or 3D Gaussians: by gradients cloned or split, by opacity removed."""
 
 from __future__ import annotations
 
 import torch
 from torch import Tensor
 
-from texgs.config.fit import Densify
+from texgs.config.phase import Densify
 from texgs.core.rotation import quats_to_matrices
 from texgs.fields.surfels.shading import MATERIAL
 from texgs.fit.optimizer import Optimizer
@@ -83,10 +83,10 @@ class DensityControl:
         return chosen
 
     def _children(self, parents: dict[str, Tensor], generator: torch.Generator) -> dict[str, Tensor]:
-        """Two smaller surfels for each, drawn from its Gaussian."""
+        """Two smaller ones for each, drawn from its Gaussian."""
         rows = {name: x.repeat(CHILDREN, *[1] * (x.ndim - 1)) for name, x in parents.items()}
         noise = torch.randn(rows["scales"].shape, generator=generator).to(rows["scales"])
-        along = quats_to_matrices(rows["quats"])[..., :2]  # [n, 3, 2]
+        along = quats_to_matrices(rows["quats"])[..., : rows["scales"].shape[1]]  # [n, 3, 2 or 3]
         rows["means"] = rows["means"] + (along @ (noise * rows["scales"].exp())[..., None]).squeeze(-1)
         rows["scales"] = rows["scales"] - torch.log(torch.tensor(SHRINK)).item()
         return rows

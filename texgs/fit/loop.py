@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from texgs.config.fit import Phase, Rates
+from texgs.config.phase import Phase, Rates
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.surfels.bounds import visible_part
-from texgs.fields.surfels.shading import MATERIAL, ShadingModel
+from texgs.fields.surfels.shading import MATERIAL
 from texgs.fit.densify import DensityControl
 from texgs.fit.harmonics import join
-from texgs.fit.losses import view_loss
+from texgs.fit.losses import Shading, view_loss
 from texgs.fit.optimizer import Optimizer, Rate
 from texgs.volume.images import Images
 
@@ -59,7 +59,7 @@ def rates(names: Iterable[str], r: Rates, size: float) -> dict[str, Rate]:
 
 
 class Fit:
-    """One phase on one set of views.
+    """One phase of surfels or 3D Gaussians on one set of views.
 
     Args:
         parameters: raw, where the phase starts.
@@ -72,7 +72,7 @@ class Fit:
     def __init__(
         self,
         parameters: Mapping[str, Tensor],
-        shading: ShadingModel,
+        shading: Shading,
         images: Images,
         phase: Phase,
         seed: int,
@@ -110,9 +110,9 @@ class Fit:
         """One view: loss, gradients, a step of Adam, density control."""
         self.iteration += 1
         p = self.parameters
-        target = visible_part(self.images, self.view_of(self.iteration), p, self.shading)
+        target = visible_part(self.images, self.view_of(self.iteration), p, self.shading.options)
         is_observed = self.iteration <= self.phase.densify.stop
-        shift = torch.zeros_like(p["scales"]).requires_grad_() if is_observed else None
+        shift = torch.zeros_like(p["means"][:, :2]).requires_grad_() if is_observed else None
         degrees = min(self.phase.sh_degree, self.iteration // self.phase.sh_every)
         visible = join(p, degrees)
         loss = view_loss(

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import cast
+from typing import Protocol, cast
 
 import torch
 from torch import Tensor
 
-from texgs.config.fit import Losses
+from texgs.config.phase import Losses
+from texgs.core.camera import Camera
+from texgs.core.light import Light
 from texgs.fields.surfels.model import geometry
-from texgs.fields.surfels.shading import MATERIAL, ShadingModel, material, shaded
-from texgs.raster import Render, rasterize
+from texgs.fields.surfels.shading import MATERIAL, ShadingModel, material
+from texgs.raster import Options, Render, Texture, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.ssim import l1_dssim, ssim
@@ -20,9 +22,22 @@ from texgs.volume.images import Target
 SMOOTHED = len(MATERIAL)
 
 
+class Shading(Protocol):
+    """What turns raw parameters of surfels or 3D Gaussians into what the rasterizer takes."""
+
+    @property
+    def options(self) -> Options:
+        """For the rasterizer."""
+        ...
+
+    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
+        """Colours [N, 3] in a view, or a texture; differentiable."""
+        ...
+
+
 def view_loss(
     parameters: Mapping[str, Tensor],
-    shading: ShadingModel,
+    shading: Shading,
     target: Target,
     weights: Losses,
     shift: Tensor | None,
@@ -32,7 +47,7 @@ def view_loss(
     """Render a view and compare it: L1 + D-SSIM of colour and alpha, normals, smooth material.
 
     Args:
-        parameters: raw, of the surfels.
+        parameters: raw, of surfels or 3D Gaussians.
         shading: of the model.
         target: the view.
         weights: of the losses.
@@ -42,9 +57,9 @@ def view_loss(
     """
     camera = target.camera
     fixed = {} if turns_normals else {name: parameters[name].detach() for name in ("means", "quats")}
-    colors = cast(
-        Tensor, shaded({**parameters, **fixed}, shading, camera, target.light)
-    )  # surfels have no texture yet
+    colors = cast(  # surfels have no texture yet
+        Tensor, shading.colors({**parameters, **fixed}, camera, target.light)
+    )
     maps = material_maps(parameters, shading) if weights.smoothness > 0 else None
     has_normals = weights.normal > 0 and iteration > weights.normal_from
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
@@ -81,9 +96,10 @@ def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:
     return weights.dssim * (1 - ssim(alpha, target))
 
 
-def material_maps(parameters: Mapping[str, Tensor], shading: ShadingModel) -> Tensor | None:
+def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:
     """The material of each surfel as features [N, 4]; None where all share one, or there is none."""
-    if "ambient" not in parameters or len(parameters["ambient"]) == 1:
+    has_maps = "ambient" in parameters and len(parameters["ambient"]) > 1
+    if not has_maps or not isinstance(shading, ShadingModel):
         return None
     return torch.stack(list(material(parameters, shading.material).values()), dim=1)
 

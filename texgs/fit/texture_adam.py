@@ -42,7 +42,7 @@ def refine(
     for iteration in progress(range(iterations), title=title, unit="iteration"):
         if not order:
             order = torch.randperm(len(images), generator=generator).tolist()
-        target = visible_part(images, order.pop(), model.parameters, model.shading)
+        target = visible_part(images, order.pop(), model.parameters, model.shading.options)
         image = moving.render(target.camera, target.light).color
         loss = l1_dssim(image, target.color, DSSIM)
         if sparsity > 0:

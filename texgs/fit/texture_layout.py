@@ -11,7 +11,6 @@ from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.fields.surfels.bounds import visible_part
 from texgs.fields.surfels.model import Surfels, geometry
-from texgs.fields.surfels.shading import shaded
 from texgs.raster import Texture, rasterize
 from texgs.raster.atlas import MOST_TEXELS
 from texgs.volume.images import Images
@@ -44,9 +43,9 @@ def look(model: Surfels, images: Images, title: str) -> Sight:
     largest, total, squares = means.new_zeros(3, n)
     pixel = means.new_full((n,), torch.inf)
     for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
-        target = visible_part(images, index, model.parameters, model.shading)
+        target = visible_part(images, index, model.parameters, model.shading.options)
         camera = target.camera
-        texture = shaded(model.parameters, model.shading, camera, target.light)
+        texture = model.shading.colors(model.parameters, camera, target.light)
         if not isinstance(texture, Texture):
             raise ArgumentError(f"model: expected a texture, got stage {model.stage}; lay one out first")
         seen = rasterize(

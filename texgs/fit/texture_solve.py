@@ -44,7 +44,7 @@ def solve(
     generator = torch.Generator().manual_seed(seed)
     order = [i for _ in range(sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
-        target = visible_part(images, index, model.parameters, model.shading)
+        target = visible_part(images, index, model.parameters, model.shading.options)
         image = moving.render(target.camera, target.light).color
         structure = STRUCTURE * image.numel() * l1_dssim(image, target.color, 1.0)
         loss = 0.5 * squared_error(image, target) + structure

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from texgs.config.fit import Densify, Losses, Phase, Rates
+from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit

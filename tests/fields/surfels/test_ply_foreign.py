@@ -66,7 +66,7 @@ def test_points_without_surfels_are_named(tmp_path):
 
 
 def test_a_point_cloud_of_the_papers_data_is_no_model():
-    with pytest.raises(ArgumentError, match="expected surfels with a number scale_0 each, got x, y, z, nx"):
+    with pytest.raises(ArgumentError, match="expected vertices with a number scale_0 each, got x, y, z, nx"):
         read_ply(real_data("vortex/TF01/points3d.ply"))
 
 

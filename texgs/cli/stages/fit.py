@@ -9,6 +9,7 @@ from texgs.config.fields import kinds
 from texgs.config.typed import typed
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
+from texgs.fit import checkpoint
 from texgs.fit.task import FitTask, Fitted
 from texgs.report.results import FitResult
 from texgs.volume.images import load
@@ -50,4 +51,5 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         **training_quality(fitted.field, views, fit["reduce"], title),
         peak_gpu_memory_mib=gpu_memory(device),
     )
+    checkpoint.discard(output / checkpoint.FOLDER)
     return Outcome(result)

@@ -1,6 +1,5 @@
-"""What the stages of the fit share: views, the loop with checkpoints, evaluation, numbers."""
+"""What the stages of the fit share: views, the loop, evaluation, numbers."""
 
-import time
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,19 +7,16 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.config.fit import Densify, Losses, Phase, Rates
-from texgs.core.progress import progress
+from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
-from texgs.fit import checkpoint
+from texgs.fit.checkpoint import FOLDER
 from texgs.fit.loop import Fit
+from texgs.fit.resumable import run_to_end
 from texgs.metrics.quality import evaluate, mean
 from texgs.volume.images import Images
 from texgs.volume.view_set import ViewSet
-
-SAVED_EVERY = 30.0  # seconds between checkpoints
-CHECKPOINT = "checkpoint"  # folder, there until the stage has ended
 
 
 def phase_from(values: Mapping[str, Any]) -> Phase:
@@ -49,23 +45,9 @@ def run_phase(
         The model, the seconds of all runs together, and the losses that they looked at.
     """
     fit = Fit(parameters, shading, images, phase, seed)
-    folder = output / CHECKPOINT
-    if (state := checkpoint.latest(folder)) is not None:
-        fit.restore(state)
-    saved = time.monotonic()
-    start = saved - fit.seconds
-    steps = phase.iterations - fit.iteration
-    for _ in progress(fit.run(), steps, title=title, unit="view") if steps else ():
-        if time.monotonic() - saved > SAVED_EVERY:
-            fit.seconds = time.monotonic() - start
-            checkpoint.save(folder, fit)
-            saved = time.monotonic()
-    seconds = time.monotonic() - start
-    return (
-        Surfels({name: x.detach() for name, x in fit.parameters.items()}, shading),
-        seconds,
-        fit.losses,
-    )
+    seconds = run_to_end(fit, output / FOLDER, title)
+    model = Surfels({name: x.detach() for name, x in fit.parameters.items()}, shading)
+    return model, seconds, fit.losses
 
 
 def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:

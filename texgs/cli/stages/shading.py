@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
+from texgs.cli.stages.phase import gpu_memory, phase_from, quality, run_phase
 from texgs.core.device import torch_device
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
@@ -49,5 +49,5 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         **quality(model, views, fit["reduce"], title),
         peak_gpu_memory_mib=gpu_memory(device),
     )
-    checkpoint.discard(output / CHECKPOINT)
+    checkpoint.discard(output / checkpoint.FOLDER)
     return Outcome(result)

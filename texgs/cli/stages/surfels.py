@@ -6,7 +6,7 @@ from typing import Any
 import torch
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import CHECKPOINT, gpu_memory, phase_from, quality, run_phase
+from texgs.cli.stages.phase import gpu_memory, phase_from, quality, run_phase
 from texgs.core.device import torch_device
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
@@ -46,7 +46,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     model = Surfels(join(model.parameters), shading, {"dataset": settings["dataset"], "tf": settings["tf"]})
     write_model(output / "model.safetensors", model)
     measured = quality(model, views, fit["reduce"], title) if phase.iterations else {}
-    checkpoint.discard(output / CHECKPOINT)
+    checkpoint.discard(output / checkpoint.FOLDER)
     return Outcome(
         FitResult(
             seconds, len(model), phase.iterations, losses, peak_gpu_memory_mib=gpu_memory(device), **measured

@@ -1,4 +1,4 @@
-"""Where surfels are on screen."""
+"""Where surfels, or 3D Gaussians, are on screen."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.fields.surfels.shading import ShadingModel
+from texgs.raster import Options
 from texgs.volume.boxes import Box
 from texgs.volume.images import Images, Target
 
@@ -17,8 +17,8 @@ REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, belo
 
 
 @torch.no_grad()
-def surfel_box(parameters: Mapping[str, Tensor], shading: ShadingModel, camera: Camera) -> Box:
-    """A box around the projected bounding spheres of all surfels. Waits for a GPU once.
+def surfel_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> Box:
+    """A box around the projected bounding spheres of all surfels or 3D Gaussians. Waits for a GPU once.
 
     The whole image where a sphere reaches behind the camera, or a value is not finite.
     """
@@ -38,7 +38,9 @@ def surfel_box(parameters: Mapping[str, Tensor], shading: ShadingModel, camera: 
     if not isfinite(sum((nearest, left, right, top, bottom))) or nearest <= 0:
         return whole
     (fx, cx), (fy, cy) = camera.K[0, ::2].tolist(), camera.K[1, 1:].tolist()
-    disc = REACH / max(shading.low_pass, 1e-6) ** 0.5  # of the low-pass filter, pixels
+    is_flat = parameters["scales"].shape[1] == 2
+    variance = 1 / max(options.low_pass, 1e-6) if is_flat else options.dilation
+    disc = REACH * variance**0.5  # of the low-pass filter, pixels
     return Box(
         floor(fx * left + cx - disc),
         floor(fy * top + cy - disc),
@@ -47,9 +49,7 @@ def surfel_box(parameters: Mapping[str, Tensor], shading: ShadingModel, camera: 
     )
 
 
-def visible_part(
-    images: Images, index: int, parameters: Mapping[str, Tensor], shading: ShadingModel
-) -> Target:
+def visible_part(images: Images, index: int, parameters: Mapping[str, Tensor], options: Options) -> Target:
     """The part of a view in which it or the surfels show anything, on the surfels' device."""
-    around = surfel_box(parameters, shading, images.cameras[index])
+    around = surfel_box(parameters, options, images.cameras[index])
     return images.target(index, parameters["means"].device, around)

@@ -16,7 +16,7 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Role
 from texgs.fields.surfels import groups
 from texgs.fields.surfels.groups import GEOMETRY
-from texgs.fields.surfels.shading import MATERIAL, ShadingModel, shaded
+from texgs.fields.surfels.shading import MATERIAL, ShadingModel
 from texgs.raster import Render, Texture, rasterize
 
 
@@ -100,7 +100,7 @@ class Surfels:
             background: [3]; white by default.
             outputs: of the rasterizer.
         """
-        colored = shaded(self.parameters, self.shading, camera, light)
+        colored = self.shading.colors(self.parameters, camera, light)
         kind = "texture" if isinstance(colored, Texture) else "features"
         return rasterize(
             *geometry(self.parameters),

@@ -1,8 +1,7 @@
-"""Files of basic models: raw tensors as safetensors, and what belongs to them as JSON in the header."""
+"""Files of basic models of surfels, at every stage of their fit."""
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -14,8 +13,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.io import write_bytes
-from texgs.core.reading import reading
+from texgs.fields.described_file import read_described, require_json, short, write_described
 from texgs.fields.surfels.groups import GEOMETRY, TEXTURE
 from texgs.fields.surfels.model import SHAPES, Surfels
 from texgs.fields.surfels.shading import MATERIAL, ShadingModel
@@ -33,8 +31,7 @@ def write_model(path: str | Path, model: Surfels) -> Path:
     """Create or replace a model file in one step; the same model gives the same bytes.
 
     A safetensors file with the raw tensors under their names. Its header has one entry, "texgs-model": JSON
-    with `version`, `stage`, `optics` (the shading model) and `metadata`. One, because safetensors keeps no
-    order of entries.
+    with `version`, `stage`, `optics` (the shading model) and `metadata`.
 
     Args:
         path: target, by custom `model.safetensors`.
@@ -47,11 +44,7 @@ def write_model(path: str | Path, model: Surfels) -> Path:
         ArgumentError, ShapeError: if the model could not be read back (a tensor is missing, unknown, not
             finite or of another type, textures overlap, metadata is no JSON), or the file cannot be written.
     """
-    from safetensors.numpy import save
-
-    text = json.dumps(describe(path, model))
-    arrays = {name: x.detach().cpu().contiguous().numpy() for name, x in model.parameters.items()}
-    return write_bytes(path, save(arrays, {FORMAT: text}))
+    return write_described(path, FORMAT, describe(path, model), model.parameters)
 
 
 def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
@@ -67,10 +60,7 @@ def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
         "optics": asdict(model.shading),
         "metadata": dict(model.metadata),
     }
-    try:
-        json.dumps(description, allow_nan=False)
-    except (TypeError, ValueError) as error:
-        raise ArgumentError(f"{path}: metadata cannot be written as JSON: {error}") from error
+    require_json(path, description)
     return description
 
 
@@ -82,7 +72,7 @@ def read_model(path: str | Path) -> Surfels:
             newer version, or a tensor is missing, unknown, not finite or of another type or shape.
     """
     path = Path(path)
-    return model_of(path, *_open(path))
+    return model_of(path, *read_described(path, FORMAT, VERSION))
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Surfels:
@@ -98,57 +88,11 @@ def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[
         raise type(error)(f"{path}: {error}") from error
     except (KeyError, TypeError, ValueError) as error:
         raise ArgumentError(
-            f"{path}: expected stage, optics and metadata in the header, got {_short(description)}; "
+            f"{path}: expected stage, optics and metadata in the header, got {short(description)}; "
             "write the file again"
         ) from error
     _check(path, model, stage)
     return model
-
-
-def _open(path: Path) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Description and tensors; the description is judged before any tensor is looked at."""
-    from safetensors import SafetensorError, safe_open
-
-    with reading(path, "a model file", "write it again"):
-        try:
-            with safe_open(path, framework="pt") as file:
-                description = _description(path, file.metadata() or {})
-                # A copy is aligned in memory and does not depend on the file any more.
-                return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
-        except SafetensorError as error:
-            raise ArgumentError(f"{path}: {_damage(path)}") from error
-
-
-def _damage(path: Path) -> str:
-    """What is wrong with a file that safetensors cannot open; a good one begins with a length and JSON."""
-    with path.open("rb") as file:
-        start = file.read(9)
-    if start[8:] == b"{":
-        return "expected a whole safetensors file, got one cut short or damaged; copy or write it again"
-    return "expected a safetensors file, got one of another format; read_ply reads PLY files"
-
-
-def _description(path: Path, header: dict[str, str]) -> dict[str, Any]:
-    if FORMAT not in header:
-        raise ArgumentError(f"{path}: expected a {FORMAT} file, got safetensors of another program")
-    try:
-        description: dict[str, Any] = json.loads(header[FORMAT])
-        version = int(str(description["version"]))
-    except (KeyError, RecursionError, TypeError, ValueError) as error:
-        raise ArgumentError(
-            f"{path}: expected JSON with a version in the header, got {_short(header[FORMAT])}; "
-            "write the file again"
-        ) from error
-    if version > VERSION:
-        raise ArgumentError(
-            f"{path}: expected version {VERSION} of the format at most, got {version}; update texgs"
-        )
-    return description
-
-
-def _short(value: object) -> str:
-    """Enough of a value to recognise it in a message."""
-    return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
 
 
 def _optics(stored: dict[str, Any]) -> ShadingModel:

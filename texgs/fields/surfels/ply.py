@@ -12,14 +12,20 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.io import write_atomic
 from texgs.core.ply_file import read_vertices
 from texgs.core.rotation import quats_to_matrices
+from texgs.fields.ply_columns import (
+    numbered,
+    splat_columns,
+    take,
+    take_geometry,
+    take_harmonics,
+    write_columns,
+)
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.release_texture import read_texture
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fields.surfels.texels import mean_texels
-from texgs.raster.spherical_harmonics import DEGREES
 
 FLAVOURS = ("2dgs", "3dgs", "release")
 Y00 = 0.5 / math.sqrt(math.pi)  # the constant harmonic
@@ -59,8 +65,6 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
         ArgumentError: if the flavour is unknown or cannot express the model, a value is not finite, or the
             file cannot be written.
     """
-    from plyfile import PlyData, PlyElement
-
     if flavour not in FLAVOURS:
         raise ArgumentError(f"flavour: expected {', '.join(FLAVOURS)}, got {flavour!r}")
     if flavour == "release" and model.stage == "surfels":
@@ -73,10 +77,7 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
         columns = _columns(Surfels(parameters, model.shading), flavour)
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
-    vertices = np.empty(len(model), [(name, "<f4") for name in columns])
-    for name, column in columns.items():
-        vertices[name] = column.numpy()
-    return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
+    return write_columns(path, columns)
 
 
 def read_ply(path: str | Path) -> Surfels:
@@ -95,7 +96,7 @@ def read_ply(path: str | Path) -> Surfels:
     try:
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
-            parameters["sh"] = _harmonics(vertices)
+            parameters["sh"] = take_harmonics(vertices)
             shading = ShadingModel(low_pass=2.0)
         else:
             parameters |= _appearance(vertices, path.parent)
@@ -114,24 +115,16 @@ def _columns(model: Surfels, flavour: str) -> dict[str, Tensor]:
     p = model.parameters
     normals = quats_to_matrices(p["quats"])[..., 2]  # [N, 3]
     sh = p["sh"] if model.stage == "surfels" else ((_color(p) - 0.5) / Y00)[:, None]  # [N, K, 3]
-    rest = sh[:, 1:].transpose(1, 2).flatten(1)  # [N, 3 (K - 1)], one channel after the other
-    place = dict(zip("xyz", p["means"].T, strict=True))
-    common = {"opacity": p["opacities"]}
-    dc, rotation = _numbered("f_dc", sh[:, 0]), _numbered("rot", p["quats"])
-    scales = _numbered("scale", p["scales"])
     if flavour == "release":
-        dark = _numbered("f_rest", rest.new_zeros(len(model), 45))  # its loader expects as many
-        normal = _numbered("normal", normals)
-        return place | dc | dark | common | normal | scales | rotation | _release_material(model)
+        place = dict(zip("xyz", p["means"].T, strict=True))
+        dark = numbered("f_rest", sh.new_zeros(len(model), 45))  # its loader expects as many
+        shape = numbered("scale", p["scales"]) | numbered("rot", p["quats"])
+        common = {"opacity": p["opacities"]} | numbered("normal", normals) | shape
+        return place | numbered("f_dc", sh[:, 0]) | dark | common | _release_material(model)
     if flavour == "3dgs":
-        scales["scale_2"] = torch.full_like(p["opacities"], FLAT)
-    normal = dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
-    return place | normal | dc | _numbered("f_rest", rest) | common | scales | rotation
-
-
-def _numbered(name: str, values: Tensor) -> dict[str, Tensor]:
-    """Columns of [N, k] as name_0, name_1, ..."""
-    return {f"{name}_{k}": column for k, column in enumerate(values.T)}
+        third = torch.full_like(p["opacities"], FLAT)[:, None]
+        p = {**p, "scales": torch.cat([p["scales"], third], dim=1)}
+    return splat_columns(p, normals, sh)
 
 
 def _color(p: Mapping[str, Tensor]) -> Tensor:
@@ -159,51 +152,25 @@ def _release_material(model: Surfels) -> dict[str, Tensor]:
 # -- reading ---
 
 
-def _take(vertices: np.ndarray, *names: str) -> Tensor:
-    """Properties as columns [N, k] float32."""
-    given = vertices.dtype.names or ()
-    for name in names:
-        if name not in given or vertices.dtype[name].kind not in "iuf":
-            raise ArgumentError(f"expected surfels with a number {name} each, got {', '.join(given)}")
-    return torch.from_numpy(np.stack([vertices[name].astype(np.float32) for name in names], axis=1))
-
-
 def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
-    scales = _take(vertices, "scale_0", "scale_1")
+    geometry = take_geometry(vertices, 2)
     names = vertices.dtype.names or ()
     if "scale_2" in names and "ambient_factor" not in names:  # the release has one without meaning
-        third = _take(vertices, "scale_2")[:, 0]
-        thick = (third > FLAT) & (third > scales.amax(1) - math.log(10))
+        third = take(vertices, "scale_2")[:, 0]
+        thick = (third > FLAT) & (third > geometry["scales"].amax(1) - math.log(10))
         if bool(thick.any()):
             raise ArgumentError(
                 f"expected flat Gaussians, got {int(thick.sum())} of {len(thick)} with a third axis above a "
                 "tenth of the longest; fit surfels instead"
             )
-    return {
-        "means": _take(vertices, "x", "y", "z"),
-        "quats": _take(vertices, *(f"rot_{k}" for k in range(4))),
-        "scales": scales,
-        "opacities": _take(vertices, "opacity")[:, 0],
-    }
-
-
-def _harmonics(vertices: np.ndarray) -> Tensor:
-    """[N, K, 3] with as many coefficients as the file has."""
-    dc = _take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")[:, None]  # [N, 1, 3]
-    n_rest = sum(name.startswith("f_rest_") for name in vertices.dtype.names or ())
-    if n_rest % 3 or 1 + n_rest // 3 not in DEGREES:
-        raise ArgumentError(f"expected 0, 9, 24 or 45 properties f_rest, got {n_rest}")
-    if not n_rest:
-        return dc
-    rest = _take(vertices, *(f"f_rest_{k}" for k in range(n_rest))).unflatten(1, (3, -1))  # [N, 3, K - 1]
-    return torch.cat([dc, rest.transpose(1, 2)], dim=1)
+    return geometry
 
 
 def _appearance(vertices: np.ndarray, folder: Path) -> dict[str, Tensor]:
     """Colour and material of the release's surfels, with their textures where the file has no colour."""
-    factors = _take(vertices, *RELEASE)
+    factors = take(vertices, *RELEASE)
     found = {ours: factors[:, k].contiguous() for k, ours in enumerate(RELEASE.values())}
     if "mappings_0" in (vertices.dtype.names or ()):
         return found | {"colors": torch.zeros(len(vertices), 3)} | read_texture(folder, len(vertices))
-    dc = _take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")
+    dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")
     return found | {"colors": (0.5 + Y00 * dc.double()).clamp(min=0).float()}

@@ -35,6 +35,18 @@ class ShadingModel:
         """For the rasterizer."""
         return Options(low_pass=self.low_pass)
 
+    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
+        """Colours [N, 3] of the surfels in a view, or their texture with base and gain; differentiable."""
+        p = parameters
+        if "ambient" not in p:
+            return spherical_harmonics(p["sh"], p["means"], camera.position)
+        a, d, s, b = material(p, self.material).values()
+        rest = (a, d, s, b, p["means"], p["quats"], viewer(camera, self), light_direction(light, camera))
+        if "texels" not in p:  # clamped as renderers of volumes do
+            return blinn_phong(p["colors"], *rest, facing=self.facing).clamp(0, 1)
+        base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest, facing=self.facing)
+        return Texture(base.clamp(0, 1), gain, p["texels"], p["sizes"], p["offsets"])
+
 
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
     """Factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
@@ -83,20 +95,3 @@ def light_direction(light: Light, camera: Camera) -> Tensor | None:
     if light.kind == "headlight":
         return None
     return light.direction(camera).to(camera.viewmat)
-
-
-def shaded(
-    parameters: Mapping[str, Tensor], shading: ShadingModel, camera: Camera, light: Light
-) -> Tensor | Texture:
-    """Colours [N, 3] of the surfels in a view, or their texture with base and gain; differentiable."""
-    p = parameters
-    if "ambient" not in p:
-        return spherical_harmonics(p["sh"], p["means"], camera.position)
-    a, d, s, b = material(p, shading.material).values()
-    rest = (a, d, s, b, p["means"], p["quats"], viewer(camera, shading), light_direction(light, camera))
-    if "texels" not in p:
-        return blinn_phong(p["colors"], *rest, facing=shading.facing).clamp(
-            0, 1
-        )  # as renderers of volumes do
-    base, gain = blinn_phong_texture(p["colors"] + p["palette"], *rest, facing=shading.facing)
-    return Texture(base.clamp(0, 1), gain, p["texels"], p["sizes"], p["offsets"])

@@ -1,0 +1,77 @@
+"""3D Gaussians from the command line to a scene, on views of a small sphere."""
+
+import json
+
+import pytest
+
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.fields.files import open_field
+from texgs.fields.gaussians.composition import JoinedGaussians
+from texgs.scene.scene_file import read_scene
+
+TINY = [
+    "dataset=sphere",
+    "dataset.volume.size=32",
+    "views=small",
+    "views.width=48",
+    "views.height=48",
+    "views.train.frequency=1",
+    "views.test.count=3",
+    "views.turntable=2",
+    "views.radius=2.5",
+    "tracking=none",
+    "fit=gaussians_quick",
+    "fit.gaussians.seeds={kind: hull, count: 400}",
+    "fit.gaussians.iterations=150",
+    "fit.gaussians.sh_every=10",
+    "fit.gaussians.densify.stop=0",
+]
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    """Results with a scene of one fit; tests work beside them."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("finished")
+        patch.chdir(folder)
+        assert main(["compose", *TINY]) == 0
+    return folder / "results"
+
+
+def test_a_fit_has_a_model_and_numbers_and_leaves_no_checkpoint(results):
+    folder = results / "sphere" / "TF01" / "gaussians_quick" / "gaussians"
+    numbers = json.loads((folder / "metrics.json").read_text())["numbers"]
+    assert numbers["psnr"] > 25
+    assert numbers["sizes"]["total_mib"] * 2**20 == pytest.approx(400 * 248)
+    field = open_field(folder / "model.safetensors")
+    assert (field.kind, len(field)) == ("gaussians", 400)
+    assert field.parameters["sh"][:, 9:].abs().max() > 0, "degree 3 has learned"
+    assert sorted(path.name for path in folder.iterdir() if path.name[0] != ".") == [
+        "metrics.json",
+        "model.safetensors",
+    ]
+
+
+def test_a_scene_opens_and_fades(results, tmp_path):
+    path = results / "sphere" / "scene" / "gaussians_quick" / "compose" / "scene.yaml"
+    whole = read_scene(path)
+    composed = whole.open()
+    assert isinstance(composed, JoinedGaussians)
+    assert main(["edit", str(path), "TF01.opacity=0.2", "--output", str(tmp_path / "faint.yaml")]) == 0
+    faint = read_scene(tmp_path / "faint.yaml")
+    camera = orbit(30, 20, 2.5, 50, 48, 48)
+    before, after = (composed.render(camera, edits=scene.edits).alpha.sum() for scene in (whole, faint))
+    assert float(after) < 0.8 * float(before)
+    palette = ["TF01.palette=#ff0000", "--output", str(tmp_path / "red.yaml")]
+    assert main(["edit", str(path), *palette]) == 0
+    with pytest.raises(ArgumentError, match=r"palette: 3D Gaussians can change visible and opacity only"):
+        composed.render(camera, edits=read_scene(tmp_path / "red.yaml").edits)
+
+
+def test_seeds_that_need_a_volume_are_one_sentence(results, monkeypatch, capsys):
+    monkeypatch.chdir(results.parent)
+    words = ["fit.gaussians.seeds.kind=voxels", "fit.name=other"]
+    assert main(["gaussians", *TINY, *words]) == 2
+    assert "seeds.kind=voxels needs a volume" in capsys.readouterr().err

@@ -1,0 +1,104 @@
+from dataclasses import replace
+
+import pytest
+import torch
+from torch.testing import assert_close
+
+from tests.fields.gaussians.samples import sample
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import Light
+from texgs.fields.gaussians.model import Gaussians
+from texgs.raster import Options
+from texgs.raster.reference.render import rasterize
+
+CAMERA = orbit(30, 20, 3, 40, 48, 40)
+
+
+def directional(camera, means, sh):
+    """Colours of harmonics of degree 0 and 1 as 3DGS has them, in float64."""
+    x, y, z = torch.nn.functional.normalize(means.double() - camera.position.double(), dim=1)[
+        ..., None
+    ].unbind(1)
+    sh = sh.double()
+    linear = -y * sh[:, 1] + z * sh[:, 2] - x * sh[:, 3]
+    return (0.5 + 0.28209479177387814 * sh[:, 0] + 0.4886025119029199 * linear).clamp_min(0)
+
+
+@pytest.mark.parametrize("antialiased", [False, True])
+def test_a_view_is_that_of_the_float64_reference(antialiased):
+    model = sample(30, degree=1, antialiased=antialiased)
+    p = {name: x.double() for name, x in model.parameters.items()}
+    expected = rasterize(
+        p["means"],
+        p["quats"],
+        p["scales"].exp(),
+        p["opacities"].sigmoid(),
+        CAMERA.viewmat.double(),
+        CAMERA.K.double(),
+        CAMERA.width,
+        CAMERA.height,
+        features=directional(CAMERA, p["means"], p["sh"]),
+        background=torch.ones(3).double(),
+        outputs=("depth",),
+        options=Options(antialiased=antialiased),
+    )
+    found = model.render(CAMERA, outputs=("depth",))
+    # Rounding of float32; a fragment whose alpha is at the threshold of 1/255 may be in one of them only.
+    assert_close(found.color.double(), expected.color, atol=5e-3, rtol=0)
+    assert float((found.color - expected.color).abs().mean()) < 1e-5
+    assert float((found.depth - expected.depth).abs().mean()) < 1e-3
+
+
+def test_the_filter_matters():
+    model = sample(30)
+    thin = replace(model, parameters={**model.parameters, "scales": torch.full((30, 3), -6.0)})
+    other = replace(thin, shading=sample(antialiased=True).shading)
+    assert float(other.render(CAMERA).alpha.sum()) < 0.5 * float(thin.render(CAMERA).alpha.sum())
+
+
+def test_light_changes_nothing_and_the_background_is_white_unless_told():
+    model = sample(5)
+    found = model.render(CAMERA)
+    assert torch.equal(found.color, model.render(CAMERA, Light("directional", 100, 30)).color)
+    empty = found.alpha == 0
+    assert bool((found.color[empty] == 1).all())
+    assert bool((model.render(CAMERA, background=torch.zeros(3)).color[empty] == 0).all())
+
+
+def test_parameters_by_role():
+    model = sample()
+    assert set(model.tensors("geometry")) == {"means", "quats", "scales", "opacities"}
+    assert set(model.tensors("appearance")) == {"sh"}
+    assert (len(model), str(model.device), str(model.to("cpu").device)) == (7, "cpu", "cpu")
+
+
+def test_sizes_are_those_of_the_paper_and_of_the_tensors():
+    """The paper's 357,090 Gaussians of StyleSplat have 89 MB: 248 bytes each."""
+    sizes = sample(7, degree=1).sizes()
+    assert sizes["total_mib"] * 2**20 == pytest.approx(7 * 248)
+    assert sizes["geometry_mib"] + sizes["shading_mib"] == pytest.approx(sizes["total_mib"])
+    assert sizes["texture_mib"] == sizes["stored_texture_mib"] == 0
+    assert sizes["stored_geometry_mib"] * 2**20 == pytest.approx(7 * 4 * (3 + 4 + 3 + 1))
+    assert sizes["stored_shading_mib"] * 2**20 == pytest.approx(7 * 4 * 12)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"sh": None}, ArgumentError, "expected means, quats, scales, opacities, sh, got means"),
+        ({"mood": torch.zeros(7)}, ArgumentError, "got means, quats, scales, opacities, sh, mood"),
+        ({"scales": torch.zeros(7, 2)}, ShapeError, r"scales: expected \[7, 3\], got \[7, 2\]"),
+        ({"opacities": torch.zeros(6)}, ShapeError, r"opacities: expected \[7\], got \[6\]"),
+        ({"sh": torch.zeros(7, 5, 3)}, ShapeError, "sh: expected 1, 4, 9 or 16 coefficients"),
+    ],
+)
+def test_what_is_no_model_is_refused(change, error, message):
+    changed = {**sample().parameters, **change}
+    with pytest.raises(error, match=message):
+        Gaussians({name: x for name, x in changed.items() if x is not None})
+
+
+def test_there_are_no_normals():
+    with pytest.raises(ArgumentError, match=r"3D Gaussians .* have no normal"):
+        sample().render(CAMERA, outputs=("normal",))

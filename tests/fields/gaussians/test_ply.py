@@ -1,0 +1,110 @@
+import numpy as np
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from plyfile import PlyData
+
+from tests.fields.gaussians.samples import sample
+from tests.fields.surfels.ply_files import columns_of, numbered, vertices, write_vertices
+from tests.fields.surfels.samples import same
+from tests.fields.surfels.samples import sample as surfels
+from texgs.core.errors import ArgumentError
+from texgs.fields.gaussians.model import Baked, Gaussians
+from texgs.fields.gaussians.ply import read_ply, write_ply
+from texgs.fields.surfels.ply import write_ply as write_surfels
+
+NAMES = [
+    *"xyz", "nx", "ny", "nz", *numbered("f_dc", 3), *numbered("f_rest", 45), "opacity",
+    *numbered("scale", 3), *numbered("rot", 4),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("degree", [0, 3])
+def test_the_layout_is_that_of_3dgs_with_248_bytes_each(tmp_path, degree):
+    path = write_ply(tmp_path / "m.ply", sample(degree=degree))
+    data = PlyData.read(path)
+    assert (data.text, data.byte_order) == (False, "<")
+    assert [p.name for p in data["vertex"].properties] == NAMES
+    assert data["vertex"].data.dtype.itemsize == 248
+    assert path.stat().st_size - 7 * 248 == path.read_bytes().index(b"end_header\n") + len(b"end_header\n")
+
+
+def test_values_are_raw_and_harmonics_channel_major(tmp_path):
+    model = sample()
+    p, found = model.parameters, vertices(write_ply(tmp_path / "m.ply", model))
+    for name, expected in (
+        ("x", p["means"][:, 0]),
+        ("nz", torch.zeros(7)),
+        ("opacity", p["opacities"]),
+        ("scale_2", p["scales"][:, 2]),
+        ("rot_0", p["quats"][:, 0]),
+        ("f_dc_2", p["sh"][:, 0, 2]),
+        ("f_rest_0", p["sh"][:, 1, 0]),
+        ("f_rest_15", p["sh"][:, 1, 1]),
+        ("f_rest_44", p["sh"][:, 15, 2]),
+    ):
+        np.testing.assert_array_equal(found[name], expected.numpy(), err_msg=name)
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10**6), n=st.integers(0, 5), antialiased=st.booleans())
+def test_gaussians_come_back_exactly_but_for_the_filter(tmp_path_factory, seed, n, antialiased):
+    model = sample(n, seed=seed, antialiased=antialiased)
+    found = read_ply(write_ply(tmp_path_factory.mktemp("p") / "m.ply", model))
+    assert same(found, model)
+    assert found.shading == Baked()
+
+
+def test_fewer_harmonics_come_back_with_zeros(tmp_path):
+    model = sample(degree=1)
+    found = read_ply(write_ply(tmp_path / "m.ply", model)).parameters["sh"]
+    assert torch.equal(found[:, :4], model.parameters["sh"])
+    assert not found[:, 4:].any()
+
+
+def test_files_of_other_programs_may_have_fewer_harmonics_and_more_properties(tmp_path):
+    path = write_ply(tmp_path / "m.ply", sample())
+    changes = {f"f_rest_{k}": None for k in range(45)} | {"segment": np.arange(7)}
+    found = read_ply(write_vertices(tmp_path / "o.ply", columns_of(path, **changes), text=True))
+    assert torch.equal(found.parameters["sh"], sample().parameters["sh"][:, :1])
+
+
+def test_surfels_written_for_viewers_of_gaussians_are_gaussians(tmp_path):
+    model = surfels("surfels")
+    found = read_ply(write_surfels(tmp_path / "m.ply", model, "3dgs"))
+    assert torch.equal(found.parameters["scales"][:, :2], model.parameters["scales"])
+    assert found.parameters["scales"][:, 2].exp().max() < 1.1e-6
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"scale_2": None}, "expected vertices with a number scale_2 each, got x, y, z"),
+        ({"opacity": None}, "expected vertices with a number opacity each"),
+        ({"f_rest_44": None}, "expected 0, 9, 24 or 45 properties f_rest, got 44"),
+        ({"rot_3": np.full(7, np.nan)}, "quats: expected finite values, got 7 NaN"),
+    ],
+)
+def test_what_is_no_gaussian_is_named(tmp_path, changes, message):
+    path = write_ply(tmp_path / "m.ply", sample())
+    write_vertices(path, columns_of(path, **changes))
+    with pytest.raises(ArgumentError, match=message) as raised:
+        read_ply(path)
+    assert str(raised.value).startswith(f"{path}: ")
+
+
+def test_files_that_cannot_be_read_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="none: no such file"):
+        read_ply(tmp_path / "none")
+    path = write_ply(tmp_path / "m.ply", sample())
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(ArgumentError, match="expected a whole PLY file"):
+        read_ply(path)
+
+
+def test_what_is_not_finite_is_not_written(tmp_path):
+    broken = {**sample().parameters, "means": torch.full((7, 3), torch.inf)}
+    with pytest.raises(ArgumentError, match=r"m.ply: means: expected finite values"):
+        write_ply(tmp_path / "m.ply", Gaussians(broken))
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,141 @@
+import pytest
+import torch
+
+from texgs.config.phase import CommonRates, Densify, Seeds
+from texgs.core.errors import ArgumentError
+from texgs.core.image import write_png
+from texgs.fields.gaussians.model import Baked, Gaussians
+from texgs.fit import checkpoint
+from texgs.fit.densify import SHRINK, DensityControl
+from texgs.fit.gaussian_seeds import seed_gaussians
+from texgs.fit.harmonics import C0
+from texgs.fit.loop import Fit
+from texgs.fit.optimizer import Optimizer, Rate
+from texgs.fit.task import FitTask
+from texgs.kinds.gaussians import FIELD, GaussianKeys
+from texgs.metrics.quality import evaluate, mean
+from texgs.volume.view_set import View, ViewSet
+
+from .scenes import SIZE, ball_images, is_finite, run
+
+SEEDS = Seeds(kind="hull", count=80, opacity=0.1, half_size=0.4)
+DENSIFY = Densify(start=20, stop=120, every=20, cap=150)  # no resets, after which images are pale
+HARMONICS = (1, 4, 9, 16)
+
+
+def task_of(folder, **keys):
+    """A fit of the ball that learns as fast as the quick recipe."""
+    rates = CommonRates(quats=0.016, sh_rest=0.03)
+    keys = {"iterations": 200, "sh_every": 20, "rates": rates, "densify": DENSIFY, "seeds": SEEDS, **keys}
+    views = ViewSet(folder, [], [], {})
+    return FitTask(GaussianKeys(**keys), views, ball_images(), folder, torch.device("cpu"), 0, "ball")
+
+
+def psnr_of(model, images, folder):
+    """Mean PSNR on the images that it was fitted to."""
+    views = []
+    for index, camera in enumerate(images.cameras):
+        path = write_png(folder / f"{index}.png", images.target(index).color)
+        views.append(View(camera, path, images.lights[index]))
+    return mean(evaluate(model, views))["psnr"]
+
+
+def test_it_fits_a_ball(tmp_path):
+    task = task_of(tmp_path)
+    fitted = FIELD.fit(task)
+    seeds = FIELD.fit(task_of(tmp_path / "none", iterations=0)).field
+    assert psnr_of(seeds, task.images, tmp_path) < 19
+    assert psnr_of(fitted.field, task.images, tmp_path) > 24
+    assert 80 < len(fitted.field) <= 150
+    assert fitted.field.parameters["sh"].shape[1:] == (16, 3)
+    assert (fitted.iterations, len(fitted.losses)) == (200, 2)
+    assert is_finite(fitted.field.parameters)
+
+
+@pytest.mark.parametrize(
+    "keys", [{"antialiased": True}, {"alpha": 0.1}, {"sh_degree": 1}, {"dssim": 1.0}, {"sh_degree": 0}]
+)
+def test_keys_reach_the_fit(tmp_path, keys):
+    field = FIELD.fit(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
+    assert field.shading == Baked(keys.get("antialiased", False))
+    assert field.parameters["sh"].shape[1] == HARMONICS[keys.get("sh_degree", 3)]
+    plain = FIELD.fit(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
+    assert not torch.equal(field.parameters["means"], plain.parameters["means"])
+
+
+def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
+    whole = FIELD.fit(task_of(tmp_path / "whole", iterations=60)).field
+    task = task_of(tmp_path / "parts", iterations=60)
+    start = seed_gaussians(task.images, task.views, SEEDS, 3, 0)
+    half = run(Fit(start, Baked(), task.images, task.settings.phase, 0), 45)
+    half.seconds = 1000.0
+    checkpoint.save(task.output / checkpoint.FOLDER, half)
+    fitted = FIELD.fit(task)
+    assert fitted.seconds > 1000
+    for name, x in whole.parameters.items():
+        assert torch.equal(fitted.field.parameters[name], x), name
+
+
+def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
+    """The box of surfels is as good for Gaussians, whose filter is wider."""
+    from texgs.fields.surfels.bounds import surfel_box
+
+    for seed in range(20):
+        generator = torch.Generator().manual_seed(seed)
+        p = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 0, seed)
+        p["scales"] = p["scales"] + 0.5 * torch.randn(80, 3, generator=generator)
+        model = Gaussians({**p, "opacities": torch.full((80,), 4.0)})
+        camera = ball_images().cameras[seed % 6]
+        box = surfel_box(p, model.shading.options, camera).within(SIZE, SIZE)
+        alpha = model.render(camera).alpha
+        alpha[box.top : box.bottom, box.left : box.right] = 0
+        assert not alpha.any()
+
+
+def test_seeds_are_grey_from_everywhere_and_as_thick_as_wide(tmp_path):
+    found = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 2, 0)
+    assert found["scales"].shape == (80, 3)
+    assert torch.equal(found["scales"][:, 2], found["scales"][:, :2].amin(dim=1))
+    assert found["sh_rest"].shape == (80, 8, 3)
+    assert not found["sh_rest"].any()
+    shown = 0.5 + C0 * found["sh"]
+    assert bool(((shown > -1e-6) & (shown < 1 + 1e-6)).all())
+
+
+def test_seeds_in_voxels_are_refused(tmp_path):
+    with pytest.raises(ArgumentError, match=r"seeds\.kind=voxels needs a volume"):
+        seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), Seeds(kind="voxels"), 3, 0)
+
+
+# --- densification ----------------------------------------------------------
+
+
+def test_children_are_drawn_from_the_ellipsoid_of_their_parent():
+    n = 4000
+    deviations = torch.tensor([0.1, 0.05, 0.2])
+    quats = torch.tensor([0.9, 0.1, -0.3, 0.2])
+    optimizer = Optimizer(
+        {
+            "means": torch.zeros(n, 3),
+            "quats": quats.repeat(n, 1),
+            "scales": deviations.log().repeat(n, 1),
+            "opacities": torch.zeros(n),
+            "sh": torch.zeros(n, 1, 3),
+        },
+        {"sh": Rate(1.0, 1.0)},
+    )
+    control = DensityControl(Densify(start=0, every=10, cap=2 * n), n, 5.0, torch.device("cpu"))
+    control.gradients, control.counts = torch.ones(n), torch.ones(n)
+    control.step(10, optimizer, torch.Generator().manual_seed(0))
+    p = optimizer.parameters
+    assert len(p["means"]) == 2 * n
+    torch.testing.assert_close(p["scales"][0].exp(), deviations / SHRINK)
+    w, x, y, z = (quats / quats.norm()).double()
+    rotation = torch.stack([
+        torch.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)]),
+        torch.stack([2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)]),
+        torch.stack([2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]),
+    ])  # fmt: skip
+    covariance = rotation @ torch.diag(deviations.double() ** 2) @ rotation.T
+    # The error of a standard deviation from 8000 draws is 0.8 %, of a variance twice that.
+    torch.testing.assert_close(p["means"].detach().double().T.cov(), covariance, atol=1.6e-3, rtol=0)

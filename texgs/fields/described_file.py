@@ -1,0 +1,101 @@
+"""Files of fields: raw tensors as safetensors, and what belongs to them as JSON in the header.
+
+The header has one entry, whose name is that of the format: safetensors keeps no order of entries.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_bytes
+from texgs.core.reading import reading
+
+
+def write_described(
+    path: str | Path, format: str, description: Mapping[str, Any], tensors: Mapping[str, Tensor]
+) -> Path:
+    """Create or replace a file in one step; the same contents give the same bytes.
+
+    Raises:
+        ArgumentError: if the file cannot be written.
+    """
+    from safetensors.numpy import save
+
+    arrays = {name: x.detach().cpu().contiguous().numpy() for name, x in tensors.items()}
+    return write_bytes(path, save(arrays, {format: json.dumps(description)}))
+
+
+def require_json(path: str | Path, description: Mapping[str, Any]) -> None:
+    """Require a description that JSON can hold.
+
+    Raises:
+        ArgumentError: naming the file; all but the metadata is ours.
+    """
+    try:
+        json.dumps(description, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{path}: metadata cannot be written as JSON: {error}") from error
+
+
+def read_described(path: Path, format: str, version: int) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Description and tensors, bit for bit, on the CPU. Nothing in the file is executed.
+
+    The description is judged before any tensor is looked at.
+
+    Args:
+        path: of the file.
+        format: entry of its header.
+        version: the newest that can be read.
+
+    Raises:
+        ArgumentError: if the file is missing, no safetensors, cut short, of another program or a newer
+            version.
+    """
+    from safetensors import SafetensorError, safe_open
+
+    with reading(path, "a model file", "write it again"):
+        try:
+            with safe_open(path, framework="pt") as file:
+                description = _description(path, format, version, file.metadata() or {})
+                # A copy is aligned in memory and does not depend on the file any more.
+                return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+        except SafetensorError as error:
+            raise ArgumentError(f"{path}: {_damage(path)}") from error
+
+
+def short(value: object) -> str:
+    """Enough of a value to recognise it in a message."""
+    return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
+
+
+def _damage(path: Path) -> str:
+    """What is wrong with a file that safetensors cannot open; a good one begins with a length and JSON."""
+    with path.open("rb") as file:
+        start = file.read(9)
+    if start[8:] == b"{":
+        return "expected a whole safetensors file, got one cut short or damaged; copy or write it again"
+    return "expected a safetensors file, got one of another format; read_ply reads PLY files"
+
+
+def _description(path: Path, format: str, newest: int, header: dict[str, str]) -> dict[str, Any]:
+    if format not in header:
+        raise ArgumentError(f"{path}: expected a {format} file, got safetensors of another program")
+    try:
+        description: dict[str, Any] = json.loads(header[format])
+        version = int(str(description["version"]))
+    except (KeyError, RecursionError, TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"{path}: expected JSON with a version in the header, got {short(header[format])}; "
+            "write the file again"
+        ) from error
+    if version > newest:
+        raise ArgumentError(
+            f"{path}: expected version {newest} of the format at most, got {version}; update texgs"
+        )
+    return description

@@ -1,0 +1,127 @@
+"""3D Gaussians of several models as one scene: joined once, sorted and blended together."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import fields
+
+import torch
+from torch import Tensor
+from torch.nn.functional import pad
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.field import Look
+from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.part_edit import PartEdit
+from texgs.raster import Render
+
+POSSIBLE = ("visible", "opacity")  # what edits can change
+
+
+class JoinedGaussians:
+    """Models as one scene on one device.
+
+    Args:
+        models: with one filter; their harmonics may have different degrees.
+        segments: of each model; there may be none.
+
+    Raises:
+        ArgumentError: if there is no model, their filters differ, or there is a segment.
+    """
+
+    def __init__(self, models: Sequence[Gaussians], segments: Sequence[Sequence[Tensor]] = ()) -> None:
+        if not models:
+            raise ArgumentError("models: expected at least one, got none")
+        if len({model.shading for model in models}) > 1:
+            raise ArgumentError(
+                "models: expected all with the antialiased filter or none, got both; fit them by one recipe"
+            )
+        if any(segments):
+            raise ArgumentError("segments: 3D Gaussians have none; remove them, or fit surfels")
+        self.counts = [len(model) for model in models]
+        self.whole = joined(models)
+
+    def __len__(self) -> int:
+        return len(self.whole)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the Gaussians are."""
+        return self.whole.device
+
+    @property
+    def palettes(self) -> list[tuple[float, ...]]:
+        """Black for each model: none has a palette."""
+        return [(0.0, 0.0, 0.0)] * len(self.counts)
+
+    @torch.no_grad()
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        edits: Sequence[PartEdit] | None = None,
+        *,
+        look: Look = "shaded",
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render all visible models.
+
+        Args:
+            camera: on the models' device.
+            light: changes nothing: the colours are those of the views.
+            edits: one for each model, of opacity and visibility; by default nothing is changed.
+            look: only "shaded".
+            background: [3]; white by default.
+            outputs: of the rasterizer, without "normal".
+
+        Raises:
+            ArgumentError: if there are not as many edits as models, or 3D Gaussians cannot show what is
+                asked for.
+        """
+        if look != "shaded":
+            raise ArgumentError(f"look: 3D Gaussians have light in their colours, so no {look}; fit surfels")
+        opacity = 1.0 if edits is None else self._opacity(edits)
+        return self.whole.render(camera, light, background=background, outputs=outputs, opacity=opacity)
+
+    def _opacity(self, edits: Sequence[PartEdit]) -> Tensor:
+        """Factors [N] on opacities; 0 for what is hidden, so that nothing of it is drawn."""
+        if len(edits) != len(self.counts):
+            raise ArgumentError(
+                f"edits: expected one for each of {len(self.counts)} models, got {len(edits)}"
+            )
+        for edit in edits:
+            require_possible(edit)
+        factors = [edit.opacity if edit.visible else 0.0 for edit in edits]
+        pairs = zip(factors, self.counts, strict=True)
+        return torch.cat([torch.full((n,), factor, device=self.device) for factor, n in pairs])
+
+
+def require_possible(edit: PartEdit) -> None:
+    """Require an edit of nothing but opacity and visibility.
+
+    Raises:
+        ArgumentError: naming what else it changes.
+    """
+    default = PartEdit()
+    names = [each.name for each in fields(PartEdit) if each.name not in POSSIBLE]
+    changed = [name for name in names if getattr(edit, name) != getattr(default, name)]
+    if changed:
+        raise ArgumentError(
+            f"{changed[0]}: 3D Gaussians can change {' and '.join(POSSIBLE)} only; fit surfels for the rest"
+        )
+
+
+def joined(models: Sequence[Gaussians]) -> Gaussians:
+    """One model of all; harmonics that a model has not are zero."""
+    most = max(model.parameters["sh"].shape[1] for model in models)
+    parameters = {
+        name: torch.cat([model.parameters[name] for model in models])
+        for name in models[0].parameters
+        if name != "sh"
+    }
+    harmonics = [model.parameters["sh"] for model in models]
+    parameters["sh"] = torch.cat([pad(sh, (0, 0, 0, most - sh.shape[1])) for sh in harmonics])
+    return Gaussians(parameters, models[0].shading)

@@ -1,0 +1,90 @@
+"""Files of 3D Gaussians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.fields.described_file import read_described, require_json, short, write_described
+from texgs.fields.gaussians.model import Baked, Gaussians
+
+FORMAT = "texgs-gaussians"
+VERSION = 1
+
+
+def write_gaussians(path: str | Path, model: Gaussians) -> Path:
+    """Create or replace a model file in one step; the same model gives the same bytes.
+
+    A safetensors file with the raw tensors under their names. Its header has one entry, "texgs-gaussians":
+    JSON with `version`, `filter` and `metadata`.
+
+    Args:
+        path: target, by custom `model.safetensors`.
+        model: on any device. Its metadata must be JSON: tuples come back as lists, keys as text.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if the model could not be read back (a tensor is not finite or of another type,
+            metadata is no JSON), or the file cannot be written.
+    """
+    _check(path, model)
+    description = {
+        "version": VERSION,
+        "filter": asdict(model.shading),
+        "metadata": dict(model.metadata),
+    }
+    require_json(path, description)
+    return write_described(path, FORMAT, description, model.parameters)
+
+
+def read_gaussians(path: str | Path) -> Gaussians:
+    """Read a model file as `write_gaussians` writes it, bit for bit, to the CPU. Nothing in it is executed.
+
+    Raises:
+        ArgumentError, ShapeError: if the file is missing, no safetensors, cut short, of another program or a
+            newer version, or a tensor is missing, unknown, not finite or of another type or shape.
+    """
+    path = Path(path)
+    description, tensors = read_described(path, FORMAT, VERSION)
+    model = _model(path, description, tensors)
+    _check(path, model)
+    return model
+
+
+def _model(path: Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Gaussians:
+    try:
+        shading = Baked(**description["filter"])
+        if not isinstance(shading.antialiased, bool):
+            raise ValueError("antialiased is neither true nor false")
+        return Gaussians(tensors, shading, dict(description["metadata"]))
+    except TexgsError as error:
+        raise type(error)(f"{path}: {error}") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"{path}: expected filter and metadata in the header, got {short(description)}; "
+            "write the file again"
+        ) from error
+
+
+def _check(path: str | Path, model: Gaussians) -> None:
+    """Require finite float32 values.
+
+    Raises:
+        ArgumentError: naming the file and the tensor.
+    """
+    for name, tensor in model.parameters.items():
+        if tensor.dtype != torch.float32:
+            raise ArgumentError(f"{path}: {name}: expected torch.float32, got {tensor.dtype}; convert it")
+    try:
+        check.finite(**model.parameters)
+    except TexgsError as error:
+        raise type(error)(f"{path}: {error}") from error

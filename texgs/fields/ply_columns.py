@@ -1,0 +1,93 @@
+"""What PLY files of 2DGS and 3DGS have in common: raw geometry and harmonics, a property for each number."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_atomic
+from texgs.raster.spherical_harmonics import DEGREES
+
+
+def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[str, Tensor]:
+    """[N] values by property, in the order of 2DGS and 3DGS.
+
+    Args:
+        p: raw `means`, `opacities`, `scales` [N, 2 or 3] and `quats`.
+        normals: [N, 3].
+        sh: [N, K, 3]; all but the first become `f_rest`, one channel after the other.
+    """
+    place = dict(zip("xyz", p["means"].T, strict=True))
+    normal = dict(zip(("nx", "ny", "nz"), normals.T, strict=True))
+    rest = sh[:, 1:].transpose(1, 2).flatten(1)  # [N, 3 (K - 1)]
+    colors = numbered("f_dc", sh[:, 0]) | numbered("f_rest", rest)
+    shape = numbered("scale", p["scales"]) | numbered("rot", p["quats"])
+    return place | normal | colors | {"opacity": p["opacities"]} | shape
+
+
+def numbered(name: str, values: Tensor) -> dict[str, Tensor]:
+    """Columns of [N, k] as name_0, name_1, ..."""
+    return {f"{name}_{k}": column for k, column in enumerate(values.T)}
+
+
+def write_columns(path: str | Path, columns: Mapping[str, Tensor]) -> Path:
+    """Create or replace a binary PLY file of float32 vertices in one step.
+
+    Raises:
+        ArgumentError: if the file cannot be written.
+    """
+    from plyfile import PlyData, PlyElement
+
+    vertices = np.empty(len(columns["x"]), [(name, "<f4") for name in columns])
+    for name, column in columns.items():
+        vertices[name] = column.numpy()
+    return write_atomic(path, PlyData([PlyElement.describe(vertices, "vertex")], byte_order="<").write)
+
+
+def take(vertices: np.ndarray, *names: str) -> Tensor:
+    """Properties as columns [N, k] float32.
+
+    Raises:
+        ArgumentError: naming the property that is missing or no number.
+    """
+    given = vertices.dtype.names or ()
+    for name in names:
+        if name not in given or vertices.dtype[name].kind not in "iuf":
+            raise ArgumentError(f"expected vertices with a number {name} each, got {', '.join(given)}")
+    return torch.from_numpy(np.stack([vertices[name].astype(np.float32) for name in names], axis=1))
+
+
+def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
+    """Raw means, quaternions, `axes` scales and opacities.
+
+    Raises:
+        ArgumentError: as `take`.
+    """
+    scales = take(vertices, *(f"scale_{k}" for k in range(axes)))  # first: without, there is nothing to draw
+    return {
+        "means": take(vertices, "x", "y", "z"),
+        "quats": take(vertices, *(f"rot_{k}" for k in range(4))),
+        "scales": scales,
+        "opacities": take(vertices, "opacity")[:, 0],
+    }
+
+
+def take_harmonics(vertices: np.ndarray) -> Tensor:
+    """[N, K, 3] with as many coefficients as the file has.
+
+    Raises:
+        ArgumentError: as `take`, or where their number is that of no degree.
+    """
+    dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")[:, None]  # [N, 1, 3]
+    n_rest = sum(name.startswith("f_rest_") for name in vertices.dtype.names or ())
+    if n_rest % 3 or 1 + n_rest // 3 not in DEGREES:
+        raise ArgumentError(f"expected 0, 9, 24 or 45 properties f_rest, got {n_rest}")
+    if not n_rest:
+        return dc
+    rest = take(vertices, *(f"f_rest_{k}" for k in range(n_rest))).unflatten(1, (3, -1))  # [N, 3, K - 1]
+    return torch.cat([dc, rest.transpose(1, 2)], dim=1)
