@@ -33,6 +33,8 @@ SMALL = {
     "views.turntable": "2",
     "fit.seeds.count": "300",
     "fit.shading.iterations": "30",
+    "fit.gaussians.iterations": "30",
+    "fit.gaussians.seeds.count": "300",
     "edit.image.iterations": "5",
     "edit.text.size": "64",
     "tracking": "none",
