@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Protocol
 
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 from texgs.core.reading import reading
-from texgs.fit.loop import Fit, require_finite
+from texgs.fit.loop import require_finite
 
 NAME = "checkpoint.safetensors"
 FOLDER = "checkpoint"  # beside the result, there until it is written
 
 
-def save(folder: str | Path, fit: Fit) -> Path:
+class Stateful(Protocol):
+    """A fit whose state is a number of iterations and tensors."""
+
+    iteration: int  # done
+
+    def state(self) -> dict[str, Tensor]:
+        """Everything a resumed run needs, as tensors, between two steps."""
+        ...
+
+
+def save(folder: str | Path, fit: Stateful) -> Path:
     """Write the state of a fit; the checkpoint before it stays until this one is complete.
 
     Args:
@@ -38,7 +49,7 @@ def save(folder: str | Path, fit: Fit) -> Path:
 
 
 def latest(folder: str | Path) -> dict[str, Tensor] | None:
-    """The state that `save` wrote last, on the CPU, for `Fit.restore`; None where there is none.
+    """The state that `save` wrote last, on the CPU, for `restore`; None where there is none.
 
     Raises:
         ArgumentError: if the file cannot be read or is no checkpoint.

@@ -87,6 +87,11 @@ class Fit:
         self.control = DensityControl(phase.densify, len(means), size, means.device)
 
     @property
+    def iterations(self) -> int:
+        """Of the whole phase."""
+        return self.phase.iterations
+
+    @property
     def parameters(self) -> dict[str, Tensor]:
         """Raw parameters of now."""
         return self.optimizer.parameters

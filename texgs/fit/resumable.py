@@ -3,16 +3,38 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Protocol
+
+from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.fit import checkpoint
-from texgs.fit.loop import Fit
 
 SAVED_EVERY = 30.0  # seconds between checkpoints
 
 
-def run_to_end(fit: Fit, folder: Path, title: str) -> float:
+class Resumable(checkpoint.Stateful, Protocol):
+    """A fit that can stop and go on."""
+
+    seconds: float  # that earlier runs have taken
+
+    @property
+    def iterations(self) -> int:
+        """Of the whole fit."""
+        ...
+
+    def run(self) -> Iterator[object]:
+        """Iterate to the end."""
+        ...
+
+    def restore(self, state: Mapping[str, Tensor]) -> None:
+        """Go on from what `state` returned."""
+        ...
+
+
+def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
     """Run a fit from the last checkpoint in a folder, if there is one.
 
     Whoever has written the result removes the checkpoint, see `checkpoint.discard`.
@@ -33,7 +55,7 @@ def run_to_end(fit: Fit, folder: Path, title: str) -> float:
         fit.restore(state)
     saved = time.monotonic()
     start = saved - fit.seconds
-    steps = fit.phase.iterations - fit.iteration
+    steps = fit.iterations - fit.iteration
     for _ in progress(fit.run(), steps, title=title, unit="view") if steps else ():
         if time.monotonic() - saved > SAVED_EVERY:
             fit.seconds = time.monotonic() - start

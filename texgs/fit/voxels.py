@@ -51,7 +51,9 @@ class VoxelFit:
         self.march = March(step=settings.step, transmittance_min=settings.transmittance_min)
         self.rays = training_rays(images)
         self.generator = torch.Generator().manual_seed(seed)
-        self.step_count = 0
+        self.iteration = 0  # steps that are done
+        self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
+        self.losses: list[float] = []  # that were looked at
         self._begin(hull_grid(images, sides[0], settings.half_size, settings.degree, settings.start_density))
 
     def _begin(self, grid: VoxelGrid) -> None:
@@ -59,6 +61,11 @@ class VoxelFit:
         self.grid = grid
         self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
         self.filled_blocks = grid.masks.flatten().nonzero()[:, 0].int()
+
+    @property
+    def iterations(self) -> int:
+        """Steps of all stages."""
+        return self.settings.steps
 
     def run(self) -> Iterator[VoxelProgress]:
         """All stages, or what is left of them.
@@ -68,10 +75,10 @@ class VoxelFit:
         """
         start = 0
         for index, stage in enumerate(self.settings.stages):
-            if index and self.step_count == start:
+            if index and self.iteration == start:
                 self.refine()
             start += stage.steps
-            while self.step_count < start:
+            while self.iteration < start:
                 yield self.step(stage)
         self.grid.refresh_occupancy()
 
@@ -92,8 +99,9 @@ class VoxelFit:
         }
         moments = {"second": self.optimizer.second, "first": self.optimizer.first}
         kept = {f"optimizer.{name}": x for name, x in moments.items() if x is not None}
-        clock = {"step": torch.tensor(self.step_count), "random": self.generator.get_state()}
-        return {**grid, **kept, **clock}
+        clock = {"iteration": torch.tensor(self.iteration), "seconds": torch.tensor(self.seconds).double()}
+        told = {"losses": torch.tensor(self.losses).double(), "random": self.generator.get_state()}
+        return {**grid, **kept, **clock, **told}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
         """Go on from what `state` returned, as if the run had never stopped."""
@@ -103,7 +111,9 @@ class VoxelFit:
         self.optimizer.second.copy_(state["optimizer.second"])
         if self.optimizer.first is not None:
             self.optimizer.first.copy_(state["optimizer.first"])
-        self.step_count = int(state["step"])
+        self.iteration = int(state["iteration"])
+        self.seconds = float(state["seconds"])
+        self.losses = state["losses"].tolist()
         self.generator.set_state(state["random"])
 
     @torch.no_grad()
@@ -114,7 +124,7 @@ class VoxelFit:
             FitError: if the loss or a density is no longer finite, where they are looked at.
         """
         s = self.settings
-        if self.step_count % s.occupy_every == 0:
+        if self.iteration % s.occupy_every == 0:
             self.grid.refresh_occupancy()
         rays, target = self.rays.draw(s.rays, s.run, self.generator)
         out = Rays(torch.empty_like(target), *target.new_empty(2, len(rays)))
@@ -124,20 +134,20 @@ class VoxelFit:
         if stage.total_variation:
             self._smooth()
         self.optimizer.step(self.rates())
-        self.step_count += 1
-        is_looked_at = self.step_count % CHECKED_EVERY == 0 or self.step_count == s.steps
+        self.iteration += 1
+        is_looked_at = self.iteration % CHECKED_EVERY == 0 or self.iteration == s.steps
         loss = error.square().mean() if is_looked_at else None
-        if (
-            loss is not None
-        ):  # densities that are not finite show nothing, so that the loss alone does not tell
-            require_finite(self.step_count, {"loss": loss, "density": self.grid.density})
-        return VoxelProgress(self.step_count, len(self.grid), None if loss is None else float(loss))
+        if loss is not None:
+            # Densities that are not finite show nothing, so that the loss alone does not tell.
+            require_finite(self.iteration, {"loss": loss, "density": self.grid.density})
+            self.losses.append(float(loss))
+        return VoxelProgress(self.iteration, len(self.grid), None if loss is None else float(loss))
 
     def rates(self) -> VoxelRates:
         """Learning rates of the step to come."""
         s = self.settings
-        sh = s.sh.at(self.step_count, s.steps)
-        return VoxelRates(s.density.at(self.step_count, s.steps), sh, sh)
+        sh = s.sh.at(self.iteration, s.steps)
+        return VoxelRates(s.density.at(self.iteration, s.steps), sh, sh)
 
     def _smooth(self) -> None:
         """The gradient of total variation in some random blocks."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -41,25 +40,23 @@ def compose(fields: Sequence[Voxels], segments: Sequence[Sequence[Tensor]]) -> V
 
 
 def fit(task: FitTask[VoxelKeys]) -> Fitted:
-    """Fit a grid to random rays, coarse to fine.
+    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one.
 
     Raises:
         DeviceError: for another device than the CPU.
     """
-    from texgs.core.progress import progress
     from texgs.fields.voxels.model import Voxels
+    from texgs.fit import checkpoint
+    from texgs.fit.resumable import run_to_end
     from texgs.fit.task import Fitted
     from texgs.fit.voxels import VoxelFit
 
     if task.device.type != "cpu":
         raise DeviceError(f"device: expected cpu, got {task.device}; voxels are fitted on the CPU")
-    start = time.monotonic()
-    run, losses = VoxelFit(task.images, task.settings, task.seed), []
-    for done in progress(run.run(), task.settings.steps, title=task.title, unit="step"):
-        losses += [] if done.loss is None else [done.loss]
-    field = Voxels(run.grid, run.march)
+    run = VoxelFit(task.images, task.settings, task.seed)
+    seconds = run_to_end(run, task.output / checkpoint.FOLDER, task.title)
     notes = {"lattice": list(run.grid.size)}
-    return Fitted(field, time.monotonic() - start, task.settings.steps, losses, notes)
+    return Fitted(Voxels(run.grid, run.march), seconds, run.iterations, run.losses, notes)
 
 
 FIELD = Kind(
