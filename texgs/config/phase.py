@@ -49,10 +49,10 @@ class Densify:
     threshold: float = key(
         2e-4, "mean screen-space gradient, half image widths, that clones or splits", least=0
     )
-    size: float = key(0.01, "scale, in extents, above which a surfel is split, not cloned", least=0)
-    cap: int = key(30000, "surfels at most", least=1)
-    prune_opacity: float = key(0.005, "surfels with less opacity are removed", least=0)
-    prune_size: float = key(0.1, "surfels of a larger scale, in extents, are removed", least=0)
+    size: float = key(0.01, "scale, in extents, above which one is split, not cloned", least=0)
+    cap: int = key(30000, "surfels or Gaussians at most", least=1)
+    prune_opacity: float = key(0.005, "what has less opacity is removed", least=0)
+    prune_size: float = key(0.1, "what has a larger scale, in extents, is removed", least=0)
     reset_every: int = key(0, "iterations between opacity resets; 0: never", least=0)
 
 
@@ -71,13 +71,13 @@ class Phase:
 
 @dataclass
 class Seeds:
-    """Where surfels start."""
+    """Where surfels or Gaussians start."""
 
     kind: str = key(
         "auto",
         "points of the views if there are any, else what is visible",
         choices=("auto", "points", "visible", "voxels", "hull", "random"),
     )
-    count: int = key(10000, "surfels at the start; given points are taken as they are", least=1)
+    count: int = key(10000, "at the start; given points are taken as they are", least=1)
     opacity: float = key(0.1, "of each", least=0)
     half_size: float = key(0.55, "half the side of the box, where views do not say", "world units", least=0)

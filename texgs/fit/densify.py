@@ -25,7 +25,7 @@ class DensityControl:
 
     Args:
         settings: when and how.
-        n: number of surfels.
+        n: number of surfels or Gaussians.
         extent: radius of the cameras, world units.
         device: of the surfels.
     """
