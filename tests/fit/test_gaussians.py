@@ -28,7 +28,7 @@ def task_of(folder, **keys):
     rates = CommonRates(quats=0.016, sh_rest=0.03)
     keys = {"iterations": 200, "sh_every": 20, "rates": rates, "densify": DENSIFY, "seeds": SEEDS, **keys}
     views = ViewSet(folder, [], [], {})
-    return FitTask(GaussianKeys(**keys), views, ball_images(), folder, torch.device("cpu"), 0, "ball")
+    return FitTask(GaussianKeys(**keys), views, ball_images(), folder, torch.device("cpu"), 0, "ball", {})
 
 
 def psnr_of(model, images, folder):

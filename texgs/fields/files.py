@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
-from texgs.config.fields import kinds
+from texgs.config.fields import Kind, kinds
 from texgs.fields.field import Field
 
 LONGEST_HEADER = 1 << 20  # bytes; those of fields have a kilobyte
@@ -19,11 +20,14 @@ def open_field(path: str | Path) -> Field:
         ArgumentError, ShapeError: if the file is missing, damaged or of no kind.
     """
     path = Path(path)
-    names = formats(path)
-    known = kinds()
-    kind = next((kind for kind in known.values() if names & {*kind.formats}), known[FIRST])
-    field: Field = kind.read(path)
+    field: Field = kind_of(path).read(path)
     return field
+
+
+def kind_of(path: Path) -> Kind[Any]:
+    """The kind of the field in a file, by its header."""
+    names, known = formats(path), kinds()
+    return next((kind for kind in known.values() if names & {*kind.formats}), known[FIRST])
 
 
 def formats(path: Path) -> set[str]:

@@ -28,6 +28,7 @@ class FitTask(Generic[Settings]):
     device: torch.device
     seed: int
     title: str  # of progress bars
+    metadata: Mapping[str, str]  # of the field: where it is from
 
 
 @dataclass(frozen=True, eq=False)

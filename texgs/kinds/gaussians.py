@@ -87,7 +87,7 @@ def fit(task: FitTask[GaussianKeys]) -> Fitted:
     run = Fit(on_device, shading, task.images, keys.phase, task.seed)
     seconds = run_to_end(run, task.output / checkpoint.FOLDER, task.title)
     parameters = join({name: x.detach() for name, x in run.parameters.items()})
-    return Fitted(Gaussians(parameters, shading), seconds, keys.iterations, run.losses)
+    return Fitted(Gaussians(parameters, shading, task.metadata), seconds, keys.iterations, run.losses)
 
 
 FIELD: Kind[GaussianKeys] = Kind(

@@ -56,7 +56,7 @@ def fit(task: FitTask[VoxelKeys]) -> Fitted:
     run = VoxelFit(task.images, task.settings, task.seed)
     seconds = run_to_end(run, task.output / checkpoint.FOLDER, task.title)
     notes = {"lattice": list(run.grid.size)}
-    return Fitted(Voxels(run.grid, run.march), seconds, run.iterations, run.losses, notes)
+    return Fitted(Voxels(run.grid, run.march, task.metadata), seconds, run.iterations, run.losses, notes)
 
 
 FIELD = Kind(

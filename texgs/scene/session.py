@@ -73,6 +73,11 @@ class Session:
         """
         entry = entry_of(self.scene, part)
         known({key: value}, EDITS, place_of(part))
+        kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
+        if NEEDS.get(key, "relight") not in kind.can and value != getattr(PartEdit(), key):
+            raise ArgumentError(
+                f"{place_of(part)}.{key}: expected a model that can change it, got {kind.name}"
+            )
         try:
             edit = replace(entry.edit, **{key: value})
         except ArgumentError as error:

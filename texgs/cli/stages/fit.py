@@ -37,6 +37,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         device,
         fit["seed"],
         title,
+        {name: settings[name] for name in ("dataset", "tf")},
     )
     fitted: Fitted = kind.fit(task)
     kind.write(output / "model.safetensors", fitted.field)
