@@ -19,7 +19,7 @@ from texgs.fields.field import Composed
 from texgs.fields.part_edit import PartEdit, color
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import Mode, frame
-from texgs.scene.parts import entry_of, place_of, replaced, require_name, require_new, split
+from texgs.scene.parts import entry_of, place_of, replaced, require_able, require_name, require_new, split
 from texgs.scene.scene_file import EDITS, WHITE, Scene, SceneSegment, known, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 
@@ -73,11 +73,7 @@ class Session:
         """
         entry = entry_of(self.scene, part)
         known({key: value}, EDITS, place_of(part))
-        kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
-        if NEEDS.get(key, "relight") not in kind.can and value != getattr(PartEdit(), key):
-            raise ArgumentError(
-                f"{place_of(part)}.{key}: expected a model that can change it, got {kind.name}"
-            )
+        require_able(self.scene, part, key, value)
         try:
             edit = replace(entry.edit, **{key: value})
         except ArgumentError as error:
