@@ -156,6 +156,29 @@ def test_library_refuses_what_gaussians_do_not_have():
         forward(five)
 
 
+def test_library_refuses_colours_that_do_not_add_up():
+    scene = textured_with_features(random_scene(), 2)
+    texture = scene.texture
+    tensors = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
+    colored = tensors._replace(base=texture.base, gain=texture.gain, texels=texture.texels)
+    view = View(scene.viewmat, scene.K, 8, 8, None, texture.sizes, texture.offsets, frozenset(), Options())
+
+    def forward(surfels, channels):
+        structures = view.structures(surfels)
+        structures[0].channels = channels
+        handle = ctypes.byref(ctypes.c_void_p())
+        native.call("texgs_forward", *structures, native.Image(), handle, device=torch.device("cpu"))
+
+    with pytest.raises(ArgumentError, match="features: expected C - 3 beside a texture"):
+        forward(colored, 3)
+    with pytest.raises(ArgumentError, match="features: expected C - 3 beside a texture"):
+        forward(colored._replace(features=None), 5)
+    with pytest.raises(ArgumentError, match=r"texture: .* are needed, with 3 channels at least"):
+        forward(colored, 2)
+    with pytest.raises(ArgumentError, match="surfels: features or a texture are needed"):
+        forward(tensors._replace(features=None), 2)
+
+
 def test_wrong_device():
     scene = random_scene()
     with pytest.raises(DeviceError, match="features: expected device cpu"):
