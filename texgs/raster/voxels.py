@@ -142,7 +142,7 @@ def render_rays(
             are faster.
         march: how rays are sampled.
         into: where the backward pass adds its gradient, in place of `grid.rows.grad`.
-        keep: the samples, 40 bytes each, for the backward pass; False: it marches piece by piece again
+        keep: the samples, 36 bytes each, for the backward pass; False: it marches piece by piece again
             (deferred back-propagation, Zhang et al. 2022), for views that memory does not suffice for.
 
     Raises:

@@ -96,7 +96,7 @@ TEXGS_MATHS void corner_weights(const float f[3], float w[8]) {
 // The part of a ray inside the lattice; sample k lies at entry + (k + 0.5) step direction.
 struct Ray {
     float entry[3], direction[3];  // lattice coordinates; unit length
-    float inverse[3];              // of the direction, finite
+    float samples_per[3];          // samples on which it moves by one along an axis, with the direction's sign; finite
     float near;                    // distance of the entry from the origin, spacings
     int samples;
 };
@@ -111,12 +111,14 @@ TEXGS_MATHS Ray enter(const texgs_grid& g, const float* given, float step) {
         const float high = static_cast<float>(g.size[a] - 1);
         ray.direction[a] = direction;
         ray.entry[a] = origin;
-        ray.inverse[a] = std::fabs(direction) < 1e-12f ? 1e12f : 1.0f / direction;
-        if (ray.inverse[a] == 1e12f) {
+        const bool is_across = std::fabs(direction) < 1e-12f;
+        const float inverse = is_across ? 1e12f : 1.0f / direction;
+        ray.samples_per[a] = inverse / step;
+        if (is_across) {
             if (!(origin >= 0.0f && origin <= high)) far = -1.0f;
             continue;
         }
-        const float t0 = -origin * ray.inverse[a], t1 = (high - origin) * ray.inverse[a];
+        const float t0 = -origin * inverse, t1 = (high - origin) * inverse;
         const float first = t0 < t1 ? t0 : t1, last = t0 < t1 ? t1 : t0;
         if (!(first <= last)) far = -1.0f;  // not a number
         near = first > near ? first : near;
@@ -148,15 +150,15 @@ TEXGS_MATHS Point sample_point(const texgs_grid& g, const Ray& ray, int k, float
 }
 
 // How many samples on the first one lies that leaves the empty blocks around a point: those nearer than `distance`.
-TEXGS_MATHS int skipped(const Ray& ray, const Point& p, int distance, float step) {
+TEXGS_MATHS int skipped(const Ray& ray, const Point& p, int distance) {
     const int c[3] = {p.cell.x, p.cell.y, p.cell.z};
     float leave = 1e6f;
     for (int a = 0; a < 3; ++a) {
-        const int face = (c[a] & ~3) + kBlockSide * (ray.inverse[a] > 0.0f ? distance : 1 - distance);
-        const float length = (static_cast<float>(face - c[a]) - p.f[a]) * ray.inverse[a];
-        leave = length < leave ? length : leave;
+        const int face = (c[a] & ~3) + kBlockSide * (ray.samples_per[a] > 0.0f ? distance : 1 - distance);
+        const float samples = (static_cast<float>(face - c[a]) - p.f[a]) * ray.samples_per[a];
+        leave = samples < leave ? samples : leave;
     }
-    return static_cast<int>(leave / step) + 1;
+    return static_cast<int>(leave) + 1;
 }
 
 struct Sample {
@@ -175,7 +177,7 @@ TEXGS_LOOP float march(const texgs_grid& grid, const texgs_march& how, const Ray
         const Point p = sample_point(grid, ray, k, step);
         const int block = block_of(grid, p.cell);
         if (const int distance = grid.distance[block]) {
-            k += skipped(ray, p, distance, step);
+            k += skipped(ray, p, distance);
             continue;
         }
         ++k;

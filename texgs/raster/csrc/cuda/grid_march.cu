@@ -53,20 +53,20 @@ __global__ __launch_bounds__(kThreads) void render_kernel(const GridJob job) {
     const Ray ray = enter(job.grid, job.how.rays + 6 * i, job.how.step);
     float basis[K];
     row_basis(K == 32 ? 2 : K == 16 ? 1 : 0, ray.direction, basis);
+    if (Keep)
+        for (int k = 0; k < K; ++k) job.basis[i * K + k] = basis[k];
     float color[3] = {0.0f, 0.0f, 0.0f}, depth = 0.0f;
-    uint64_t next = Keep ? job.begin[i] : 0;
+    GridSample* next = Keep ? job.samples + job.begin[i] : nullptr;
     const float light = march(job.grid, job.how, ray, [&](const Sample& s) {
         float own[3];
         shade<K>(job.grid, s, basis, own);
         for (int c = 0; c < 3; ++c) color[c] = fma(s.weight, own[c], color[c]);
         depth = fma(s.weight, s.distance, depth);
         if (Keep)
-            job.samples[next++] = {
+            *next++ = {
                 pack(s.point.cell), static_cast<uint32_t>(i), {s.point.f[0], s.point.f[1], s.point.f[2]}, s.weight,
                 s.behind,           {own[0], own[1], own[2]}};
     });
-    if (Keep)
-        for (int k = 0; k < K; ++k) job.basis[i * K + k] = basis[k];
     const float alpha = 1.0f - light;
     if (job.color)
         for (int c = 0; c < 3; ++c) job.color[3 * i + c] = color[c] + light * job.how.background[c];
