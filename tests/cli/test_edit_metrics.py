@@ -6,7 +6,7 @@ from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.edit_metrics import agreement
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.scene.scene_file import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel
 from texgs.volume.cameras import spiral as path
 
 

@@ -14,7 +14,8 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.ply import read_ply
 from texgs.fields.surfels.texels import bare_colors
 from texgs.fields.surfels.texture_file import write_texture
-from texgs.scene.scene_file import Scene, SceneModel, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
 
 
 @pytest.fixture

@@ -17,7 +17,8 @@ from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.edit.parts import edit_parts
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.volume.tf_plot import plot
 

@@ -12,7 +12,8 @@ from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.texture_file import write_texture
-from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
 
 
 @pytest.fixture

@@ -11,7 +11,8 @@ from tests.edit.test_lift import pixel_of
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
-from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 
 SIZE = 120

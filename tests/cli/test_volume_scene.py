@@ -10,7 +10,7 @@ from texgs.core.io import write_json
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
-from texgs.scene.scene_file import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel
 from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource

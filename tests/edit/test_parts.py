@@ -6,7 +6,7 @@ import torch
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
 from texgs.edit.parts import ScenePart, surfels_of
-from texgs.scene.scene_file import SceneModel, SceneSegment
+from texgs.scene.scene import SceneModel, SceneSegment
 
 
 def test_a_part_has_what_earlier_segments_left(tmp_path):

@@ -29,7 +29,8 @@ from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texture_file import with_texture, write_texture
 from texgs.fit.checkpoint import latest
 from texgs.models.tensors import read_tensors
-from texgs.scene.scene_file import Scene, SceneModel, SceneSegment, read_scene, write_scene
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 from texgs.volume.prepare import prepare
 from texgs.volume.sources import open_source

@@ -11,7 +11,8 @@ from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.voxels.composition import VoxelScene
 from texgs.fields.voxels.file import write_voxels
-from texgs.scene.scene_file import Scene, SceneModel, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
 from texgs.scene.session import Session
 
 

@@ -9,7 +9,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.texture_file import write_texture
-from texgs.scene.scene_file import Scene, SceneModel, read_scene, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
 from texgs.scene.session import Session
 

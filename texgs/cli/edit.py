@@ -81,7 +81,8 @@ def change_part(session: "Session", part: str, key: str, text: str) -> None:
 def change_scene(session: "Session", key: str, text: str) -> None:
     """Change the light or the background; an empty text takes it back."""
     from texgs.core.light import HEADLIGHT
-    from texgs.scene.scene_file import WHITE, known, light_of
+    from texgs.scene.scene import WHITE
+    from texgs.scene.scene_file import known, light_of
 
     known({key: text}, ("light", "background"), "the scene")
     if key == "background":

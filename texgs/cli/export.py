@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from texgs.fields.surfels.composition import Composition
     from texgs.fields.surfels.model import Surfels
     from texgs.raster import Render
-    from texgs.scene.scene_file import Scene, SceneModel
+    from texgs.scene.scene import Scene, SceneModel
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
 DEFAULTS = {".ply": "3dgs", ".texgs": "compact"}

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     import torch
 
     from texgs.edit.clicks import Clicks
-    from texgs.scene.scene_file import Scene
+    from texgs.scene.scene import Scene
 
 
 LENS = Lens()

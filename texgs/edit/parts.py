@@ -15,7 +15,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of
 from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.parts import entry_of, replaced
-from texgs.scene.scene_file import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel
 
 
 @dataclass(frozen=True)

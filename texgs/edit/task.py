@@ -14,7 +14,7 @@ from texgs.config.edit import EditKeys
 from texgs.core.errors import ArgumentError
 from texgs.edit.parts import edit_parts
 from texgs.fields.surfels.model import Surfels
-from texgs.scene.scene_file import Scene
+from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")

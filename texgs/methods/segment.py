@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from texgs.edit.lift import Lifted
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
-    from texgs.scene.scene_file import Scene
+    from texgs.scene.scene import Scene
 
 LENS = Lens()  # of the view that is clicked on
 SHOWN = 3  # views of the segment around the object

@@ -14,7 +14,7 @@ from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.report.strip import write_strip
 from texgs.scene.frame import frame
-from texgs.scene.scene_file import Scene
+from texgs.scene.scene import Scene
 from texgs.volume.cameras import orbit_path
 
 POLAR = 20.0  # degrees

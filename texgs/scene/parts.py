@@ -8,7 +8,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import label
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit
-from texgs.scene.scene_file import RESERVED, Scene, SceneModel, SceneSegment
+from texgs.scene.scene import RESERVED, Scene, SceneModel, SceneSegment
 
 Entry = SceneModel | SceneSegment
 # What a field has to be capable of for a value of an edit; all others are factors of a material.

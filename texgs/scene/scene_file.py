@@ -4,30 +4,22 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import asdict, dataclass, field, fields
+from collections.abc import Callable, Collection
+from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
-import torch
 import yaml
-from torch import Tensor
 
-from texgs.config.fields import kinds
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 from texgs.core.light import Light
 from texgs.core.names import label, named_file
 from texgs.core.numbers import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.reading import reading, reading_as
-from texgs.fields.field import Composed, Field
-from texgs.fields.files import open_field
 from texgs.fields.part_edit import PartEdit, color
-from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.segment import labels_of, with_variants
-from texgs.fields.surfels.texture_file import with_texture
-from texgs.scene.segment_file import read_segment
+from texgs.scene.scene import RESERVED, WHITE, Scene, SceneModel, SceneSegment
 
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
@@ -35,115 +27,6 @@ KEYS = ("texgs-scene", "light", "background", "models")
 EDITS = tuple(each.name for each in fields(PartEdit))
 SEGMENT_KEYS = ("file", "texture", *EDITS)
 MODEL_KEYS = (*SEGMENT_KEYS, "segments")
-RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
-WHITE = (1.0, 1.0, 1.0)
-
-
-@dataclass(frozen=True)
-class SceneSegment:
-    """Surfels of a model that are edited on their own: the model's edit does not count for them."""
-
-    file: Path  # mask of surfels, see `write_segment`
-    edit: PartEdit = field(default_factory=PartEdit)
-    texture: Path | None = None  # variant of the whole model, of which these surfels take their texels
-
-
-@dataclass(frozen=True)
-class SceneModel:
-    """One model of a scene.
-
-    Segments have an order: a surfel that two of them hold belongs to the first.
-    """
-
-    file: Path  # lossless or compact
-    edit: PartEdit = field(default_factory=PartEdit)  # of what no segment holds
-    texture: Path | None = None  # variant in place of the model's own texels
-    segments: Mapping[str, SceneSegment] = field(default_factory=dict)
-
-    @property
-    def files(self) -> list[Path | None]:
-        """All that `open` reads."""
-        paths = [self.file, self.texture]
-        for segment in self.segments.values():
-            paths += [segment.file, segment.texture]
-        return paths
-
-    def open(self) -> tuple[Field, list[Tensor]]:
-        """The field, of surfels with the texels of all variants, and the masks [N] of its segments.
-
-        Raises:
-            ArgumentError, ShapeError: naming the file.
-        """
-        fitted = open_field(self.file)
-        if isinstance(fitted, Surfels) or self.texture is not None or self.segments:
-            return self.surfels(fitted)
-        return fitted, []
-
-    def surfels(self, fitted: Field | None = None) -> tuple[Surfels, list[Tensor]]:
-        """The same, for what only surfels can.
-
-        Args:
-            fitted: what the file holds, where that is known.
-
-        Raises:
-            ArgumentError, ShapeError: naming the file, also where it holds a field of another kind.
-        """
-        fitted = open_field(self.file) if fitted is None else fitted
-        if not isinstance(fitted, Surfels):
-            raise ArgumentError(f"{self.file}: expected surfels, got {fitted.kind}; fit surfels for this")
-        model = fitted if self.texture is None else with_texture(fitted, self.texture)
-        masks, variants = [], []
-        for name, segment in self.segments.items():
-            try:
-                masks.append(read_segment(segment.file, fitted))
-                own = fitted if segment.texture is None else with_texture(fitted, segment.texture)
-            except TexgsError as error:
-                raise type(error)(f"segments.{name}: {error}") from error
-            variants.append(own)
-        if masks and fitted.stage == "texture":
-            model = with_variants(model, labels_of(masks, len(model)), variants)
-        return model, masks
-
-
-@dataclass(frozen=True)
-class Scene:
-    """Models by name in the order in which they were added, one light for all, and a background."""
-
-    models: Mapping[str, SceneModel]
-    light: Light = field(default_factory=lambda: Light("headlight"))
-    background: tuple[float, float, float] = WHITE
-
-    def __post_init__(self) -> None:
-        if not self.models:
-            raise ArgumentError("models: expected at least one, got none")
-
-    @property
-    def edits(self) -> list[PartEdit]:
-        """Of all models; behind the edit of a model those of its segments."""
-        edits = []
-        for model in self.models.values():
-            edits += [model.edit, *(segment.edit for segment in model.segments.values())]
-        return edits
-
-    def open(self, device: torch.device | str = "cpu") -> Composed:
-        """Read and join the models.
-
-        Raises:
-            ArgumentError, ShapeError: naming the model and its file.
-        """
-        models, segments = [], []
-        for name, entry in self.models.items():
-            try:
-                model, masks = entry.open()
-            except TexgsError as error:
-                raise type(error)(f"models.{name}: {error}") from error
-            models.append(model.to(device))
-            segments.append([mask.to(device) for mask in masks])
-        made_of = sorted({model.kind for model in models})
-        if len(made_of) > 1:
-            raise ArgumentError(f"models: expected fields of one kind, got {' and '.join(made_of)}")
-        composed: Composed = kinds()[made_of[0]].compose(models, segments)
-        return composed
 
 
 def read_scene(path: str | Path) -> Scene:

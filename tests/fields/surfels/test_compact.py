@@ -17,7 +17,7 @@ from texgs.core.rotation import quats_to_matrices
 from texgs.fields.surfels.compact import STEP, open_model, read_compact, seen_surfels, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.image import psnr
-from texgs.scene.scene_file import Scene, SceneModel
+from texgs.scene.scene import Scene, SceneModel
 
 
 def changed(model, **parameters):

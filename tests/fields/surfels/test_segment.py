@@ -19,7 +19,8 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.segment import labels_of, with_variants
 from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.export import joined
-from texgs.scene.scene_file import Scene, SceneModel, SceneSegment, read_scene, write_scene
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 
 HALF = torch.arange(150) % 2 == 0

@@ -10,7 +10,8 @@ from texgs.core.lens import Lens
 from texgs.core.movie import write_frames
 from texgs.report.results import SceneResult
 from texgs.scene.frame import frame
-from texgs.scene.scene_file import Scene, SceneModel, write_scene
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
 
 SHOWN = "The basic models as one scene, rendered from their primitives."
 AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees

@@ -24,7 +24,8 @@ from texgs.models.clip import Clip
 from texgs.models.lpips import Lpips
 from texgs.models.vgg import Vgg
 from texgs.report.results import EditMeasures
-from texgs.scene.scene_file import Scene, read_scene
+from texgs.scene.scene import Scene
+from texgs.scene.scene_file import read_scene
 from texgs.volume.cameras import spiral
 
 

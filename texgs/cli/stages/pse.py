@@ -20,7 +20,8 @@ from texgs.fields.field import Composed
 from texgs.metrics.image import psnr, ssim
 from texgs.report.results import Comparison, PseResult
 from texgs.report.strip import write_strip
-from texgs.scene.scene_file import Scene, read_scene, write_scene
+from texgs.scene.scene import Scene
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.session import Session
 from texgs.volume.cameras import orbit_path
 
