@@ -14,7 +14,7 @@ from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.camera import Camera, orbit
 from texgs.edit.clicks import Clicks
-from texgs.edit.lift import HEADLIGHT, Views
+from texgs.edit.lift import HEADLIGHT, ViewMasks
 from texgs.edit.votes import CentreVotes, ContributionVotes
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
@@ -77,7 +77,7 @@ def mask_case(whole: Surfels, device: torch.device, size: int) -> Case:
     camera = orbit(-60.0, 25.0, DISTANCE, 30.0, size, size).to(device)
     middle = torch.full((1, 2), size / 2, device=device)
     clicks = Clicks(camera, middle, torch.ones(1, dtype=torch.bool, device=device))
-    views = Views(whole, HEADLIGHT, GrabCut())
+    views = ViewMasks(whole, HEADLIGHT, GrabCut())
     return Case("GrabCut of a view", {"size": size}, {"mask": lambda: views.mask(clicks)})
 
 

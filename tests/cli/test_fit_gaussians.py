@@ -9,6 +9,7 @@ from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import open_field
 from texgs.fields.gaussians.composition import JoinedGaussians
+from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene_file import read_scene
 
 TINY = [
@@ -65,9 +66,9 @@ def test_a_scene_opens_and_fades(results, tmp_path):
     before, after = (composed.render(camera, edits=scene.edits).alpha.sum() for scene in (whole, faint))
     assert float(after) < 0.8 * float(before)
     palette = ["TF01.palette=#ff0000", "--output", str(tmp_path / "red.yaml")]
-    assert main(["edit", str(path), *palette]) == 0
+    assert main(["edit", str(path), *palette]) == 2
     with pytest.raises(ArgumentError, match=r"palette: 3D Gaussians can change visible and opacity only"):
-        composed.render(camera, edits=read_scene(tmp_path / "red.yaml").edits)
+        composed.render(camera, edits=[PartEdit(palette=(1, 0, 0))])
 
 
 def test_seeds_that_need_a_volume_are_one_sentence(results, monkeypatch, capsys):

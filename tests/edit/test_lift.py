@@ -7,7 +7,7 @@ from tests.edit.lift_scenes import BLUE, RED, cameras, joined, nested, overlap, 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.edit.clicks import Clicks, is_visible, projected, prompts_at
-from texgs.edit.lift import HEADLIGHT, Views, lift, middle_of
+from texgs.edit.lift import HEADLIGHT, ViewMasks, lift, middle_of
 from texgs.edit.preview import preview
 from texgs.models.grabcut import GrabCut
 
@@ -121,7 +121,7 @@ def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along():
     model, _ = two_balls()
     masks = Alike()
     click = clicks((0.3, 0.1, 0.35))
-    mask = Views(model, HEADLIGHT, masks).mask(click)
+    mask = ViewMasks(model, HEADLIGHT, masks).mask(click)
     image, ((point,), _) = masks.images[0], masks.clicked[0]
     assert image.shape[0] * image.shape[1] < 0.7 * SIZE * SIZE
     x, y = point.long().tolist()

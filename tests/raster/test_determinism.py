@@ -17,7 +17,7 @@ def everything(scene):
     """All that the rasterizer computes for a scene, by name."""
     render = scene.render(rasterize, scene.outputs)
     found = images(render) | vars(render.statistics)
-    image = torch.linspace(-1, 1, scene.height * scene.width * 2, device=scene.device)
+    image = torch.linspace(-1, 1, scene.height * scene.width * 2, device=scene.means.device)
     geometry = {
         name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
     }
