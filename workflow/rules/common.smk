@@ -6,6 +6,7 @@ import sys
 from importlib.resources import files
 from pathlib import Path
 
+from texgs.cli import fork_client
 from texgs.cli.plan import planned, words_of
 from texgs.config.code import digest
 from texgs.config.places import PLACES
@@ -73,19 +74,15 @@ def log_of(place):
     return f"<logs>/{PLACES[place].folder}.log"
 
 
-def times_of(place):
-    """Where Snakemake writes the time and memory of a job."""
-    return f"<benchmarks>/{PLACES[place].folder}.tsv"
-
-
 def any_of(names, otherwise="none"):
     """A wildcard's values."""
     return "|".join(map(re.escape, names)) or otherwise
 
 
 def begin():
-    """Hold the results before the first job, and close the tracked runs of processes that were killed."""
-    global RUN_LOCK
+    """Hold the results, close the tracked runs of killed processes, and start what forks the jobs."""
+    global RUN_LOCK, FORK_SERVER
+    from texgs.cli import fork_server
     from texgs.cli.result import run_alone
     from texgs.track import close_dead_runs
 
@@ -95,6 +92,9 @@ def begin():
     except TexgsError as error:
         print(f"texgs: {error}", file=sys.stderr)
         sys.exit(2)
+    jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in PLACES]
+    if workflow.local_exec and len(jobs) > 1:
+        FORK_SERVER = fork_server.start(ENVIRONMENT)
 
 
 # In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
@@ -102,10 +102,11 @@ def begin():
 ENVIRONMENT = {"OMP_WAIT_POLICY": os.environ.get("OMP_WAIT_POLICY", "passive")}
 if PLAN.tracking is not None:
     ENVIRONMENT |= {"TEXGS_TRACKING": PLAN.tracking, "TEXGS_EXPERIMENT": PLAN.experiment}
+CLIENT = fork_client.__file__
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 shell.prefix(
     "set -euo pipefail; "
-    f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -P -m texgs.cli.main "$@"; }}}}; '
+    f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -PSE {shlex.quote(CLIENT)} "$@"; }}}}; '
 )
 # One command for all stages. A second attempt adds to the log of the first.
 RUN = "texgs {params.words:q} 2>&1 | tee --append {log:q}"
@@ -119,7 +120,6 @@ outputflags:
 pathvars:
     results=RESULTS,
     logs=f"{RESULTS}/logs",
-    benchmarks=f"{RESULTS}/benchmarks",
 
 
 wildcard_constraints:

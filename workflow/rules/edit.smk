@@ -13,8 +13,6 @@ rule edit:
         writes("edit"),
     log:
         log_of("edit"),
-    benchmark:
-        times_of("edit")
     threads: 4
     resources:
         gpu=FIT_GPU,

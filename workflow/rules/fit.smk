@@ -18,8 +18,6 @@ rule phase:
         writes("phase"),
     log:
         log_of("phase"),
-    benchmark:
-        times_of("phase")
     threads: 4
     resources:
         gpu=FIT_GPU,
@@ -37,8 +35,6 @@ rule figure:
         writes("figure"),
     log:
         log_of("figure"),
-    benchmark:
-        times_of("figure")
     threads: 4
     params:
         code=code("figure"),

@@ -28,8 +28,6 @@ rule pse:
         writes("pse"),
     log:
         log_of("pse"),
-    benchmark:
-        times_of("pse")
     threads: 4
     params:
         code=code("pse"),

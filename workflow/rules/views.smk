@@ -13,8 +13,6 @@ rule views:
         writes("views"),
     log:
         log_of("views"),
-    benchmark:
-        times_of("views")
     threads: 4
     resources:
         gpu=MAPPER_GPU,
@@ -32,8 +30,6 @@ rule sheet:
         writes("sheet"),
     log:
         log_of("sheet"),
-    benchmark:
-        times_of("sheet")
     params:
         code=code("sheet"),
         words=words("sheet"),

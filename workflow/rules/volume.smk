@@ -35,8 +35,6 @@ rule volume:
         writes("volume"),
     log:
         log_of("volume"),
-    benchmark:
-        times_of("volume")
     threads: 1
     params:
         code=code("volume"),
@@ -52,8 +50,6 @@ rule transfer:
         writes("transfer"),
     log:
         log_of("transfer"),
-    benchmark:
-        times_of("transfer")
     params:
         code=code("transfer"),
         words=words("transfer"),
