@@ -1,8 +1,11 @@
 """How all tests run: at any speed of the machine, and long files first where several workers share them."""
 
+import gc
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
+
+from texgs.cli.main import COLLECTED
 
 FOLDER = Path(__file__).parent
 
@@ -11,6 +14,9 @@ settings.register_profile(
     "texgs", settings.default, deadline=None, suppress_health_check=[HealthCheck.too_slow]
 )
 settings.load_profile("texgs")
+
+# As the command line does: the objects of large libraries stay, and need not be looked at again and again.
+gc.set_threshold(COLLECTED)
 
 # Folders and files below tests/ that take longest, so that no worker is left with one of them at the end.
 LONG = ("workflow", "test_readme.py", "cli", "track", "test_benchmarks.py")

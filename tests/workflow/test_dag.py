@@ -43,7 +43,6 @@ def test_results_are_complete(project):
         metrics
     )
     assert (project.work / "results" / "logs" / "turbulence" / "TF01" / "views.log").stat().st_size > 0
-    assert (project.work / "results" / "benchmarks" / "turbulence" / "TF01" / "views.tsv").stat().st_size > 0
     assert half_written(project.work) == []
 
 

@@ -8,7 +8,9 @@ with such libraries is not safe, and jobs start as programs do.
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import gc
 import importlib
 import json
 import os
@@ -22,8 +24,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from texgs.cli.main import COLLECTED
+from texgs.cli.main import main as texgs
+
 ADDRESS = "TEXGS_FORK_SERVER"  # environment variable: the server's name among the abstract sockets
-LIBRARIES = ("torch", "kornia", "omegaconf", "scipy.ndimage", "PIL.Image")
+LIBRARIES = (
+    "torch._dynamo",  # which optimisers import
+    "hydra",
+    "kornia",
+    "matplotlib.backends.backend_agg",
+    "matplotlib.figure",
+    "PIL.Image",
+    "scipy.spatial",
+)
 TRACKING = ("mlflow", "mlflow.store.tracking.sqlalchemy_store")
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # a pool of threads would not outlive a fork
 
@@ -192,16 +205,20 @@ def use_threads(count: int) -> None:
 def main() -> int:
     """Serve, or in a forked process run the job."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # its jobs hear of it themselves
+    gc.set_threshold(COLLECTED)
     for library in sys.argv[2:]:
         importlib.import_module(library)
+    gc.freeze()  # a collection in a job would copy each page that it looks at
     with socket.socket(fileno=int(sys.argv[1])) as listener:
         request = Server(listener, sys.stdin.fileno()).serve()
     if request is None:
         return 0
     become(request)
-    from texgs.cli.main import main as texgs  # only now: a job reads the sources as they are when it starts
-
-    return texgs()
+    code = texgs()
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(code)  # to take apart all that the libraries have made takes longer than many a job
 
 
 if __name__ == "__main__":

@@ -1,6 +1,8 @@
 """`texgs VERB`: picks the verb and turns errors into one sentence and an exit code."""
 
 import argparse
+import atexit
+import gc
 import importlib
 import io
 import os
@@ -47,6 +49,9 @@ VERBS = {
     "weights": "list pretrained weights, and download those that are named",
     "doctor": "show what is installed, what is missing and what to do about it",
 }
+
+
+COLLECTED = 50_000  # new objects before the garbage collector looks at them
 
 
 def parser() -> argparse.ArgumentParser:
@@ -119,6 +124,10 @@ def own_process() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     keep_freed_memory()
+    # Imports of large libraries make millions of objects that stay: by default the collector goes through them
+    # again and again, which is a third of the time of a short verb, and once more at the end of the process.
+    gc.set_threshold(COLLECTED)
+    atexit.register(gc.freeze)
 
 
 def again(verb: str) -> str:
