@@ -1,11 +1,10 @@
 """How all tests run: at any speed of the machine, and long files first where several workers share them."""
 
-import gc
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
-from texgs.cli.main import COLLECTED
+from texgs.core.memory import collect_rarely
 
 FOLDER = Path(__file__).parent
 
@@ -15,8 +14,7 @@ settings.register_profile(
 )
 settings.load_profile("texgs")
 
-# As the command line does: the objects of large libraries stay, and need not be looked at again and again.
-gc.set_threshold(COLLECTED)
+collect_rarely()
 
 # Folders and files below tests/ that take longest, so that no worker is left with one of them at the end.
 LONG = ("workflow", "test_readme.py", "cli", "track", "test_benchmarks.py")

@@ -9,7 +9,7 @@ from texgs.core.errors import ArgumentError
 from texgs.edit.target_views import render_views
 from texgs.edit.text import RECIPES, edit_by_text
 from texgs.fields.surfels.texels import bare_colors
-from texgs.models.filters import ProceduralFilters
+from texgs.models.filters.guidance import ProceduralFilters
 
 
 @pytest.fixture(scope="module")

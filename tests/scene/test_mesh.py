@@ -11,7 +11,8 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render
 from texgs.scene.mesh import Mesh, fuse, write_mesh
-from texgs.volume.cameras import geodesic_vertices, icosphere
+from texgs.volume.cameras import icosphere
+from texgs.volume.geodesic import geodesic_vertices
 
 RADIUS, VOXEL = 0.4, 1 / 128
 VIEWS = icosphere(2, 4.0311, 30, 256, 256)  # pixels about as wide as a voxel

@@ -8,6 +8,7 @@ import torch
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
 from texgs.volume import cameras
+from texgs.volume.geodesic import geodesic_vertices
 
 RADIUS = 4.0311  # of the published views
 LENS = {"radius": RADIUS, "fov_y": 30.0, "width": 80, "height": 60}
@@ -41,7 +42,7 @@ def test_test_path_is_the_published_test_set_view_by_view():
 
 @pytest.mark.parametrize("frequency", [1, 2, 3, 4, 5])
 def test_icosphere_has_its_symmetries_and_is_even(frequency):
-    vertices = cameras.geodesic_vertices(frequency)
+    vertices = geodesic_vertices(frequency)
     assert len(vertices) == 10 * frequency**2 + 2
     np.testing.assert_allclose(np.linalg.norm(vertices, axis=1), 1, atol=1e-15)
     cosine = vertices @ vertices.T

@@ -24,8 +24,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from texgs.cli.main import COLLECTED
 from texgs.cli.main import main as texgs
+from texgs.core.memory import collect_rarely
 
 ADDRESS = "TEXGS_FORK_SERVER"  # environment variable: the server's name among the abstract sockets
 LIBRARIES = (
@@ -205,7 +205,7 @@ def use_threads(count: int) -> None:
 def main() -> int:
     """Serve, or in a forked process run the job."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # its jobs hear of it themselves
-    gc.set_threshold(COLLECTED)
+    collect_rarely()
     for library in sys.argv[2:]:
         importlib.import_module(library)
     gc.freeze()  # a collection in a job would copy each page that it looks at

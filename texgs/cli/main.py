@@ -1,8 +1,6 @@
 """`texgs VERB`: picks the verb and turns errors into one sentence and an exit code."""
 
 import argparse
-import atexit
-import gc
 import importlib
 import io
 import os
@@ -14,7 +12,7 @@ from texgs import __version__
 from texgs.config.fields import kinds
 from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
-from texgs.core.memory import keep_freed_memory, told
+from texgs.core.memory import collect_rarely, keep_freed_memory, told
 
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
 # the verbs of stages share the module texgs.cli.stage.
@@ -49,9 +47,6 @@ VERBS = {
     "weights": "list pretrained weights, and download those that are named",
     "doctor": "show what is installed, what is missing and what to do about it",
 }
-
-
-COLLECTED = 50_000  # new objects before the garbage collector looks at them
 
 
 def parser() -> argparse.ArgumentParser:
@@ -124,10 +119,7 @@ def own_process() -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     keep_freed_memory()
-    # Imports of large libraries make millions of objects that stay: by default the collector goes through them
-    # again and again, which is a third of the time of a short verb, and once more at the end of the process.
-    gc.set_threshold(COLLECTED)
-    atexit.register(gc.freeze)
+    collect_rarely()
 
 
 def again(verb: str) -> str:

@@ -157,7 +157,8 @@ def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
         ArgumentError: if there is no such model, the new name cannot be one, or nothing is to be written.
     """
     from texgs.core.errors import ArgumentError
-    from texgs.scene.parts import require_name, require_new
+    from texgs.core.names import require_name
+    from texgs.scene.parts import require_new
 
     name = next(iter(scene.models)) if arguments.model is None and len(scene.models) == 1 else arguments.model
     if name not in scene.models:

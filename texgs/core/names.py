@@ -9,6 +9,7 @@ from texgs.core.errors import ArgumentError
 LONGEST = 100  # letters of a name
 LONGEST_PATH = 1000  # letters of a path in a file
 LONGEST_FILE = 250  # bytes of a file's name; file systems take 255, and we put a few before it
+RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
 SEPARATORS = frozenset("/\\")  # of folders, on one system or another
 
 
@@ -28,6 +29,16 @@ def label(where: str, name: object) -> str:
             f"{where}: expected a name of 1 to {LONGEST} printable letters, got {text[: LONGEST + 1]!r}"
         )
     return text
+
+
+def require_name(name: str | None, where: str) -> None:
+    """Require a name that a segment can have.
+
+    Raises:
+        ArgumentError: naming where it comes from.
+    """
+    if not name or any(mark in label(where, name) for mark in RESERVED):
+        raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
 
 
 def file_name(where: str, name: str) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import torch
 from torch import Tensor
@@ -144,16 +142,3 @@ def extent(model: Surfels) -> float:
     """Longest side of the box around the surfels' means, world units."""
     means = model.parameters["means"]
     return float((means.amax(0) - means.amin(0)).max()) if len(means) else 0.0
-
-
-def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
-    """Clicks as shares of the sides of a picture.
-
-    Raises:
-        ArgumentError: naming the key, if one is no place in the picture.
-    """
-    for point in points:
-        is_pair = isinstance(point, list) and len(point) == 2
-        if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):
-            raise ArgumentError(f"{name}: expected two shares from 0 to 1, got {point}")
-    return list(points)

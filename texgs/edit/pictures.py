@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
 from PIL import Image, ImageDraw
-from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.edit.noise import fractal, grid, palette, smoothstep, voronoi
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 OVERSAMPLED = 2  # strokes are drawn at twice the size
 
@@ -28,6 +30,8 @@ def picture(name: str, size: int = 512) -> Tensor:
     Raises:
         ArgumentError: if there is none of that name.
     """
+    import torch  # not at the top: a plan of edits asks for the names only
+
     if name not in PICTURES:
         raise ArgumentError(f"picture: expected one of {', '.join(PICTURES)}, got {name!r}")
     pixels = PICTURES[name](size).clip(0, 1).astype(np.float32)

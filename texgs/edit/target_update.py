@@ -18,7 +18,8 @@ from texgs.edit.followers import AdamFollower, Follower, SolveFollower
 from texgs.edit.target_views import render_views, require_texture
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
-from texgs.models.guidance import EditViews, Guidance, require_edited, require_instruction
+from texgs.models.guidance import EditViews, Guidance, require_edited
+from texgs.models.instruction import require_instruction
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,8 @@ from texgs.config.keys import key
 from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
+from texgs.core.names import require_name
+from texgs.methods.shares import shares
 
 if TYPE_CHECKING:
     import torch
@@ -112,6 +114,20 @@ def model_of(scene: Scene, name: str) -> str:
     return name
 
 
+def places_of(settings: SegmentKeys) -> list[list[float]]:
+    """The clicks, those beside the part last, as shares of the sides of the view.
+
+    Raises:
+        ArgumentError: if there is none on the part, one is outside of the view, or the view has no direction.
+    """
+    places = shares("edit.segment.points", [*settings.points, *settings.others])
+    if not settings.points:
+        raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
+    if len(settings.view) != 2:
+        raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {settings.view}")
+    return places
+
+
 def clicks_of(settings: SegmentKeys, device: torch.device) -> Clicks:
     """Clicks in pixels.
 
@@ -121,14 +137,9 @@ def clicks_of(settings: SegmentKeys, device: torch.device) -> Clicks:
     import torch
 
     from texgs.core.camera import orbit
-    from texgs.edit.clicks import Clicks, shares
+    from texgs.edit.clicks import Clicks
 
-    places = shares("edit.segment.points", [*settings.points, *settings.others])
-    if not settings.points:
-        raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
-    if len(settings.view) != 2:
-        raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {settings.view}")
-    azimuth, polar = settings.view
+    places, (azimuth, polar) = places_of(settings), settings.view
     camera = orbit(azimuth, polar, *LENS).to(device)
     points = LENS.width * torch.tensor(places, dtype=torch.float32, device=device)
     positive = torch.arange(len(points), device=device) < len(settings.points)
@@ -165,14 +176,11 @@ def check(settings: SegmentKeys) -> None:
     Raises:
         ArgumentError: naming what is not as it should be.
     """
-    import torch
-
-    from texgs.scene.parts import require_name
-    from texgs.volume.cameras import icosphere_of
+    from texgs.volume.geodesic import frequency_of
 
     require_name(settings.name, "edit.segment.name")
-    clicks_of(settings, torch.device("cpu"))
-    icosphere_of(settings.views, LENS.square(settings.size))
+    places_of(settings)
+    frequency_of(settings.views, "edit.segment.views")
 
 
 def weights(settings: SegmentKeys, clip: str) -> Mapping[str, bool]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.config.keys import key
 from texgs.core.errors import ArgumentError
+from texgs.methods.shares import shares
 
 if TYPE_CHECKING:
     from texgs.edit.style_picture import StylePicture
@@ -59,9 +60,10 @@ def check(settings: StyleKeys, where: str) -> None:
     Raises:
         ArgumentError: naming the key.
     """
-    from texgs.edit.clicks import shares
+    from texgs.edit.pictures import PICTURES
 
-    picture_of(settings.style, where)
+    if settings.style not in PICTURES:
+        picture_of(settings.style, where)
     shares(f"{where}.region", settings.region)
 
 
@@ -73,7 +75,6 @@ def style_of(settings: StyleKeys, where: str) -> StylePicture:
     """
     import torch
 
-    from texgs.edit.clicks import shares
     from texgs.edit.style_picture import StylePicture
     from texgs.models.by_name import mask_model
 

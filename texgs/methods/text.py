@@ -93,7 +93,7 @@ def guidance_of(settings: TextKeys, device: torch.device) -> Guidance:
     Raises:
         MissingDataError: if its weights are not on this machine.
     """
-    from texgs.models.filters import ProceduralFilters
+    from texgs.models.filters.guidance import ProceduralFilters
     from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
     from texgs.models.weights import locate
 
@@ -116,7 +116,7 @@ def check(settings: TextKeys) -> None:
         ArgumentError: if there is none.
     """
     from texgs.models.filters.vocabulary import understand
-    from texgs.models.guidance import require_instruction
+    from texgs.models.instruction import require_instruction
 
     instruction = require_instruction(settings.instruction)
     if settings.guidance == "filters":

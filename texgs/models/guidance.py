@@ -67,19 +67,6 @@ class Guidance(Protocol):
         """
 
 
-def require_instruction(instruction: str) -> str:
-    """The instruction without blanks around it.
-
-    Raises:
-        ArgumentError: if nothing is left.
-    """
-    if not isinstance(instruction, str) or not instruction.strip():
-        raise ArgumentError(
-            f"instruction: expected what to do in words, such as 'make it gold', got {instruction!r}"
-        )
-    return instruction.strip()
-
-
 def require_edited(edited: Tensor, views: EditViews, name: str) -> Tensor:
     """Edited images, clamped to [0, 1] on the views' device.
 

@@ -12,7 +12,8 @@ from torch.nn.functional import interpolate, pad
 from texgs.core.errors import ArgumentError, MissingDataError, first_line
 from texgs.core.progress import progress
 from texgs.models.epipolar import Consistency
-from texgs.models.guidance import EditViews, require_instruction
+from texgs.models.guidance import EditViews
+from texgs.models.instruction import require_instruction
 
 PARTS = ("unet", "vae", "text_encoder", "tokenizer", "scheduler")  # folders of the file format
 LONGEST = 512  # pixels: the size the model was trained at

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import label
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit
-from texgs.scene.scene import RESERVED, Scene, SceneModel, SceneSegment
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
 
 Entry = SceneModel | SceneSegment
 # What a field has to be capable of for a value of an edit; all others are factors of a material.
@@ -84,16 +83,6 @@ def require_able(scene: Scene, part: str, key: str, value: object) -> None:
         raise ArgumentError(
             f"{place_of(part)}.{key}: expected a model that can change it, got one of {kind.name}"
         )
-
-
-def require_name(name: str | None, where: str) -> None:
-    """Require a name that a segment can have.
-
-    Raises:
-        ArgumentError: naming where it comes from.
-    """
-    if not name or any(mark in label(where, name) for mark in RESERVED):
-        raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
 
 
 def require_new(scene: Scene, part: str) -> None:

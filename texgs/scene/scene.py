@@ -20,7 +20,6 @@ from texgs.fields.surfels.segment import labels_of, with_variants
 from texgs.fields.surfels.texture_file import with_texture
 from texgs.scene.segment_file import read_segment
 
-RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
 WHITE = (1.0, 1.0, 1.0)
 
 

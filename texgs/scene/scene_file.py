@@ -14,12 +14,12 @@ import yaml
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 from texgs.core.light import Light
-from texgs.core.names import label, named_file
+from texgs.core.names import label, named_file, require_name
 from texgs.core.numbers import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.reading import reading, reading_as
 from texgs.fields.part_edit import PartEdit, color
-from texgs.scene.scene import RESERVED, WHITE, Scene, SceneModel, SceneSegment
+from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
 
 VERSION = 1
 LARGEST = 1 << 20  # bytes; with a hundred models a scene has a few thousand
@@ -121,10 +121,7 @@ def _model(where: str, values: Any, folder: Path) -> SceneModel:
     known(entries, None, f"{where}.segments")
     segments = {}
     for name, entry in entries.items():
-        if any(mark in label(f"{where}.segments", name) for mark in RESERVED):
-            raise ArgumentError(
-                f"{where}.segments: expected names without {' '.join(RESERVED)}, got {name!r}"
-            )
+        require_name(name, f"{where}.segments")
         known(entry, SEGMENT_KEYS, f"{where}.segments.{name}")
         segments[str(name)] = SceneSegment(*_entry(f"{where}.segments.{name}", entry, folder, "a segment"))
     return SceneModel(*_entry(where, values, folder, "a model"), segments)

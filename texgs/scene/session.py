@@ -15,11 +15,12 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.part_edit import PartEdit, color
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import Mode, frame
-from texgs.scene.parts import entry_of, place_of, replaced, require_able, require_name, require_new, split
+from texgs.scene.parts import entry_of, place_of, replaced, require_able, require_new, split
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment

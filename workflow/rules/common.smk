@@ -12,6 +12,9 @@ from texgs.config.code import digest
 from texgs.config.places import PLACES
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
+from texgs.core.memory import collect_rarely
+
+collect_rarely()
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
@@ -88,13 +91,13 @@ def begin():
 
     try:
         RUN_LOCK = run_alone(RESULTS)  # it goes with the process, however that ends
+        jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in PLACES]
+        if workflow.local_exec and len(jobs) > 1:
+            FORK_SERVER = fork_server.start(ENVIRONMENT)
         close_dead_runs(PLAN.tracking, PLAN.experiment)
     except TexgsError as error:
         print(f"texgs: {error}", file=sys.stderr)
         sys.exit(2)
-    jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in PLACES]
-    if workflow.local_exec and len(jobs) > 1:
-        FORK_SERVER = fork_server.start(ENVIRONMENT)
 
 
 # In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no

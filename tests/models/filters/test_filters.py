@@ -10,11 +10,11 @@ from torch.testing import assert_close
 from tests.models.views_of import random_views
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.models.filters import ProceduralFilters
+from texgs.models.filters.guidance import FILTERS, ProceduralFilters
 from texgs.models.filters.material import GOLD, tint
 from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
 from texgs.models.filters.surface import Surface, surface_of
-from texgs.models.filters.vocabulary import FILTERS
+from texgs.models.filters.vocabulary import WORDS
 from texgs.models.guidance import EditViews
 
 GENERATOR = torch.Generator()
@@ -36,6 +36,10 @@ def plane(tone=0.5, side=160, cells=14.0, normal=(0.0, 0.0, 1.0)):
     tones = torch.full((n,), tone)
     normals = torch.tensor(normal).expand(n, 3)
     return Surface(torch.full((n, 3), 0.6), tones, tones, points, normals, cells / side, 0)
+
+
+def test_every_filter_has_words():
+    assert list(FILTERS) == list(WORDS)
 
 
 @pytest.mark.parametrize("name", [*FILTERS, "make it teal"])
@@ -79,14 +83,14 @@ def test_patterns_do_not_depend_on_the_call_but_on_seed_and_scale():
 
 @pytest.mark.parametrize("name", ["stipple drawing", "pencil hatching", "woodcut"])
 def test_drawings_have_as_much_ink_as_it_is_dark(name):
-    tones = [float(FILTERS[name][0](plane(tone)).mean()) for tone in (0.95, 0.65, 0.35, 0.05)]
+    tones = [float(FILTERS[name](plane(tone)).mean()) for tone in (0.95, 0.65, 0.35, 0.05)]
     assert all(a > b + 0.03 for a, b in pairwise(tones))
     assert tones[0] > 0.8
     assert tones[-1] < 0.55
 
 
 def test_dots_are_round_and_apart():
-    image = FILTERS["stipple drawing"][0](plane(0.7))[:, 0].reshape(160, 160)
+    image = FILTERS["stipple drawing"](plane(0.7))[:, 0].reshape(160, 160)
     from scipy.ndimage import find_objects, label
 
     dark = (image < 0.5).numpy()
@@ -99,7 +103,7 @@ def test_dots_are_round_and_apart():
 
 def test_hatches_are_lines():
     """Along them the image changes far less than across."""
-    image = FILTERS["pencil hatching"][0](plane(0.6))[:, 0].reshape(160, 160)
+    image = FILTERS["pencil hatching"](plane(0.6))[:, 0].reshape(160, 160)
     change = [float((image - image.roll(shift, dims=(0, 1))).abs().mean()) for shift in ((5, 4), (-4, 5))]
     assert max(change) > 1.3 * min(change)
 

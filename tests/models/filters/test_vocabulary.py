@@ -3,7 +3,7 @@
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.models.filters.vocabulary import FILTERS, named_color, understand, vocabulary
+from texgs.models.filters.vocabulary import WORDS, named_color, understand, vocabulary
 
 
 @pytest.mark.parametrize(
@@ -55,9 +55,9 @@ def test_what_is_not_in_the_vocabulary_is_answered_by_it(instruction):
 
 
 def test_every_entry_is_understood_as_itself():
-    for name in FILTERS:
+    for name, words in WORDS.items():
         assert understand(name)[0] == name
-        for word in FILTERS[name][1]:
+        for word in words:
             assert understand(f"make it {word}")[0] == name
 
 

@@ -2,13 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.models.filters.surface import surface_of
+from texgs.models.filters import ink, material, paint
+from texgs.models.filters.surface import Surface, surface_of
 from texgs.models.filters.vocabulary import understand
 from texgs.models.guidance import EditViews
+
+Filter = Callable[[Surface], Tensor]
+
+FILTERS: dict[str, Filter] = {  # by the names of the vocabulary
+    "stipple drawing": ink.stipple,
+    "pencil hatching": ink.hatching,
+    "woodcut": ink.woodcut,
+    "watercolour": paint.watercolour,
+    "oil painting": paint.oil,
+    "cartoon": paint.cartoon,
+    "marble": material.marble,
+    "wood": material.wood,
+    "mosaic": material.mosaic,
+    "gold": partial(material.metal, tones=material.GOLD),
+    "silver": partial(material.metal, tones=material.SILVER),
+    "copper": partial(material.metal, tones=material.COPPER),
+}
 
 
 class ProceduralFilters:
@@ -42,7 +63,8 @@ class ProceduralFilters:
         Raises:
             ArgumentError: if the instruction is empty or not in the vocabulary.
         """
-        _, function = understand(instruction)
+        name, color = understand(instruction)
+        function = FILTERS[name] if color is None else partial(material.tint, color=color)
         surface, where = surface_of(views, self.scale, self.seed)
         edited = views.images.clone()
         alpha = views.alphas[where][:, None]

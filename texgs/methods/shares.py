@@ -1,0 +1,21 @@
+"""Clicks in the configuration: places in a picture, as shares of its sides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from texgs.core.errors import ArgumentError
+
+
+def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
+    """Clicks as shares of the sides of a picture.
+
+    Raises:
+        ArgumentError: naming the key, if one is no place in the picture.
+    """
+    for point in points:
+        is_pair = isinstance(point, list) and len(point) == 2
+        if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):
+            raise ArgumentError(f"{name}: expected two shares from 0 to 1, got {point}")
+    return list(points)
