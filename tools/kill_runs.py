@@ -21,7 +21,7 @@ from pathlib import Path
 import psutil
 
 TIMES = ("seconds", "_ms", "milliseconds", "minutes", "peak_memory", "run", "git_sha")
-NOT_COMPARED = ("logs", "benchmarks", "tables", "mlartifacts", "report.html", "mlflow.db")
+NOT_COMPARED = ("logs", "tables", "mlartifacts", "report.html", "mlflow.db")
 
 
 def start(folder: Path, words: list[str]) -> subprocess.Popen[str]:
