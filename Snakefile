@@ -27,6 +27,7 @@ rule all:
         rules.volumes.input,
         rules.sheets.input,
         rules.figures.input,
+        rules.meshes.input,
         rules.scenes.input,
         rules.tables.output,
         rules.report.output if TABLES else [],

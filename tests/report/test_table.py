@@ -71,7 +71,7 @@ def test_the_verb_writes_three_files_a_table(tmp_path, capsys):
     assert main(["tables", str(path), "--output", str(tmp_path / "tables")]) == 0
     assert sorted(file.name for file in (tmp_path / "tables").iterdir()) == [
         f"{name}.{kind}"
-        for name in ("datasets", "edits", "fitting", "looks", "model_size", "rendering")
+        for name in ("datasets", "edits", "fitting", "looks", "meshes", "model_size", "rendering")
         for kind in ("csv", "md", "tex")
     ]
     assert "| engine | TF01 | default | shading | 40.00 |" in capsys.readouterr().out

@@ -1,5 +1,3 @@
-import sys
-
 import numpy as np
 import pytest
 import torch
@@ -10,17 +8,14 @@ from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render
-from texgs.scene.mesh import Mesh, fuse, write_mesh
+from texgs.scene.mesh import fuse, write_mesh
 from texgs.volume.cameras import icosphere
 from texgs.volume.geodesic import geodesic_vertices
+from texgs.volume.isosurface import Mesh
 
 RADIUS, VOXEL = 0.4, 1 / 128
 VIEWS = icosphere(2, 4.0311, 30, 256, 256)  # pixels about as wide as a voxel
 RED = torch.tensor([1.0, 0.25, 0.0])
-
-
-def open3d():
-    return pytest.importorskip("open3d", exc_type=ImportError)
 
 
 def ball(opacity=8.0):
@@ -71,7 +66,6 @@ def centroid(mesh):
 
 
 def test_exact_depth_becomes_a_sphere():
-    open3d()
     mesh = fuse(exact, VIEWS, VOXEL)
     radii = np.linalg.norm(mesh.vertices, axis=1)
     assert np.abs(radii - RADIUS).max() < VOXEL
@@ -82,7 +76,6 @@ def test_exact_depth_becomes_a_sphere():
 
 
 def test_a_ball_of_surfels_becomes_a_sphere():
-    open3d()
     mesh = fuse(show(ball()), VIEWS, VOXEL)
     radii = np.linalg.norm(mesh.vertices, axis=1)
     # Discs that touch a sphere stand out from it, and at its rim each is wider than a pixel.
@@ -92,28 +85,14 @@ def test_a_ball_of_surfels_becomes_a_sphere():
     assert np.abs(mesh.colors.mean(0) - 255 * RED.numpy()).max() < 3
 
 
-def test_open3d_reads_the_file(tmp_path):
-    library = open3d()
-    mesh = Mesh(
-        np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], np.float32),
-        np.array([[0, 1, 2], [0, 2, 3]], np.int32),
-        np.array([[255, 0, 0], [0, 255, 0], [0, 0, 255], [51, 102, 153]], np.uint8),
-    )
-    found = library.io.read_triangle_mesh(str(write_mesh(tmp_path / "new" / "mesh.ply", mesh)))
-    assert np.array_equal(np.asarray(found.vertices), mesh.vertices)
-    assert np.array_equal(np.asarray(found.triangles), mesh.triangles)
-    assert np.array_equal(np.asarray(found.vertex_colors) * 255, mesh.colors)
-
-
 def test_plyfile_reads_the_file(tmp_path):
     mesh = Mesh(np.eye(3, dtype=np.float32), np.array([[0, 1, 2]], np.int32), np.eye(3, dtype=np.uint8) * 200)
-    found = vertices(write_mesh(tmp_path / "mesh.ply", mesh))
-    assert found["x"].tolist() == [1, 0, 0]
-    assert found["green"].tolist() == [0, 200, 0]
+    written = vertices(write_mesh(tmp_path / "mesh.ply", mesh))
+    assert written["x"].tolist() == [1, 0, 0]
+    assert written["green"].tolist() == [0, 200, 0]
 
 
 def test_what_lets_light_through_has_no_surface():
-    open3d()
     faint = ball(opacity=-4.0)
     with pytest.raises(
         ArgumentError, match="expected a surface that lets less than half of the light through"
@@ -121,15 +100,11 @@ def test_what_lets_light_through_has_no_surface():
         fuse(show(faint), VIEWS[:3], VOXEL)
 
 
-def test_mistakes_are_named(monkeypatch):
+def test_a_voxel_is_a_length():
     with pytest.raises(ArgumentError, match="voxel: expected a length above 0, got 0"):
         fuse(show(ball()), VIEWS, 0)
-    monkeypatch.setitem(sys.modules, "open3d", None)
-    with pytest.raises(ArgumentError, match=r"needs Open3D, which .* install the extra texgs\[mesh\]"):
-        fuse(show(ball()), VIEWS, VOXEL)
 
 
-def test_renders_without_median_are_refused():
-    open3d()
-    with pytest.raises(ArgumentError, match="show: expected renders with median"):
+def test_renders_without_depth_are_refused():
+    with pytest.raises(ArgumentError, match="show: expected renders with median or depth"):
         fuse(lambda camera: sample("surfels").render(camera), VIEWS, VOXEL)

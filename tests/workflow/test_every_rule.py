@@ -23,15 +23,16 @@ EDITS = {
 SWEEP = "name: tiny\nvariants:\n  few: [fit.seeds.count=150]\n"
 SMALL = (
     "fit.seeds.count=200 fit.surfels.iterations=4 fit.shading.iterations=12 fit.shading.densify.stop=10 "
-    "fits=[demo,ball] edits=[glass,piece,red,fade] edit.image.iterations=2 +sweeps.tiny=sphere"
+    "fits=[demo,ball] edits=[glass,piece,red,fade] edit.image.iterations=2 "
+    "mesh.tfs=[TF01] +sweeps.tiny=sphere"
 )
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
-AFTER_FITS = {"figure", "compose", "pse", "timing", "edit", "edit_metrics"}
+AFTER_FITS = {"figure", "mesh", "compose", "pse", "timing", "edit", "edit_metrics"}
 TABLES = {"tables", "sweep", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
-GROUPS = {"all", "volumes", "sheets", "figures", "fits", "scenes", "edits", "phase"}  # not told apart
+GROUPS = {"all", "volumes", "sheets", "figures", "fits", "meshes", "scenes", "edits", "phase"}  # only names
 
 
 def changed(project, extra=""):
@@ -92,9 +93,9 @@ def sources(project):
 
 def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
-    of_surfels, of_ball, of_sweep = 4 + 3 + 4 + 3, 2 + 3 + 2, 3
+    of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
     assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep
-    for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "sweep-tiny"):
+    for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert (results / "tables" / f"{name}.csv").stat().st_size > 0
     assert "red" in (results / "tables" / "looks.md").read_text()
     assert (results / "report.html").stat().st_size > 10_000

@@ -187,7 +187,7 @@ def add_jobs(
             missing.append(str(error))
             continue
         for stage in STAGES.values():
-            for each in (by_tf if stage.per_tf else [config]) if stage.applies(config) else ():
+            for each in filter(stage.applies, by_tf if stage.per_tf else [config]):
                 try:
                     job = Job.of(stage, each, checksums)
                 except MissingDataError as error:

@@ -126,6 +126,10 @@ def check(config: DictConfig) -> None:
     check_name("views.name", config.views.name)
     for tf in config.dataset.basic_tfs:
         check_name("dataset.basic_tfs", tf)
+    known = list(config.dataset.basic_tfs)
+    for tf in config.mesh.tfs:
+        if tf not in known:
+            raise ConfigError(f"mesh.tfs: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
     for entry in keys():
         for name, value in values(config, entry.name):
             if value is not None:

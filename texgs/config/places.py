@@ -28,6 +28,7 @@ PLACES = {
     "sheet": Place("{dataset}/{tf}/sheet", ("sheet.png",)),
     "phase": Place("{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",)),
     "figure": Place("{dataset}/{tf}/{fit}/figure", ("figure.png",)),
+    "mesh": Place("{dataset}/{tf}/{fit}/mesh", ("mesh.ply", "reference.ply", "mesh.png")),
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
     "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
     "timing": Place("{dataset}/scene/{fit}/timing"),

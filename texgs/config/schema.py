@@ -162,6 +162,16 @@ class Metric:
 
 
 @dataclass
+class MeshKeys:
+    """Surfaces of fits beside those of their volumes."""
+
+    tfs: list[str] = key([], "basic TFs that get one: those with an opaque surface")
+    voxel: float = key(1 / 128, "edge of the cells that depth is fused in", "world units", above=0)
+    opacity: float = key(0.5, "of a TF, per opacity unit, that makes a surface", above=0, below=1)
+    tolerance: float = key(0.01, "distance that counts as right in the F-score", "world units", above=0)
+
+
+@dataclass
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
@@ -185,6 +195,7 @@ class Config:
     edit: Edit = key(Edit, "a new look for the scene")
     edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
     metric: Metric = key(Metric, "what edits are measured with")
+    mesh: MeshKeys = key(MeshKeys, "surfaces of fits beside those of their volumes")
     sweep: Sweep = key(Sweep, "variants of the experiment")
     sweeps: dict[str, str] = field(
         default_factory=dict,

@@ -10,6 +10,7 @@ from texgs.config.inputs import (
     edit_settings,
     edited_scene,
     fit_label,
+    last_phase,
     lens,
     model_of,
     models,
@@ -41,6 +42,11 @@ def is_fit_of(kind: str) -> Callable[[DictConfig], bool]:
 def has_volume(config: DictConfig) -> bool:
     """Whether the data set starts from a volume, not from views."""
     return is_fit(config) and config.dataset.views_folder is None
+
+
+def has_mesh(config: DictConfig) -> bool:
+    """Whether a mesh is made of the fit of a basic TF."""
+    return has_volume(config) and config.tf in config.mesh.tfs and bool(kinds()[config.fit.field].depth)
 
 
 def has_scene(config: DictConfig) -> bool:
@@ -164,6 +170,20 @@ ROWS = (
         place="figure",
         needs=tuple(kind.phases[-1] for kind in kinds().values()),  # which need those before
         applies=is_fit,
+    ),
+    Stage(
+        "mesh",
+        "texgs.cli.stages.mesh",
+        select=lambda config: {
+            **recipe()(config),
+            "tf_values": config.dataset.tf_values,
+            "points": basic_tf(config),
+            "mesh": {name: value for name, value in config.mesh.items() if name != "tfs"},
+        },
+        inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
+        place="mesh",
+        needs=("volume", "views", *(kind.phases[-1] for kind in kinds().values())),
+        applies=has_mesh,
     ),
     Stage(
         "compose",

@@ -101,4 +101,5 @@ FIELD: Kind[GaussianKeys] = Kind(
     phases=("gaussians",),
     settings=GaussianKeys,
     fit=fit,
+    depth="depth",  # the mean, as the authors of 2DGS take it of 3D Gaussians
 )

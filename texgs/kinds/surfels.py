@@ -45,4 +45,5 @@ FIELD: Kind[None] = Kind(
     write,
     compose,
     phases=("surfels", "shading", "texture"),
+    depth="median",
 )

@@ -86,6 +86,22 @@ class FigureResult:
 
 
 @dataclass(frozen=True)
+class MeshResult:
+    """The surface of a fit against that of its volume; lengths in world units."""
+
+    chamfer: float  # mean of the next two
+    accuracy: float  # mean distance of the mesh from the surface
+    completeness: float  # and back
+    f_score: float  # of what is within the tolerance, in [0, 1]
+    normal_angle: float  # degrees
+    vertices: int
+    triangles: int
+    mesh_seconds: float
+    tolerance: float
+    visible: float  # share of the surface that training views see: the rest does not count
+
+
+@dataclass(frozen=True)
 class SceneResult:
     """Fields as one scene."""
 
@@ -168,6 +184,7 @@ Result = (
     | SheetResult
     | FitResult
     | FigureResult
+    | MeshResult
     | SceneResult
     | PseResult
     | TimingResult

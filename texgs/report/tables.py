@@ -5,6 +5,7 @@ from typing import Any
 
 from texgs.report.fitting import fitting
 from texgs.report.looks import looks
+from texgs.report.meshes import meshes
 from texgs.report.metrics_files import Record
 from texgs.report.scene_tables import datasets, edits, model_size, rendering
 from texgs.report.table import Table
@@ -16,4 +17,5 @@ TABLES: dict[str, Callable[[Iterable[Record[Any]]], Table]] = {
     "model_size": model_size,
     "edits": edits,
     "looks": looks,
+    "meshes": meshes,
 }

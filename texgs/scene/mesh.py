@@ -1,126 +1,190 @@
-"""Surfaces of opaque scenes as triangles: rendered depth is fused and meshed by Open3D."""
+"""Surfaces of opaque scenes as triangles: rendered depth is fused on a lattice (Curless and Levoy 1996)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
+from texgs.core.memory import require_memory
 from texgs.core.progress import progress
 from texgs.raster import Render
 from texgs.scene.export import VERTEX, fill
+from texgs.volume.isosurface import Mesh, isosurface
 
 VOXEL = 1 / 256  # world units
 TRUNCATION = 5.0  # voxels on each side of a surface that know their distance from it, as in 2DGS
-LEAST_VIEWS = 1.0  # more views than this must have seen a voxel
-FAR = 1e4  # world units: no depth is left out
-BLOCKS = 1000  # of 8^3 voxels that have memory from the start, 10 MB; more are added
+BLOCK = 8  # voxels along each side of what a view updates together; more than the truncation
+BLOCKS = 4000  # that are updated at once, 2 million voxels
+LEAST_VIEWS = 1  # more views than this must have seen a voxel
+CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
 @dataclass(frozen=True, eq=False)
-class Mesh:
-    """Triangles with a colour at each corner."""
+class DepthView:
+    """What a view knows of a surface."""
 
-    vertices: np.ndarray  # [V, 3] float32, world units
-    triangles: np.ndarray  # [F, 3] int32, counter-clockwise seen from outside
-    colors: np.ndarray  # [V, 3] uint8
+    camera: Camera
+    depth: Tensor  # [H, W] camera z in world units, 0 where there is no surface
+    color: Tensor  # [H, W, 3] uint8
+
+    def points(self) -> Tensor:
+        """Where the surface is that its pixels show [P, 3], world units."""
+        v, u = self.depth.nonzero().T
+        z = self.depth[v, u]
+        rays = torch.stack([u + 0.5, v + 0.5, torch.ones_like(z)], dim=1) @ self.camera.K.inverse().T
+        return (z[:, None] * rays - self.camera.viewmat[:3, 3]) @ self.camera.viewmat[:3, :3]
+
+
+class Lattice:
+    """Mean signed distances and colours of voxels around a surface."""
+
+    def __init__(self, low: Tensor, high: Tensor, voxel: float) -> None:
+        """A lattice of voxels that holds the box from `low` to `high` [3].
+
+        Raises:
+            OutOfMemoryError: if there are too many.
+        """
+        self.blocks = [int(n) for n in ((high - low) / (BLOCK * voxel)).ceil().long() + 1]
+        self.shape = [BLOCK * n for n in self.blocks]  # x, y, z
+        count = self.shape[0] * self.shape[1] * self.shape[2]
+        what = f"a mesh of {' x '.join(map(str, self.shape))} voxels"
+        require_memory(5 * 4 * count, what, "choose a larger voxel")
+        self.low, self.voxel = low, voxel
+        self.distance, self.views = torch.ones(count), torch.zeros(count)
+        self.color = torch.zeros(count, 3)
+
+    def add(self, view: DepthView) -> None:
+        """Update the voxels close to what a view sees."""
+        near = torch.zeros(self.blocks)
+        places = ((view.points() - self.low) / (BLOCK * self.voxel)).long()
+        near[places.unbind(1)] = 1
+        blocks = F.max_pool3d(near[None], 3, stride=1, padding=1)[0].nonzero()
+        inside = torch.cartesian_prod(*[torch.arange(BLOCK)] * 3)
+        for some in blocks.split(BLOCKS):
+            self._add((BLOCK * some[:, None] + inside).flatten(0, 1), view)
+
+    def _add(self, index: Tensor, view: DepthView) -> None:
+        """Update voxels by their indices x, y, z [N, 3]."""
+        camera = view.camera
+        seen = (self.low + self.voxel * index) @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
+        projected = seen @ camera.K.T
+        u, v = (projected[:, :2] / projected[:, 2:]).floor().long().unbind(1)
+        on_image = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+        index, u, v, z = index[on_image], u[on_image], v[on_image], seen[on_image, 2]
+        depth = view.depth[v, u]
+        distance = (depth - z) / (TRUNCATION * self.voxel)
+        known = (depth > 0) & (distance > -1)
+        x, y, z_index = index[known].unbind(1)
+        at = (z_index * self.shape[1] + y) * self.shape[0] + x
+        weight = self.views[at]
+        self.views[at] = weight + 1
+        self.distance[at] = (weight * self.distance[at] + distance[known].clamp_max(1)) / (weight + 1)
+        color = view.color[v[known], u[known]].float()
+        self.color[at] = (weight[:, None] * self.color[at] + color) / (weight + 1)[:, None]
+
+    def surface(self) -> Mesh:
+        """Where the distance is 0, in cells all of whose corners were seen."""
+        x, y, z = self.shape
+        values = -self.distance.reshape(z, y, x).numpy()  # inside is positive
+        mesh = isosurface(values, 0.0, (self.voxel,) * 3, tuple(self.low.tolist()))
+        seen = (self.views > LEAST_VIEWS).reshape(z, y, x).float()
+        whole = -F.max_pool3d(-seen[None], 2, stride=1)[0]
+        cells = ((torch.from_numpy(mesh.corners).mean(1) - self.low) / self.voxel).floor().long()
+        kept = whole[tuple(cells.clamp_min(0).T.flip(0))] > 0
+        return compact(mesh, kept.numpy())
+
+    def colors_at(self, places: np.ndarray) -> np.ndarray:
+        """Colours [V, 3] of places [V, 3] on edges of the lattice, uint8."""
+        x, y, z = self.shape
+        grid = (torch.from_numpy(places) - self.low) / self.voxel / (torch.tensor(self.shape) - 1) * 2 - 1
+        volume = self.color.reshape(1, z, y, x, 3).permute(0, 4, 1, 2, 3)
+        colors = F.grid_sample(volume, grid.float()[None, :, None, None], align_corners=True)
+        return colors[0, :, :, 0, 0].T.round().clamp(0, 255).to(torch.uint8).numpy()
 
 
 def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float = VOXEL) -> Mesh:
-    """The surface that views of a scene see, by fusion of their depth (Curless and Levoy 1996).
+    """The surface that views of a scene see, with colours, but for small specks.
 
-    Depth is where half of the light is left, as 2DGS has it for objects with a boundary; what is less opaque
-    than that has no surface.
+    What lets more than half of the light through has no surface.
 
     Args:
-        show: renders a view over black, with `median`.
+        show: renders a view over black, with `median` or else `depth`: where half of the light is left, as
+            2DGS has it for objects with a boundary; or the mean, as its authors take it for 3D Gaussians.
         cameras: around the scene.
-        voxel: edge of the grid's cells, world units.
+        voxel: edge of the lattice's cells, world units.
 
     Raises:
-        ArgumentError: if Open3D is not there, the voxel is no length, or no view sees a surface.
+        ArgumentError: if the voxel is no length, or no view sees a surface.
+        OutOfMemoryError: if there are too many voxels.
     """
     if not voxel > 0:
         raise ArgumentError(f"voxel: expected a length above 0, got {voxel}")
-    o3d = open3d()
-    volume = o3d.t.geometry.VoxelBlockGrid(
-        attr_names=("tsdf", "weight", "color"),
-        attr_dtypes=(o3d.core.float32,) * 3,
-        attr_channels=((1,), (1,), (3,)),
-        voxel_size=voxel,
-        block_resolution=8,
-        block_count=BLOCKS,
-    )
-    seen = False
-    for camera in progress(cameras, title="fuse", unit="view"):
-        with torch.no_grad():
-            seen |= _integrate(o3d, volume, camera, show(camera))
-    triangles = volume.extract_triangle_mesh(weight_threshold=LEAST_VIEWS) if seen else None
-    if triangles is None or not len(triangles.vertex.positions):
+    views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
+    boxes = [view.points().aminmax(dim=0) for view in views if bool(view.depth.any())]
+    if not boxes:
         raise ArgumentError(
             "mesh: expected a surface that lets less than half of the light through, got none"
         )
-    colors = triangles.vertex.colors.numpy().clip(0, 255).round().astype(np.uint8)
-    return Mesh(
-        triangles.vertex.positions.numpy(), triangles.triangle.indices.numpy().astype(np.int32), colors
-    )
+    margin = (TRUNCATION + 1) * voxel
+    low, high = (torch.stack(ends) for ends in zip(*boxes, strict=True))
+    lattice = Lattice(low.amin(0) - margin, high.amax(0) + margin, voxel)
+    for view in progress(views, title="fuse", unit="view"):
+        lattice.add(view)
+    mesh = largest_clusters(lattice.surface())
+    return Mesh(mesh.vertices, mesh.triangles, lattice.colors_at(mesh.vertices))
+
+
+@torch.no_grad()
+def depth_view(render: Render, camera: Camera) -> DepthView:
+    """The surface in a view, on the CPU; behind what is fainter the last fragment would be taken for one."""
+    depth = render.depth if render.median is None else render.median
+    if depth is None:
+        raise ArgumentError("show: expected renders with median or depth; ask for one in outputs")
+    color = 255 * render.color.clamp_min(0) / render.alpha.clamp_min(1e-6)[..., None]
+    opaque = depth * (render.alpha > 0.5)
+    return DepthView(camera.to("cpu"), opaque.cpu(), color.clamp_max(255).round().to(torch.uint8).cpu())
+
+
+def largest_clusters(mesh: Mesh) -> Mesh:
+    """A mesh without specks: its largest connected parts, as 2DGS keeps them."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count, (a, b, c) = len(mesh.vertices), mesh.triangles.T
+    edges = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, c])), shape=(count, count))
+    cluster = connected_components(edges, directed=False)[1][a]  # of each triangle
+    sizes = np.bincount(cluster) if len(cluster) else np.zeros(1, int)
+    least = max(np.sort(sizes)[-CLUSTERS:][0], min(LEAST_TRIANGLES, sizes.max()))
+    return compact(mesh, sizes[cluster] >= least)
+
+
+def compact(mesh: Mesh, kept: np.ndarray) -> Mesh:
+    """The triangles that stay [F] bool, and the vertices that they need."""
+    used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
+    return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.int32))
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> Path:
-    """Create or replace a binary PLY file in one step.
+    """Create or replace a binary PLY file in one step; a mesh without colours is grey.
 
     Raises:
         ArgumentError: if the file cannot be written.
     """
     from plyfile import PlyData, PlyElement
 
+    colors = np.full_like(mesh.vertices, 200, dtype=np.uint8) if mesh.colors is None else mesh.colors
     vertices = np.empty(len(mesh.vertices), VERTEX)
-    fill(vertices, torch.from_numpy(mesh.vertices), torch.from_numpy(mesh.colors))
+    fill(vertices, torch.from_numpy(mesh.vertices), torch.from_numpy(colors))
     faces = np.empty(len(mesh.triangles), [("vertex_indices", "<i4", (3,))])
     faces["vertex_indices"] = mesh.triangles
     elements = [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")]
     return write_atomic(path, PlyData(elements, byte_order="<").write)
-
-
-def open3d() -> Any:
-    """The library.
-
-    Raises:
-        ArgumentError: if it is not installed, or the system lacks a library that it needs.
-    """
-    try:
-        import open3d
-    except ImportError as error:
-        raise ArgumentError(
-            f"mesh: needs Open3D, which cannot be loaded ({error}); install the extra texgs[mesh], and on "
-            "Linux the system's libusb-1.0"
-        ) from error
-    return open3d
-
-
-def _integrate(o3d: Any, volume: Any, camera: Camera, render: Render) -> bool:
-    """Add one view to a volume, if it sees a surface."""
-    if render.median is None:
-        raise ArgumentError("show: expected renders with median; ask for it in outputs")
-    opaque = render.alpha > 0.5  # behind what is fainter the last fragment would be taken for a surface
-    if not bool(opaque.any()):
-        return False
-    color = 255 * render.color / render.alpha.clamp_min(1e-6)[..., None]
-
-    def image(values: Tensor) -> Any:
-        return o3d.t.geometry.Image(o3d.core.Tensor(values.contiguous().cpu().numpy()))
-
-    depth, picture = image((render.median * opaque)[..., None]), image(color)
-    K, viewmat = (o3d.core.Tensor(x.double().cpu().numpy()) for x in (camera.K, camera.viewmat))
-    limits = (1.0, FAR, TRUNCATION)  # depth is in world units already
-    blocks = volume.compute_unique_block_coordinates(depth, K, viewmat, *limits)
-    volume.integrate(blocks, depth, picture, K, K, viewmat, *limits)
-    return True

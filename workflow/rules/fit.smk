@@ -11,6 +11,11 @@ rule figures:
         PLAN.done("figure"),
 
 
+rule meshes:
+    input:
+        PLAN.done("mesh"),
+
+
 rule phase:
     input:
         reads("phase"),
@@ -39,5 +44,22 @@ rule figure:
     params:
         code=code("figure"),
         words=words("figure"),
+    shell:
+        RUN
+
+
+rule mesh:
+    input:
+        reads("mesh"),
+    output:
+        writes("mesh"),
+    log:
+        log_of("mesh"),
+    threads: 4
+    resources:
+        gpu=FIT_GPU,
+    params:
+        code=code("mesh"),
+        words=words("mesh"),
     shell:
         RUN

@@ -9,7 +9,7 @@ TABLES = list(tables.TABLES) if "" in PLAN.sweeps else []
 
 rule tables:
     input:
-        PLAN.done("volume", "views", "phase", "pse", "timing", "edit", "edit_metrics"),
+        PLAN.done("volume", "views", "phase", "mesh", "pse", "timing", "edit", "edit_metrics"),
     output:
         collect("<results>/tables/{name}.{format}", name=TABLES, format=("csv", "md", "tex")),
     log:

@@ -1,0 +1,131 @@
+"""How far a mesh is from a surface that is known: Chamfer distance, F-score and angle between normals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.volume.isosurface import Mesh
+
+STEEPEST = 3.0  # slope of a surface that is taken for one
+STEPS = 1 << 20  # of depth per world unit in which points of one pixel are compared
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Places on a surface."""
+
+    places: Tensor  # [N, 3] float64, world units
+    normals: Tensor  # [N, 3] unit length, outwards
+
+    def __getitem__(self, kept: Tensor) -> Points:
+        """Some of them, by a mask [N] or indices."""
+        return Points(self.places[kept], self.normals[kept])
+
+
+@dataclass(frozen=True)
+class SurfaceErrors:
+    """A mesh against a surface."""
+
+    accuracy: float  # mean distance of the mesh from the surface, world units
+    completeness: float  # mean distance of the surface from the mesh
+    precision: float  # share of the mesh that is closer than the tolerance
+    recall: float  # the same of the surface
+    normal_angle: float  # mean angle to the normal of the nearest place, both ways, degrees
+
+    @property
+    def chamfer(self) -> float:
+        """Mean of both distances, world units."""
+        return (self.accuracy + self.completeness) / 2
+
+    @property
+    def f_score(self) -> float:
+        """Harmonic mean of precision and recall, in [0, 1]."""
+        return 2 * self.precision * self.recall / max(self.precision + self.recall, 1e-12)
+
+
+def sample(mesh: Mesh, count: int, seed: int = 0) -> Points:
+    """Random places on a mesh, as many on equal areas.
+
+    Raises:
+        ArgumentError: if it has no area.
+    """
+    a, b, c = mesh.corners.transpose(1, 0, 2)
+    normals = np.cross(b - a, c - a)
+    areas = np.linalg.norm(normals, axis=1)
+    if not areas.sum() > 0:
+        raise ArgumentError("mesh: expected triangles with an area, got none")
+    rng = np.random.default_rng(seed)
+    chosen = rng.choice(len(areas), size=count, p=areas / areas.sum())
+    # Uniform on a triangle: Osada et al. 2002, equation 1.
+    s, t = np.sqrt(rng.random(count))[:, None], rng.random(count)[:, None]
+    places = (1 - s) * a[chosen] + s * (1 - t) * b[chosen] + s * t * c[chosen]
+    return Points(torch.from_numpy(places), torch.from_numpy(normals[chosen] / areas[chosen, None]))
+
+
+def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
+    """Which of many points [N, 3] each pixel of a view shows.
+
+    Returns:
+        [H * W] the nearest point of each pixel, -1 where there is none; [N] the pixel of each point, -1
+        outside of the image; [N] their camera z.
+    """
+    viewmat, K = camera.viewmat.to(points), camera.K.to(points)
+    seen = points @ viewmat[:3, :3].T + viewmat[:3, 3]
+    u, v = ((seen @ K.T)[:, :2] / seen[:, 2:]).floor().long().unbind(1)
+    on_image = (seen[:, 2] > 0) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    pixel = torch.where(on_image, v * camera.width + u, -1)
+    z, index = seen[:, 2], torch.arange(len(points))
+    key = ((z * STEPS).long() << 32) + index
+    first = torch.full((camera.width * camera.height,), torch.iinfo(torch.int64).max)
+    first.scatter_reduce_(0, pixel[on_image], key[on_image], "amin")
+    return torch.where(first < torch.iinfo(torch.int64).max, first & (2**32 - 1), -1), pixel, z
+
+
+def seen(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
+    """Which points [N] bool a camera sees: nothing is nearer in their pixel by more than the tolerance."""
+    is_seen = torch.zeros(len(points.places), dtype=torch.bool)
+    for camera in cameras:
+        first, pixel, z = nearest(points.places, camera)
+        rays = camera.position.to(points.places) - points.places
+        cosine = (rays * points.normals).sum(1) / rays.norm(dim=1)
+        slope = (1 / cosine.square() - 1).clamp_min(0).sqrt().clamp_max(STEEPEST)
+        in_front = z[first[pixel.clamp_min(0)].clamp_min(0)]
+        # A surface that is seen from the side is at several depths in one pixel.
+        margin = tolerance + 1.5 * slope * z / float(camera.K[0, 0])
+        is_seen |= (pixel >= 0) & (cosine > 0) & (z <= in_front + margin)
+    return is_seen
+
+
+def compare(mesh: Points, surface: Points, tolerance: float) -> SurfaceErrors:
+    """Errors of a mesh, by points on it and on the surface that it should be.
+
+    Args:
+        mesh: points of the mesh.
+        surface: points of the surface, of what can be seen of it.
+        tolerance: distance below which a point counts as right, world units.
+    """
+    forth, angles_forth = distances(mesh, surface)
+    back, angles_back = distances(surface, mesh)
+    return SurfaceErrors(
+        float(forth.mean()),
+        float(back.mean()),
+        float((forth < tolerance).double().mean()),
+        float((back < tolerance).double().mean()),
+        float((angles_forth.mean() + angles_back.mean()) / 2),
+    )
+
+
+def distances(points: Points, others: Points) -> tuple[Tensor, Tensor]:
+    """Distance to the nearest of others, world units, and the angle between the normals there, degrees."""
+    from scipy.spatial import cKDTree
+
+    distance, index = cKDTree(others.places.numpy()).query(points.places.numpy(), workers=-1)
+    cosine = (points.normals * others.normals[torch.from_numpy(index)]).sum(1).clamp(-1, 1)
+    return torch.from_numpy(distance), cosine.acos().rad2deg()

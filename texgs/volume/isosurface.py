@@ -1,0 +1,106 @@
+"""Surfaces of scalar fields as triangles, by marching cubes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import Grid, Triple
+from texgs.volume.transfer import TransferFunction
+
+FAR_OUTSIDE = 1000.0  # times the largest value, around a volume: its surface ends at the outermost samples
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles."""
+
+    vertices: np.ndarray  # [V, 3] float32, world units
+    triangles: np.ndarray  # [F, 3] int32, counter-clockwise seen from outside
+    colors: np.ndarray | None = None  # [V, 3] uint8
+
+    @property
+    def corners(self) -> np.ndarray:
+        """Corners of the triangles [F, 3, 3]."""
+        return self.vertices[self.triangles].astype(np.float64)
+
+
+def isosurface(values: np.ndarray, level: float, spacing: Triple, origin: Triple) -> Mesh:
+    """Where values on a lattice cross a level (flying edges, Schroeder et al. 2015); larger ones are inside.
+
+    Args:
+        values: [Z, Y, X], real numbers.
+        level: of the surface.
+        spacing: x, y, z between samples, world units.
+        origin: of the first sample, world units.
+    """
+    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+    from vtkmodules.vtkCommonDataModel import vtkImageData
+    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
+    image = vtkImageData()
+    image.SetDimensions(*values.shape[::-1])
+    image.SetSpacing(*spacing)
+    image.SetOrigin(*origin)
+    image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(values).ravel()))
+    contour: Any = vtkFlyingEdges3D()
+    contour.SetInputData(image)
+    contour.SetValue(0, level)
+    contour.ComputeNormalsOff()
+    contour.ComputeScalarsOff()
+    contour.Update()
+    surface = contour.GetOutput()
+    if not surface.GetNumberOfPolys():
+        return Mesh(np.empty((0, 3), np.float32), np.empty((0, 3), np.int32))
+    corners = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
+    places = vtk_to_numpy(surface.GetPoints().GetData())
+    return Mesh(places.astype(np.float32), corners.astype(np.int32))
+
+
+def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
+    """What a transfer function makes a surface of a volume: where its opacity rises to a value.
+
+    Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
+    box, where what is opaque ends there.
+
+    Args:
+        grid: the volume.
+        tf: in units of the data.
+        opacity: in (0, 1), per opacity unit.
+
+    Raises:
+        ArgumentError: if the function stays below this opacity, or none of the volume reaches it.
+    """
+    least, most = float(grid.values.min()), float(grid.values.max())
+    span = max(most - least, 1e-30)
+    signed = np.full(grid.values.shape, -span, np.float32)  # above 0 in what is opaque
+    for low, high in opaque_ranges(tf, opacity):
+        # A range that holds the largest values does not end there, nor does one with the smallest begin.
+        above = grid.values - np.float32(low) if low > least else span
+        below = np.float32(high) - grid.values if high < most else span
+        signed = np.maximum(signed, np.minimum(above, below))
+    if not (signed > 0).any():
+        raise ArgumentError(
+            f"mesh.opacity: expected a transfer function that is as opaque as {opacity:g} somewhere in the "
+            "volume, got one that lets more light through; choose another basic TF"
+        )
+    # In a shell of samples so low that the surface ends at the outermost of the volume.
+    shelled = np.pad(signed, 1, constant_values=-FAR_OUTSIDE * span)
+    x, y, z = (grid.scale * step for step in grid.spacing)
+    left, bottom, back = grid.aabb[0]
+    return isosurface(shelled, 0.0, (x, y, z), (left - x, bottom - y, back - z))
+
+
+def opaque_ranges(tf: TransferFunction, opacity: float) -> list[tuple[float, float]]:
+    """Ranges of values in which a transfer function is as opaque as that."""
+    points = [(tf.opacity[0][0], 0.0), *tf.opacity, (tf.opacity[-1][0], 0.0)]
+    crossed = [
+        low + (high - low) * (opacity - before) / (after - before)
+        for (low, before), (high, after) in pairwise(points)
+        if (before < opacity) != (after < opacity)
+    ]
+    return list(zip(crossed[::2], crossed[1::2], strict=True))
