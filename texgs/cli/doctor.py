@@ -21,8 +21,8 @@ def examine(probe: Callable[[], Finding]) -> Finding:
     try:
         return probe()
     except Exception as error:
-        found = f"the probe failed with {type(error).__name__}: {error}"
-        return Finding(probe.__name__, "missing", found, "install texgs again", is_required=True)
+        trouble = f"the probe failed with {type(error).__name__}: {error}"
+        return Finding(probe.__name__, "missing", trouble, "install texgs again", is_required=True)
 
 
 def show(findings: Iterable[Finding]) -> int:

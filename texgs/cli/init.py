@@ -55,9 +55,9 @@ def run(arguments: argparse.Namespace) -> int:
         return 0
     if folder.exists() and not folder.is_dir():
         raise ArgumentError(f"{folder}: expected a new or empty folder, got a file; choose another name")
-    if folder.is_dir() and (found := sorted(path.name for path in folder.iterdir())):
+    if folder.is_dir() and (names := sorted(path.name for path in folder.iterdir())):
         raise ArgumentError(
-            f"{folder}: expected a new or empty folder, got one with {', '.join(found[:3])}; choose another"
+            f"{folder}: expected a new or empty folder, got one with {', '.join(names[:3])}; choose another"
         )
     for name, text in FILES.items():
         write_bytes(folder / name, text.encode())

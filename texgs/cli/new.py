@@ -115,8 +115,8 @@ def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -
     summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     low, high = summary["minimum"], summary["maximum"]
     if not files:
-        found = suggest(np.array(summary["histogram"]), low, high, count)
-        return {name: rounded(tf, low, high) for name, tf in found.items()}
+        suggested = suggest(np.array(summary["histogram"]), low, high, count)
+        return {name: rounded(tf, low, high) for name, tf in suggested.items()}
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
     check_disjoint(basic)
     for path, tf in zip(files, basic.values(), strict=True):

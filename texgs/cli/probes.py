@@ -26,10 +26,10 @@ class Finding:
 
 def python() -> Finding:
     """Whether this Python is one texgs is tested with."""
-    found = f"{platform.python_version()} on {platform.machine()} {platform.system()}"
+    python = f"{platform.python_version()} on {platform.machine()} {platform.system()}"
     if (3, 11) <= sys.version_info[:2] <= (3, 13):
-        return Finding("Python", "ok", found)
-    return Finding("Python", "missing", found, "install Python 3.11 to 3.13", is_required=True)
+        return Finding("Python", "ok", python)
+    return Finding("Python", "missing", python, "install Python 3.11 to 3.13", is_required=True)
 
 
 def packages() -> Finding:
@@ -44,12 +44,12 @@ def packages() -> Finding:
         if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
             continue
         try:
-            found = metadata.version(wanted.name)
+            installed = metadata.version(wanted.name)
         except metadata.PackageNotFoundError:
             lacking.append(f"no {wanted.name}")
             continue
-        if not wanted.specifier.contains(found, prereleases=True):
-            lacking.append(f"{wanted.name} {found}, expected {wanted.specifier}")
+        if not wanted.specifier.contains(installed, prereleases=True):
+            lacking.append(f"{wanted.name} {installed}, expected {wanted.specifier}")
     if lacking:
         return Finding("packages", "missing", ", ".join(lacking), "install texgs again", is_required=True)
     return Finding("packages", "ok", "all that texgs asks for")
@@ -77,7 +77,7 @@ def configuration() -> Finding:
 def compiler() -> Finding:
     """The C++ compiler: needed to build from source only."""
     candidates = [os.environ.get("CXX", ""), "c++", "g++", "clang++", "cl"]
-    path = next((found for name in candidates if name and (found := shutil.which(name))), None)
+    path = next((path for name in candidates if name and (path := shutil.which(name))), None)
     if path is None:
         advice = "install g++ 11, clang++ 14 or Visual Studio 2022 to build texgs from source"
         return Finding("C++ compiler", "warning", "not found", advice)
@@ -89,13 +89,13 @@ def native() -> Finding:
     try:
         from texgs.raster import native
 
-        found = f"{native.instruction_set()}, {native.library_path()}"
+        library = f"{native.instruction_set()}, {native.library_path()}"
     except ImportError as error:
         return Finding("native library", "missing", _sentence(error), "see torch below", is_required=True)
     except TexgsError as error:
         what, _, advice = str(error).partition("; ")
         return Finding("native library", "missing", what, advice, is_required=True)
-    return Finding("native library", "ok", found)
+    return Finding("native library", "ok", library)
 
 
 def threads() -> Finding:
@@ -107,10 +107,10 @@ def threads() -> Finding:
         used = native.threads()
     except (ImportError, TexgsError) as error:
         return Finding("threads", "warning", f"unknown, {_sentence(error)}")
-    found = f"{used} of {available} processors"
+    share = f"{used} of {available} processors"
     if used < available:
-        return Finding("threads", "warning", found, "set OMP_NUM_THREADS or torch.set_num_threads to use all")
-    return Finding("threads", "ok", found)
+        return Finding("threads", "warning", share, "set OMP_NUM_THREADS or torch.set_num_threads to use all")
+    return Finding("threads", "ok", share)
 
 
 def torch() -> Finding:
@@ -149,8 +149,8 @@ def opengl() -> Finding:
     try:
         return Finding("offscreen OpenGL", "ok", offscreen_opengl())
     except TexgsError as error:
-        found, _, advice = str(error).removeprefix("offscreen OpenGL: ").partition("; ")
-        return Finding("offscreen OpenGL", "missing", found, f"only for views.mapper=gpu: {advice}")
+        trouble, _, advice = str(error).removeprefix("offscreen OpenGL: ").partition("; ")
+        return Finding("offscreen OpenGL", "missing", trouble, f"only for views.mapper=gpu: {advice}")
 
 
 def cache() -> Finding:
@@ -180,8 +180,8 @@ def weights() -> Finding:
     where = f"optional: `texgs weights NAME`, or put them into {weights_folder()}, or set TEXGS_WEIGHTS"
     if not there:
         return Finding("weights", "missing", f"none of {', '.join(lacking)}", where)
-    found = f"{', '.join(there)}" + (f"; not {', '.join(lacking)}" if lacking else "")
-    return Finding("weights", "ok", found, where if lacking else "")
+    state = f"{', '.join(there)}" + (f"; not {', '.join(lacking)}" if lacking else "")
+    return Finding("weights", "ok", state, where if lacking else "")
 
 
 def _sentence(error: BaseException) -> str:

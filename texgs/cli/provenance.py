@@ -77,13 +77,13 @@ def seed(settings: Mapping[str, Any]) -> int | None:
 
 def versions() -> dict[str, str]:
     """Versions of Python, texgs and what results depend on most."""
-    found = {"python": platform.python_version(), "texgs": __version__}
+    versions = {"python": platform.python_version(), "texgs": __version__}
     for package in PACKAGES:
         try:
-            found[package] = version(package)
+            versions[package] = version(package)
         except PackageNotFoundError:
             continue
-    return found
+    return versions
 
 
 def machine() -> dict[str, Any]:
@@ -91,16 +91,16 @@ def machine() -> dict[str, Any]:
 
     Of torch and numpy only what the job has loaded.
     """
-    found: dict[str, Any] = {"system": platform.platform(), "cores": os.cpu_count()}
+    facts: dict[str, Any] = {"system": platform.platform(), "cores": os.cpu_count()}
     if torch := sys.modules.get("torch"):
-        found |= {"threads": torch.get_num_threads(), "torch_cpu": torch.backends.cpu.get_cpu_capability()}
-        found["torch_blas"] = setting(torch.__config__.show(), "BLAS_INFO")
+        facts |= {"threads": torch.get_num_threads(), "torch_cpu": torch.backends.cpu.get_cpu_capability()}
+        facts["torch_blas"] = setting(torch.__config__.show(), "BLAS_INFO")
     if numpy := sys.modules.get("numpy"):
-        found["numpy_blas"] = numpy.show_config(mode="dicts")["Build Dependencies"]["blas"].get("name")
+        facts["numpy_blas"] = numpy.show_config(mode="dicts")["Build Dependencies"]["blas"].get("name")
     native = sys.modules.get("texgs.raster.native")
     if native and native.library_path().exists():
-        found["texgs_cpu"] = native.instruction_set()
-    return found
+        facts["texgs_cpu"] = native.instruction_set()
+    return facts
 
 
 def setting(text: str, name: str) -> str | None:

@@ -143,8 +143,8 @@ def check_value(entry: Key, name: str, value: Any) -> None:
         ConfigError: naming the key, and the file where the value is from one.
     """
     if entry.choices and value not in entry.choices:
-        found = f"{', '.join(entry.choices)}, got {shortened(value)}{close(value, entry.choices)}"
-        raise ConfigError(f"{origin(name, value)}{name}: expected one of {found}")
+        choices = f"{', '.join(entry.choices)}, got {shortened(value)}{close(value, entry.choices)}"
+        raise ConfigError(f"{origin(name, value)}{name}: expected one of {choices}")
     for number in numbers(value):
         if expected := entry.bounds.complaint(number):
             raise ConfigError(f"{origin(name, number)}{name}: expected {expected}, got {shortened(number)}")

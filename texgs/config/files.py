@@ -53,8 +53,8 @@ def slip(path: Path) -> str | None:
     try:
         text = data.decode()
         root = yaml.compose(text, yaml.SafeLoader)
-        if found := misfit(root, package(path)):
-            return f"{shown(path)}:{found}"
+        if fault := misfit(root, package(path)):
+            return f"{shown(path)}:{fault}"
         OmegaConf.create(text)
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
@@ -124,8 +124,8 @@ def misfit(node: yaml.Node | None, parts: list[str]) -> str | None:
     if not isinstance(node, expected):
         name = ".".join(parts) or "configuration"
         return f"{node.start_mark.line + 1}: {name}: expected {KINDS[expected]}, got {KINDS[type(node)]}"
-    found = (misfit(value, [*parts, key]) for key, value in children(node) if key != "defaults")
-    return next((text for text in found if text), None)
+    faults = (misfit(value, [*parts, key]) for key, value in children(node) if key != "defaults")
+    return next((text for text in faults if text), None)
 
 
 def expected_kind(parts: list[str]) -> type[yaml.Node] | None:

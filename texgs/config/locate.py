@@ -83,9 +83,9 @@ def basic_tf(config: DictConfig) -> DictConfig:
     """
     known = config.dataset.basic_tfs
     if config.tf not in known:
-        found = ", ".join(known) or "none"
+        names = ", ".join(known) or "none"
         raise ConfigError(
-            f"tf: expected a basic TF of data set {config.dataset.name} ({found}), got {config.tf}"
+            f"tf: expected a basic TF of data set {config.dataset.name} ({names}), got {config.tf}"
         )
     return known[config.tf]
 

@@ -25,11 +25,11 @@ def folders() -> tuple[Path, ...]:
 
 def members(group: str) -> list[str]:
     """Names of the files of a group, such as all data sets."""
-    found = (path for folder in folders() for path in (folder / group).glob("*.yaml"))
-    return sorted({path.stem for path in found if path.is_file()})
+    files = (path for folder in folders() for path in (folder / group).glob("*.yaml"))
+    return sorted({path.stem for path in files if path.is_file()})
 
 
 def groups() -> str:
     """The groups of conf/ with their members, a line each."""
-    found = {path.name for folder in folders() for path in folder.iterdir() if path.is_dir()}
-    return "\n".join(f"  {name}={'|'.join(members(name))}" for name in sorted(found) if members(name))
+    names = {path.name for folder in folders() for path in folder.iterdir() if path.is_dir()}
+    return "\n".join(f"  {name}={'|'.join(members(name))}" for name in sorted(names) if members(name))

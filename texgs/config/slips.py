@@ -17,9 +17,9 @@ def sentence(error: Exception) -> str:
     """What is wrong, from an exception of Hydra, OmegaConf or PyYAML."""
     if isinstance(error, MissingConfigException) and error.missing_cfg_file:
         group, _, name = error.missing_cfg_file.partition("/")
-        found = members(group)
-        hint = close(name, found) or ("; an address goes to tracking.uri" if group == "tracking" else "")
-        return f"{place(file_of(error), '')}{group}: expected one of {', '.join(found)}, got {name}{hint}"
+        known = members(group)
+        hint = close(name, known) or ("; an address goes to tracking.uri" if group == "tracking" else "")
+        return f"{place(file_of(error), '')}{group}: expected one of {', '.join(known)}, got {name}{hint}"
     if isinstance(error, OverrideParseException):
         return (
             f"{shortened(error.override)}: expected key=value, with quotes around a value that has commas, "
@@ -59,8 +59,8 @@ def no_such_key(name: str) -> str:
 
 def close(word: str, known: list[str] | tuple[str, ...]) -> str:
     """A hint at the known word that is most like the given one."""
-    found = difflib.get_close_matches(str(word), known, n=1, cutoff=0.6)
-    return f", did you mean {found[0]}?" if found else ""
+    similar = difflib.get_close_matches(str(word), known, n=1, cutoff=0.6)
+    return f", did you mean {similar[0]}?" if similar else ""
 
 
 def file_of(error: Exception) -> Path | None:
@@ -69,7 +69,7 @@ def file_of(error: Exception) -> Path | None:
         mark = getattr(error, "problem_mark", None)
         return Path(mark.name if mark else getattr(error, "name", ""))
     if named := re.search(r"\b[Ii]n '([^']+)'", str(error)):
-        found = (folder / f"{named[1]}.yaml" for folder in folders() if named[1] != "config")
-        return next((path for path in found if path.is_file()), None)
+        candidates = (folder / f"{named[1]}.yaml" for folder in folders() if named[1] != "config")
+        return next((path for path in candidates if path.is_file()), None)
     is_told = str(error) and (full_key(error) or isinstance(error, HydraException | OmegaConfBaseException))
     return None if is_told else next((path for path in files() if slip(path)), None)

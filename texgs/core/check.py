@@ -77,8 +77,8 @@ def floating(name: str, tensor: Tensor) -> None:
         ArgumentError: naming the dtype found.
     """
     if tensor.dtype != torch.float32:
-        found = str(tensor.dtype).removeprefix("torch.")
-        raise ArgumentError(f"{name}: expected float32, got {found}; convert it with .float()")
+        dtype = str(tensor.dtype).removeprefix("torch.")
+        raise ArgumentError(f"{name}: expected float32, got {dtype}; convert it with .float()")
 
 
 def same_device(**tensors: Tensor | None) -> torch.device:

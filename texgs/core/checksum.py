@@ -71,10 +71,10 @@ class Checksums:
         known = self._known.get(key)
         if isinstance(known, list) and known[:2] == state and len(known) == 3:
             return str(known[2])
-        found = sha256(path)
-        self._known[key] = [*state, found]
+        digest = sha256(path)
+        self._known[key] = [*state, digest]
         self._is_new = True
-        return found
+        return digest
 
     def forget(self, path: Path) -> None:
         """Compute the checksum of a file anew the next time."""

@@ -27,9 +27,9 @@ def peak_memory() -> int:
     Linux tells it for the program that runs; elsewhere the peak may be that of the process that started it.
     """
     if STATUS.exists():
-        found = re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())
-        if found:
-            return 1024 * int(found[1])
+        peak = re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())
+        if peak:
+            return 1024 * int(peak[1])
     import resource  # not on Windows
 
     unit = 1 if sys.platform == "darwin" else 1024
@@ -52,11 +52,11 @@ def free_memory() -> int:
     if sys.platform == "linux":
         import resource
 
-        found = dict(re.findall(r"(VmSize|VmData):\s+(\d+) kB", STATUS.read_text()))
+        used_by_kind = dict(re.findall(r"(VmSize|VmData):\s+(\d+) kB", STATUS.read_text()))
         for kind, name in ((resource.RLIMIT_AS, "VmSize"), (resource.RLIMIT_DATA, "VmData")):
             limit = resource.getrlimit(kind)[0]
             if limit != resource.RLIM_INFINITY:
-                limits.append(limit - 1024 * int(found[name]))
+                limits.append(limit - 1024 * int(used_by_kind[name]))
     return max(0, min(limits))
 
 

@@ -26,8 +26,8 @@ def read_vertices(path: str | Path) -> np.ndarray:
         _check_counts(path)
         data = PlyData.read(path)
         if "vertex" not in data:
-            found = ", ".join(element.name for element in data) or "nothing"
-            raise ArgumentError(f"{path}: expected vertices, got {found}")
+            elements = ", ".join(element.name for element in data) or "nothing"
+            raise ArgumentError(f"{path}: expected vertices, got {elements}")
         vertices: np.ndarray = data["vertex"].data
         return vertices
 

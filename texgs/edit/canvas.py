@@ -57,9 +57,9 @@ def paint(
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
     features = None if chosen is None else chosen.to(texels)[:, None]  # blended, they are the share
-    found = splatted(model, part, opacity, texture=texture, features=features)
-    color = found.color.permute(2, 0, 1)
-    return Canvas(color[:3], found.alpha, None if chosen is None else color[3].detach())
+    render = splatted(model, part, opacity, texture=texture, features=features)
+    color = render.color.permute(2, 0, 1)
+    return Canvas(color[:3], render.alpha, None if chosen is None else color[3].detach())
 
 
 def around(model: Surfels, camera: Camera) -> Camera:
@@ -96,10 +96,10 @@ def visible_part(alpha: Tensor) -> tuple[slice, slice]:
 
 def extent(seen: Tensor) -> slice:
     """Where a row [n] has anything, widened to a multiple of pixels as far as there are any."""
-    found = seen.nonzero()[:, 0]
-    if not len(found):
+    used = seen.nonzero()[:, 0]
+    if not len(used):
         return slice(0, min(MULTIPLE, len(seen)))
-    start = max(0, int(found[0]) - MARGIN)
-    size = int(found[-1]) + 1 + MARGIN - start
+    start = max(0, int(used[0]) - MARGIN)
+    size = int(used[-1]) + 1 + MARGIN - start
     stop = min(len(seen), start + -(-size // MULTIPLE) * MULTIPLE)
     return slice(start, stop)

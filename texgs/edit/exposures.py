@@ -89,7 +89,7 @@ def expose(
     own = geometry(model.parameters)
     changing = torch.ones_like(own[3]) if surfels is None else surfels.to(own[3])
     straight = [straight_colors(image, alpha) for image, alpha in zip(edited, views.alphas, strict=True)]
-    found = []
+    rows = []
     for factor in opacities:
         scaled = (own[3] * factor).clamp_max(1)
         row = []
@@ -97,8 +97,8 @@ def expose(
             highlight, gain = light_on(model, camera, light)
             lit = (highlight * changing[:, None], gain * changing)
             row.append(_exposure(own[:3], scaled, lit, changing, camera, color, model.shading.options))
-        found.append(row)
-    return found
+        rows.append(row)
+    return rows
 
 
 @torch.no_grad()

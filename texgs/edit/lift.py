@@ -116,11 +116,11 @@ class ViewMasks:
         image = self.model.render(cut, self.light).color.clamp(0, 1)
         moved = clicks.points.to(image) - image.new_tensor(box[:2])
         inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
-        found = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
+        mask = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
         if bool(clicks.positive[inside].any()):
             part = self.masks(image, moved[inside], clicks.positive[inside])
-            found[box.top : box.bottom, box.left : box.right] = part
-        return found
+            mask[box.top : box.bottom, box.left : box.right] = part
+        return mask
 
 
 def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:

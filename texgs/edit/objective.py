@@ -60,13 +60,12 @@ class Objective:
         if recipe.needs_vgg and vgg is not None:
             small = style.scaled(max(style.region.shape) / reduce)
             with torch.no_grad():
-                found = vgg.features(small.image)
+                maps = vgg.features(small.image)
             region = (
-                F.interpolate(small.region[None, None].float(), found.shape[1:], mode="area")[0, 0]
-                > ON_OBJECT
+                F.interpolate(small.region[None, None].float(), maps.shape[1:], mode="area")[0, 0] > ON_OBJECT
             )
             features = StyleFeatures.of(
-                found,
+                maps,
                 region if bool(region.any()) else None,
                 recipe.positions,
                 recipe.dimensions,
@@ -84,21 +83,21 @@ class Objective:
             share: [h, w] how much of each pixel is to look like the style.
             iteration: chooses the directions and the draw of patches.
         """
-        recipe, found = self.recipe, {}
+        recipe, terms = self.recipe, {}
         if self.style is not None and self.vgg is not None:
             small = F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
             features = self.vgg.features(small)
             where = pooled(share, self.reduce * STRIDE, features.shape[1:]) if recipe.foreground else None
             distance = nnfm(features, self.style, where, recipe.queries, iteration)
-            found["nnfm"] = recipe.features * recipe.lambda_s * distance
+            terms["nnfm"] = recipe.features * recipe.lambda_s * distance
         if recipe.needs_clip and self.clip is not None:
-            found["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
+            terms["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
         if self.patches is not None:
             where = (share > ON_OBJECT) if recipe.foreground else None
-            found["patches"] = recipe.patches * sliced_wasserstein(
+            terms["patches"] = recipe.patches * sliced_wasserstein(
                 image, self.patches, where, iteration, iteration
             )
-        return found
+        return terms
 
 
 def pooled(share: Tensor, side: int, size: torch.Size) -> Tensor:

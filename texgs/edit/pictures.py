@@ -75,10 +75,10 @@ def stroke(
 
 def paths(points: np.ndarray, centres: np.ndarray) -> np.ndarray:
     """Ways [S, 10, 2] that follow the flow from points [S, 2]."""
-    found = [points]
+    places = [points]
     for _ in range(9):
-        found.append(found[-1] + 0.011 * flow(found[-1], centres))
-    return np.stack(found, axis=1)
+        places.append(places[-1] + 0.011 * flow(places[-1], centres))
+    return np.stack(places, axis=1)
 
 
 def flow(points: np.ndarray, centres: np.ndarray) -> np.ndarray:

@@ -38,6 +38,6 @@ def pieces_at(model: Surfels, mask: Tensor, places: Tensor) -> Tensor:
     _, piece = connected_components(coo_array(edges, shape=(count, count)), directed=False)
     _, nearest = tree.query(places.detach().cpu().numpy())
     kept = torch.from_numpy(np.isin(piece, piece[nearest])).to(mask.device)
-    found = torch.zeros_like(mask)
-    found[chosen[kept]] = True
-    return found
+    largest = torch.zeros_like(mask)
+    largest[chosen[kept]] = True
+    return largest

@@ -53,30 +53,30 @@ class PatchStatistics:
             inside = mask if bool((mask > 0.5).any()) else torch.ones_like(mask)
             values = filters @ patches(image, centres(inside, STYLE_MOST, generator)).T
             order = ranking(values)
-            found = at_quantiles(values.gather(1, order), QUANTILES)
-            quantiles.append(found.unflatten(0, (BANKS, FILTERS)))
+            targets = at_quantiles(values.gather(1, order), QUANTILES)
+            quantiles.append(targets.unflatten(0, (BANKS, FILTERS)))
         return cls(filters.unflatten(0, (BANKS, FILTERS)), tuple(quantiles))
 
 
 def pyramid(image: Tensor, where: Tensor) -> list[tuple[Tensor, Tensor]]:
     """The image [3, h, w] and what counts of its patches' centres [h - 6, w - 6], at each level."""
-    found, margin = [], SIDE // 2
+    scales, margin = [], SIDE // 2
     for level in range(LEVELS):
         if level:
             image, where = (F.avg_pool2d(x[None], 2)[0] for x in (image, where[None]))
             where = where[0]
         if min(image.shape[1:]) < SIDE:
             break
-        found.append((image, where[margin:-margin, margin:-margin]))
-    return found
+        scales.append((image, where[margin:-margin, margin:-margin]))
+    return scales
 
 
 def centres(where: Tensor, most: int, generator: torch.Generator) -> Tensor:
     """Rows and columns [n, 2] at which a mask [h, w] is above 1/2; `most` of them, drawn at random."""
-    found = (where > 0.5).nonzero()
-    if len(found) > most:
-        found = found[torch.randperm(len(found), generator=generator)[:most].to(found.device)]
-    return found
+    places = (where > 0.5).nonzero()
+    if len(places) > most:
+        places = places[torch.randperm(len(places), generator=generator)[:most].to(places.device)]
+    return places
 
 
 def patches(image: Tensor, corners: Tensor) -> Tensor:

@@ -88,10 +88,10 @@ def stylize(
 def _order(views: int, recipe: Recipe) -> list[int]:
     """Views in random order, all of them once before any again."""
     generator = torch.Generator().manual_seed(recipe.seed)
-    found: list[int] = []
-    while len(found) < recipe.iterations:
-        found += torch.randperm(views, generator=generator).tolist()
-    return found[: recipe.iterations]
+    order: list[int] = []
+    while len(order) < recipe.iterations:
+        order += torch.randperm(views, generator=generator).tolist()
+    return order[: recipe.iterations]
 
 
 def _check(

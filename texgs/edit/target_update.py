@@ -147,17 +147,17 @@ class _Targets:
     @property
     def views(self) -> EditViews:
         """What was edited, in the order of views."""
-        found = [self.latest[index][:2] for index in sorted(self.latest)]
+        newest = [self.latest[index][:2] for index in sorted(self.latest)]
         tensors = {
-            name: torch.stack([getattr(views, name)[place] for views, place in found])
+            name: torch.stack([getattr(views, name)[place] for views, place in newest])
             for name in ("images", "conditions", "alphas", "points", "normals")
         }
-        return EditViews(**tensors, cameras=[views.cameras[place] for views, place in found])
+        return EditViews(**tensors, cameras=[views.cameras[place] for views, place in newest])
 
     @property
     def rows(self) -> list[list[Exposure]]:
         """For each opacity the exposures of all views with an edit."""
-        return [[found[k] for found in self.exposures.values()] for k in range(self.opacities)]
+        return [[each[k] for each in self.exposures.values()] for k in range(self.opacities)]
 
 
 def changing_texels(model: Surfels, surfels: Tensor) -> Tensor:

@@ -70,7 +70,7 @@ def sample(picture: Tensor, points: Tensor) -> Tensor:
     size = points.new_tensor(picture.shape[:0:-1])  # width and height
     planes = torch.stack([torch.stack(pair, 1) for pair in ((z, -y), (x, z), (x, -y))])  # [3, n, 2]
     grid = planes * 2 / size
-    found = F.grid_sample(
+    sampled = F.grid_sample(
         picture.expand(3, -1, -1, -1), grid[:, None], padding_mode="reflection", align_corners=False
     )
-    return found[:, :, 0].transpose(1, 2)
+    return sampled[:, :, 0].transpose(1, 2)

@@ -43,13 +43,13 @@ def color(name: str, value: object) -> tuple[float, float, float]:
     Raises:
         ArgumentError: naming the value.
     """
-    found: object = value
+    channels: object = value
     if isinstance(value, str) and len(value) == 7 and value[0] == "#":
         try:
-            found = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+            channels = [int(value[i : i + 2], 16) / 255 for i in (1, 3, 5)]
         except ValueError:
-            found = value
-    numbers = found if isinstance(found, list | tuple) else ()
+            channels = value
+    numbers = channels if isinstance(channels, list | tuple) else ()
     if len(numbers) != 3 or not all(is_number(x) and 0 <= x <= 1 for x in numbers):
         raise ArgumentError(f"{name}: expected three numbers from 0 to 1 or #rrggbb, got {value!r}")
     red, green, blue = (float(x) for x in numbers)

@@ -30,16 +30,16 @@ def hull_points(images: Images, box: Box, count: int, generator: torch.Generator
     Raises:
         ArgumentError: if no point is in the hull: the views show nothing, or their cameras are wrong.
     """
-    found: list[Tensor] = []
+    inside: list[Tensor] = []
     for _ in range(ROUNDS):
         points = random_points(box, TRIED, generator)
         for index, camera in enumerate(images.cameras):
             points = points[is_covered(images.planes[index, 3], camera, points)]
-        found.append(points)
-        if sum(map(len, found)) >= count:
+        inside.append(points)
+        if sum(map(len, inside)) >= count:
             break
-    if any(map(len, found)):
-        return torch.cat(found)[:count]
+    if any(map(len, inside)):
+        return torch.cat(inside)[:count]
     raise ArgumentError(
         f"visual hull: expected points that every view shows, found none between {box[0].tolist()} and "
         f"{box[1].tolist()}; do the views show anything there, and do their cameras agree?"

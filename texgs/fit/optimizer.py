@@ -81,11 +81,11 @@ class Optimizer:
 
     def state(self) -> dict[str, Tensor]:
         """All parameters and moments, for a checkpoint."""
-        found = {name: x.detach() for name, x in self.parameters.items()}
+        state = {name: x.detach() for name, x in self.parameters.items()}
         for group in self._adam.param_groups:
             for key, value in self._adam.state.get(group["params"][0], {}).items():
-                found[f"adam.{group['name']}.{key}"] = value
-        return found
+                state[f"adam.{group['name']}.{key}"] = value
+        return state
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
         """Go on from `state`, wherever it was kept."""

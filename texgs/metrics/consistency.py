@@ -134,7 +134,7 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
     pixels, z = reprojected(target, source.camera)
     height, width = source.depth.shape
     x, y = (pixels - 0.5).unbind(-1)
-    found = remap(source.image.permute(2, 0, 1)[None], x[None], y[None], align_corners=True)
+    warped = remap(source.image.permute(2, 0, 1)[None], x[None], y[None], align_corners=True)
     inside = ((pixels >= 0.5) & (pixels <= pixels.new_tensor([width - 0.5, height - 0.5]))).all(-1)
     same = (target.alpha >= OPAQUE) & inside & (z > 0)
     column, row = (at.nan_to_num(0, 0, 0).floor().long() for at in (x, y))
@@ -142,7 +142,7 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
         for right in (column, column + 1):
             at = (down.clamp(0, height - 1), right.clamp(0, width - 1))
             same &= (source.alpha[at] >= OPAQUE) & ((source.depth[at] - z).abs() <= tolerance * z)
-    return found[0].permute(1, 2, 0), same
+    return warped[0].permute(1, 2, 0), same
 
 
 def reprojected(frame: SeenFrame, camera: Camera) -> tuple[Tensor, Tensor]:

@@ -26,16 +26,16 @@ def evaluate(
         reduce: of the images, as in `images.load`.
         title: of the progress bar.
     """
-    found: dict[str, list[float]] = {"psnr": [], "ssim": []}
+    measured: dict[str, list[float]] = {"psnr": [], "ssim": []}
     device = model.device
     for view in progress(views, title=title, unit="view"):
         target = over_white(view, reduce)[:3].permute(1, 2, 0).to(device)
         image = model.render(smaller(view.camera, reduce).to(device), view.light).color
-        found["psnr"].append(psnr(image, target))
-        found["ssim"].append(ssim(image, target))
-    return found
+        measured["psnr"].append(psnr(image, target))
+        measured["ssim"].append(ssim(image, target))
+    return measured
 
 
-def mean(found: dict[str, list[float]]) -> dict[str, float]:
+def mean(measured: dict[str, list[float]]) -> dict[str, float]:
     """Mean of each metric over the views."""
-    return {name: fmean(values) for name, values in found.items() if values}
+    return {name: fmean(values) for name, values in measured.items() if values}

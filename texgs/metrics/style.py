@@ -53,12 +53,12 @@ def likeness(
     """
     device = model.device
     style = style.to(device)
-    found = vgg.features(style)
+    maps = vgg.features(style)
     part = None
     if region is not None:
-        part = F.interpolate(region[None, None].float(), found.shape[1:], mode="area")[0, 0].to(device) > 0.5
-    features = StyleFeatures.of(found, part)
-    target = gram(found if part is None else found[:, part])
+        part = F.interpolate(region[None, None].float(), maps.shape[1:], mode="area")[0, 0].to(device) > 0.5
+    features = StyleFeatures.of(maps, part)
+    target = gram(maps if part is None else maps[:, part])
     distances, grams, colors = [], [], []
     for camera, light in progress(
         list(zip(cameras, lights, strict=True)), len(cameras), title=title, unit="view"

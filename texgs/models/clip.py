@@ -103,5 +103,5 @@ class Clip:
 
 def _unit(features: Any) -> Tensor:
     """Features [B, D] of unit length; newer versions of transformers wrap them."""
-    found: Tensor = features if isinstance(features, Tensor) else features.pooler_output
-    return F.normalize(found, dim=-1)
+    pooled: Tensor = features if isinstance(features, Tensor) else features.pooler_output
+    return F.normalize(pooled, dim=-1)

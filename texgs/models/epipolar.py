@@ -122,13 +122,13 @@ class Consistency:
                 return torch.cat([branches([index]) for index in range(count)], dim=1)
             self.key_ids = sorted(torch.randperm(count, generator=generator)[: self.keys].tolist())
             self.role, self.stored = "key", {}
-            found = dict(zip(self.key_ids, branches(self.key_ids).unbind(dim=1), strict=True))
+            by_view = dict(zip(self.key_ids, branches(self.key_ids).unbind(dim=1), strict=True))
             self.role = "view"
             for index in range(count):
-                if index not in found:
+                if index not in by_view:
                     self.view, self.nearest = index, self._nearest_key(index)
-                    found[index] = branches([index])[:, 0]
-            return torch.stack([found[index] for index in range(count)], dim=1)
+                    by_view[index] = branches([index])[:, 0]
+            return torch.stack([by_view[index] for index in range(count)], dim=1)
         finally:
             self.role, self.stored = "alone", {}
 

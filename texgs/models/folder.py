@@ -33,9 +33,9 @@ def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[A
         ) from error
     folder = Path(folder)
     settings = read_json(folder / "config.json")
-    found = settings.get("model_type") if isinstance(settings, dict) else None
-    if found != kind:
-        raise ArgumentError(f"{folder}: expected a model of type {kind}, got {found}")
+    model_type = settings.get("model_type") if isinstance(settings, dict) else None
+    if model_type != kind:
+        raise ArgumentError(f"{folder}: expected a model of type {kind}, got {model_type}")
     with reading_as(f"a {kind} model of transformers", "copy or download it again", f"{folder}: "):
         read = [getattr(transformers, name).from_pretrained(folder, local_files_only=True) for name in names]
     for part in read:

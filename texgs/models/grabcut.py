@@ -46,8 +46,8 @@ class GrabCut:
         pixels = planes[0].clamp(0, 1).mul(255).round().to(torch.uint8).permute(1, 2, 0).contiguous().numpy()
         shrink = points.new_tensor([width / shape[1], height / shape[0]])
         places = np.floor((points * shrink).cpu().numpy()).astype(int).clip(0, (width - 1, height - 1))
-        found = cut(cv2, pixels, places, positive.cpu().numpy())
-        mask = torch.from_numpy(found).float()[None, None]
+        foreground = cut(cv2, pixels, places, positive.cpu().numpy())
+        mask = torch.from_numpy(foreground).float()[None, None]
         return (F.interpolate(mask, shape, mode="bilinear")[0, 0] > 0.5).to(image.device)
 
 
@@ -107,8 +107,8 @@ def connected(cv2: Any, mask: np.ndarray, places: np.ndarray) -> np.ndarray:
 def flooded(cv2: Any, pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
     """Pixels [H, W] bool connected to a place whose channels differ from it by at most so much."""
     height, width = pixels.shape[:2]
-    found = np.zeros((height + 2, width + 2), dtype=np.uint8)
+    filled = np.zeros((height + 2, width + 2), dtype=np.uint8)
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | (1 << 8)
     x, y = (int(value) for value in place)
-    cv2.floodFill(pixels.copy(), found, (x, y), 0, (most,) * 3, (most,) * 3, flags)
-    return found[1:-1, 1:-1] > 0
+    cv2.floodFill(pixels.copy(), filled, (x, y), 0, (most,) * 3, (most,) * 3, flags)
+    return filled[1:-1, 1:-1] > 0

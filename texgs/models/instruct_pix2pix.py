@@ -142,11 +142,11 @@ class InstructPix2Pix:
             generator: to sample and scale them, as they are denoised; without one the mode, not scaled, as
                 conditions enter.
         """
-        found = self.vae.encode((2 * images - 1).to(self.vae.device, self.vae.dtype)).latent_dist
+        latents = self.vae.encode((2 * images - 1).to(self.vae.device, self.vae.dtype)).latent_dist
         if generator is None:
-            return found.mode()
-        noise = torch.randn(found.mean.shape, generator=generator).to(found.mean)
-        return (found.mean + found.std * noise) * self.vae.config.scaling_factor
+            return latents.mode()
+        noise = torch.randn(latents.mean.shape, generator=generator).to(latents.mean)
+        return (latents.mean + latents.std * noise) * self.vae.config.scaling_factor
 
     def decode(self, latents: Tensor) -> Tensor:
         """Images [V, 3, 8h, 8w] in [0, 1] of latents [V, 4, h, w]."""
@@ -182,8 +182,8 @@ class InstructPix2Pix:
             stacked = torch.cat([latents[ids].expand(3, -1, -1, -1, -1), condition], dim=2)
             words = texts[:, None].expand(-1, len(ids), -1, -1)
             inputs, dtype = stacked.flatten(0, 1).to(self.unet.dtype), self.unet.dtype
-            found = self.unet(inputs, time, words.flatten(0, 1).to(dtype)).sample
-            return found.to(latents).unflatten(0, (3, len(ids)))
+            noise = self.unet(inputs, time, words.flatten(0, 1).to(dtype)).sample
+            return noise.to(latents).unflatten(0, (3, len(ids)))
 
         if self.consistency is not None:
             noise = self.consistency.run(branches, len(latents), time, generator)

@@ -58,9 +58,9 @@ class Lpips:
         """
         size = check.shape("image", image, "H W 3")
         check.shape("other", other, "H W 3", H=size["H"], W=size["W"])
-        found, others = (self.vgg.layers(x.permute(2, 0, 1)) for x in (image, other))
+        ours, others = (self.vgg.layers(x.permute(2, 0, 1)) for x in (image, other))
         total = image.new_zeros(())
-        for a, b, head in zip(found, others, self.heads, strict=True):
+        for a, b, head in zip(ours, others, self.heads, strict=True):
             difference = (unit(a) - unit(b)).square()  # [1, C, h, w]
             total = total + (difference * head[:, None, None]).sum(dim=1).mean()
         return total

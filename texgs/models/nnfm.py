@@ -49,16 +49,16 @@ class StyleFeatures:
             ArgumentError: if the region is empty.
         """
         size = check.shape("features", features, "C h w")
-        found = features.detach().flatten(1).T  # [h w, C]
+        vectors = features.detach().flatten(1).T  # [h w, C]
         if region is not None:
             check.shape("region", region, "h w", h=size["h"], w=size["w"])
-            found = found[region.flatten()]
-        if not len(found):
+            vectors = vectors[region.flatten()]
+        if not len(vectors):
             raise ArgumentError("region: expected a part of the style picture, got none of its features")
-        if positions is not None and len(found) > positions:
-            order = torch.randperm(len(found), generator=torch.Generator().manual_seed(seed))
-            found = found[order[:positions].to(found.device)]
-        exact = F.normalize(found.float(), dim=1)
+        if positions is not None and len(vectors) > positions:
+            order = torch.randperm(len(vectors), generator=torch.Generator().manual_seed(seed))
+            vectors = vectors[order[:positions].to(vectors.device)]
+        exact = F.normalize(vectors.float(), dim=1)
         unit = exact.to(features.dtype).contiguous()
         if dimensions is None or dimensions >= size["C"]:
             return cls(unit, exact, None)

@@ -151,12 +151,12 @@ def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
         return features
 
     def decode(features: Tensor, points: Tensor, labels: Tensor, several: bool) -> tuple[Tensor, Tensor]:
-        found = model(
+        answer = model(
             image_embeddings=features,
             input_points=points[:, None],
             input_labels=labels[:, None],
             multimask_output=several,
         )
-        return found.pred_masks[0, 0], found.iou_scores[0, 0]
+        return answer.pred_masks[0, 0], answer.iou_scores[0, 0]
 
     return encode, decode

@@ -27,17 +27,17 @@ def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[s
     with reading(path, "a file of weights", "copy or download it again") as path:
         if path.suffix == ".safetensors":
             with safe_open(path, framework="pt") as file:
-                found = _chosen(path, file.keys(), names)
-                return {name: file.get_tensor(name) for name in found}
+                chosen = _chosen(path, file.keys(), names)
+                return {name: file.get_tensor(name) for name in chosen}
         stored = load_torch(path)
         return {name: _whole(path, name, stored[name]) for name in _chosen(path, stored, names)}
 
 
-def _whole(path: Path, name: str, found: object) -> Tensor:
+def _whole(path: Path, name: str, tensor: object) -> Tensor:
     """A tensor of which every number is in the file: few can be told to be read again and again."""
-    if not isinstance(found, Tensor) or found.nbytes > found.untyped_storage().nbytes():
+    if not isinstance(tensor, Tensor) or tensor.nbytes > tensor.untyped_storage().nbytes():
         raise ArgumentError(f"{path}: {name}: expected a tensor, got something else; download it again")
-    return found
+    return tensor
 
 
 def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> list[str]:

@@ -82,14 +82,14 @@ class Vgg:
         check.shape("image", image, "3 H W")
         x = normalize(image[None], torch.tensor(MEAN), torch.tensor(DEVIATION))
         x = x.to(self.dtype, memory_format=torch.channels_last)
-        found = []
+        features = []
         for name, weight, bias in zip(self.names, self.weights, self.biases, strict=True):
             if name.endswith("_1") and name != "relu1_1":
                 x = F.max_pool2d(x, 2)
             x = F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
             if name in self.wanted:
-                found.append(x)
-        return found
+                features.append(x)
+        return features
 
     def features(self, image: Tensor) -> Tensor:
         """The wanted layers of one block as one [C, H/s, W/s], without copying their channels' order.

@@ -27,9 +27,9 @@ def locate(name: str) -> Path:
         MissingDataError: if the weights are nowhere and cannot be downloaded.
     """
     entry = _entry(name)
-    found = _local(name, entry)
-    if found is not None:
-        return found
+    path = _local(name, entry)
+    if path is not None:
+        return path
     return _download_file(name, entry) if isinstance(entry, Single) else _download_snapshot(name, entry)
 
 
@@ -57,13 +57,13 @@ def checksum(name: str, checksums: Checksums) -> str | None:
     Raises:
         ArgumentError: if the name is unknown, or a file is not what its checksum says.
     """
-    entry, found = _entry(name), find(name)
-    if found is None:
+    entry, path = _entry(name), find(name)
+    if path is None:
         return None
     if isinstance(entry, Single):
-        return checksums.of(found)
-    names = [next(each for each in names if (found / each).is_file()) for names in entry.needs]
-    return combined((each, checksums.of(found / each)) for each in names)
+        return checksums.of(path)
+    names = [next(each for each in names if (path / each).is_file()) for names in entry.needs]
+    return combined((each, checksums.of(path / each)) for each in names)
 
 
 def _entry(name: str) -> Single | Snapshot:
@@ -105,10 +105,10 @@ def _is_complete(folder: Path, entry: Snapshot) -> bool:
 
 def _verify(name: str, file: File, path: Path) -> None:
     status = path.stat()
-    found = _sha256(path, status.st_size, status.st_mtime_ns)
-    if found != file.sha256:
+    checksum = _sha256(path, status.st_size, status.st_mtime_ns)
+    if checksum != file.sha256:
         raise ArgumentError(
-            f"{path}: expected the weights of {name} with checksum {file.sha256[:12]}, got {found[:12]}; "
+            f"{path}: expected the weights of {name} with checksum {file.sha256[:12]}, got {checksum[:12]}; "
             "the file is damaged or another one: remove it, and copy or download it again"
         )
 
@@ -129,8 +129,8 @@ def _download_file(name: str, entry: Single) -> Path:
     pooch.get_logger().setLevel("WARNING")
     folder = cache_folder() / "weights"
     try:
-        found = pooch.retrieve(file.url, f"sha256:{file.sha256}", file.name, folder, progressbar=True)
-        return Path(found)
+        downloaded = pooch.retrieve(file.url, f"sha256:{file.sha256}", file.name, folder, progressbar=True)
+        return Path(downloaded)
     except (OSError, ValueError) as error:  # ValueError: of another checksum; nothing is kept then
         names = [file.name for file in entry.files]
         raise _missing(name, entry, names, file.megabytes, error) from error

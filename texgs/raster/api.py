@@ -71,13 +71,13 @@ def rasterize(
     camera = {"viewmat": viewmat, "K": K} | ({} if background is None else {"background": background})
     surfels = arguments.surfel_tensors(geometry, shift, features, texture)
     view = arguments.view(surfels, camera, (width, height), texture, outputs, options)
-    found: dict = {}
-    images = RasterizeFunction.apply(view, found, *surfels)
+    extra: dict = {}
+    images = RasterizeFunction.apply(view, extra, *surfels)
     image = dict(zip(IMAGES, images, strict=True))
     for name in ("color", "normal"):
         if image[name] is not None:
             image[name] = image[name].permute(1, 2, 0)
-    return Render(**image, statistics=found.get("statistics"))
+    return Render(**image, statistics=extra.get("statistics"))
 
 
 def splat(

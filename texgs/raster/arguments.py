@@ -63,10 +63,10 @@ def surfel_tensors(
 def _colors(features: Tensor | None, texture: Texture | None) -> dict[str, Tensor]:
     if features is None and texture is None:
         raise ArgumentError("rasterize: expected features, a texture or both, got neither")
-    found = {} if features is None else {"features": features}
+    colors = {} if features is None else {"features": features}
     if texture is not None:
-        found |= {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
-    return found
+        colors |= {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
+    return colors
 
 
 def channels(name: str, n: int, most: int = MAX_CHANNELS) -> None:

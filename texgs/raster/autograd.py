@@ -52,8 +52,8 @@ class RasterizeFunction(torch.autograd.Function):
     """Surfel tensors to images; the images are planar, [C, H, W] and [H, W]."""
 
     @staticmethod
-    def forward(ctx: Any, view: View, found: dict, *tensors: Any) -> tuple[Tensor | None, ...]:
-        """Render; `found` receives the statistics."""
+    def forward(ctx: Any, view: View, extra: dict, *tensors: Any) -> tuple[Tensor | None, ...]:
+        """Render; `extra` receives the statistics."""
         surfels = SurfelTensors(*tensors)
         means = surfels.means
         size = (view.height, view.width)
@@ -66,7 +66,7 @@ class RasterizeFunction(torch.autograd.Function):
         frame = bin_surfels(surfels, view, images | radii)
         if radii:
             _, weight_sum, weight_max, pixels = contribute(frame, surfels, view, None)
-            found["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
+            extra["statistics"] = Statistics(weight_sum, weight_max, pixels, radii["radii"])
         ctx.view, ctx.frame = view, frame
         # The view has them already; saved here too, autograd refuses a backward pass after they were changed.
         constants = (view.viewmat, view.K, view.background, view.sizes, view.offsets)

@@ -127,9 +127,9 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
         lib = ctypes.CDLL(str(path))
     except OSError as error:
         raise NativeError(f"{path.name}: cannot be loaded: {error}; {INSTALL}") from error
-    found = function(lib, "texgs_abi_version")()
-    if found != ABI_VERSION:
-        raise NativeError(f"{path.name}: interface version {ABI_VERSION} expected, got {found}; {INSTALL}")
+    version = function(lib, "texgs_abi_version")()
+    if version != ABI_VERSION:
+        raise NativeError(f"{path.name}: interface version {ABI_VERSION} expected, got {version}; {INSTALL}")
     _require_own_sources(lib)
     for name, arguments in PROTOTYPES.items():
         function(lib, name).argtypes = arguments
@@ -148,10 +148,10 @@ def _require_own_sources(lib: ctypes.CDLL) -> None:
     Raises:
         NativeError: if a source was changed since.
     """
-    expected, found = library_sources(), built_from(function(lib, "texgs_sources"))
-    if CSRC.is_dir() and found != expected:
+    expected, built = library_sources(), built_from(function(lib, "texgs_sources"))
+    if CSRC.is_dir() and built != expected:
         raise NativeError(
-            f"{Path(lib._name).name}: built from other sources ({found}) than those in {CSRC} ({expected}); "
+            f"{Path(lib._name).name}: built from other sources ({built}) than those in {CSRC} ({expected}); "
             "compile them with `make install`"
         )
 

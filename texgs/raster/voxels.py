@@ -58,14 +58,14 @@ class RowGradient:
         Raises:
             ShapeError: naming both sizes.
         """
-        found, expected = (
+        given, expected = (
             (list(self.rows.shape), len(self.touched)),
             (list(grid.rows.shape), grid.masks.numel()),
         )
-        if found != expected:
+        if given != expected:
             raise ShapeError(
                 f"into: expected the gradient of {expected[0]} rows in {expected[1]} blocks, got one of "
-                f"{found[0]} in {found[1]}; make a new one for each grid"
+                f"{given[0]} in {given[1]}; make a new one for each grid"
             )
 
 

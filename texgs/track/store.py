@@ -86,17 +86,17 @@ def connect(uri: str, experiment: str) -> tuple["MlflowClient", str]:
 def _experiment_id(client: "MlflowClient", name: str, location: str | None) -> str:
     from mlflow.exceptions import MlflowException
 
-    found = client.get_experiment_by_name(name)
-    if found is None:
+    experiment = client.get_experiment_by_name(name)
+    if experiment is None:
         try:
             return str(client.create_experiment(name, artifact_location=location))
         except MlflowException:
-            found = client.get_experiment_by_name(name)
-            if found is None:  # else another process was faster
+            experiment = client.get_experiment_by_name(name)
+            if experiment is None:  # else another process was faster
                 raise
-    if found.lifecycle_stage == "deleted":
+    if experiment.lifecycle_stage == "deleted":
         raise TrackingError(
             f"experiment {name!r} was deleted from the tracking store; bring it back with "
-            f"`mlflow experiments restore --experiment-id {found.experiment_id}`, or choose another name"
+            f"`mlflow experiments restore --experiment-id {experiment.experiment_id}`, or choose another name"
         )
-    return str(found.experiment_id)
+    return str(experiment.experiment_id)

@@ -52,8 +52,8 @@ class SampledField:
         points = pad(points.reshape(-1, 3), [0, 0, 0, -count % parts])
         points = points.reshape(parts, 1, 1, -1, 3)  # torch has a thread for each element of a batch
         values = self.values.expand(parts, -1, -1, -1, -1)
-        found = grid_sample(values, points, align_corners=True, padding_mode="border")
-        return found.reshape(-1)[:count].reshape(shape)
+        sampled = grid_sample(values, points, align_corners=True, padding_mode="border")
+        return sampled.reshape(-1)[:count].reshape(shape)
 
     def normals(self, points: Tensor) -> Tensor:
         """Directions [n, 3] of the gradient at points [n, 3], world axes; 0 where it is 0."""

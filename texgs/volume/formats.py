@@ -45,16 +45,16 @@ def open_raw(
     except TypeError as error:
         raise ArgumentError(f"dtype: expected a name such as uint8 or float32, got {dtype!r}") from error
     check_lattice(dims, stored, spacing or ONES, origin or ZEROS)
-    found = path.stat().st_size
+    size = path.stat().st_size
     expected = skip + prod(dims) * stored.itemsize
-    if found != expected:
+    if size != expected:
         x, y, z = dims
         skipped = f" + {skip} skipped" if skip else ""
-        fits = [name for name in COMMON_TYPES if found == skip + prod(dims) * np.dtype(name).itemsize]
+        fits = [name for name in COMMON_TYPES if size == skip + prod(dims) * np.dtype(name).itemsize]
         advice = f"dtype {fits[0]} would fit" if fits else "correct dims, dtype or skip"
         raise ArgumentError(
             f"expected {x} x {y} x {z} x {stored.itemsize} ({stored.name}){skipped} = {expected} bytes, "
-            f"found {found}; {advice}"
+            f"found {size}; {advice}"
         )
     return RawSource(path, dims, stored, skip, spacing or ONES, origin or ZEROS)
 

@@ -94,9 +94,9 @@ class RawSource:
         check_lattice(self.dims, self.stored, self.spacing, self.origin)
         if not self.path.is_file():
             raise ArgumentError(f"no such file with samples: {self.path}")
-        found = self.path.stat().st_size
-        if self.offset < 0 or found < self.offset + byte_count(self.dims, self.stored):
-            raise ArgumentError(f"the file is cut off: {self.expected_size()}, found {found} bytes")
+        size = self.path.stat().st_size
+        if self.offset < 0 or size < self.offset + byte_count(self.dims, self.stored):
+            raise ArgumentError(f"the file is cut off: {self.expected_size()}, found {size} bytes")
 
     @property
     def name(self) -> str:

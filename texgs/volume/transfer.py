@@ -133,8 +133,8 @@ class TransferFunction:
             ArgumentError: if a key is missing or unknown, or a point is wrong.
         """
         if not isinstance(data, Mapping) or set(data) != {"opacity", "color"}:
-            found = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
-            raise ArgumentError(f"transfer function: expected the keys opacity, color, got {found or 'none'}")
+            keys = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
+            raise ArgumentError(f"transfer function: expected the keys opacity, color, got {keys or 'none'}")
         return TransferFunction(data["opacity"], data["color"])
 
 

@@ -158,8 +158,8 @@ def _split_of(path: Path, values: Any) -> tuple[list[View], dict[str, Any]]:
 
 def _image_path(path: Path, index: int, frame: Mapping[str, Any]) -> Path:
     """Image of a frame; the layout leaves out the extension."""
-    found = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"), "an image")
-    return found if found.suffix == ".png" else found.with_name(f"{found.name}.png")
+    image = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"), "an image")
+    return image if image.suffix == ".png" else image.with_name(f"{image.name}.png")
 
 
 def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tuple[int, int]:
@@ -167,11 +167,11 @@ def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tupl
     sizes = [_png_size(image) for image in images]
     stated = ("w" in values or "h" in values) and tuple(number(str(path), values, key) for key in ("w", "h"))
     size = stated or sizes[0]
-    for image, found in zip(images, sizes, strict=True):
-        if found != size:
+    for image, actual in zip(images, sizes, strict=True):
+        if actual != size:
             source = "w and h say" if stated else f"{images[0].name} has"
             raise ArgumentError(
-                f"{image}: expected {size[0]} x {size[1]} pixels as {source}, got {found[0]} x {found[1]}"
+                f"{image}: expected {size[0]} x {size[1]} pixels as {source}, got {actual[0]} x {actual[1]}"
             )
     return sizes[0]
 

@@ -57,5 +57,5 @@ def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, 
 
 def training_quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
     """The same on the views that the model was fitted to."""
-    found = mean(evaluate(model, views.train, reduce, f"{title}: training views"))
-    return {f"train_{name}": value for name, value in found.items()}
+    measured = mean(evaluate(model, views.train, reduce, f"{title}: training views"))
+    return {f"train_{name}": value for name, value in measured.items()}

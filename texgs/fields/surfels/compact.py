@@ -221,10 +221,10 @@ def _unpacked(path: Path, packed: bytes) -> bytes:
 
 def _taken(stream: lzma.LZMADecompressor, count: int, packed: bytes = b"") -> bytes:
     """The next bytes of a stream, fewer where it ends."""
-    found = b"" if stream.eof else stream.decompress(packed, count)
-    while len(found) < count and not stream.eof and not stream.needs_input:
-        found += stream.decompress(b"", count - len(found))
-    return found
+    unpacked = b"" if stream.eof else stream.decompress(packed, count)
+    while len(unpacked) < count and not stream.eof and not stream.needs_input:
+        unpacked += stream.decompress(b"", count - len(unpacked))
+    return unpacked
 
 
 def _parameters(stored: dict[str, np.ndarray], step: float) -> dict[str, Tensor]:

@@ -29,8 +29,8 @@ def sizes(parameters: Mapping[str, Tensor]) -> dict[str, float]:
 
 
 def _mebibytes(parameters: Mapping[str, Tensor], groups: Mapping[str, Collection[str]]) -> dict[str, float]:
-    found = {
+    sizes = {
         f"{group}_mib": sum(x.nbytes for name, x in parameters.items() if name in names) / MIB
         for group, names in groups.items()
     }
-    return found | {"total_mib": sum(found.values())}
+    return sizes | {"total_mib": sum(sizes.values())}

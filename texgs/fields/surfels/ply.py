@@ -169,8 +169,8 @@ def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
 def _appearance(vertices: np.ndarray, folder: Path) -> dict[str, Tensor]:
     """Colour and material of the release's surfels, with their textures where the file has no colour."""
     factors = take(vertices, *RELEASE)
-    found = {ours: factors[:, k].contiguous() for k, ours in enumerate(RELEASE.values())}
+    parameters = {ours: factors[:, k].contiguous() for k, ours in enumerate(RELEASE.values())}
     if "mappings_0" in (vertices.dtype.names or ()):
-        return found | {"colors": torch.zeros(len(vertices), 3)} | read_texture(folder, len(vertices))
+        return parameters | {"colors": torch.zeros(len(vertices), 3)} | read_texture(folder, len(vertices))
     dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")
-    return found | {"colors": (0.5 + Y00 * dc.double()).clamp(min=0).float()}
+    return parameters | {"colors": (0.5 + Y00 * dc.double()).clamp(min=0).float()}

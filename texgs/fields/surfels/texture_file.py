@@ -49,26 +49,26 @@ def with_texture(model: Surfels, path: str | Path) -> Surfels:
     Raises:
         ArgumentError: if the file is missing, of another kind, or of another model.
     """
-    found = _read(Path(path))
+    texture = _read(Path(path))
     p = model.parameters
-    if model.stage != "texture" or not torch.equal(found["sizes"], p["sizes"].cpu()):
+    if model.stage != "texture" or not torch.equal(texture["sizes"], p["sizes"].cpu()):
         raise ArgumentError(
-            f"{path}: expected a texture of this model, got one of {len(found['sizes'])} surfels "
-            f"and {len(found['texels'])} texels; make it again from the model"
+            f"{path}: expected a texture of this model, got one of {len(texture['sizes'])} surfels "
+            f"and {len(texture['texels'])} texels; make it again from the model"
         )
     try:
-        check.finite(texels=found["texels"], colors=found.get("colors"))
-        if "colors" in found:
-            check.shape("colors", found["colors"], "N 3", N=len(model))
+        check.finite(texels=texture["texels"], colors=texture.get("colors"))
+        if "colors" in texture:
+            check.shape("colors", texture["colors"], "N 3", N=len(model))
     except TexgsError as error:
         raise ArgumentError(f"{path}: {error}") from error
-    changed = {name: x.to(p[name].device) for name, x in found.items() if name in ("texels", "colors")}
+    changed = {name: x.to(p[name].device) for name, x in texture.items() if name in ("texels", "colors")}
     return replace(model, parameters={**p, **changed})
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    found, _ = read_tensor_file(path, FORMAT)
-    shapes = [found[name].shape[1:] for name in ("texels", "sizes") if name in found]
-    if shapes != [(3,), (2,)] or len(found["texels"]) != int(found["sizes"].long().prod(1).sum()):
+    texture, _ = read_tensor_file(path, FORMAT)
+    shapes = [texture[name].shape[1:] for name in ("texels", "sizes") if name in texture]
+    if shapes != [(3,), (2,)] or len(texture["texels"]) != int(texture["sizes"].long().prod(1).sum()):
         raise ArgumentError(f"{path}: expected texels and sizes that fit each other; make it again")
-    return found
+    return texture

@@ -72,5 +72,5 @@ def _saturated(colors: Tensor, factor: float) -> Tensor:
     """Colours [P, 3] farther from the grey of their luminance."""
     from kornia.enhance import adjust_saturation_with_gray_subtraction
 
-    found: Tensor = adjust_saturation_with_gray_subtraction(colors.T[..., None], factor)[..., 0].T
-    return found
+    saturated: Tensor = adjust_saturation_with_gray_subtraction(colors.T[..., None], factor)[..., 0].T
+    return saturated

@@ -58,8 +58,8 @@ def luminance(colors: Tensor) -> Tensor:
     """Luminance [P] of colours [P, 3]."""
     from kornia.color import rgb_to_grayscale
 
-    found: Tensor = rgb_to_grayscale(colors.T[..., None])[0, :, 0]
-    return found
+    grey: Tensor = rgb_to_grayscale(colors.T[..., None])[0, :, 0]
+    return grey
 
 
 def _side(points: Tensor) -> float:
