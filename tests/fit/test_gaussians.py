@@ -78,7 +78,7 @@ def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
     """The box of surfels is as good for Gaussians, whose filter is wider."""
-    from texgs.fields.surfels.bounds import surfel_box
+    from texgs.fields.bounds import screen_box
 
     for seed in range(20):
         generator = torch.Generator().manual_seed(seed)
@@ -86,7 +86,7 @@ def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
         p["scales"] = p["scales"] + 0.5 * torch.randn(80, 3, generator=generator)
         model = Gaussians({**p, "opacities": torch.full((80,), 4.0)})
         camera = ball_images().cameras[seed % 6]
-        box = surfel_box(p, model.shading.options, camera).within(SIZE, SIZE)
+        box = screen_box(p, model.shading.options, camera).within(SIZE, SIZE)
         alpha = model.render(camera).alpha
         alpha[box.top : box.bottom, box.left : box.right] = 0
         assert not alpha.any()

@@ -6,7 +6,7 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
 from texgs.config.phase import Losses
-from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.losses import view_loss

@@ -14,8 +14,8 @@ from texgs.core.image import write_png
 from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
+from texgs.report.figure_page import Scale
 from texgs.report.fit_figure import (
-    Scale,
     compare,
     frame,
     map_panel,

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.light import Light
-from texgs.fields.surfels.bounds import surfel_box
+from texgs.fields.bounds import screen_box
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import Render, Texture, rasterize
 
@@ -64,7 +64,7 @@ def paint(
 
 def around(model: Surfels, camera: Camera) -> Camera:
     """The camera of the part of a view that surfels can be seen in; one pixel of it at least."""
-    box = surfel_box(model.parameters, model.shading.options, camera)
+    box = screen_box(model.parameters, model.shading.options, camera)
     left, top = min(max(box.left, 0), camera.width - 1), min(max(box.top, 0), camera.height - 1)
     right, bottom = min(box.right, camera.width), min(box.bottom, camera.height)
     return camera.crop(left, top, max(right, left + 1), max(bottom, top + 1))

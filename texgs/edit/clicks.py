@@ -11,7 +11,7 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.rotation import quats_to_matrices
-from texgs.fields.surfels.bounds import REACH
+from texgs.fields.bounds import REACH
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import rasterize
 

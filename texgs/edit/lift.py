@@ -15,7 +15,7 @@ from texgs.core.progress import progress
 from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, projected, prompts_at
 from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
-from texgs.fields.surfels.bounds import surfel_box
+from texgs.fields.bounds import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 
@@ -109,7 +109,7 @@ class ViewMasks:
     def mask(self, clicks: Clicks) -> Tensor:
         """The mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
         camera = clicks.camera
-        box = surfel_box(self.model.parameters, self.model.shading.options, camera).within(
+        box = screen_box(self.model.parameters, self.model.shading.options, camera).within(
             camera.width, camera.height
         )
         cut = camera.crop(*box)

@@ -11,7 +11,7 @@ from torch import Tensor
 from texgs.config.phase import Phase, Rates
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
-from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.shading import MATERIAL
 from texgs.fit.densify import DensityControl
 from texgs.fit.harmonics import join

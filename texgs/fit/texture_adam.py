@@ -6,7 +6,7 @@ import torch
 
 from texgs.core.errors import FitError
 from texgs.core.progress import progress
-from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.groups import TEXTURE
 from texgs.fields.surfels.model import Surfels
 from texgs.raster.ssim import l1_dssim

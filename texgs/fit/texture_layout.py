@@ -9,7 +9,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
-from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import Texture, rasterize
 from texgs.raster.atlas import MOST_TEXELS

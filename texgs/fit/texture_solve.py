@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.progress import progress
-from texgs.fields.surfels.bounds import visible_part
+from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fit.texture_layout import EXTENT, Sight
 from texgs.raster.ssim import l1_dssim

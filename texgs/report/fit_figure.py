@@ -3,81 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_atomic
-from texgs.core.plots import words
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.shading import MATERIAL, material
 from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
+from texgs.report.figure_page import Panel, PanelRow, Scale, draw
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-DPI = 200
-WIDTH = 10.0  # inches, as all lengths on the page: 2000 pixels
-COLUMNS = 5  # at least, of a row
-LEFT, GAP = 0.3, 0.08  # the names of the rows, and what is free between panels
-TOP, HEAD, FOOT = 0.4, 0.25, 0.28  # the title of the page, and the lines above and below a panel
-LARGE, MEDIUM, SMALL = 11, 9, 8  # points
-CENTERED: dict[str, Any] = {"fontsize": MEDIUM, "ha": "center", "va": "center"}
 
 MAGNIFIED = 4  # errors: a quarter of the range of colours has the full colour
 DIVERGING = "bwr"  # 0 is white
 VISIBLE = 2 / 255  # alpha
 MARGIN = 1.06  # of what is shown around what is visible
-
-
-@dataclass(frozen=True)
-class Scale:
-    """Which colours stand for which values."""
-
-    low: float
-    high: float
-    colormap: str = "viridis"
-
-    def __call__(self, values: Tensor) -> Tensor:
-        """Colours [..., 3] of values [...]."""
-        from matplotlib import colormaps  # slow to import
-
-        shares = ((values - self.low) / (self.high - self.low)).clamp(0, 1)
-        return torch.from_numpy(colormaps[self.colormap](shares.numpy())[..., :3]).float()
-
-
-@dataclass(frozen=True, eq=False)
-class Panel:
-    """One picture of the figure, or words in its place."""
-
-    title: str
-    pixels: Tensor | None = None  # [H, W, 3] in [0, 1]
-    words: str = ""  # below the picture
-    scale: Scale | None = None  # below the picture, instead of words
-
-
-@dataclass(frozen=True, eq=False)
-class PanelRow:
-    """Panels side by side."""
-
-    name: str
-    panels: list[Panel]
-
-    @property
-    def panel_width(self) -> float:
-        """Of each panel, inches."""
-        columns = max(COLUMNS, len(self.panels))
-        return (WIDTH - LEFT - columns * GAP) / columns
 
 
 @torch.no_grad()
@@ -88,7 +35,7 @@ def write_fit_figure(
     reduce: int = 1,
     title: str = "",
 ) -> Path:
-    """Draw a fit beside its views as PNG, 2000 pixels wide, in one step; the same models give the same bytes.
+    """Draw a fit beside its views as PNG, in one step; the same models give the same bytes.
 
     A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
     that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first
@@ -201,53 +148,3 @@ def frame(visible: Tensor) -> tuple[slice, slice]:
 def crop(panel: Panel, box: tuple[slice, slice]) -> Panel:
     """The part of a panel's picture in a box."""
     return panel if panel.pixels is None else replace(panel, pixels=panel.pixels[box])
-
-
-def draw(path: str | Path, rows: list[PanelRow], title: str) -> Path:
-    """Lay out rows of panels, whose pictures are of one size, and write them as PNG."""
-    from matplotlib.figure import Figure  # slow to import
-
-    height, width = next(panel.pixels.shape[:2] for panel in rows[0].panels if panel.pixels is not None)
-    heights = [row.panel_width * height / width for row in rows]
-    page = TOP + sum(heights) + len(rows) * (HEAD + FOOT)
-    figure = Figure(figsize=(WIDTH, page), dpi=DPI, facecolor="white")
-
-    def axes_at(left: float, top: float, width: float, height: float) -> Axes:
-        """Axes without ticks in a grey frame, by inches from the upper left corner."""
-        box = (left / WIDTH, 1 - (top + height) / page, width / WIDTH, height / page)
-        axes = figure.add_axes(box, xticks=[], yticks=[])
-        axes.spines[:].set(color="0.8", linewidth=0.5)
-        return axes
-
-    figure.text(LEFT / WIDTH, 1 - 0.5 * TOP / page, words(title), fontsize=LARGE, va="center")
-    top = TOP
-    for row, tall in zip(rows, heights, strict=True):
-        top, wide = top + HEAD, row.panel_width
-        for index, panel in enumerate(row.panels):
-            left = LEFT + index * (wide + GAP)
-            fill(axes_at(left, top, wide, tall), panel)
-            if panel.scale is not None:
-                bar = axes_at(left + 0.33 * wide, top + tall + 0.07, 0.34 * wide, 0.1)
-                fill_bar(bar, panel.scale)
-        figure.text(
-            0.5 * LEFT / WIDTH, 1 - (top + 0.5 * tall) / page, words(row.name), rotation=90, **CENTERED
-        )
-        top += tall + FOOT
-    return write_atomic(path, lambda file: figure.savefig(file, format="png"))
-
-
-def fill(axes: Axes, panel: Panel) -> None:
-    """The picture with its title above and its words below, or the words in its place."""
-    axes.set_title(panel.title, fontsize=MEDIUM, pad=4)
-    if panel.pixels is None:
-        axes.text(0.5, 0.5, panel.words, transform=axes.transAxes, family="monospace", **CENTERED)
-        return
-    axes.imshow(panel.pixels.numpy(), aspect="auto")
-    axes.set_xlabel(panel.words, fontsize=SMALL, labelpad=4)
-
-
-def fill_bar(axes: Axes, scale: Scale) -> None:
-    """All colours of a scale, between the values of its ends."""
-    axes.imshow(scale(torch.linspace(scale.low, scale.high, 256))[None].numpy(), aspect="auto")
-    for x, value, side in ((-0.1, scale.low, "right"), (1.1, scale.high, "left")):
-        axes.text(x, 0.4, f"{value:.3g}", transform=axes.transAxes, fontsize=SMALL, ha=side, va="center")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +18,12 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
 from texgs.fields.part_edit import PartEdit, color
-from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, place_of, replaced, require_able, require_new, split
+from texgs.scene.pick import Picked, pick
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
-
-
-@dataclass(frozen=True)
-class Picked:
-    """What a pixel of a frame shows most of."""
-
-    part: str
-    surfel: int  # its place in the model
-    share: float  # of the pixel, 0 to 1
 
 
 class Session:
@@ -205,27 +196,8 @@ class Session:
         return frame(self.composition, camera, scene.light, scene.edits, mode, scene.background)
 
     def pick(self, camera: Camera, x: int, y: int) -> Picked | None:
-        """The surfel that a pixel shows most of, counted from 0, 0 at the upper left; None on the background.
-
-        Raises:
-            ArgumentError: if the pixel is outside of the frame.
-        """
-        if not (0 <= x < camera.width and 0 <= y < camera.height):
-            size = f"{camera.width} x {camera.height}"
-            raise ArgumentError(f"pixel: expected one of a frame of {size}, got {x}, {y}")
-        pixel, composition = camera.crop(x, y, x + 1, y + 1).to(self._device), self.composition
-        if not isinstance(composition, Composition):
-            raise ArgumentError("pick: expected a scene of surfels, got fields of another kind")
-        shown = composition.render(pixel, self.scene.light, self.scene.edits, outputs=("statistics",))
-        weights = shown.statistics.weight_sum  # type: ignore[union-attr]
-        if not bool((weights > 0).any()):
-            return None
-        share, place = weights.max(dim=0)
-        part, surfel = composition.place_of(int(place))
-        name = list(self.scene.models)[part]
-        label = int(composition.parts[part].label_of(surfel))
-        segments = ["", *(f"/{segment}" for segment in self.scene.models[name].segments)]
-        return Picked(f"{name}{segments[label]}", surfel, float(share))
+        """What a pixel of a frame shows most of; see `texgs.scene.pick.pick`."""
+        return pick(self.scene, self.composition, camera, x, y)
 
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder.

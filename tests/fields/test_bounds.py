@@ -8,7 +8,7 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import cameras, images_of, random_surfels
 from texgs.core.camera import orbit
-from texgs.fields.surfels.bounds import surfel_box
+from texgs.fields.bounds import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.volume.boxes import MARGIN, Box, content_box
@@ -39,13 +39,13 @@ def test_nothing_is_drawn_outside_the_box_of_the_surfels(seed, count, spread, si
     shading = ShadingModel(low_pass)
     alpha = Surfels(p, shading).render(camera).alpha
     if (alpha > 0).any():
-        assert is_inside(box_of(alpha > 0), surfel_box(p, shading.options, camera))
+        assert is_inside(box_of(alpha > 0), screen_box(p, shading.options, camera))
 
 
 def test_the_box_is_not_much_larger_than_what_is_drawn():
     p = random_surfels(3, 200, 0.05, 0.02)
     camera = orbit(30, 20, 2, 50, 200, 200)
-    drawn, box = box_of(Surfels(p).render(camera).alpha > 0), surfel_box(p, ShadingModel().options, camera)
+    drawn, box = box_of(Surfels(p).render(camera).alpha > 0), screen_box(p, ShadingModel().options, camera)
     assert max(abs(a - b) for a, b in zip(drawn, box, strict=True)) <= 10
 
 
@@ -54,12 +54,12 @@ def test_a_surfel_around_the_camera_or_nowhere_needs_the_whole_image(mean):
     p = random_surfels(0, 4, 0.0, 0.1)
     camera = cameras(1)[0]
     p["means"][0] = camera.position if mean[2] == 1 else torch.tensor(mean)
-    assert surfel_box(p, ShadingModel().options, camera) == Box(0, 0, camera.width, camera.height)
+    assert screen_box(p, ShadingModel().options, camera) == Box(0, 0, camera.width, camera.height)
 
 
 def test_no_surfels_need_one_place():
     p = {"means": torch.zeros(0, 3), "scales": torch.zeros(0, 2)}
-    assert surfel_box(p, ShadingModel().options, cameras(1)[0]) == Box(16, 16, 16, 16)
+    assert screen_box(p, ShadingModel().options, cameras(1)[0]) == Box(16, 16, 16, 16)
 
 
 def test_content_is_what_is_not_white():

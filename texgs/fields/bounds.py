@@ -17,7 +17,7 @@ REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, belo
 
 
 @torch.no_grad()
-def surfel_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> Box:
+def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> Box:
     """A box around the projected bounding spheres of all surfels or 3D Gaussians. Waits for a GPU once.
 
     The whole image where a sphere reaches behind the camera, or a value is not finite.
@@ -51,5 +51,5 @@ def surfel_box(parameters: Mapping[str, Tensor], options: Options, camera: Camer
 
 def visible_part(images: Images, index: int, parameters: Mapping[str, Tensor], options: Options) -> Target:
     """The part of a view in which it or the surfels show anything, on the surfels' device."""
-    around = surfel_box(parameters, options, images.cameras[index])
+    around = screen_box(parameters, options, images.cameras[index])
     return images.target(index, parameters["means"].device, around)
