@@ -4,7 +4,10 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.pse import Step, compared
+from texgs.cli.stages.settings import FitLabel, OfScene
 from texgs.cli.stages.volume_scene import VolumeScene, edited
+from texgs.config.dataset import BasicTF
+from texgs.config.views import Shading, ViewKeys
 from texgs.core.camera import orbit
 from texgs.core.io import write_json
 from texgs.core.light import Light
@@ -35,12 +38,10 @@ def volume(tmp_path_factory):
     prepare(ArraySource(grid, "sphere"), folder / "volume.nrrd")
     bounds = {"minimum": float(grid.values.min()), "maximum": float(grid.values.max())}
     write_json(folder / "volume.json", bounds)
-    shading = {"ambient": 0.3, "diffuse": 0.7, "specular": 0.3, "shininess": 20.0}
-    views = {"shading": shading, "step": 0.5, "opacity_unit": 0.005, "mapper": "cpu"}
-    return VolumeScene(
-        {"tf_values": "fraction", "basic_tfs": {"low": LOW, "high": HIGH}, "views": views},
-        folder / "volume.nrrd",
-    )
+    views = ViewKeys(shading=Shading(), step=0.5, mapper="cpu")
+    basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
+    fit = FitLabel("quick", "surfels", 0, "none", "", "cpu")
+    return VolumeScene(OfScene("pse", "sphere", "fraction", basic, views, fit), folder / "volume.nrrd")
 
 
 CAMERA, LIGHT = orbit(20, 10, 4, 30, 48, 48), Light("headlight")

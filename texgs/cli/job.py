@@ -7,20 +7,25 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from omegaconf import DictConfig
+from omegaconf.errors import OmegaConfBaseException
 
 from texgs import track
 from texgs.cli import result
 from texgs.cli.provenance import git_revision, record, user
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.weights import require_same, weights_of
+from texgs.config.slips import sentence
 from texgs.config.stage import Stage, settings_digest
+from texgs.config.typed import typed
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.report.results import plain
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,8 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
             )
         result.require_intact(path)
     require_same(job.settings.get("weights", {}))
+    module = importlib.import_module(job.stage.module)
+    settings = _typed(module.Settings, job)
     identity = job.identity()
     work = result.claim(job.output, identity)
     name = " ".join(str(job.settings[key]) for key in ("dataset", "tf", "stage") if key in job.settings)
@@ -106,9 +113,7 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
         tracking, experiment=experiment, name=name, tags=_tags(job, identity), params=job.settings
     ) as run:
         start = time.perf_counter()
-        outcome: Outcome = importlib.import_module(job.stage.module).work(
-            job.settings, dict(job.inputs), work
-        )
+        outcome: Outcome = module.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         numbers = plain(outcome.result)
         metrics = {
@@ -125,6 +130,14 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
             run.log(values, step)
         for name in (*outcome.pictures, result.METRICS):
             run.artifact(job.output / name)
+
+
+def _typed(kind: type[T], job: Job) -> T:
+    """A job's settings as the dataclass of its stage."""
+    try:
+        return typed(kind, job.settings)
+    except OmegaConfBaseException as error:
+        raise ArgumentError(f"settings of a {job.stage.name} job: {sentence(error)}") from error
 
 
 def _tags(job: Job, identity: Mapping[str, Any]) -> dict[str, str]:

@@ -42,9 +42,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
     from texgs.cli.stage import ensure
     from texgs.config.compose import check_name
+    from texgs.config.dataset import BasicTF
     from texgs.config.files import shown
     from texgs.config.project import members, own_folder
-    from texgs.config.schema import BasicTF
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
     check_name("--name", name)
@@ -80,7 +80,7 @@ def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
     from omegaconf import OmegaConf
 
     from texgs.config.compose import compose
-    from texgs.config.schema import Dataset
+    from texgs.config.dataset import Dataset
 
     path = str(file.absolute())
     if "${" in path:

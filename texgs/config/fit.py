@@ -5,30 +5,7 @@ from typing import Any
 
 from texgs.config.fields import kinds
 from texgs.config.keys import key
-from texgs.config.phase import Phase, Seeds
-
-
-@dataclass
-class Material:
-    """Blinn-Phong factors that the shading phase starts with."""
-
-    ambient: float = key(0.5, "k_a", least=0)
-    diffuse: float = key(0.5, "k_d", least=0)
-    specular: float = key(0.1, "k_s", least=0)
-    shininess: float = key(20.0, "beta", least=0)
-
-
-@dataclass
-class TextureKeys:
-    """Texels: how many, and how they are found."""
-
-    texels: int | None = key(None, "in all; default where they are seen, about one per pixel")
-    sweeps: int = key(3, "of the least-squares solver over all views", least=0)
-    iterations: int = key(0, "of Adam on L1 + D-SSIM afterwards", least=0)
-    rate: float = key(0.0025, "of Adam at the start; it falls to a tenth", least=0)
-    ridge: float = key(0.2, "of the solver: how strongly texels stay at 0, relative", least=0)
-    sparsity: float = key(0.0, "weight of the L1 norm of what texels add to an image", least=0)
-    has_offset: bool = key(True, "surfels keep their colours as offsets; the paper has none")
+from texgs.config.phase import Material, Phase, Seeds, TextureKeys
 
 
 @dataclass

@@ -1,12 +1,11 @@
 """Where the data of a data set are on this machine, and its basic TFs."""
 
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from omegaconf import DictConfig
 
 from texgs.config.compose import check_name
+from texgs.config.dataset import Volume
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder
 from texgs.core.names import file_name
@@ -43,16 +42,16 @@ def source_file(config: DictConfig) -> Path | None:
     )
 
 
-def cached_volume(volume: Mapping[str, Any]) -> Path:
+def cached_volume(volume: Volume) -> Path:
     """Where a volume's file is downloaded to; another checksum is another file.
 
     Raises:
         ConfigError: if there is no checksum to compare it with.
     """
-    checksum, name = volume["sha256"], file_name("dataset.volume.file", Path(volume["file"]).name)
+    checksum, name = volume.sha256, file_name("dataset.volume.file", Path(volume.file or "").name)
     if not checksum or not checksum.isalnum():
         raise ConfigError(
-            f"dataset.volume.sha256: expected the checksum of {volume['url']}, got {checksum or 'none'}"
+            f"dataset.volume.sha256: expected the checksum of {volume.url}, got {checksum or 'none'}"
         )
     return cache_folder() / "volumes" / checksum[:12] / name
 

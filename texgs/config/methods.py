@@ -56,9 +56,10 @@ class Method(Generic[Settings]):
         """Where it is."""
         return self.run.__module__
 
-    def of(self, edit: Mapping[str, Any]) -> Settings:
-        """Its settings among the values of an edit."""
-        return typed(self.settings, edit[self.name])
+    def of(self, edit: Any) -> Settings:
+        """Its settings among those of an edit: the schema's `Edit`, or its node in a configuration."""
+        values = getattr(edit, self.name)
+        return values if isinstance(values, self.settings) else typed(self.settings, values)
 
 
 def methods() -> dict[str, Method[Any]]:
@@ -66,10 +67,10 @@ def methods() -> dict[str, Method[Any]]:
     return specifications(PACKAGE, "METHOD")
 
 
-def method_of(edit: Mapping[str, Any]) -> Method[Any]:
+def method_of(edit: Any) -> Method[Any]:
     """The method of an edit.
 
     Raises:
         KeyError: for the edit `none`, which has no method.
     """
-    return methods()[edit["method"]]
+    return methods()[edit.method]

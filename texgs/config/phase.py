@@ -1,4 +1,4 @@
-"""Settings of one run of the loop, and of where it starts. Kinds of field build on them."""
+"""Settings of the phases of a fit, and of where it starts. Kinds of field build on them."""
 
 from dataclasses import dataclass
 
@@ -81,3 +81,26 @@ class Seeds:
     count: int = key(10000, "at the start; given points are taken as they are", least=1)
     opacity: float = key(0.1, "of each", least=0)
     half_size: float = key(0.55, "half the side of the box, where views do not say", "world units", least=0)
+
+
+@dataclass
+class Material:
+    """Blinn-Phong factors that the shading phase starts with."""
+
+    ambient: float = key(0.5, "k_a", least=0)
+    diffuse: float = key(0.5, "k_d", least=0)
+    specular: float = key(0.1, "k_s", least=0)
+    shininess: float = key(20.0, "beta", least=0)
+
+
+@dataclass
+class TextureKeys:
+    """Texels: how many, and how they are found."""
+
+    texels: int | None = key(None, "in all; default where they are seen, about one per pixel")
+    sweeps: int = key(3, "of the least-squares solver over all views", least=0)
+    iterations: int = key(0, "of Adam on L1 + D-SSIM afterwards", least=0)
+    rate: float = key(0.0025, "of Adam at the start; it falls to a tenth", least=0)
+    ridge: float = key(0.2, "of the solver: how strongly texels stay at 0, relative", least=0)
+    sparsity: float = key(0.0, "weight of the L1 norm of what texels add to an image", least=0)
+    has_offset: bool = key(True, "surfels keep their colours as offsets; the paper has none")

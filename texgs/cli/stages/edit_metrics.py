@@ -1,16 +1,20 @@
 """Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 import torch
 
+from texgs.cli.stages.edit import Settings as EditSettings
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.timing import milliseconds
+from texgs.config.edit import Edit
 from texgs.config.fields import kinds
 from texgs.config.methods import method_of
+from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
@@ -29,32 +33,39 @@ from texgs.scene.scene_file import read_scene
 from texgs.volume.cameras import spiral
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class Settings(EditSettings):
+    """What the stage reads of the configuration."""
+
+    compared: int
+    views: ViewKeys
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `scene`, edited, and `before`, as fitted.
         output: folder.
     """
-    edit, views, weights = settings["edit"], settings["views"], settings["weights"]
-    title, can = f"{settings['dataset']}: {edit['name']}", kinds()[settings["fit"]["field"]].can
-    device = torch_device(settings["fit"]["device"])
+    edit, views, weights = settings.edit, settings.views, settings.weights
+    title, can = f"{settings.dataset}: {edit.name}", kinds()[settings.fit.field].can
+    device = torch_device(settings.fit.device)
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
     scenes = after.open(device), before.open(device)
-    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
-    cameras = [camera.to(device) for camera in spiral(views["test"]["count"], *lens)]
-    some = cameras[:: max(1, len(cameras) // settings["compared"])]
+    cameras = [camera.to(device) for camera in spiral(views.test.count, *views.lens)]
+    some = cameras[:: max(1, len(cameras) // settings.compared)]
     frames = milliseconds(lambda camera: scenes[0].render(camera, after.light, after.edits), cameras, title)
     result = EditMeasures(
-        edit["name"],
-        edit["method"],
+        edit.name,
+        edit.method,
         fmean(frames),
         max(frames),
         len(scenes[0]),
         megabytes=sum(size_of(after)) * 2**20 / 1e6,
         geometry_kept=is_geometry_kept(*scenes, some, "normals" in can),
-        **agreement(scenes[0], after, cameras, settings["compared"], weights, "unlit" in can),
+        **agreement(scenes[0], after, cameras, settings.compared, weights, "unlit" in can),
         **style_distance(after, edit, some, device, weights, title),
         **clip_numbers(settings, (after, before), scenes, cameras, title),
     )
@@ -115,14 +126,14 @@ def agreement(
 
 def style_distance(
     scene: Scene,
-    edit: dict[str, Any],
+    edit: Edit,
     cameras: Sequence[Camera],
     device: torch.device,
     weights: Mapping[str, str | None],
     title: str,
 ) -> dict[str, Any]:
     """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
-    parts, method = parts_of(scene, edit["parts"]), method_of(edit)
+    parts, method = parts_of(scene, edit.parts), method_of(edit)
     if method.style is None or any(part.segment for part in parts) or not weights["vgg16"]:
         return {}
     vgg = Vgg.load(device=device)
@@ -147,17 +158,17 @@ def style_distance(
 
 @torch.no_grad()
 def clip_numbers(
-    settings: dict[str, Any],
+    settings: Settings,
     scenes: tuple[Scene, Scene],
     compositions: tuple[Composed, Composed],
     cameras: Sequence[Camera],
     title: str,
 ) -> dict[str, Any]:
     """CLIP's similarity and directional similarity over all views, or why they were not measured."""
-    edit, backbone = settings["edit"], settings["clip"]
-    if settings["weights"][backbone] is None:
+    edit, backbone = settings.edit, settings.clip
+    if settings.weights[backbone] is None:
         return {"clip_missing": f"the weights of {backbone} are not on this machine"}
-    if not edit["source_caption"] or not edit["target_caption"]:
+    if not edit.source_caption or not edit.target_caption:
         return {"clip_missing": "the edit has no captions"}
     clip = Clip.load(backbone, compositions[0].device)
     edited, originals = (
@@ -167,5 +178,5 @@ def clip_numbers(
         )
         for scene, composition in zip(scenes, compositions, strict=True)
     )
-    scores = clip_scores(clip, edited, originals, edit["source_caption"], edit["target_caption"])
+    scores = clip_scores(clip, edited, originals, edit.source_caption, edit.target_caption)
     return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}

@@ -1,9 +1,10 @@
 """Stage `figure`: show what a fit is worth, its phases beside views it has not seen."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfTF, Recipe
 from texgs.fields.files import open_field
 from texgs.fields.surfels.model import Surfels
 from texgs.report.fit_figure import write_fit_figure
@@ -13,16 +14,30 @@ from texgs.volume.view_set import read_views
 SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class ShownFit(Recipe):
+    """What the figure says of a fit."""
+
+    surfels_iterations: int
+
+
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: ShownFit
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write figure.png.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: the models of all phases by their names, and `views`, the transforms_train.json; without test
             views training views are shown.
         output: folder.
     """
-    fit, views = settings["fit"], read_views(inputs["views"].parent)
+    fit, views = settings.fit, read_views(inputs["views"].parent)
     split, candidates = ("test", views.test) if views.test else ("training", views.train)
     shown = sorted({0, len(candidates) // 3})
     models = {phase: open_field(path) for phase, path in inputs.items() if phase != "views"}
@@ -30,18 +45,18 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     counts = {last.kind: len(last)}
     if isinstance(last, Surfels):
         counts["texels"] = len(last.parameters["texels"])
-    title = f"{settings['dataset']}/{settings['tf']}, recipe {fit['name']}: "
+    title = f"{settings.dataset}/{settings.tf}, recipe {fit.name}: "
     title += ", ".join(f"{count:,} {things}" for things, count in counts.items())
     write_fit_figure(
         output / "figure.png",
         {phase: model if is_fitted(phase, fit) else None for phase, model in models.items()},
         {f"{split} view {index}": candidates[index] for index in shown},
-        fit["reduce"],
+        fit.reduce,
         title,
     )
     return Outcome(FigureResult(shown, len(last)), {"figure.png": SHOWN})
 
 
-def is_fitted(phase: str, fit: dict[str, Any]) -> bool:
+def is_fitted(phase: str, fit: ShownFit) -> bool:
     """Whether a phase does more than seed."""
-    return phase != "surfels" or fit["surfels_iterations"] > 0
+    return phase != "surfels" or fit.surfels_iterations > 0

@@ -1,10 +1,12 @@
 """Stages of fits in one phase: a field of another kind than surfels, from the views alone."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.phase import gpu_memory, quality, training_quality
+from texgs.cli.stages.settings import OfTF, Recipe
 from texgs.config.fields import kinds
 from texgs.config.typed import typed
 from texgs.core.device import torch_device
@@ -16,28 +18,36 @@ from texgs.volume.images import load
 from texgs.volume.view_set import read_views
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: Recipe
+    keys: Any  # of the kind, whose dataclass its specification names
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `views`, the transforms_train.json.
         output: folder.
     """
-    kind, fit = kinds()[settings["stage"]], settings["fit"]
+    kind, fit = kinds()[settings.stage], settings.fit
     if kind.settings is None or kind.fit is None:
         raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
-    title = f"{settings['dataset']}/{settings['tf']}: {kind.name}"
-    device, views = torch_device(fit["device"]), read_views(inputs["views"].parent)
+    title = f"{settings.dataset}/{settings.tf}: {kind.name}"
+    device, views = torch_device(fit.device), read_views(inputs["views"].parent)
     task: FitTask[Any] = FitTask(
-        typed(kind.settings, settings["keys"]),
+        typed(kind.settings, settings.keys),
         views,
-        load(views.train, fit["reduce"]),
+        load(views.train, fit.reduce),
         output,
         device,
-        fit["seed"],
+        fit.seed,
         title,
-        {name: settings[name] for name in ("dataset", "tf")},
+        {"dataset": settings.dataset, "tf": settings.tf},
     )
     fitted: Fitted = kind.fit(task)
     kind.write(output / "model.safetensors", fitted.field)
@@ -48,8 +58,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         list(fitted.losses),
         sizes=fitted.field.sizes(),
         notes=dict(fitted.notes),
-        **quality(fitted.field, views, fit["reduce"], title),
-        **training_quality(fitted.field, views, fit["reduce"], title),
+        **quality(fitted.field, views, fit.reduce, title),
+        **training_quality(fitted.field, views, fit.reduce, title),
         peak_gpu_memory_mib=gpu_memory(device),
     )
     checkpoint.discard(output / checkpoint.FOLDER)

@@ -2,16 +2,19 @@
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfTF, Recipe
 from texgs.cli.stages.tf import in_data_values
+from texgs.config.dataset import BasicTF
 from texgs.config.fields import kinds
+from texgs.config.mesh import MeshKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
@@ -36,28 +39,38 @@ PICTURE = 300  # pixels
 FAR = 0.02  # world units, the brightest colour of an error
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: Recipe
+    tf_values: str
+    points: BasicTF
+    mesh: MeshKeys
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write mesh.ply, reference.ply and mesh.png.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `model`, of the last phase of a fit; `views`, the transforms_train.json; `volume`.
         output: folder.
     """
-    keys, views = settings["mesh"], read_views(inputs["views"].parent)
-    cameras = [smaller(view.camera, settings["fit"]["reduce"]) for view in views.train]
+    keys, views = settings.mesh, read_views(inputs["views"].parent)
+    cameras = [smaller(view.camera, settings.fit.reduce) for view in views.train]
     reference = reference_of(settings, inputs["volume"])
-    field = open_field(inputs["model"]).to(torch_device(settings["fit"]["device"]))
+    field = open_field(inputs["model"]).to(torch_device(settings.fit.device))
     start = time.perf_counter()
-    mesh = fuse(shown_by(field), [camera.to(field.device) for camera in cameras], keys["voxel"])
+    mesh = fuse(shown_by(field), [camera.to(field.device) for camera in cameras], keys.voxel)
     seconds = time.perf_counter() - start
     write_mesh(output / "mesh.ply", mesh)
     write_mesh(output / "reference.ply", reference)
     points, whole = sample(mesh, MEASURED), sample(reference, MEASURED)
     small = [smaller(camera, max(1, camera.width // VISIBLE)) for camera in cameras]
-    visible = seen(whole, small, 2 * keys["voxel"])
-    errors = compare(points, whole[visible], keys["tolerance"])
-    show(output / "mesh.png", mesh, reference, whole[visible], (settings["dataset"], settings["tf"]))
+    visible = seen(whole, small, 2 * keys.voxel)
+    errors = compare(points, whole[visible], keys.tolerance)
+    show(output / "mesh.png", mesh, reference, whole[visible], (settings.dataset, settings.tf))
     result = MeshResult(
         errors.chamfer,
         errors.accuracy,
@@ -67,7 +80,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         len(mesh.vertices),
         len(mesh.triangles),
         seconds,
-        keys["tolerance"],
+        keys.tolerance,
         float(visible.double().mean()),
     )
     return Outcome(
@@ -75,13 +88,13 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
 
 
-def reference_of(settings: dict[str, Any], volume: Path) -> Mesh:
+def reference_of(settings: Settings, volume: Path) -> Mesh:
     """The surface that the basic TF makes of the volume."""
     grid, summary = open_grid(volume), read_json(volume.with_name("volume.json"))
     tf = in_data_values(
-        settings["tf"], settings["points"], settings["tf_values"], summary["minimum"], summary["maximum"]
+        settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
     )
-    return surface_of(grid, tf, settings["mesh"]["opacity"])
+    return surface_of(grid, tf, settings.mesh.opacity)
 
 
 def shown_by(field: Field) -> Callable[[Camera], Render]:

@@ -7,7 +7,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Densify, Losses, Phase, Rates
+from texgs.config.phase import Phase
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
@@ -17,12 +17,6 @@ from texgs.fit.resumable import run_to_end
 from texgs.metrics.quality import evaluate, mean
 from texgs.volume.images import Images
 from texgs.volume.view_set import ViewSet
-
-
-def phase_from(values: Mapping[str, Any]) -> Phase:
-    """A phase from the plain values of its settings."""
-    parts = {"rates": Rates, "losses": Losses, "densify": Densify}
-    return Phase(**{**values, **{name: kind(**values[name]) for name, kind in parts.items()}})
 
 
 def gpu_memory(device: torch.device) -> float | None:

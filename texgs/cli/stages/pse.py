@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfScene as Settings
 from texgs.cli.stages.volume_scene import VolumeScene
 from texgs.config.fields import kinds
 from texgs.core.camera import Camera
@@ -42,21 +43,20 @@ class Step:
     scene: Scene
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write a scene file for each edit, pse.png and relight.png.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
         output: folder.
     """
-    scene, views = read_scene(inputs["scene"]), settings["views"]
-    composition = scene.open(torch_device(settings["fit"]["device"]))
+    scene = read_scene(inputs["scene"])
+    composition = scene.open(torch_device(settings.fit.device))
     volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
-    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
-    cameras = orbit_path(COMPARED, POLAR, *lens)
+    cameras = orbit_path(COMPARED, POLAR, *settings.views.lens)
     done: dict[str, list[Comparison]] = {}
-    can = kinds()[settings["fit"]["field"]].can
+    can = kinds()[settings.fit.field].can
     groups = {
         "pse": edits_of_the_paper(scene, composition.palettes, can),
         "relight": light_sweep(scene),
@@ -64,7 +64,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     for group, steps in groups.items():
         rows: dict[str, list[np.ndarray]] = {}
         done[group] = []
-        for step in progress(steps, title=f"{settings['dataset']}: {group}", unit="edit"):
+        for step in progress(steps, title=f"{settings.dataset}: {group}", unit="edit"):
             write_scene(output / f"{group}-{len(done[group])}.yaml", step.scene)
             comparison, shown = compared(step, composition, volume, cameras)
             done[group].append(comparison)

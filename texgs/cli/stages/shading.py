@@ -1,10 +1,12 @@
 """Stage `shading`: from surfels to relightable ones, with Blinn-Phong shading fitted to the views."""
 
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.phase import gpu_memory, phase_from, quality, run_phase
+from texgs.cli.stages.phase import gpu_memory, quality, run_phase
+from texgs.cli.stages.settings import OfTF, Recipe
+from texgs.config.phase import Material, Phase
 from texgs.core.device import torch_device
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
@@ -18,25 +20,42 @@ from texgs.volume.view_set import read_views
 HARMONICS = ("sh", "sh_rest")
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class ShadingRecipe(Recipe):
+    """What this phase reads of a recipe besides."""
+
+    material_range: str
+    materials: str
+    first_material: Material
+
+
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: ShadingRecipe
+    phase: Phase
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `model`, of the stage before, and `views`, the transforms_train.json.
         output: folder.
     """
-    fit, title = settings["fit"], f"{settings['dataset']}/{settings['tf']}: shading"
-    device = torch_device(fit["device"])
+    fit, phase = settings.fit, settings.phase
+    title = f"{settings.dataset}/{settings.tf}: shading"
+    device = torch_device(fit.device)
     views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
-    images = load(views.train, fit["reduce"])
+    images = load(views.train, fit.reduce)
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}
     start["colors"] = base_color(before.parameters["sh"])
-    first = raw_material(**fit["first_material"], kind=fit["material_range"])
-    rows = 1 if fit["materials"] == "shared" else len(before)
+    first = raw_material(**asdict(fit.first_material), kind=fit.material_range)
+    rows = 1 if fit.materials == "shared" else len(before)
     start |= {name: value.to(device).repeat(rows) for name, value in first.items()}
-    phase = phase_from(settings["phase"])
-    model, seconds, losses = run_phase(start, before.shading, images, phase, fit["seed"], output, title)
+    model, seconds, losses = run_phase(start, before.shading, images, phase, fit.seed, output, title)
     model = Surfels(model.parameters, before.shading, before.metadata)
     write_model(output / "model.safetensors", model)
     factors = material(model.parameters, before.shading.material)
@@ -46,7 +65,7 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         phase.iterations,
         losses,
         material={name: float(value.median()) for name, value in factors.items()},
-        **quality(model, views, fit["reduce"], title),
+        **quality(model, views, fit.reduce, title),
         peak_gpu_memory_mib=gpu_memory(device),
     )
     checkpoint.discard(output / checkpoint.FOLDER)

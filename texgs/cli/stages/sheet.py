@@ -1,11 +1,11 @@
 """Stage `sheet`: read a folder of views, rendered here or elsewhere, and show them on one contact sheet."""
 
 from pathlib import Path
-from typing import Any
 
 from PIL import Image
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfTF as Settings
 from texgs.report.results import SheetResult
 from texgs.volume.sheet import write_sheet
 from texgs.volume.view_set import read_views
@@ -14,11 +14,11 @@ SHOWN = 12  # views
 CAPTION = "Views that the model was fitted to, and test views."
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write sheet.png from up to twelve training views.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `views`, the transforms_train.json of the folder of views.
         output: folder.
     """

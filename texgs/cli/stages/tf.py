@@ -2,19 +2,18 @@
 
 from typing import Any
 
+from texgs.config.dataset import BasicTF
 from texgs.core.errors import ArgumentError
 from texgs.volume.basic_tfs import check_disjoint
 from texgs.volume.transfer import TransferFunction
 
 
-def in_data_values(
-    name: str, points: dict[str, Any], tf_values: str, low: float, high: float
-) -> TransferFunction:
+def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high: float) -> TransferFunction:
     """A basic TF in the units of the data.
 
     Args:
         name: of the TF, for messages.
-        points: lists `opacity` and `color`.
+        points: of its opacity and colour.
         tf_values: "data", or "fraction" where the points are on fractions of the data's range.
         low: smallest value of the data.
         high: largest value of the data.
@@ -23,7 +22,7 @@ def in_data_values(
         ArgumentError: if a point is wrong, or none of the data would be visible.
     """
     try:
-        tf = TransferFunction(points["opacity"], points["color"])
+        tf = TransferFunction(tuple(points.opacity), tuple(points.color))
         tf = tf.scaled(low, high) if tf_values == "fraction" else tf
     except ArgumentError as error:
         raise ArgumentError(f"basic TF {name}: {error}") from error

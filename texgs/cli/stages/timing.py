@@ -5,11 +5,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean, median
-from typing import Any
 
 import torch
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfScene as Settings
 from texgs.cli.stages.volume_scene import VolumeScene
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
@@ -22,19 +22,18 @@ WARM = 3  # frames before those that count
 VOLUME_FRAMES = 12  # of the volume, spread over the path: they take long, and differ little
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
         output: folder.
     """
-    scene, views = read_scene(inputs["scene"]), settings["views"]
-    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
-    cameras = spiral(views["test"]["count"], *lens)
-    composition = scene.open(torch_device(settings["fit"]["device"]))
-    title = f"{settings['dataset']}: timing"
+    scene, views = read_scene(inputs["scene"]), settings.views
+    cameras = spiral(views.test.count, *views.lens)
+    composition = scene.open(torch_device(settings.fit.device))
+    title = f"{settings.dataset}: timing"
     device = composition.device
     frames = milliseconds(
         lambda camera: composition.render(camera.to(device), scene.light, scene.edits), cameras, title
@@ -44,8 +43,8 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
         max(frames),
         median(frames),
         len(composition),
-        views["width"],
-        views["height"],
+        views.width,
+        views.height,
         torch.get_num_threads(),
     )
     if "volume" in inputs:

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from statistics import mean, median
@@ -13,10 +13,14 @@ from PIL import Image
 
 from texgs.cli.result import TIMES
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfTF
 from texgs.cli.stages.tf import in_data_values
+from texgs.config.dataset import BasicTF
+from texgs.config.views import CameraPath, ViewKeys
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_atomic
+from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
@@ -36,24 +40,33 @@ SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
 TURNTABLE = 320  # pixels of its longer side
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    tf_values: str
+    points: BasicTF
+    views: ViewKeys
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write the folder of views: train/, test/, transforms_*.json, turntable.png, and times.json.
 
     Views that are in the folder already, from an interrupted run of the same job, are kept, and so are
     their times.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `volume`, the volume.nrrd; volume.json is beside it.
         output: folder.
     """
-    views, title = settings["views"], f"{settings['dataset']}/{settings['tf']}"
+    views, title = settings.views, f"{settings.dataset}/{settings.tf}"
     grid, summary = open_grid(inputs["volume"]), read_json(inputs["volume"].with_name("volume.json"))
     tf = in_data_values(
-        settings["tf"], settings["points"], settings["tf_values"], summary["minimum"], summary["maximum"]
+        settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
     )
-    appearance = Appearance(**views["shading"], step=views["step"], opacity_unit=views["opacity_unit"])
-    mapper = mapper_for(views["mapper"], grid, appearance)
+    appearance = appearance_of(views)
+    mapper = mapper_for(views.mapper, grid, appearance)
     times, coverages = Times(output / TIMES), []
     shots = {split: views_of(views, split, output) for split in SPLITS}
     for split, shot in shots.items():
@@ -64,11 +77,16 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
                 f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
             )
     turntable(mapper, tf, views, output, title)
-    if views["geometry"]:
+    if views.geometry:
         write_geometry(grid, tf, appearance, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
     return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
+
+
+def appearance_of(views: ViewKeys) -> Appearance:
+    """How the volume looks in views."""
+    return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
@@ -78,36 +96,37 @@ def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
     return CpuMapper(grid, appearance, int(os.environ.get("OMP_NUM_THREADS") or os.cpu_count() or 1))
 
 
-def cameras(path: dict[str, Any], views: dict[str, Any]) -> list[Camera]:
+def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
     """The cameras of one arrangement."""
-    lens = (views["radius"], views["fov_y"], views["width"], views["height"])
-    if path["kind"] == "icosphere":
-        return icosphere(path["frequency"], *lens)
-    if path["kind"] == "spiral":
-        return spiral(path["count"], *lens)
-    return orbit_path(path["count"], path["polar"], *lens)
+    if path.kind == "icosphere":
+        return icosphere(path.frequency, *lens)
+    if path.kind == "spiral":
+        return spiral(path.count, *lens)
+    return orbit_path(path.count, path.polar, *lens)
 
 
-def views_of(views: dict[str, Any], split: str, output: Path) -> list[View]:
+def views_of(views: ViewKeys, split: Literal["train", "test"], output: Path) -> list[View]:
     """Cameras, lights and files of the training or the test views."""
-    chosen = (views["test_lights"] if split == "test" else None) or views["lights"]
-    lights = [Light(**light) for light in chosen]
+    path, chosen = views.train, views.lights
+    if split == "test":
+        path, chosen = views.test, views.test_lights or views.lights
+    lights = [Light(**asdict(light)) for light in chosen]
     if not lights:
         raise ArgumentError("views.lights: expected at least one light, got none")
     return [
         View(camera, output / split / f"r_{index:04}.png", lights[index % len(lights)])
-        for index, camera in enumerate(cameras(views[split], views))
+        for index, camera in enumerate(cameras(path, views.lens))
     ]
 
 
-def turntable(mapper: Mapper, tf: TransferFunction, views: dict[str, Any], output: Path, title: str) -> None:
+def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Path, title: str) -> None:
     """Write turntable.png, an animation of one turn under a headlight."""
-    scale = min(1.0, TURNTABLE / max(views["width"], views["height"]))
-    small = {key: max(1, round(scale * views[key])) for key in ("width", "height")}
-    path = {"kind": "orbit", "count": views["turntable"], "polar": 15.0}
+    scale = min(1.0, TURNTABLE / max(views.width, views.height))
+    small = [max(1, round(scale * size)) for size in (views.width, views.height)]
+    around = orbit_path(views.turntable, 15.0, views.radius, views.fov_y, *small)
     shot = [
         View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
-        for index, camera in enumerate(cameras(path, {**views, **small}))
+        for index, camera in enumerate(around)
     ]
     render_views(mapper, tf, shot, f"{title}: turntable")
     write_animation(output / "turntable.png", [Image.fromarray(view.load().numpy()) for view in shot])
@@ -127,15 +146,17 @@ def write_geometry(
         write_atomic(path, write)
 
 
-def describe(settings: dict[str, Any], tf: TransferFunction, grid: Grid, mapper: Mapper) -> dict[str, Any]:
+def describe(settings: Settings, tf: TransferFunction, grid: Grid, mapper: Mapper) -> dict[str, Any]:
     """What transforms_*.json says about the images beside cameras and lights."""
-    views = settings["views"]
+    views = settings.views
     return {
-        "volume": settings["dataset"],
-        "tf": {"name": settings["tf"], **tf.to_dict()},
+        "volume": settings.dataset,
+        "tf": {"name": settings.tf, **tf.to_dict()},
         "aabb": [list(corner) for corner in grid.aabb],
-        "shading": {"model": "blinn-phong", "local_viewer": mapper.local_viewer, **views["shading"]},
-        **{key: views[key] for key in ("mapper", "step", "opacity_unit")},
+        "shading": {"model": "blinn-phong", "local_viewer": mapper.local_viewer, **asdict(views.shading)},
+        "mapper": views.mapper,
+        "step": views.step,
+        "opacity_unit": views.opacity_unit,
     }
 
 

@@ -1,11 +1,13 @@
 """Stage `volume`: make or read a scalar field, check it, and write the one file that later stages read."""
 
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.stages.settings import OfDataset
+from texgs.config.dataset import Volume
 from texgs.config.locate import cached_volume
 from texgs.core.io import write_json
 from texgs.core.progress import progress
@@ -17,27 +19,34 @@ from texgs.volume.slabs import ArraySource, Source
 from texgs.volume.sources import open_source
 
 
-def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Outcome:
+@dataclass
+class Settings(OfDataset):
+    """What the stage reads of the configuration."""
+
+    volume: Volume
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, range and histogram.
 
     Args:
-        settings: what the stage reads of the configuration.
+        settings: of the job.
         inputs: `source`, the volume's file, where it is not generated.
         output: folder.
     """
-    volume = settings["volume"]
+    volume = settings.volume
 
     def slabs(steps: Iterable[tuple[int, int]], total: int) -> Iterable[tuple[int, int]]:
-        return progress(steps, total, title=f"{settings['dataset']}: volume", unit="slab")
+        return progress(steps, total, title=f"{settings.dataset}: volume", unit="slab")
 
     summary = prepare(
-        generated(volume) if volume["generator"] is not None else source(volume, inputs["source"]),
+        source(volume, inputs["source"]) if volume.generator is None else generated(volume, volume.generator),
         output / "volume.nrrd",
-        crop=volume["crop"] and tuple(volume["crop"]),
-        reduce=volume["reduce"],
-        method=volume["method"],
-        up=volume["up"],
-        nan_value=volume["nan_value"],
+        crop=volume.crop and tuple(volume.crop),  # type: ignore[arg-type]
+        reduce=volume.reduce,
+        method=volume.method,
+        up=volume.up,
+        nan_value=volume.nan_value,
         progress=slabs,
     )
     write_json(output / "volume.json", asdict(summary))
@@ -55,15 +64,16 @@ def work(settings: dict[str, Any], inputs: dict[str, Path], output: Path) -> Out
     )
 
 
-def generated(volume: dict[str, Any]) -> Source:
+def generated(volume: Volume, generator: str) -> Source:
     """The field of a generator."""
-    options = {"seed": volume["seed"]} if volume["generator"] in RANDOM else {}
-    return ArraySource(GENERATORS[volume["generator"]](volume["size"], **options), volume["generator"])
+    options = {"seed": volume.seed} if generator in RANDOM else {}
+    return ArraySource(GENERATORS[generator](volume.size, **options), generator)
 
 
-def source(volume: dict[str, Any], path: Path) -> Source:
+def source(volume: Volume, path: Path) -> Source:
     """The field of a file; one that was downloaded is compared with its checksum."""
-    if volume["url"] and path == cached_volume(volume):
-        require_whole(path, volume["sha256"])
-    triples = {key: volume[key] and tuple(volume[key]) for key in ("dims", "spacing", "origin")}
-    return open_source(path, dtype=volume["dtype"], endian=volume["endian"], skip=volume["skip"], **triples)
+    if volume.url and path == cached_volume(volume):
+        require_whole(path, volume.sha256 or "")
+    given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
+    triples: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
+    return open_source(path, dtype=volume.dtype, endian=volume.endian, skip=volume.skip, **triples)

@@ -1,14 +1,14 @@
 """The volume with all basic TFs, edited as a scene is: what its pictures are compared with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from texgs.cli.stages.settings import OfScene
 from texgs.cli.stages.tf import in_data_values
-from texgs.cli.stages.views import mapper_for
+from texgs.cli.stages.views import appearance_of, mapper_for
 from texgs.core.camera import Camera
 from texgs.core.io import read_json
 from texgs.core.light import Light
@@ -24,20 +24,19 @@ class VolumeScene:
     """A volume and its basic TFs.
 
     Args:
-        settings: `basic_tfs`, `tf_values` and `views` of the configuration.
+        settings: of a job that compares with it.
         volume: volume.nrrd, with volume.json beside it.
     """
 
-    def __init__(self, settings: Mapping[str, Any], volume: Path) -> None:
+    def __init__(self, settings: OfScene, volume: Path) -> None:
         summary = read_json(volume.with_name("volume.json"))
-        bounds = (settings["tf_values"], summary["minimum"], summary["maximum"])
+        bounds = (settings.tf_values, summary["minimum"], summary["maximum"])
         self.tfs = {
-            name: in_data_values(name, points, *bounds) for name, points in settings["basic_tfs"].items()
+            name: in_data_values(name, points, *bounds) for name, points in settings.basic_tfs.items()
         }
-        views = settings["views"]
         self.grid = open_grid(volume)
-        self.look = Appearance(**views["shading"], step=views["step"], opacity_unit=views["opacity_unit"])
-        self.kind = views["mapper"]
+        self.look = appearance_of(settings.views)
+        self.kind = settings.views.mapper
         self._mappers: dict[Appearance, Mapper] = {}
 
     def render(

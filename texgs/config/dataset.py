@@ -1,0 +1,67 @@
+"""The schema of conf/dataset: a volume with its basic transfer functions."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from omegaconf import II, MISSING
+
+from texgs.config.keys import key
+
+AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+
+
+@dataclass
+class Volume:
+    """Where the scalar field of a data set comes from: a generator, or a file that is there or downloaded."""
+
+    generator: str | None = key(
+        None, "name of a built-in field", choices=("sphere", "orbital", "turbulence", "jets")
+    )
+    size: int = key(128, "samples along each side of a generated field", least=16)
+    seed: int = key(0, "random numbers of a generated field")
+    file: str | None = key(None, "file, or folder of TIFF slices; relative to data_folder")
+    url: str | None = key(None, "where the file is downloaded from when it is not there")
+    sha256: str | None = key(None, "checksum of the download")
+    obtain: str = key("", "how to get a file that cannot be downloaded")
+    dims: list[int] | None = key(None, "samples along x, y, z; of raw files", "samples")
+    dtype: str | None = key(None, "type of the samples of raw files, such as uint8 or float32")
+    endian: str = key("little", "byte order of raw files", choices=("little", "big"))
+    skip: int = key(0, "header of raw files", "bytes", least=0)
+    spacing: list[float] | None = key(None, "distance of samples along x, y, z; default the file's", "length")
+    origin: list[float] | None = key(None, "position of the first sample; default the file's", "length")
+    crop: list[int] | None = key(None, "part to keep: x0, x1, y0, y1, z0, z1, half open", "samples")
+    reduce: int = key(1, "factor by which every side is made smaller on reading", least=1)
+    method: str = key("mean", "how samples are reduced; labels must be sampled", choices=("mean", "sample"))
+    up: str = key("+y", "axis of the volume that points up in the world", choices=AXES)
+    nan_value: float | None = key(None, "replaces NaN; without it NaN is an error")
+
+
+@dataclass
+class BasicTF:
+    """A basic transfer function: piecewise linear opacity and colour over one range of values."""
+
+    # OmegaConf takes no integers for list[list[float]]; the points are checked where the TF is made.
+    opacity: list[Any] = key([], "points [value, opacity]; opacity is 0 outside")
+    color: list[Any] = key([], "points [value, r, g, b], linear, 0 to 1")
+
+
+@dataclass
+class Dataset:
+    """A volume with its basic transfer functions, or a folder of views."""
+
+    name: str = key(MISSING, "name, also of the folder under results/")
+    title: str = key(II(".name"), "name in tables")
+    source: str = key("", "who made the data, and its licence")
+    stand_in: str = key("", "what the data stand in for, where the real ones are not public")
+    image: int = key(800, "width and height of views", "pixels", least=1)
+    volume: Volume = key(Volume, "where the scalar field comes from")
+    views_folder: str | None = key(
+        None, "folder with views of one basic TF per subfolder, instead of a volume"
+    )
+    tf_values: str = key(
+        "data", "values of TFs: of the data, or fractions of its range", choices=("data", "fraction")
+    )
+    basic_tfs: dict[str, BasicTF] = field(
+        default_factory=dict,
+        metadata={"help": "basic transfer functions by name; their ranges must not overlap"},
+    )
