@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,98 +16,64 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import require_memory
 from texgs.core.progress import progress
 from texgs.raster import Render
+from texgs.raster.fusion import BLOCK, DepthView, Lattice
 from texgs.scene.export import VERTEX, fill
 from texgs.volume.isosurface import Mesh, isosurface
 
 VOXEL = 1 / 256  # world units
-TRUNCATION = 5.0  # voxels on each side of a surface that know their distance from it, as in 2DGS
-BLOCK = 8  # voxels along each side of what a view updates together; more than the truncation
-BLOCKS = 4000  # that are updated at once, 2 million voxels
+TRUNCATION = (
+    5.0  # voxels on each side of a surface that know their distance from it, as in 2DGS; at most BLOCK
+)
 LEAST_VIEWS = 1  # more views than this must have seen a voxel
 CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
-@dataclass(frozen=True, eq=False)
-class DepthView:
-    """What a view knows of a surface."""
-
-    camera: Camera
-    depth: Tensor  # [H, W] camera z in world units, 0 where there is no surface
-    color: Tensor  # [H, W, 3] uint8
-
-    def points(self) -> Tensor:
-        """Where the surface is that its pixels show [P, 3], world units."""
-        v, u = self.depth.nonzero().T
-        z = self.depth[v, u]
-        rays = torch.stack([u + 0.5, v + 0.5, torch.ones_like(z)], dim=1) @ self.camera.K.inverse().T
-        return (z[:, None] * rays - self.camera.viewmat[:3, 3]) @ self.camera.viewmat[:3, :3]
+def points(view: DepthView) -> Tensor:
+    """Where the surface is that the pixels of a view show [P, 3], world units."""
+    v, u = view.depth.nonzero().T
+    z, camera = view.depth[v, u], view.camera
+    rays = torch.stack([u + 0.5, v + 0.5, torch.ones_like(z)], dim=1) @ camera.K.inverse().T
+    return (z[:, None] * rays - camera.viewmat[:3, 3]) @ camera.viewmat[:3, :3]
 
 
-class Lattice:
-    """Mean signed distances and colours of voxels around a surface."""
+def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
+    """A lattice of voxels that holds the box from `low` to `high` [3].
 
-    def __init__(self, low: Tensor, high: Tensor, voxel: float) -> None:
-        """A lattice of voxels that holds the box from `low` to `high` [3].
+    Raises:
+        OutOfMemoryError: if there are too many.
+    """
+    x, y, z = (int(n) for n in ((high - low) / (BLOCK * voxel)).ceil().long() + 1)
+    what = f"a mesh of {BLOCK * x} x {BLOCK * y} x {BLOCK * z} voxels"
+    require_memory(5 * 4 * x * y * z * BLOCK**3, what, "choose a larger voxel")
+    return Lattice((x, y, z), low, voxel)
 
-        Raises:
-            OutOfMemoryError: if there are too many.
-        """
-        self.blocks = [int(n) for n in ((high - low) / (BLOCK * voxel)).ceil().long() + 1]
-        self.shape = [BLOCK * n for n in self.blocks]  # x, y, z
-        count = self.shape[0] * self.shape[1] * self.shape[2]
-        what = f"a mesh of {' x '.join(map(str, self.shape))} voxels"
-        require_memory(5 * 4 * count, what, "choose a larger voxel")
-        self.low, self.voxel = low, voxel
-        self.distance, self.views = torch.ones(count), torch.zeros(count)
-        self.color = torch.zeros(count, 3)
 
-    def add(self, view: DepthView) -> None:
-        """Update the voxels close to what a view sees."""
-        near = torch.zeros(self.blocks)
-        places = ((view.points() - self.low) / (BLOCK * self.voxel)).long()
-        near[places.unbind(1)] = 1
-        blocks = F.max_pool3d(near[None], 3, stride=1, padding=1)[0].nonzero()
-        inside = torch.cartesian_prod(*[torch.arange(BLOCK)] * 3)
-        for some in blocks.split(BLOCKS):
-            self._add((BLOCK * some[:, None] + inside).flatten(0, 1), view)
+def add(lattice: Lattice, view: DepthView) -> None:
+    """Update the voxels close to what a view sees."""
+    near = torch.zeros(lattice.blocks)
+    near[((points(view) - lattice.low) / (BLOCK * lattice.voxel)).long().unbind(1)] = 1
+    blocks = F.max_pool3d(near[None], 3, stride=1, padding=1)[0].nonzero()
+    lattice.add(view, blocks, TRUNCATION * lattice.voxel)
 
-    def _add(self, index: Tensor, view: DepthView) -> None:
-        """Update voxels by their indices x, y, z [N, 3]."""
-        camera = view.camera
-        seen = (self.low + self.voxel * index) @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
-        projected = seen @ camera.K.T
-        u, v = (projected[:, :2] / projected[:, 2:]).floor().long().unbind(1)
-        on_image = (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
-        index, u, v, z = index[on_image], u[on_image], v[on_image], seen[on_image, 2]
-        depth = view.depth[v, u]
-        distance = (depth - z) / (TRUNCATION * self.voxel)
-        known = (depth > 0) & (distance > -1)
-        x, y, z_index = index[known].unbind(1)
-        at = (z_index * self.shape[1] + y) * self.shape[0] + x
-        weight = self.views[at]
-        self.views[at] = weight + 1
-        self.distance[at] = (weight * self.distance[at] + distance[known].clamp_max(1)) / (weight + 1)
-        color = view.color[v[known], u[known]].float()
-        self.color[at] = (weight[:, None] * self.color[at] + color) / (weight + 1)[:, None]
 
-    def surface(self) -> Mesh:
-        """Where the distance is 0, in cells all of whose corners were seen."""
-        x, y, z = self.shape
-        values = -self.distance.reshape(z, y, x).numpy()  # inside is positive
-        mesh = isosurface(values, 0.0, (self.voxel,) * 3, tuple(self.low.tolist()))
-        seen = (self.views > LEAST_VIEWS).reshape(z, y, x).float()
-        whole = -F.max_pool3d(-seen[None], 2, stride=1)[0]
-        cells = ((torch.from_numpy(mesh.corners).mean(1) - self.low) / self.voxel).floor().long()
-        kept = whole[tuple(cells.clamp_min(0).T.flip(0))] > 0
-        return compact(mesh, kept.numpy())
+def surface(lattice: Lattice) -> Mesh:
+    """Where the distance is 0, in cells all of whose corners were seen."""
+    values = -lattice.distance.numpy()  # inside is positive
+    mesh = isosurface(values, 0.0, (lattice.voxel,) * 3, tuple(lattice.low.tolist()))
+    seen = (lattice.views > LEAST_VIEWS).float()
+    whole = -F.max_pool3d(-seen[None], 2, stride=1)[0]
+    cells = ((torch.from_numpy(mesh.corners).mean(1) - lattice.low) / lattice.voxel).floor().long()
+    kept = whole[tuple(cells.clamp_min(0).T.flip(0))] > 0
+    return compact(mesh, kept.numpy())
 
-    def colors_at(self, places: np.ndarray) -> np.ndarray:
-        """Colours [V, 3] of places [V, 3] on edges of the lattice, uint8."""
-        x, y, z = self.shape
-        grid = (torch.from_numpy(places) - self.low) / self.voxel / (torch.tensor(self.shape) - 1) * 2 - 1
-        volume = self.color.reshape(1, z, y, x, 3).permute(0, 4, 1, 2, 3)
-        colors = F.grid_sample(volume, grid.float()[None, :, None, None], align_corners=True)
-        return colors[0, :, :, 0, 0].T.round().clamp(0, 255).to(torch.uint8).numpy()
+
+def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
+    """Colours [V, 3] of places [V, 3] on edges of the lattice, uint8."""
+    last = BLOCK * torch.tensor(lattice.blocks) - 1
+    grid = (torch.from_numpy(places) - lattice.low) / lattice.voxel / last * 2 - 1
+    volume = lattice.color[None].permute(0, 4, 1, 2, 3)
+    colors = F.grid_sample(volume, grid.float()[None, :, None, None], align_corners=True)
+    return colors[0, :, :, 0, 0].T.round().clamp(0, 255).to(torch.uint8).numpy()
 
 
 def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float = VOXEL) -> Mesh:
@@ -129,18 +94,18 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     if not voxel > 0:
         raise ArgumentError(f"voxel: expected a length above 0, got {voxel}")
     views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
-    boxes = [view.points().aminmax(dim=0) for view in views if bool(view.depth.any())]
+    boxes = [points(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
     if not boxes:
         raise ArgumentError(
             "mesh: expected a surface that lets less than half of the light through, got none"
         )
     margin = (TRUNCATION + 1) * voxel
     low, high = (torch.stack(ends) for ends in zip(*boxes, strict=True))
-    lattice = Lattice(low.amin(0) - margin, high.amax(0) + margin, voxel)
+    lattice = lattice_of(low.amin(0) - margin, high.amax(0) + margin, voxel)
     for view in progress(views, title="fuse", unit="view"):
-        lattice.add(view)
-    mesh = largest_clusters(lattice.surface())
-    return Mesh(mesh.vertices, mesh.triangles, lattice.colors_at(mesh.vertices))
+        add(lattice, view)
+    mesh = largest_clusters(surface(lattice))
+    return Mesh(mesh.vertices, mesh.triangles, colors_at(lattice, mesh.vertices))
 
 
 @torch.no_grad()

@@ -1,0 +1,120 @@
+"""Depth maps of many views as one surface: the mean signed distance of voxels (Curless and Levoy 1996).
+
+On the CPU; deterministic for any number of threads.
+"""
+
+from __future__ import annotations
+
+from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
+from dataclasses import dataclass, field
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.raster import native
+
+BLOCK = 8  # TEXGS_FUSION_BLOCK
+
+
+class NativeLattice(Structure):
+    """`texgs_lattice`."""
+
+    _fields_ = [
+        *(("shape", c_int32 * 3), ("low", c_float * 3), ("voxel", c_float)),
+        *((name, c_void_p) for name in ("distance", "views", "color")),
+    ]
+
+
+class NativeView(Structure):
+    """`texgs_depth_view`."""
+
+    _fields_ = [
+        *(("viewmat", c_void_p), ("K", c_void_p), ("width", c_int32), ("height", c_int32)),
+        *(("depth", c_void_p), ("color", c_void_p)),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class DepthView:
+    """What a view knows of a surface; on the CPU.
+
+    Raises:
+        ArgumentError: if the images are not as large as the camera's.
+    """
+
+    camera: Camera
+    depth: Tensor  # [H, W] camera z in world units, 0 where there is no surface
+    color: Tensor  # [H, W, 3] uint8
+
+    def __post_init__(self) -> None:
+        size = (self.camera.height, self.camera.width)
+        if tuple(self.depth.shape) != size or tuple(self.color.shape) != (*size, 3):
+            raise ArgumentError(
+                f"view: expected depth {size} and color {(*size, 3)}, got {tuple(self.depth.shape)} and "
+                f"{tuple(self.color.shape)}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Lattice:
+    """Means over the views that saw a voxel, of a box of blocks of 8 x 8 x 8 voxels.
+
+    Attributes:
+        blocks: along x, y and z.
+        low: place of the first voxel [3], world units.
+        voxel: distance of voxels, world units.
+        distance: to the surface in truncations [Z, Y, X], from -1, behind it, to 1.
+        views: how many saw a voxel [Z, Y, X].
+        color: [Z, Y, X, 3], 0 to 255.
+    """
+
+    blocks: tuple[int, int, int]
+    low: Tensor
+    voxel: float
+    distance: Tensor = field(init=False)
+    views: Tensor = field(init=False)
+    color: Tensor = field(init=False)
+
+    def __post_init__(self) -> None:
+        shape = [BLOCK * n for n in reversed(self.blocks)]
+        object.__setattr__(self, "distance", torch.ones(shape))
+        object.__setattr__(self, "views", torch.zeros(shape))
+        object.__setattr__(self, "color", torch.zeros(*shape, 3))
+
+    def add(self, view: DepthView, blocks: Tensor, truncation: float) -> None:
+        """Update the voxels of some blocks, in front of the surface and up to the truncation behind it.
+
+        Args:
+            view: the surface.
+            blocks: which [N, 3], each once, by numbers along x, y and z.
+            truncation: world units.
+
+        Raises:
+            ArgumentError: if a block is none of the lattice's.
+        """
+        if len(blocks) and not bool(((blocks >= 0) & (blocks < torch.tensor(self.blocks))).all()):
+            raise ArgumentError(f"blocks: expected numbers below {self.blocks}, got others")
+        matrices = [matrix.float().contiguous() for matrix in (view.camera.viewmat, view.camera.K)]
+        depth, color = view.depth.float().contiguous(), view.color.contiguous()
+        chosen = blocks.to(torch.int32).contiguous()
+        lattice = NativeLattice(
+            (c_int32 * 3)(*(BLOCK * n for n in self.blocks)),
+            (c_float * 3)(*self.low.tolist()),
+            self.voxel,
+            *(values.data_ptr() for values in (self.distance, self.views, self.color)),
+        )
+        size = (view.camera.width, view.camera.height)
+        seen = NativeView(*(x.data_ptr() for x in matrices), *size, depth.data_ptr(), color.data_ptr())
+        _describe()
+        native.call(
+            *("texgs_fuse", byref(lattice), len(chosen), chosen.data_ptr(), byref(seen), truncation),
+            device=torch.device("cpu"),
+        )
+
+
+def _describe() -> None:
+    """Tell ctypes the argument types."""
+    arguments = [POINTER(NativeLattice), c_int64, c_void_p, POINTER(NativeView), c_float, c_void_p]
+    native.function(native.library("cpu"), "texgs_fuse").argtypes = arguments
