@@ -5,10 +5,13 @@ definition changes its mind when inputs move by a thousandth, float32 may decide
 pixels are left out of comparisons ("undecided"), and all others must agree closely.
 """
 
+import pickle
 from dataclasses import replace
+from functools import lru_cache, wraps
 
 import torch
 
+from texgs.raster.reference import render as reference
 from texgs.raster.reference.fragments import ALPHA_MAX
 from texgs.raster.reference.render import TEXTURE_SIGMA, composite, kind_of, pixel_centres
 from texgs.raster.types import DEFAULT_OPTIONS
@@ -17,6 +20,17 @@ MARGIN = 1e-3
 IMAGES = ("color", "alpha", "depth", "median", "normal", "distortion")
 
 
+def remembered(function):
+    """Compute once for equal arguments: several libraries are compared with one definition, which is slow."""
+
+    @lru_cache(maxsize=100)
+    def of(pickled):
+        return function(*pickle.loads(pickled))
+
+    return wraps(function)(lambda *arguments: of(pickle.dumps(arguments)))
+
+
+@remembered
 def decided(scene, options=DEFAULT_OPTIONS):
     """Pixels [H, W] in which no threshold is close, nor a kink of a texture."""
     scene = scene.double()
@@ -52,10 +66,10 @@ def decisions(scene, options):
 
 def near_texel_centre(scene, options):
     """Pixels [P] with a fragment next to a texel centre, where bilinear interpolation has a kink."""
+    if scene.texture is None:
+        return torch.zeros(scene.height * scene.width, dtype=torch.bool)
     surfels, fragments, weights, _ = dense(scene, options)
     near = torch.zeros_like(weights, dtype=torch.bool)
-    if scene.texture is None:
-        return near.any(1)
     for axis, coordinate in enumerate((fragments.u, fragments.v)):
         size = scene.texture.sizes[surfels.index, axis]
         x = (coordinate / (2 * TEXTURE_SIGMA) + 0.5) * size - 0.5
@@ -95,6 +109,18 @@ def gradients(rasterize, scene, cotangents, options=DEFAULT_OPTIONS, wanted=None
         name: torch.zeros_like(leaf) if gradient is None else gradient
         for (name, leaf), gradient in zip(leaves.items(), found, strict=True)
     }
+
+
+@remembered
+def true_images(scene, outputs=(), options=DEFAULT_OPTIONS):
+    """The images of the definition, by name."""
+    return images(scene.double().render(reference.rasterize, outputs, options))
+
+
+@remembered
+def true_gradients(scene, cotangents, options=DEFAULT_OPTIONS, wanted=None):
+    """The gradients of the definition, as `gradients`."""
+    return gradients(reference.rasterize, scene.double(), cotangents, options, wanted)
 
 
 def random_cotangents(scene, names, mask=None, seed=0):

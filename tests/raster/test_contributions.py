@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import decided, dense
+from tests.raster.agreement import decided, dense, remembered
 from tests.raster.scenes import HARD_CASES, random_scene
 from texgs.raster.api import rasterize, splat
 from texgs.raster.reference.render import kind_of, statistics
@@ -14,6 +14,7 @@ from texgs.raster.types import DEFAULT_OPTIONS, Options
 GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
 
 
+@remembered
 def explicit(scene, options=DEFAULT_OPTIONS):
     """Blending weights [H W, N] by the definition, in the order of the inputs, and its statistics."""
     scene = scene.double()

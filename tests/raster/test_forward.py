@@ -5,10 +5,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import decided, images, names_of
+from tests.raster.agreement import decided, images, names_of, true_images
 from tests.raster.scenes import TEXTURE_SIZES, gaussians, random_scene, textured, textured_with_features
 from texgs.raster.api import rasterize
-from texgs.raster.reference import render as reference
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
 # Absolute tolerances. Colours and alpha are sums of numbers below 1 in float32, whose exponents carry the
@@ -28,7 +27,7 @@ def check(scene, device, options=DEFAULT_OPTIONS):
     """Compare all images of a scene, pixel by pixel where the definition is sure."""
     outputs = [name for name in scene.outputs if name != "statistics"]
     found = images(scene.to(device).render(rasterize, outputs, options))
-    expected = images(scene.double().render(reference.rasterize, outputs, options))
+    expected = true_images(scene, outputs, options)
     sure = decided(scene, options)
     assert 1 - sure.double().mean() < UNDECIDED
     texels = 0 if scene.texture is None else int(scene.texture.sizes.max())

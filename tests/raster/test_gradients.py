@@ -5,11 +5,18 @@ from dataclasses import replace
 import pytest
 import torch
 
-from tests.raster.agreement import IMAGES, decided, gradients, names_of, random_cotangents, relative
+from tests.raster.agreement import (
+    IMAGES,
+    decided,
+    gradients,
+    names_of,
+    random_cotangents,
+    relative,
+    true_gradients,
+)
 from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
 from tests.raster.test_forward import described
 from texgs.raster.api import rasterize
-from texgs.raster.reference import render as reference
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
 # Relative L2 per tensor. Colours enter linearly and only carry the rounding of the weights. Geometry is a sum
@@ -32,7 +39,7 @@ def check(scene, device, names=("color",), options=DEFAULT_OPTIONS, wanted=None)
     """Compare the gradients of random combinations of the images `names` in pixels off all thresholds."""
     cotangents = random_cotangents(scene, names, decided(scene, options))
     found = gradients(rasterize, scene.to(device), cotangents, options, wanted)
-    expected = gradients(reference.rasterize, scene.double(), cotangents, options, wanted)
+    expected = true_gradients(scene, cotangents, options, wanted)
     for name, gradient in expected.items():
         assert found[name].shape == gradient.shape
         assert found[name].isfinite().all()

@@ -13,10 +13,11 @@ from tests.raster.agreement import (
     names_of,
     random_cotangents,
     relative,
+    true_gradients,
+    true_images,
 )
 from tests.raster.scenes import HARD_CASES, few, gaussians, textured
 from texgs.raster.api import rasterize
-from texgs.raster.reference import render as reference
 from texgs.raster.types import OUTPUTS, Options
 
 # Needles are 10 000 times as long as wide: the intersection across them keeps a few digits in float32.
@@ -30,7 +31,7 @@ AMBIGUOUS = {"edge-on": {"normal"}}
 def test_images(device, drawn, name):
     scene = drawn(HARD_CASES[name]())
     found = images(scene.to(device).render(rasterize, scene.outputs))
-    expected = images(scene.double().render(reference.rasterize, scene.outputs))
+    expected = true_images(scene, scene.outputs)
     sure = decided(scene)
     assert sure.double().mean() > 0.85
     for image in names_of(scene):
@@ -48,7 +49,7 @@ def test_gradients(device, drawn, name):
     compared = set(names_of(scene)) - {"distortion"} - AMBIGUOUS.get(name, set())
     cotangents = random_cotangents(scene, sorted(compared), decided(scene))
     found = gradients(rasterize, scene.to(device), cotangents)
-    expected = gradients(reference.rasterize, scene.double(), cotangents)
+    expected = true_gradients(scene, cotangents)
     for tensor, gradient in expected.items():
         assert found[tensor].isfinite().all()
         if gradient.norm() > 1e-6:
@@ -62,7 +63,7 @@ def test_textured(device, name):
     scene = HARD_CASES[name]()
     scene = textured(scene, sizes=[(4, 4), (1, 1), (33, 7), (1, 200), (60, 50)])
     found = images(scene.to(device).render(rasterize))
-    expected = images(scene.double().render(reference.rasterize))
+    expected = true_images(scene)
     error = (found["color"].cpu() - expected["color"]).abs()[decided(scene)]
     assert found["color"].isfinite().all()
     share = 0.98 if name == "edge-on" else 0.999  # along an edge texture coordinates run through all values
@@ -78,7 +79,7 @@ def test_textured(device, name):
 def test_other_filters(device, name, options):
     scene = HARD_CASES[name]()
     found = images(scene.to(device).render(rasterize, OUTPUTS, options))
-    expected = images(scene.double().render(reference.rasterize, OUTPUTS, options))
+    expected = true_images(scene, OUTPUTS, options)
     sure = decided(scene, options)
     for image in set(IMAGES) - AMBIGUOUS.get(name, set()):
         assert found[image].isfinite().all()
@@ -92,14 +93,14 @@ def test_other_filters(device, name, options):
 def test_antialiased(device, name):
     scene, options = gaussians(HARD_CASES[name]()), Options(antialiased=True)
     found = images(scene.to(device).render(rasterize, scene.outputs, options))
-    expected = images(scene.double().render(reference.rasterize, scene.outputs, options))
+    expected = true_images(scene, scene.outputs, options)
     sure = decided(scene, options)
     for image in names_of(scene):
         assert found[image].isfinite().all()
         assert float((found[image].cpu() - expected[image]).abs()[sure].max()) < 1e-4, image
     cotangents = random_cotangents(scene, ("color", "depth"), sure)
     found = gradients(rasterize, scene.to(device), cotangents, options)
-    for tensor, gradient in gradients(reference.rasterize, scene.double(), cotangents, options).items():
+    for tensor, gradient in true_gradients(scene, cotangents, options).items():
         assert relative(found[tensor], gradient) < 1e-3 or gradient.norm() < 1e-6, tensor
 
 
@@ -107,7 +108,7 @@ def test_every_surfel_at_one_pixel(device, drawn):
     scene = drawn(few(n=3000, width=20, height=20))
     scene = replace(scene, means=1e-3 * scene.means, opacities=0.01 * scene.opacities)
     found = images(scene.to(device).render(rasterize, scene.outputs))
-    expected = images(scene.double().render(reference.rasterize, scene.outputs))
+    expected = true_images(scene, scene.outputs)
     error = (found["color"].cpu() - expected["color"]).abs()
     assert float(error.median()) < 1e-4  # depths differ by less than float32 resolves, so a few change places
     assert float(error.max()) < 0.05
