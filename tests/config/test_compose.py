@@ -58,6 +58,7 @@ def test_interpolations_are_resolved():
         ("a=b=c", "a=b=c: expected key=value"),
         ("views", "views: expected key=value"),
         ("nonsense=1", "nonsense: no such key"),
+        ("mesh.tfs=[TF3]", "mesh.tfs: expected some of TF01, TF02, got TF3"),
     ],
 )
 def test_a_mistake_is_one_sentence_that_names_the_key(override, message):
@@ -65,6 +66,11 @@ def test_a_mistake_is_one_sentence_that_names_the_key(override, message):
         compose((override,))
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_views_have_no_volume_that_meshes_are_compared_with():
+    with pytest.raises(ConfigError, match="mesh.tfs: data set vortex starts from views and has no volume"):
+        compose(("dataset=vortex", "mesh.tfs=[TF01]"))
 
 
 def test_the_composition_cannot_be_changed():

@@ -29,7 +29,6 @@ RESERVED = (
     "volume",
     "transfer",
     "logs",
-    "benchmarks",
     "mlartifacts",
     "tables",
     "scene",
@@ -126,14 +125,28 @@ def check(config: DictConfig) -> None:
     check_name("views.name", config.views.name)
     for tf in config.dataset.basic_tfs:
         check_name("dataset.basic_tfs", tf)
-    known = list(config.dataset.basic_tfs)
-    for tf in config.mesh.tfs:
-        if tf not in known:
-            raise ConfigError(f"mesh.tfs: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
+    check_meshes(config)
     for entry in keys():
         for name, value in values(config, entry.name):
             if value is not None:
                 check_value(entry, name, value)
+
+
+def check_meshes(config: DictConfig) -> None:
+    """Require of the basic TFs with meshes that the data set has them, and a volume to compare with.
+
+    Raises:
+        ConfigError: naming what it has not.
+    """
+    known = list(config.dataset.basic_tfs)
+    if config.mesh.tfs and config.dataset.views_folder is not None:
+        raise ConfigError(
+            f"mesh.tfs: data set {config.dataset.name} starts from views and has no volume to compare with; "
+            "leave mesh.tfs empty"
+        )
+    for tf in config.mesh.tfs:
+        if tf not in known:
+            raise ConfigError(f"mesh.tfs: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
 
 
 def check_value(entry: Key, name: str, value: Any) -> None:
