@@ -170,8 +170,9 @@ def add_jobs(
     """Add the jobs of some configurations to those by folder, and what is missing for some; their folders.
 
     Raises:
-        ConfigError: if two different jobs have one folder.
+        ConfigError: if two different jobs have one folder, or a field is not fitted on the device.
     """
+    from texgs.cli.fits import check_device
     from texgs.cli.job import Job
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.locate import tf_names
@@ -181,6 +182,7 @@ def add_jobs(
     folders = []
     for config in configs:
         check_basic_tfs(config.dataset)
+        check_device(config)
         try:
             by_tf = [for_tf(config, name) for name in tf_names(config)]
         except MissingDataError as error:

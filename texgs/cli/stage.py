@@ -53,6 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.settings is not None:
         return run_settings(arguments)
     from texgs.cli.edits import require_base
+    from texgs.cli.fits import require_fit
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.config.locate import tf_names
@@ -60,6 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
+    require_fit(stage, config)
     if stage.place == "edit" or stage.name == "edit_metrics":
         require_edit(stage, config)
         require_base(tuple(arguments.overrides))

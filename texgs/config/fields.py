@@ -46,6 +46,8 @@ class Kind(Generic[Settings]):
     """Fits a field in one phase: from a `FitTask[Settings]` of texgs/fit/task.py to a `Fitted`."""
     depth: str = ""
     """Which of its outputs meshes are made of, "median" or "depth"; empty where it has neither."""
+    devices: frozenset[str] = frozenset({"cpu", "cuda"})
+    """Where it is fitted."""
 
     @property
     def module(self) -> str:

@@ -70,4 +70,5 @@ FIELD = Kind(
     phases=("voxels",),
     settings=VoxelKeys,
     fit=fit,
+    devices=frozenset({"cpu"}),
 )

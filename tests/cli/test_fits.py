@@ -1,0 +1,42 @@
+"""Fits that a verb or a run cannot make are told in one sentence, before anything is written."""
+
+import pytest
+
+from texgs.cli.main import main
+from texgs.cli.plan import make
+from texgs.core.errors import ConfigError
+
+ON_A_GPU = ("fit=plenoxels", "device=cuda")
+CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            ["texture", "fit=gaussians_quick"],
+            "fit.field: texture fits surfels, but fit=gaussians_quick has field gaussians; run",
+        ),
+        (
+            ["gaussians", "fit=quick"],
+            "fit.field: gaussians fits gaussians, but fit=quick has field surfels; run texgs texture",
+        ),
+        (
+            ["mesh", "fit=plenoxels_quick"],
+            "fit.field: mesh expects a fit of gaussians or surfels, but fit=plenoxels_quick has field voxels",
+        ),
+        (["voxels", *ON_A_GPU], CPU_ONLY),
+        (["compose", *ON_A_GPU], CPU_ONLY),
+    ],
+)
+def test_a_verb_wants_a_fit_that_it_can_work_on(tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "dataset=sphere", "dataset.volume.size=16", "tracking=none"]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_wants_a_device_that_the_field_is_fitted_on(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=CPU_ONLY):
+        make(("dataset=sphere", *ON_A_GPU))

@@ -1,0 +1,46 @@
+"""Mistakes in the choice of a fit, told before any job runs."""
+
+from omegaconf import DictConfig
+
+from texgs.config.fields import kinds
+from texgs.config.places import PLACES
+from texgs.config.stage import Stage
+from texgs.core.errors import ConfigError
+
+
+def check_device(config: DictConfig) -> None:
+    """Require a device that the field of the fit is fitted on.
+
+    Raises:
+        ConfigError: if it is fitted on others.
+    """
+    fit, able = config.fit, kinds()[config.fit.field].devices
+    if config.device.name not in able:
+        raise ConfigError(
+            f"device: expected {' or '.join(sorted(able))} for fit={fit.name}, which fits {fit.field}, "
+            f"got {config.device.name}; choose another device or fit"
+        )
+
+
+def require_fit(stage: Stage, config: DictConfig) -> None:
+    """Require a fit that a stage can work on; stages before the fits work with any.
+
+    Raises:
+        ConfigError: if its field goes through other phases, has no surface, or is not fitted on the device.
+    """
+    if "{fit}" not in PLACES[stage.place].folder:
+        return
+    fit, kind = config.fit, kinds()[config.fit.field]
+    if stage.place == "phase" and stage.name not in kind.phases:
+        owner = next(other.name for other in kinds().values() if stage.name in other.phases)
+        raise ConfigError(
+            f"fit.field: {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
+            f"run texgs {kind.phases[-1]} or choose another fit"
+        )
+    if stage.place == "mesh" and not kind.depth:
+        able = " or ".join(other.name for other in kinds().values() if other.depth)
+        raise ConfigError(
+            f"fit.field: mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
+            "choose another fit"
+        )
+    check_device(config)
