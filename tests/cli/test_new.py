@@ -1,5 +1,7 @@
 """`texgs new`: from a volume file to a data set that composes."""
 
+import json
+
 import numpy as np
 import pytest
 import yaml
@@ -8,7 +10,6 @@ from texgs.cli import new
 from texgs.cli.main import main
 from texgs.config.compose import compose
 from texgs.config.project import ROOT
-from texgs.volume.tf_files import write_tf
 from texgs.volume.transfer import TransferFunction
 
 DOCUMENT = "name: mine\ntitle: another\nvolume: {file: scan.npy}\n"
@@ -47,6 +48,11 @@ def test_a_data_set_with_suggested_tfs(conf, scan, capsys):
     assert (conf.parent / "results" / "my_scan" / "transfer" / "transfer.png").exists()
     text = (conf / "dataset" / "my_scan.yaml").read_text()
     assert yaml.safe_load(text)["volume"]["file"] == str(scan)
+
+
+def write_tf(path, tf):
+    """A transfer function in our JSON, as a user writes it."""
+    path.write_text(json.dumps({"format": "texgs-tf", "version": 1, **tf.to_dict()}))
 
 
 def test_tfs_from_files(conf, scan, tmp_path):

@@ -69,7 +69,7 @@ def test_a_mistake_is_one_sentence_that_names_the_key(override, message):
 
 
 def test_views_have_no_volume_that_meshes_are_compared_with():
-    with pytest.raises(ConfigError, match="mesh.tfs: data set vortex starts from views and has no volume"):
+    with pytest.raises(ConfigError, match=r"mesh\.tfs: data set vortex starts from views and has no volume"):
         compose(("dataset=vortex", "mesh.tfs=[TF01]"))
 
 

@@ -1,6 +1,5 @@
-"""Transfer functions from and to files: our JSON and ParaView's presets; and from PyVista's names."""
+"""Transfer functions from files, our JSON and ParaView's presets, and to the latter."""
 
-import difflib
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -55,13 +54,8 @@ def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
         raise ArgumentError(f"{path}: {error}") from error
     raise ArgumentError(
         f'{path}: expected a transfer function with "format": "{FORMAT}" or a list of ParaView presets, got '
-        "neither; export it from ParaView or write it with texgs"
+        "neither; export it from ParaView, or take a *.paraview.json from results/DATASET/transfer"
     )
-
-
-def write_tf(path: str | Path, tf: TransferFunction) -> Path:
-    """Write our JSON in one step; `read_tf` gives the same function back."""
-    return write_json(path, {"format": FORMAT, "version": VERSION, **tf.to_dict()})
 
 
 def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
@@ -83,44 +77,6 @@ def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
         "Points": [x for point in _extended(tf.opacity, low, high) for x in (*point, 0.5, 0.0)],
     }
     return write_json(path, [preset])
-
-
-def from_colormap(
-    name: str, opacity: str | Sequence[float], low: float, high: float, n: int = 256
-) -> TransferFunction:
-    """Transfer function from a colour map and an opacity as PyVista's `add_volume` takes them.
-
-    Args:
-        name: colour map of Matplotlib, such as viridis.
-        opacity: name of one of PyVista's opacities, such as linear, sigmoid_5 or geom_r; or two or more
-            opacities in [0, 1], evenly spaced over the range.
-        low: value of the first colour, data units.
-        high: value of the last.
-        n: points of the table, as PyVista's n_colors.
-
-    Raises:
-        ArgumentError: if a name is unknown (with what is close to it), or a value is wrong.
-    """
-    import matplotlib as mpl
-    import pyvista
-
-    if name not in mpl.colormaps:
-        close = difflib.get_close_matches(name, mpl.colormaps, n=3) or ["viridis", "magma", "coolwarm"]
-        raise ArgumentError(f"colour map: expected one of Matplotlib's, got {name!r}; try {', '.join(close)}")
-    if isinstance(opacity, str):
-        try:
-            heights = pyvista.opacity_transfer_function(opacity, n) / 255
-        except ValueError as error:
-            raise ArgumentError(
-                f"opacity: expected one of PyVista's names, got {opacity!r}; try linear, sigmoid or geom"
-            ) from error
-    else:
-        heights = np.asarray(opacity, dtype=np.float64)
-    colors = mpl.colormaps[name](np.linspace(0, 1, n))[:, :3]
-    return TransferFunction(
-        opacity=tuple(zip(np.linspace(0, 1, len(heights)), heights, strict=True)),
-        color=tuple((t, *rgb) for t, rgb in zip(np.linspace(0, 1, n), colors, strict=True)),
-    ).scaled(low, high)
 
 
 def _from_ours(data: dict[str, Any]) -> TransferFunction:
