@@ -9,7 +9,7 @@ FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -na
 .PHONY: help install test test-cluster bench lint demo lock clean
 
 help:
-	@echo "make demo      from a small simulated volume to an edited scene and results/report.html"
+	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
 	@echo "make test      run all tests; ARGS='-k name' picks some"
 	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"

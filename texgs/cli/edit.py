@@ -16,9 +16,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         metavar="KEY=VALUE",
         help="MODEL.KEY=VALUE with visible, palette (r,g,b from 0 to 1, or #rrggbb), opacity, ambient, "
-        "diffuse, specular, shininess (factors) or texture (a file); light=headlight or light=AZIMUTH,POLAR; "
-        "background=#rrggbb; MODEL.KEY= takes an edit back; MODEL/SEGMENT.KEY=VALUE edits a segment, "
-        "MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= removes it",
+        "diffuse, specular, shininess (factors), texture (a file) or file (another model); light=headlight "
+        "or light=AZIMUTH,POLAR; background=#rrggbb; MODEL.KEY= takes an edit back; MODEL/SEGMENT.KEY=VALUE "
+        "edits a segment, MODEL/SEGMENT=FILE adds one from a file and MODEL/SEGMENT= removes it",
     )
     parser.add_argument("--output", type=Path, required=True, help="the new scene.yaml")
 

@@ -13,7 +13,7 @@ Run all commands in this folder:
 
     texgs new VOLUME --name NAME       # writes conf/dataset/NAME.yaml, with suggested transfer functions
     texgs run dataset=NAME fit=quick   # from the volume to results/report.html
-    texgs run experiment=demo          # the same with a small simulated flow
+    texgs run experiment=demo          # the same with a small generated volume
     texgs views --help                 # all data sets, recipes and keys
 
 `conf/` holds what is yours. A file there comes before the file of texgs with the same name:

@@ -75,7 +75,7 @@ class Seeds:
 
     kind: str = key(
         "auto",
-        "points of the views if there are any, else what is visible",
+        "auto: points of the views if there are any, else visible",
         choices=("auto", "points", "visible", "voxels", "hull", "random"),
     )
     count: int = key(10000, "at the start; given points are taken as they are", least=1)

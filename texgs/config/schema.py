@@ -1,7 +1,7 @@
 """The typed schema of conf/: every key with its type, default, unit and meaning.
 
 Hydra merges the YAML files into these classes, so an unknown key or a value of the wrong type is an error
-that names the key; `texgs VERB --help` prints this file.
+that names the key; `texgs views --help` prints this file.
 """
 
 from dataclasses import dataclass, field

@@ -1,1 +1,1 @@
-"""What can be fitted to views and drawn: surfels, and 3D Gaussians."""
+"""What can be fitted to views and drawn: surfels, 3D Gaussians and voxel grids."""

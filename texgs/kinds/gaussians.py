@@ -1,6 +1,6 @@
-"""3D Gaussians with spherical harmonics (Kerbl et al. 2023, 3DGS): what several methods that edit stand on.
+"""3D Gaussians with spherical harmonics (Kerbl et al. 2023, 3DGS): what several methods of editing build on.
 
-Light has gone into their colours, so that edits can change their opacity, but no light and no palette.
+Lighting is baked into their colours, so that edits can change their opacity but not their light or palette.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Sparse grids of voxels (Plenoxels): what ARF and Instruct-NeRF2NeRF stand on."""
+"""Sparse grids of voxels (Plenoxels): what ARF and Instruct-NeRF2NeRF build on."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ class ImageKeys(StyleKeys):
 
     recipe: str = key(
         "default",
-        "default; translucent, for scenes one looks into; patches, which needs no weights; preview; paper",
+        "default; translucent, for semi-transparent scenes; patches, which needs no weights; preview; paper",
         choices=("default", "translucent", "patches", "preview", "paper"),
     )
     iterations: int | None = key(None, "views, one each; default the recipe's", least=0)

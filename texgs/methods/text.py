@@ -35,7 +35,8 @@ class TextKeys:
     )
     recipe: str = key(
         "default",
-        "how texels follow: solved; as in the paper; or views edited again and again, its counterpart",
+        "how texels follow: solved; as in the paper; or iterative: views are edited again and again, as in "
+        "Instruct-NeRF2NeRF",
         choices=("default", "paper", "iterative"),
     )
     size: int = key(512, "longer side of the edited views", "pixels", least=64)

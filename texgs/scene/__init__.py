@@ -1,1 +1,1 @@
-"""Basic models: surfels with shading and texture, how they look in a view, and their files."""
+"""Scenes: files, the session that edits them, frames, meshes and exports."""

@@ -56,8 +56,8 @@ def understand(instruction: str) -> tuple[str, Color | None]:
     if color is not None:
         return f"colour {asked}", color
     raise ArgumentError(
-        f"instruction: expected one of {', '.join(vocabulary())}; got {text!r}, which needs the guidance "
-        "instruct-pix2pix"
+        f"instruction: expected one of {', '.join(vocabulary())}; got {text!r}, which needs "
+        "edit.text.guidance=instruct_pix2pix"
     )
 
 
