@@ -1,5 +1,7 @@
 """`texgs segment`: clicks become a segment of the scene, which is edited and taken back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -11,6 +13,8 @@ from tests.edit.test_lift import pixel_of
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.texture_file import write_texture
+from texgs.fit.texels import textured
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment
@@ -89,6 +93,21 @@ def test_a_new_segment_starts_as_the_model_is(scene, tmp_path):
     new = read_scene(tmp_path / "new.yaml").models["balls"]
     assert new.segments["red"].edit == new.edit
     assert np.array_equal(colors(tmp_path / "new.yaml", tmp_path / "1.png")[2], before)
+
+
+def test_what_is_clicked_on_has_the_textures_of_the_scene(tmp_path):
+    fitted = two_balls()[0]
+    sizes = torch.full((len(fitted), 2), 2, dtype=torch.int32)
+    model = textured(fitted, torch.tensor([0.5, 0.2, 0.5]), sizes)
+    swapped = replace(model, parameters={**model.parameters, "colors": model.parameters["colors"].flip(1)})
+    texture = write_texture(tmp_path / "swapped.safetensors", swapped)  # red is blue, and blue is red
+    entry = SceneModel(write_model(tmp_path / "model.safetensors", model), texture=texture)
+    scene, picture = write_scene(tmp_path / "scene.yaml", Scene({"balls": entry})), tmp_path / "preview.png"
+    assert segment(scene, "--point", LEFT, "--not", RIGHT, "--preview", str(picture)) == 0
+    shown = np.asarray(Image.open(picture)).astype(int)
+    rendered = colors(scene, tmp_path / "rendered.png")[2]
+    right = np.s_[:, SIZE - 30 :]  # part of the right ball, beside the mask and the clicks
+    assert np.abs(shown[right] - rendered[right]).max() <= 1, "a step of 8 bits"
 
 
 def test_a_preview_writes_no_scene(scene, tmp_path):

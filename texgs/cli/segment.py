@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     import torch
 
     from texgs.edit.clicks import Clicks
-    from texgs.scene.scene import Scene
 
 
 LENS = Lens()
@@ -21,6 +20,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("scene", type=Path, help="scene.yaml")
     parser.add_argument("--model", help="name of the model; may be left out where there is one")
     parser.add_argument("--name", help="of the new segment")
+    add_clicks(parser)
+    parser.add_argument("--output", type=Path, help="the new scene.yaml; the segment's file is put beside it")
+    parser.add_argument("--preview", type=Path, metavar="PNG", help="write the view with the mask, no scene")
+    parser.add_argument(
+        "--masks",
+        default="mobile_sam",
+        help="mobile_sam, a folder with a SAM of transformers, or grabcut, which needs no weights "
+        "(%(default)s)",
+    )
+    parser.add_argument(
+        "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
+    )
+    parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
+    parser.add_argument(
+        "--connected", action="store_true", help="keep only the connected pieces that hold a point"
+    )
+    add_views(parser)
+
+
+def add_clicks(parser: argparse.ArgumentParser) -> None:
+    """The view that is clicked on, and where."""
     parser.add_argument(
         "--view",
         type=numbers,
@@ -45,22 +65,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="X,Y",
         help="pixel that is not of the object; repeat for several",
     )
-    parser.add_argument("--output", type=Path, help="the new scene.yaml; the segment's file is put beside it")
-    parser.add_argument("--preview", type=Path, metavar="PNG", help="write the view with the mask, no scene")
-    parser.add_argument(
-        "--masks",
-        default="mobile_sam",
-        help="mobile_sam, a folder with a SAM of transformers, or grabcut, which needs no weights "
-        "(%(default)s)",
-    )
-    parser.add_argument(
-        "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
-    )
-    parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
-    parser.add_argument(
-        "--connected", action="store_true", help="keep only the connected pieces that hold a point"
-    )
-    add_views(parser)
 
 
 def add_views(parser: argparse.ArgumentParser) -> None:
@@ -86,45 +90,36 @@ def numbers(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the preview, or the segment and the scene that has it."""
-    import sys
-
     from texgs.core.device import torch_device
     from texgs.core.image import write_png
     from texgs.core.names import part_file
-    from texgs.edit.lift import lift
+    from texgs.edit.new_segment import clicked_model, model_name, new_segment
     from texgs.edit.preview import preview
-    from texgs.fields.surfels.compact import open_model
     from texgs.models.by_name import mask_model
-    from texgs.scene.scene_file import read_scene
-    from texgs.scene.session import Session
+    from texgs.scene.scene_file import read_scene, write_scene
     from texgs.volume.cameras import icosphere_of
 
-    scene = read_scene(arguments.scene)
-    name = chosen(arguments, scene)
-    device = torch_device(arguments.device)
-    clicks = clicks_of(arguments, device)
-    lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
-    around = [camera.to(device) for camera in icosphere_of(arguments.views, lens)]
-    masks = mask_model(arguments.masks, device)
-    model = open_model(scene.models[name].file).to(device)
+    scene, device = read_scene(arguments.scene), torch_device(arguments.device)
+    name = model_name(scene, arguments.model, "--model")
+    require_output(arguments)
+    clicks, masks = clicks_of(arguments, device), mask_model(arguments.masks, device)
     if arguments.preview:
+        model = clicked_model(scene, name, device)
         print(write_png(arguments.preview, preview(model, clicks, masks, scene.light)[1]))
         return 0
-    lifted = lift(
-        *(model, clicks, around, masks),
-        light=scene.light,
+    lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
+    file = arguments.output.with_name(part_file("--name", arguments.output.stem, name, arguments.name))
+    keys = ("view", "point", "other", "masks", "vote", "connected")
+    made = new_segment(
+        *(scene, f"{name}/{arguments.name}", clicks),
+        [camera.to(device) for camera in icosphere_of(arguments.views, lens)],
+        *(masks, file, {key: getattr(arguments, key) for key in keys}),
         vote=arguments.vote,
         threshold=arguments.threshold,
         connected=arguments.connected,
         title=f"segment {arguments.name}",
     )
-    keys = ("view", "point", "other", "masks", "vote", "connected")
-    facts = {key: getattr(arguments, key) for key in keys}
-    file = arguments.output.with_name(part_file("--name", arguments.output.stem, name, arguments.name))
-    sys.stderr.write(f"{name}/{arguments.name}: {lifted.basis}\n")
-    session = Session(scene)
-    session.make_segment(f"{name}/{arguments.name}", lifted.mask, file, facts)
-    print(session.save(arguments.output), file, sep="\n")
+    print(write_scene(arguments.output, made.scene), file, sep="\n")
     return 0
 
 
@@ -150,24 +145,17 @@ def clicks_of(arguments: argparse.Namespace, device: "torch.device") -> "Clicks"
     return Clicks(camera, pixels + 0.5, positive)
 
 
-def chosen(arguments: argparse.Namespace, scene: "Scene") -> str:
-    """The model's name.
+def require_output(arguments: argparse.Namespace) -> None:
+    """Require a name and a file for the segment and its scene, unless there is a preview only.
 
     Raises:
-        ArgumentError: if there is no such model, the new name cannot be one, or nothing is to be written.
+        ArgumentError: if the name cannot be one, or there is no file.
     """
     from texgs.core.errors import ArgumentError
     from texgs.core.names import require_name
-    from texgs.scene.parts import require_new
 
-    name = next(iter(scene.models)) if arguments.model is None and len(scene.models) == 1 else arguments.model
-    if name not in scene.models:
-        raise ArgumentError(f"--model: expected one of {', '.join(scene.models)}, got {name}")
     if arguments.preview:
-        return str(name)
-    new = arguments.name
-    require_name(new, "--name")
-    require_new(scene, f"{name}/{new}")
+        return
+    require_name(arguments.name, "--name")
     if not arguments.output:
         raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
-    return str(name)

@@ -60,7 +60,7 @@ def lift(
     the views before it has no vote.
 
     Args:
-        model: of any stage, as fitted: masks are found in its own colours.
+        model: of any stage; masks are found in its own colours and textures.
         clicks: on a view of it.
         cameras: of the other views, on the model's device.
         masks: finds the object in a view.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -20,10 +19,9 @@ if TYPE_CHECKING:
 
     from texgs.core.camera import Camera
     from texgs.edit.clicks import Clicks
-    from texgs.edit.lift import Lifted
+    from texgs.edit.new_segment import Segmented
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
-    from texgs.scene.scene import Scene
 
 LENS = Lens()  # of the view that is clicked on
 SHOWN = 3  # views of the segment around the object
@@ -59,59 +57,36 @@ class SegmentKeys:
 def run(task: Task[SegmentKeys]) -> EditedScene:
     """Make the segment; write its file, and edit.png with the clicks, their mask and the segment."""
     from texgs.core.names import part_file
-    from texgs.edit.lift import lift
+    from texgs.edit.new_segment import model_name, new_segment
     from texgs.edit.task import EditedScene
     from texgs.models.by_name import mask_model
-    from texgs.scene.parts import require_new
-    from texgs.scene.session import Session
     from texgs.volume.cameras import icosphere_of
 
-    settings, scene, device = task.settings, task.scene, task.device
-    name = model_of(scene, settings.model)
-    part = f"{name}/{settings.name}"
-    require_new(scene, part)
-    model = scene.models[name].surfels()[0].to(device)
-    clicks = clicks_of(settings, device)
-    start = time.monotonic()
-    lifted = lift(
-        model,
-        clicks,
-        [camera.to(device) for camera in icosphere_of(settings.views, LENS.square(settings.size))],
+    settings, device, start = task.settings, task.device, time.monotonic()
+    name = model_name(task.scene, settings.model, "edit.segment.model")
+    clicks, lens = clicks_of(settings, device), LENS.square(settings.size)
+    made = new_segment(
+        *(task.scene, f"{name}/{settings.name}", clicks),
+        [camera.to(device) for camera in icosphere_of(settings.views, lens)],
         mask_model(settings.masks, device),
-        light=scene.light,
+        task.output / part_file("edit.segment.name", name, settings.name),
+        asdict(settings),
         vote=settings.vote,  # type: ignore[arg-type]
         connected=settings.connected,
         title=f"{task.title} {task.edit.name}",
     )
     seconds = time.monotonic() - start
-    sys.stderr.write(f"{part}: {lifted.basis}\n")
-    file = task.output / part_file("edit.segment.name", name, settings.name)
-    session = Session(scene)
-    session.make_segment(part, lifted.mask, file, asdict(settings))
-    show(task, model, clicks, lifted)
+    show(task, clicks, made)
     return EditedScene(
-        session.scene,
+        made.scene,
         f"{settings.masks}, {settings.vote}",
         seconds,
         {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
         notes={
-            "surfels": int(lifted.mask.sum()),
-            "views": {"used": lifted.used, "left out": lifted.left_out},
+            "surfels": int(made.lifted.mask.sum()),
+            "views": {"used": made.lifted.used, "left out": made.lifted.left_out},
         },
     )
-
-
-def model_of(scene: Scene, name: str) -> str:
-    """The model to segment: the one named, or the only one.
-
-    Raises:
-        ArgumentError: if there is no such model.
-    """
-    if not name and len(scene.models) == 1:
-        return next(iter(scene.models))
-    if name not in scene.models:
-        raise ArgumentError(f"edit.segment.model: expected one of {', '.join(scene.models)}, got {name!r}")
-    return name
 
 
 def places_of(settings: SegmentKeys) -> list[list[float]]:
@@ -146,7 +121,7 @@ def clicks_of(settings: SegmentKeys, device: torch.device) -> Clicks:
     return Clicks(camera, points, positive)
 
 
-def show(task: Task[SegmentKeys], model: Surfels, clicks: Clicks, lifted: Lifted) -> None:
+def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
     import torch
 
@@ -155,6 +130,7 @@ def show(task: Task[SegmentKeys], model: Surfels, clicks: Clicks, lifted: Lifted
     from texgs.report.strip import write_strip
     from texgs.volume.cameras import orbit_path
 
+    model, lifted = made.model, made.lifted
     faint = lifted.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~lifted.mask, DIMMED)
     opacities = (model.parameters["opacities"].sigmoid() * faint).clamp(1e-6, 1 - 1e-6).logit()
     dimmed = Surfels({**model.parameters, "opacities": opacities}, model.shading, model.metadata)
