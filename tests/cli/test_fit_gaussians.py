@@ -67,7 +67,9 @@ def test_a_scene_opens_and_fades(results, tmp_path):
     assert float(after) < 0.8 * float(before)
     palette = ["TF01.palette=#ff0000", "--output", str(tmp_path / "red.yaml")]
     assert main(["edit", str(path), *palette]) == 2
-    with pytest.raises(ArgumentError, match=r"palette: 3D Gaussians can change visible and opacity only"):
+    with pytest.raises(
+        ArgumentError, match="palette: expected a model that can change it, got one of gaussians"
+    ):
         composed.render(camera, edits=[PartEdit(palette=(1, 0, 0))])
 
 

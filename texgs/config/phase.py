@@ -69,15 +69,14 @@ class Phase:
     densify: Densify = key(Densify, "density control")
 
 
+SEEDS = ("auto", "points", "visible", "voxels", "hull", "random")
+
+
 @dataclass
 class Seeds:
     """Where surfels or Gaussians start."""
 
-    kind: str = key(
-        "auto",
-        "auto: points of the views if there are any, else visible",
-        choices=("auto", "points", "visible", "voxels", "hull", "random"),
-    )
+    kind: str = key("auto", "auto: points of the views if there are any, else visible", choices=SEEDS)
     count: int = key(10000, "at the start; given points are taken as they are", least=1)
     opacity: float = key(0.1, "of each", least=0)
     half_size: float = key(0.55, "half the side of the box, where views do not say", "world units", least=0)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.numbers import is_number
 
 MOST = 1000.0  # of a factor: what is larger is a typing error
+# What a field has to be capable of for a value of an edit; all others are factors of a material.
+NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,21 @@ class PartEdit:
             value = getattr(self, each.name)
             if not is_number(value) or not 0 <= value <= MOST:
                 raise ArgumentError(f"{each.name}: expected a factor from 0 to {MOST:g}, got {value!r}")
+
+
+def require_possible(edit: PartEdit, kind: str) -> None:
+    """Require of a kind of field that it can show an edit.
+
+    Raises:
+        ArgumentError: naming the first value that it cannot show, unless the value changes nothing.
+    """
+    for each in fields(edit):
+        needs = NEEDS.get(each.name, "relight")
+        if needs not in kinds()[kind].can and getattr(edit, each.name) != each.default:
+            able = " or ".join(name for name, other in kinds().items() if needs in other.can)
+            raise ArgumentError(
+                f"{each.name}: expected a model that can change it, got one of {kind}; fit {able} for this"
+            )
 
 
 def color(name: str, value: object) -> tuple[float, float, float]:

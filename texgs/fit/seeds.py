@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from texgs.config.phase import SEEDS
 from texgs.core.errors import ArgumentError
 from texgs.core.ply_file import read_vertices
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
@@ -19,7 +20,6 @@ from texgs.volume.view_set import ViewSet
 from texgs.volume.voxels import visible_voxels
 
 POINTS = "points3d.ply"  # in a folder of views
-KINDS = ("auto", "points", "visible", "voxels", "hull", "random")
 MARGIN = 0.02  # of the box around the data, relative to its longest side
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
@@ -59,8 +59,8 @@ def seed_surfels(
     Raises:
         ArgumentError: if an argument is out of range, there are no points, or the views show nothing.
     """
-    if kind not in KINDS:
-        raise ArgumentError(f"seeds.kind: expected one of {', '.join(KINDS)}, got {kind!r}")
+    if kind not in SEEDS:
+        raise ArgumentError(f"seeds.kind: expected one of {', '.join(SEEDS)}, got {kind!r}")
     if not 0 < opacity < 1:
         raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {opacity}")
     given = views.folder / POINTS

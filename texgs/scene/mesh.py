@@ -20,7 +20,6 @@ from texgs.raster.fusion import BLOCK, DepthView, Lattice
 from texgs.scene.export import VERTEX, fill
 from texgs.volume.isosurface import Mesh, isosurface
 
-VOXEL = 1 / 256  # world units
 TRUNCATION = (
     5.0  # voxels on each side of a surface that know their distance from it, as in 2DGS; at most BLOCK
 )
@@ -76,7 +75,7 @@ def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
     return colors[0, :, :, 0, 0].T.round().clamp(0, 255).to(torch.uint8).numpy()
 
 
-def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float = VOXEL) -> Mesh:
+def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float) -> Mesh:
     """The surface that views of a scene see, with colours, but for small specks.
 
     What lets more than half of the light through has no surface.

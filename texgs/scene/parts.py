@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from texgs.core.errors import ArgumentError
-from texgs.fields.files import kind_of
-from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 
 Entry = SceneModel | SceneSegment
-# What a field has to be capable of for a value of an edit; all others are factors of a material.
-NEEDS = {"visible": "opacity", "opacity": "opacity", "palette": "palette"}
 
 
 def split(scene: Scene, part: str) -> tuple[str, str | None]:
@@ -70,19 +66,6 @@ def place_of(part: str) -> str:
     """Where a part stands in a scene file."""
     model, slash, segment = part.rpartition("/")
     return f"models.{model}.segments.{segment}" if slash else f"models.{part}"
-
-
-def require_able(scene: Scene, part: str, key: str, value: object) -> None:
-    """Require of the field of a part that a value of its edit can be changed.
-
-    Raises:
-        ArgumentError: if it cannot, unless the value changes nothing.
-    """
-    kind = kind_of(scene.models[split(scene, part)[0]].file)
-    if NEEDS.get(key, "relight") not in kind.can and value != getattr(PartEdit(), key):
-        raise ArgumentError(
-            f"{place_of(part)}.{key}: expected a model that can change it, got one of {kind.name}"
-        )
 
 
 def require_new(scene: Scene, part: str) -> None:

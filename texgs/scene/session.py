@@ -17,9 +17,10 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.names import require_name
 from texgs.fields.field import Composed
-from texgs.fields.part_edit import PartEdit, color
+from texgs.fields.files import kind_of
+from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.scene.frame import Mode, frame
-from texgs.scene.parts import entry_of, place_of, replaced, require_able, require_new, split
+from texgs.scene.parts import entry_of, place_of, replaced, require_new, split
 from texgs.scene.pick import Picked, pick
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
@@ -62,12 +63,14 @@ class Session:
         """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material.
 
         Raises:
-            ArgumentError: if there is no such part or key, or the value is out of range.
+            ArgumentError: if there is no such part or key, the value is out of range, or the model's kind of
+                field cannot show it.
         """
         entry = entry_of(self.scene, part)
         known({key: value}, EDITS, place_of(part))
-        require_able(self.scene, part, key, value)
+        kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
         try:
+            require_possible(PartEdit(**{key: value}), kind.name)
             edit = replace(entry.edit, **{key: value})
         except ArgumentError as error:
             raise ArgumentError(f"{place_of(part)}.{error}") from error

@@ -67,7 +67,9 @@ def test_an_opacity_is_a_factor_and_at_most_one():
     ],
 )
 def test_other_edits_are_refused(edit, name):
-    with pytest.raises(ArgumentError, match=f"{name}: 3D Gaussians can change visible and opacity only"):
+    with pytest.raises(
+        ArgumentError, match=f"{name}: expected a model that can .* one of gaussians; fit surfels"
+    ):
         JoinedGaussians([sample()]).render(CAMERA, edits=[edit])
 
 

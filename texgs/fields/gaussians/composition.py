@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import fields
 
 import torch
 from torch import Tensor
@@ -14,10 +13,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
 from texgs.fields.gaussians.model import Gaussians
-from texgs.fields.part_edit import PartEdit
+from texgs.fields.part_edit import PartEdit, require_possible
 from texgs.raster import Render
-
-POSSIBLE = ("visible", "opacity")  # what edits can change
 
 
 class JoinedGaussians:
@@ -93,25 +90,10 @@ class JoinedGaussians:
                 f"edits: expected one for each of {len(self.counts)} models, got {len(edits)}"
             )
         for edit in edits:
-            require_possible(edit)
+            require_possible(edit, self.whole.kind)
         factors = [edit.opacity if edit.visible else 0.0 for edit in edits]
         pairs = zip(factors, self.counts, strict=True)
         return torch.cat([torch.full((n,), factor, device=self.device) for factor, n in pairs])
-
-
-def require_possible(edit: PartEdit) -> None:
-    """Require an edit of nothing but opacity and visibility.
-
-    Raises:
-        ArgumentError: naming what else it changes.
-    """
-    default = PartEdit()
-    names = [each.name for each in fields(PartEdit) if each.name not in POSSIBLE]
-    changed = [name for name in names if getattr(edit, name) != getattr(default, name)]
-    if changed:
-        raise ArgumentError(
-            f"{changed[0]}: 3D Gaussians can change {' and '.join(POSSIBLE)} only; fit surfels for the rest"
-        )
 
 
 def joined(models: Sequence[Gaussians]) -> Gaussians:

@@ -13,7 +13,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
-from texgs.fields.part_edit import PartEdit
+from texgs.fields.part_edit import PartEdit, require_possible
 from texgs.fields.voxels.model import Voxels
 from texgs.raster import Render
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, unpack_rows, voxel_grid
@@ -83,8 +83,7 @@ class VoxelScene:
                 f"edits: expected one for each of {len(self.fields)} models, got {len(edits)}"
             )
         for edit in edits:
-            if replace(edit, visible=True, opacity=1.0) != PartEdit():
-                raise ArgumentError("edits: expected visible and opacity of voxels, got others")
+            require_possible(edit, self.fields[0].kind)
         factors = tuple(edit.opacity if edit.visible else 0.0 for edit in edits)
         if self._merged is None or self._merged[0] != factors:
             self._merged = (factors, self._merge(factors))
