@@ -1,4 +1,4 @@
-"""A module imports only from layers to its left: the rule of the design, checked on the source."""
+"""Rules of the design that the source can tell: layers import from their left, and functions are short."""
 
 import ast
 from pathlib import Path
@@ -59,3 +59,21 @@ def test_imports_point_to_the_left(path):
     assert found <= allowed, (
         f"{path} imports {sorted(found - allowed)}; {package} may import {sorted(allowed)}"
     )
+
+
+LONGEST = 40  # lines of a function without its docstring
+
+
+def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    """Lines of a function without its docstring."""
+    first = function.body[0]
+    docstring = first.end_lineno - first.lineno + 1 if ast.get_docstring(function) is not None else 0
+    return function.end_lineno - function.lineno + 1 - docstring
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_functions_are_short(path):
+    nodes = ast.walk(ast.parse(path.read_text()))
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    long = [f"{each.name}: {lines_of(each)}" for each in functions if lines_of(each) > LONGEST]
+    assert not long, f"{path}: expected functions of at most {LONGEST} lines, got {', '.join(long)}"

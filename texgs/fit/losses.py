@@ -65,10 +65,7 @@ def view_loss(
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
     render = rasterize(
         *geometry(parameters),
-        camera.viewmat,
-        camera.K,
-        camera.width,
-        camera.height,
+        *(camera.viewmat, camera.K, camera.width, camera.height),
         features=features,
         background=white(features),
         shift=shift,

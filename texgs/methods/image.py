@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -51,21 +51,43 @@ class ImageKeys(StyleKeys):
 def run(task: Task[ImageKeys]) -> EditedScene:
     """Give the parts the style; write style.png and convergence.png."""
     from texgs.core.image import write_png
-    from texgs.edit.clip_loss import ClipLoss
-    from texgs.edit.stylize import stylize
     from texgs.edit.task import EditedScene
-    from texgs.models.clip import Clip
-    from texgs.models.vgg import Vgg
     from texgs.report.convergence import write_convergence
-    from texgs.volume.reduced import smaller
 
     wanted = recipe_of(task.settings, task.edit.seed)
     recipe, picture = with_what_is_there(wanted, task.clip, task.weights), style_of(task.settings)
-    pixels = picture.image.permute(1, 2, 0)
-    vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
-    clip = ClipLoss(Clip.load(task.clip, task.device), pixels.to(task.device)) if recipe.needs_clip else None
     curves: dict[str, dict[str, list[float]]] = {}
     seconds: dict[str, dict[str, float]] = {}
+    scene = task.each_part(stylist(task, recipe, picture, curves, seconds))
+    write_png(task.output / "style.png", picture.image.permute(1, 2, 0))
+    write_convergence(task.output / "convergence.png", curves)
+    return EditedScene(
+        scene,
+        how(recipe, wanted),
+        sum(each["all"] for each in seconds.values()),
+        {"style.png": "The style picture.", "convergence.png": "Terms of the loss in each iteration."},
+        recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
+        {"seconds": seconds},
+    )
+
+
+def stylist(
+    task: Task[ImageKeys],
+    recipe: Recipe,
+    picture: StylePicture,
+    curves: dict[str, dict[str, list[float]]],
+    seconds: dict[str, dict[str, float]],
+) -> Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]:
+    """What gives one part the style, for `Task.each_part`; it notes its losses and its seconds by name."""
+    from texgs.edit.clip_loss import ClipLoss
+    from texgs.edit.stylize import stylize
+    from texgs.models.clip import Clip
+    from texgs.models.vgg import Vgg
+    from texgs.volume.reduced import smaller
+
+    pixels = picture.image.permute(1, 2, 0).to(task.device)
+    vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
+    clip = ClipLoss(Clip.load(task.clip, task.device), pixels) if recipe.needs_clip else None
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
         start = time.monotonic()
@@ -84,17 +106,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
         seconds[name] = {"all": time.monotonic() - start, **result.history.seconds}
         return result.model
 
-    scene = task.each_part(one)
-    write_png(task.output / "style.png", pixels)
-    write_convergence(task.output / "convergence.png", curves)
-    return EditedScene(
-        scene,
-        how(recipe, wanted),
-        sum(each["all"] for each in seconds.values()),
-        {"style.png": "The style picture.", "convergence.png": "Terms of the loss in each iteration."},
-        recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
-        {"seconds": seconds},
-    )
+    return one
 
 
 def style_of(settings: ImageKeys) -> StylePicture:

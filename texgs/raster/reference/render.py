@@ -88,10 +88,8 @@ def rasterize(
         image["normal"] = weights @ projected.normal
     if "distortion" in outputs:
         image["distortion"] = distortion(weights, fragments.depth, options)
-    contributions = None
-    if "statistics" in outputs:
-        radii = kind.visible_radii(projected, size, options)
-        contributions = statistics(weights, radii, projected.index, len(means))
+    radii = kind.visible_radii(projected, size, options) if "statistics" in outputs else None
+    contributions = None if radii is None else statistics(weights, radii, projected.index, len(means))
     image = {name: x.reshape(height, width, *x.shape[1:]) for name, x in image.items()}
     return Render(image.pop("color"), image.pop("alpha"), **image, statistics=contributions)
 
