@@ -176,7 +176,7 @@ def _follower(model: Surfels, policy: Policy, generator: torch.Generator) -> Fol
 
 
 def _group(round_: int, size: int | None, count: int) -> list[int]:
-    """EditViews of a round: the next ones in turn."""
+    """The views of a round: the next ones in turn."""
     if size is None or size >= count:
         return list(range(count))
     return [(round_ * size + k) % count for k in range(size)]

@@ -1,4 +1,4 @@
-"""A fit that an interruption costs half a minute of: checkpoints while it runs, and where it goes on."""
+"""A fit that loses at most half a minute to an interruption: it writes checkpoints and continues from them."""
 
 from __future__ import annotations
 

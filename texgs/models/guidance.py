@@ -16,7 +16,7 @@ from texgs.core.errors import ArgumentError
 
 @dataclass(frozen=True, eq=False)
 class EditViews:
-    """EditViews of one scene to be edited together; all of one size, on one device, over white."""
+    """Views of one scene to be edited together; all of one size, on one device, over white."""
 
     images: Tensor
     """[V, H, W, 3] the scene as it looks now, in [0, 1]."""

@@ -1,4 +1,4 @@
-"""Runs of processes that were killed: MLflow leaves them RUNNING for good, the next process closes them."""
+"""Runs of processes that were killed: MLflow leaves them RUNNING for ever, the next process closes them."""
 
 import json
 import os

@@ -1,1 +1,1 @@
-"""What can be fitted to views and drawn: surfels."""
+"""Textured 2D Gaussians (surfels)."""
