@@ -1,4 +1,4 @@
-"""A fit that loses at most half a minute to an interruption: it writes checkpoints and continues from them."""
+"""Fits that lose at most half a minute to an interruption: they go on from checkpoints."""
 
 from __future__ import annotations
 
