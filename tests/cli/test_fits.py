@@ -15,15 +15,15 @@ CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
     [
         (
             ["texture", "fit=gaussians_quick"],
-            "fit.field: texture fits surfels, but fit=gaussians_quick has field gaussians; run",
+            "fit.field: texgs texture fits surfels, but fit=gaussians_quick has field gaussians;",
         ),
         (
             ["gaussians", "fit=quick"],
-            "fit.field: gaussians fits gaussians, but fit=quick has field surfels; run texgs texture",
+            "fit.field: texgs gaussians fits gaussians, but fit=quick has field surfels; run texgs texture",
         ),
         (
             ["mesh", "fit=plenoxels_quick"],
-            "fit.field: mesh expects a fit of gaussians or surfels, but fit=plenoxels_quick has field voxels",
+            "fit.field: texgs mesh expects a fit of gaussians or surfels, but fit=plenoxels_quick has field",
         ),
         (["voxels", *ON_A_GPU], CPU_ONLY),
         (["compose", *ON_A_GPU], CPU_ONLY),

@@ -34,13 +34,13 @@ def require_fit(stage: Stage, config: DictConfig) -> None:
     if stage.place == "phase" and stage.name not in kind.phases:
         owner = next(other.name for other in kinds().values() if stage.name in other.phases)
         raise ConfigError(
-            f"fit.field: {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
+            f"fit.field: texgs {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
             f"run texgs {kind.phases[-1]} or choose another fit"
         )
     if stage.place == "mesh" and not kind.depth:
         able = " or ".join(other.name for other in kinds().values() if other.depth)
         raise ConfigError(
-            f"fit.field: mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
+            f"fit.field: texgs mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
             "choose another fit"
         )
     check_device(config)

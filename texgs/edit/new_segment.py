@@ -65,8 +65,14 @@ def new_segment(
     """
     require_new(scene, part)
     model = clicked_model(scene, split(scene, part)[0], clicks.points.device)
-    options: dict[str, Any] = {"vote": vote, "threshold": threshold, "connected": connected}
-    lifted = lift(model, clicks, cameras, masks, light=scene.light, title=title, **options)
+    lifted = lift(
+        *(model, clicks, cameras, masks),
+        light=scene.light,
+        vote=vote,
+        threshold=threshold,
+        connected=connected,
+        title=title,
+    )
     sys.stderr.write(f"{part}: {lifted.basis}\n")
     session = Session(scene)
     session.make_segment(part, lifted.mask, file, facts)
