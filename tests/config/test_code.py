@@ -3,18 +3,21 @@ import shutil
 import pytest
 
 from texgs.config import code
+from texgs.config.sources import CACHE, Sources, WithoutWords
 
 
 def forget():
     """Read all sources anew."""
     for cached in (code.code_digest, code.essence, code.library_sources):
         cached.cache_clear()
+    code.SOURCES = Sources()
 
 
 @pytest.fixture
 def tree(tmp_path, monkeypatch):
     """A package with a stage that imports one module of two."""
     monkeypatch.setattr(code, "ROOT", tmp_path)
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "cache"))
     files = {
         "texgs/__init__.py": "",
         "texgs/volume/__init__.py": '"""Volumes."""',
@@ -100,3 +103,21 @@ def test_native_sources_count_where_the_native_library_is_called(tree, tmp_path)
     before = edit("texgs/core/deep.py", "LIMIT = 3", "import texgs.raster.native\nLIMIT = 3")
     assert edit("texgs/raster/csrc/maths.h", "2", "3") != before
     assert edit("texgs/raster/csrc/maths.h", "3", "2 /* three */") == before
+
+
+def test_later_processes_parse_nothing(tree, tmp_path, monkeypatch):
+    _, before = tree
+    forget()
+    monkeypatch.setattr(WithoutWords, "visit", lambda *_: pytest.fail("parsed again"))
+    assert code.code_digest("texgs.volume.stage") == before
+
+
+@pytest.mark.parametrize(
+    "damage", [("", "x"), ("{", "["), ("texgs.core", "texgs.cure"), ('"method": "', '"method": "3')]
+)
+def test_a_damaged_cache_is_an_empty_one(tree, tmp_path, damage):
+    _, before = tree
+    path = tmp_path / "cache" / CACHE
+    path.write_text(path.read_text().replace(*damage, 1))
+    forget()
+    assert code.code_digest("texgs.volume.stage") == before

@@ -177,17 +177,18 @@ def add_jobs(
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.locate import tf_names
     from texgs.config.stage import for_tf
-    from texgs.config.stages import STAGES
+    from texgs.config.stages import STAGES, is_fit
 
     folders = []
     for config in configs:
         check_basic_tfs(config.dataset)
         check_device(config)
         try:
-            by_tf = [for_tf(config, name) for name in tf_names(config)]
+            names = tf_names(config)
         except MissingDataError as error:
             missing.append(str(error))
             continue
+        by_tf = [for_tf(config, name) for name in names] if is_fit(config) else []
         for stage in STAGES.values():
             for each in filter(stage.applies, by_tf if stage.per_tf else [config]):
                 try:

@@ -1,26 +1,22 @@
 """Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
 
-Read from the source without importing it. Comments, docstrings, help texts and layout do not count, so only a
-change that can change a result changes the digest. Code that calls the native library has the digest of the
-C++ and CUDA sources in it.
+Read from the source without importing it (texgs/config/sources.py). Code that calls the native library has the
+digest of the C++ and CUDA sources in it.
 """
 
-import ast
 import ctypes
-import hashlib
 import sys
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from texgs.config.native_sources import native_digest
+from texgs.config.sources import PACKAGE, Sources, digest
 
 ROOT = Path(__file__).parents[2]
-PACKAGE = "texgs"
-LENGTH = 12  # hexadecimal digits of all digests
 NATIVE = "texgs.raster.native"  # the module that calls the native library
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # of native libraries
+SOURCES = Sources()
 
 
 @cache
@@ -34,18 +30,19 @@ def code_digest(module: str) -> str:
             continue
         seen[name], imported = read
         waiting += imported
+    SOURCES.save()
     parts = [f"{name}\n{seen[name]}" for name in sorted(seen)]
     return digest("\n".join([*parts, library_sources()] if NATIVE in seen else parts))
 
 
 @cache
 def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
-    """What counts of a module's source, and what it imports from texgs; None for a name that is no module."""
+    """Digest of what counts of a module, and what it imports; None for a name that is no module."""
     path = source(module)
     if path is None:
         return None
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    return ast.unparse(WithoutWords().visit(tree)), tuple(imports(tree))
+    what, *imported = SOURCES.of(path.read_bytes())
+    return what, tuple(imported)
 
 
 @cache
@@ -64,51 +61,8 @@ def built_from(texgs_sources: Any) -> str:
     return str(texgs_sources().decode())
 
 
-def digest(text: str) -> str:
-    """Short hexadecimal SHA-256."""
-    return hashlib.sha256(text.encode()).hexdigest()[:LENGTH]
-
-
 def source(module: str) -> Path | None:
     """The file of a module of texgs; None for a name that is no module."""
     path = ROOT.joinpath(*module.split("."))
     candidates = (path.with_suffix(".py"), path / "__init__.py")
     return next((candidate for candidate in candidates if candidate.is_file()), None)
-
-
-def imports(tree: ast.AST) -> Iterator[str]:
-    """Names in texgs that a file imports anywhere, also inside functions; some are functions, not modules."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-        else:
-            continue
-        yield from (name for name in names if name.split(".")[0] == PACKAGE)
-
-
-class WithoutWords(ast.NodeTransformer):
-    """Takes out docstrings and help texts: the words of `key(...)`, `help=...` and `{"help": ...}`."""
-
-    def visit(self, node: ast.AST) -> ast.AST:
-        """The node without them."""
-        self.generic_visit(node)
-        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-            if is_text(node.body[0] if node.body else None):
-                node.body = node.body[1:] or [ast.Pass()]
-        elif isinstance(node, ast.Call):
-            node.keywords = [word for word in node.keywords if word.arg not in ("help", "description")]
-            if isinstance(node.func, ast.Name) and node.func.id == "key":
-                node.args = node.args[:1]  # the default; then come help and unit
-        elif isinstance(node, ast.Dict):
-            items = zip(node.keys, node.values, strict=True)
-            kept = [(k, v) for k, v in items if not (isinstance(k, ast.Constant) and k.value == "help")]
-            node.keys, node.values = [k for k, _ in kept], [v for _, v in kept]
-        return node
-
-
-def is_text(node: ast.stmt | None) -> bool:
-    """Whether a statement is nothing but a text."""
-    is_constant = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
-    return is_constant and isinstance(node.value.value, str)  # type: ignore[union-attr]

@@ -13,7 +13,6 @@ from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.config.methods import method_of
 from texgs.config.places import folder_of, made
-from texgs.config.stage import for_tf
 from texgs.core.errors import ConfigError, MissingDataError
 
 
@@ -28,10 +27,10 @@ def prepared_volume(config: DictConfig) -> dict[str, Path]:
     return {"volume": made("volume", config)}
 
 
-def view_set(config: DictConfig) -> dict[str, Path]:
+def view_set(config: DictConfig, tf: str | None = None) -> dict[str, Path]:
     """The views: those that stage `views` renders, or those that the data set consists of."""
-    given = views_folder(config)
-    return {"views": made("views", config) if given is None else given / "transforms_train.json"}
+    given = views_folder(config, tf)
+    return {"views": made("views", config, tf=tf) if given is None else given / "transforms_train.json"}
 
 
 def seeded(config: DictConfig) -> dict[str, Path]:
@@ -53,7 +52,7 @@ def all_models(config: DictConfig) -> dict[str, Path]:
     """
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
-    return {name: made("phase", for_tf(config, name), last_phase(config)) for name in tf_names(config)}
+    return {name: made("phase", config, last_phase(config), name) for name in tf_names(config)}
 
 
 def last_phase(config: DictConfig) -> str:
@@ -133,7 +132,7 @@ def edited_scene(config: DictConfig) -> dict[str, Path]:
         raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
     if config.tf is not None:
         raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
-    views = {f"views.{name}": view_set(for_tf(config, name))["views"] for name in tf_names(config)}
+    views = {f"views.{name}": view_set(config, name)["views"] for name in tf_names(config)}
     method = method_of(config.edit)
     models = {} if is_scene_file(config.edit.base or "") else models_of_scene(config)
     return {"scene": scene_before(config), **models, **views, **method.files(method.of(config.edit))}

@@ -56,15 +56,17 @@ def cached_volume(volume: Volume) -> Path:
     return cache_folder() / "volumes" / checksum[:12] / name
 
 
-def views_folder(config: DictConfig) -> Path | None:
-    """Folder of the views that a data set without volume starts from, for `config.tf`; None with a volume.
+def views_folder(config: DictConfig, tf: str | None = None) -> Path | None:
+    """Folder of the views that a data set without volume starts from; None for one with a volume.
+
+    By default that of `config.tf`.
 
     Raises:
         MissingDataError: if the folder has no views; says how to get them.
     """
     if config.dataset.views_folder is None:
         return None
-    folder = Path(config.data_folder, config.dataset.views_folder, config.tf or "")
+    folder = Path(config.data_folder, config.dataset.views_folder, tf or config.tf or "")
     if not (folder / "transforms_train.json").is_file():
         raise MissingDataError(
             f"data set {config.dataset.name}: no views in {folder}; "

@@ -37,11 +37,11 @@ PLACES = {
 }
 
 
-def folder_of(place: str, config: DictConfig, phase: str = "") -> Path:
-    """Folder of a job's files."""
+def folder_of(place: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:
+    """Folder of a job's files; `tf`: of another basic TF than `config.tf`."""
     return Path(config.results) / PLACES[place].folder.format(
         dataset=config.dataset.name,
-        tf=config.tf,
+        tf=tf or config.tf,
         views=config.views.name,
         fit=fit_folder(config),
         phase=phase,
@@ -49,9 +49,9 @@ def folder_of(place: str, config: DictConfig, phase: str = "") -> Path:
     )
 
 
-def made(place: str, config: DictConfig, phase: str = "") -> Path:
+def made(place: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:
     """The file of a job that other jobs ask for."""
-    return folder_of(place, config, phase) / PLACES[place].files[0]
+    return folder_of(place, config, phase, tf) / PLACES[place].files[0]
 
 
 def fit_folder(config: DictConfig) -> str:

@@ -41,6 +41,8 @@ def told(error: Exception) -> str:
     name = full_key(error)
     if unknown := re.match(r"Key '([^']+)' (?:not in|is not in)", text):
         return no_such_key(name or unknown[1])
+    if missing := re.search(r"missing mandatory value: (\S+)", text):
+        return f"{name or missing[1]}: expected a value, got none"
     if missing := re.match(r"Could not override '([^']+)'", str(error)):
         return no_such_key(missing[1])
     return shortened(f"{name}: {text[0].lower()}{text[1:]}" if name else text)

@@ -63,9 +63,12 @@ def understand(instruction: str) -> tuple[str, Color | None]:
 
 def named_color(name: str) -> Color | None:
     """Red, green and blue of a colour by its CSS name or as #rrggbb; None if there is no such colour."""
-    from matplotlib.colors import CSS4_COLORS, is_color_like, to_rgb
+    from PIL import ImageColor
 
-    if name in CSS4_COLORS or (name.startswith("#") and is_color_like(name)):
-        red, green, blue = to_rgb(name)
-        return red, green, blue
-    return None
+    if name not in ImageColor.colormap and not name.startswith("#"):
+        return None
+    try:
+        red, green, blue, *_ = ImageColor.getrgb(name)
+    except ValueError:
+        return None
+    return red / 255, green / 255, blue / 255
