@@ -1,7 +1,7 @@
 """What counts of a Python source, and what it imports from texgs.
 
-Comments, docstrings, help texts and layout do not count, so only a change that can change a result changes the
-digest.
+Comments, docstrings, help texts and layout do not count, so only a change that can change a result changes
+the digest.
 """
 
 import ast
@@ -23,7 +23,7 @@ MOST = 3000  # sources in it
 
 
 class Sources:
-    """Digests and imports of sources by their checksums, kept for later processes: parsing takes half a second."""
+    """What is known of sources by their checksums. It is kept for later processes: parsing takes time."""
 
     def __init__(self) -> None:
         self._known: dict[str, list[str]] | None = None
@@ -43,20 +43,17 @@ class Sources:
         return self._known[checksum]
 
     def _load(self) -> dict[str, list[str]]:
-        """What the cache folder has; a cache that is damaged, or from another Python or texgs, is an empty one."""
+        """What the cache folder has; one that is damaged, or of another Python or texgs, is empty."""
         with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
             kept = json.loads((cache_folder() / CACHE).read_text())
-            if kept["method"] == self._method and kept["checksum"] == sha256(
-                json.dumps(kept["known"]).encode()
-            ):
-                return dict(kept["known"]) if len(kept["known"]) < MOST else {}
+            if kept["method"] == self._method and len(kept["known"]) < MOST:
+                return dict(kept["known"])
         return {}
 
     def save(self) -> None:
         """Keep them; where the cache cannot be written, later processes parse again."""
         if self._is_new:
-            checksum = sha256(json.dumps(self._known).encode())
-            kept = {"method": self._method, "checksum": checksum, "known": self._known}
+            kept = {"method": self._method, "known": self._known}
             with contextlib.suppress(ArgumentError, OSError):
                 write_bytes(cache_folder() / CACHE, json.dumps(kept).encode())
             self._is_new = False
