@@ -1,7 +1,7 @@
 """Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
 
-Read from the source without importing it, see sources.py. Code that calls the native library has the digest of
-the C++ and CUDA sources in it.
+Read from the source without importing it, see sources.py. Code that calls the native library has the digest
+of the C++ and CUDA sources in it.
 """
 
 import ctypes
