@@ -1,19 +1,21 @@
 """Export a scene or a model for other programs: Gaussians, points or a mesh, or as a compact model file."""
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 if TYPE_CHECKING:
+    from texgs.config.fields import Kind
     from texgs.core.camera import Camera
-    from texgs.fields.part_edit import PartEdit
-    from texgs.fields.surfels.composition import Composition
+    from texgs.fields.field import Field, Look
     from texgs.fields.surfels.model import Surfels
     from texgs.raster import Render
     from texgs.scene.scene import Scene, SceneModel
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
+SCENES = (".yaml", ".yml")
 DEFAULTS = {".ply": "3dgs", ".texgs": "compact"}
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
 
@@ -45,35 +47,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
-    from texgs.fields.surfels.compact import open_model
+    from texgs.fields.files import open_field
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
-    if arguments.source.suffix in (".yaml", ".yml"):
-        scene = read_scene(arguments.source)
-        if arguments.model is not None:
-            entry = chosen(scene, arguments.model)
-            print(of_model(arguments, entry.surfels()[0].to(arguments.device), kind))
-            return 0
-        print(of_scene(arguments, composition_of(scene, arguments.device), scene.edits, kind))
-    else:
-        print(of_model(arguments, open_model(arguments.source).to(arguments.device), kind))
+    scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
+    if scene is not None and arguments.model is None:
+        print(of_scene(arguments, scene, kind))
+        return 0
+    field = open_field(arguments.source) if scene is None else chosen(scene, arguments.model).open()[0]
+    print(of_model(arguments, field.to(arguments.device), kind))
     return 0
 
 
-def composition_of(scene: "Scene", device: str) -> "Composition":
-    """The surfels of a scene, joined.
+def require_export(field: "Kind[Any]", kind: str) -> None:
+    """Require of a kind of field that it can be exported as something.
 
     Raises:
-        ArgumentError: if it has none, but fields of another kind.
+        ArgumentError: naming what it can be exported as.
     """
+    from texgs.config.fields import kinds
     from texgs.core.errors import ArgumentError
-    from texgs.fields.surfels.composition import Composition
 
-    composed = scene.open(device)
-    if not isinstance(composed, Composition):
-        raise ArgumentError("export: expected a scene of surfels, got fields of another kind")
-    return composed
+    if kind not in field.exports:
+        able = " or ".join(name for name, other in kinds().items() if kind in other.exports)
+        instead = f"can be exported as {', '.join(field.exports)}" if field.exports else "cannot be exported"
+        raise ArgumentError(f"--kind {kind}: expected {able}, got {field.name}, which {instead}")
 
 
 def chosen(scene: "Scene", name: str) -> "SceneModel":
@@ -102,7 +101,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
     expected = {None: ".ply or .texgs", "compact": ".texgs"}.get(kind, ".ply")
     if kind is None or ending != expected:
         raise ArgumentError(f"--to: expected a file that ends in {expected}, got {arguments.to}")
-    is_scene = arguments.source.suffix in (".yaml", ".yml")
+    is_scene = arguments.source.suffix in SCENES
     if arguments.model is not None and not is_scene:
         raise ArgumentError(
             f"--model: expected a scene to choose it from, got {arguments.source}; leave it out"
@@ -115,32 +114,47 @@ def kind_of(arguments: argparse.Namespace) -> str:
     return kind
 
 
-def of_scene(
-    arguments: argparse.Namespace, scene: "Composition", edits: "Sequence[PartEdit]", kind: str
-) -> Path:
+def of_scene(arguments: argparse.Namespace, scene: "Scene", kind: str) -> Path:
     """Export the visible models of a scene as one."""
-    from texgs.fields.surfels.ply import write_ply
-    from texgs.scene.export import joined, write_points
-
-    if kind == "mesh":
-        black = scene.means.new_zeros(3)
-        return write_fused(
-            arguments,
-            lambda camera: scene.render(
-                camera, edits=edits, look="unshaded", background=black, outputs=("median",)
-            ),
-        )
-    surfels = joined(scene.parts, edits)
-    if kind == "points":
-        return write_points(arguments.to, surfels, arguments.opacity)
-    return write_ply(arguments.to, surfels, kind)
-
-
-def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path:
-    """Export one model; Gaussians with all that they can hold of it."""
-    from texgs.fields.part_edit import PartEdit
-    from texgs.fields.surfels.compact import seen_surfels, write_compact
+    from texgs.fields import files
+    from texgs.fields.gaussians.composition import JoinedGaussians
+    from texgs.fields.gaussians.ply import write_ply
     from texgs.fields.surfels.composition import Composition
+    from texgs.scene.export import joined
+
+    composed, edits = scene.open(arguments.device), scene.edits
+    field = files.kind_of(next(iter(scene.models.values())).file)
+    require_export(field, kind)
+    if kind == "mesh":
+        look: Look = "unshaded" if "unlit" in field.can else "shaded"
+        return write_fused(arguments, partial(composed.render, edits=edits, look=look), field.depth)
+    if isinstance(composed, JoinedGaussians):
+        return write_ply(arguments.to, composed.edited(edits))
+    return of_surfels(arguments, joined(cast(Composition, composed).parts, edits), kind)
+
+
+def of_model(arguments: argparse.Namespace, model: "Field", kind: str) -> Path:
+    """Export one model with all that the file can hold of it."""
+    from texgs.config.fields import kinds
+    from texgs.fields.gaussians.model import Gaussians
+    from texgs.fields.gaussians.ply import write_ply
+    from texgs.fields.surfels.composition import Composition
+    from texgs.fields.surfels.model import Surfels
+
+    field = kinds()[model.kind]
+    require_export(field, kind)
+    if kind == "mesh":
+        if isinstance(model, Surfels) and model.stage != "surfels":
+            return write_fused(arguments, partial(Composition([model]).render, look="unshaded"), field.depth)
+        return write_fused(arguments, model.render, field.depth)
+    if isinstance(model, Gaussians):
+        return write_ply(arguments.to, model)
+    return of_surfels(arguments, cast(Surfels, model), kind)
+
+
+def of_surfels(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path:
+    """Export surfels as they are, without rendering them."""
+    from texgs.fields.surfels.compact import seen_surfels, write_compact
     from texgs.fields.surfels.ply import write_ply
     from texgs.scene.export import write_points
 
@@ -149,20 +163,19 @@ def of_model(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path
         return write_compact(arguments.to, model, seen)
     if kind == "points":
         return write_points(arguments.to, model, arguments.opacity)
-    if kind != "mesh":
-        return write_ply(arguments.to, model, kind)
-    if model.stage != "surfels":
-        return of_scene(arguments, Composition([model]), [PartEdit()], kind)
-    black = model.parameters["means"].new_zeros(3)
-    return write_fused(arguments, lambda camera: model.render(camera, background=black, outputs=("median",)))
+    return write_ply(arguments.to, model, kind)
 
 
-def write_fused(arguments: argparse.Namespace, show: "Callable[[Camera], Render]") -> Path:
-    """Write the mesh of what `show` renders."""
+def write_fused(arguments: argparse.Namespace, render: "Callable[..., Render]", depth: str) -> Path:
+    """Write the mesh of what `render` shows, with the depth of that name."""
+    import torch
+
     from texgs.scene.mesh import fuse, write_mesh
 
+    black = torch.zeros(3, device=arguments.device)
     placed = [camera.to(arguments.device) for camera in cameras(arguments)]
-    return write_mesh(arguments.to, fuse(show, placed, arguments.voxel))
+    mesh = fuse(lambda camera: render(camera, background=black, outputs=(depth,)), placed, arguments.voxel)
+    return write_mesh(arguments.to, mesh)
 
 
 def cameras(arguments: argparse.Namespace) -> "list[Camera]":

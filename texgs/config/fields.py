@@ -44,6 +44,8 @@ class Kind(Generic[Settings]):
     """Dataclass of the keys of its fit, `fit.NAME`; None for surfels, whose keys are `fit` itself."""
     fit: Callable[[Any], Any] | None = None
     """Fits a field in one phase: from a `FitTask[Settings]` of texgs/fit/task.py to a `Fitted`."""
+    exports: tuple[str, ...] = ()
+    """What `texgs export` writes of it."""
     depth: str = ""
     """Which of its outputs meshes are made of, "median" or "depth"; empty where it has neither."""
     devices: frozenset[str] = frozenset({"cpu", "cuda"})

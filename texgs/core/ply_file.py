@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from pathlib import Path
 
@@ -11,6 +12,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.reading import reading
 
 LONGEST_HEADER = 1 << 16  # bytes
+MAGIC = b"ply"
+PROPERTY = re.compile(rb"^property[ \t]+\S+[ \t]+(\w+)", re.MULTILINE)
 ELEMENT = re.compile(rb"^element[ \t]+\S+[ \t]+(\d+)", re.MULTILINE)
 
 
@@ -32,10 +35,30 @@ def read_vertices(path: str | Path) -> np.ndarray:
         return vertices
 
 
+def is_ply(path: Path) -> bool:
+    """Whether a file begins as PLY files do."""
+    with contextlib.suppress(OSError), path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+    return False
+
+
+def properties(path: Path) -> set[str]:
+    """Names of the properties that the header of a PLY file has.
+
+    Raises:
+        OSError: if it cannot be read.
+    """
+    return {name.decode() for name in PROPERTY.findall(_header(path))}
+
+
+def _header(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(LONGEST_HEADER).partition(b"end_header")[0]
+
+
 def _check_counts(path: Path) -> None:
     """Refuse a header that claims more elements than the file has bytes: they would have memory first."""
-    with path.open("rb") as file:
-        header = file.read(LONGEST_HEADER).partition(b"end_header")[0]
+    header = _header(path)
     size = path.stat().st_size
     for count in ELEMENT.findall(header):
         if len(count) > 18 or int(count) > size:

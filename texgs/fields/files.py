@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs.config.fields import Kind, kinds
+from texgs.core.ply_file import is_ply, properties
 from texgs.fields.field import Field
 
 LONGEST_HEADER = 1 << 20  # bytes; those of fields have a kilobyte
@@ -33,9 +34,13 @@ def kind_of(path: Path) -> Kind[Any]:
 def formats(path: Path) -> set[str]:
     """Entries of a file's header, one of which names its format; none where it has no header of ours.
 
-    Files of fields are safetensors with one entry of metadata, or begin with a line of JSON.
+    Files of fields are safetensors with one entry of metadata, begin with a line of JSON, or are PLY files,
+    which are told apart by their properties: 3D Gaussians have a third scale.
     """
     try:
+        if is_ply(path):
+            scales = properties(path) & {"scale_1", "scale_2"}
+            return {f"ply {max(scales)}"} if scales else set()
         with path.open("rb") as file:
             start = file.read(9)
             if start[:1] == b"{":

@@ -50,10 +50,12 @@ class GaussianKeys:
 
 
 def read(path: Path) -> Gaussians:
-    """The Gaussians in a file."""
+    """The Gaussians in a file of ours, or in a PLY file of 3DGS."""
+    from texgs.core.ply_file import is_ply
     from texgs.fields.gaussians.model_file import read_gaussians
+    from texgs.fields.gaussians.ply import read_ply
 
-    return read_gaussians(path)
+    return read_ply(path) if is_ply(path) else read_gaussians(path)
 
 
 def write(path: Path, field: Gaussians) -> Path:
@@ -93,7 +95,7 @@ def fit(task: FitTask[GaussianKeys]) -> Fitted:
 FIELD: Kind[GaussianKeys] = Kind(
     "gaussians",
     "fit 3D Gaussians, the field of 3DGS",
-    ("texgs-gaussians",),
+    ("texgs-gaussians", "ply scale_2"),
     frozenset({"opacity"}),
     read,
     write,
@@ -101,5 +103,6 @@ FIELD: Kind[GaussianKeys] = Kind(
     phases=("gaussians",),
     settings=GaussianKeys,
     fit=fit,
+    exports=("3dgs", "mesh"),
     depth="depth",  # the mean, as the authors of 2DGS take it of 3D Gaussians
 )

@@ -16,10 +16,12 @@ if TYPE_CHECKING:
 
 
 def read(path: Path) -> Surfels:
-    """The surfels in a file, lossless or compact."""
+    """The surfels in a file, lossless, compact or PLY."""
+    from texgs.core.ply_file import is_ply
     from texgs.fields.surfels.compact import open_model
+    from texgs.fields.surfels.ply import read_ply
 
-    return open_model(path)
+    return read_ply(path) if is_ply(path) else open_model(path)
 
 
 def write(path: Path, field: Surfels) -> Path:
@@ -39,11 +41,12 @@ def compose(fields: Sequence[Surfels], segments: Sequence[Sequence[Tensor]]) -> 
 FIELD: Kind[None] = Kind(
     "surfels",
     "textured 2D Gaussians",
-    ("texgs-model", "texgs-compact"),
+    ("texgs-model", "texgs-compact", "ply scale_1"),
     ALL,
     read,
     write,
     compose,
     phases=("surfels", "shading", "texture"),
+    exports=("3dgs", "2dgs", "release", "points", "mesh", "compact"),
     depth="median",
 )

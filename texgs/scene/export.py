@@ -11,13 +11,11 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.fields.part_edit import PartEdit
+from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
 from texgs.fields.surfels.composition import Part, by_part
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.ply import Y00
 from texgs.fields.surfels.texels import mean_texels
-
-MOST_OPAQUE = 1 - 1e-6  # has a logit
 
 
 def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:

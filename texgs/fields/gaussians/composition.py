@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -13,7 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
 from texgs.fields.gaussians.model import Gaussians
-from texgs.fields.part_edit import PartEdit, require_possible
+from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, require_possible
 from texgs.raster import Render
 
 
@@ -82,6 +83,22 @@ class JoinedGaussians:
             raise ArgumentError(f"look: 3D Gaussians have light in their colours, so no {look}; fit surfels")
         opacity = 1.0 if edits is None else self._opacity(edits)
         return self.whole.render(camera, light, background=background, outputs=outputs, opacity=opacity)
+
+    def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
+        """What is visible as one model, opacities as edited.
+
+        Raises:
+            ArgumentError: as `render`; or if nothing is visible.
+        """
+        factors = self._opacity(edits)
+        shown = factors > 0
+        if not bool(shown.any()):
+            raise ArgumentError("models: expected at least one visible Gaussian, got none; show a model")
+        parameters = {name: x[shown] for name, x in self.whole.parameters.items()}
+        raw, factor = parameters["opacities"], factors[shown]
+        changed = (raw.sigmoid() * factor).clamp_max(MOST_OPAQUE).logit()
+        parameters["opacities"] = torch.where(factor == 1, raw, changed)
+        return replace(self.whole, parameters=parameters)
 
     def _opacity(self, edits: Sequence[PartEdit]) -> Tensor:
         """Factors [N] on opacities; 0 for what is hidden, so that nothing of it is drawn."""
