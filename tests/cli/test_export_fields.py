@@ -96,5 +96,5 @@ def test_what_gaussians_cannot_become_is_one_sentence(tmp_path, capsys, kind):
     source = write_gaussians(tmp_path / "model.safetensors", sample(5))
     assert export(source, tmp_path / "x.ply", "--kind", kind) == 2
     said = capsys.readouterr().err
-    assert f"--kind {kind}: expected surfels, got gaussians, which can be exported as 3dgs, mesh" in said
+    assert f"--kind {kind}: expected surfels, got gaussians, which can be exported as 3dgs or mesh" in said
     assert not (tmp_path / "x.ply").exists()

@@ -1,9 +1,12 @@
 """Fits that a verb or a run cannot make are told in one sentence, before anything is written."""
 
+from dataclasses import replace
+
 import pytest
 
 from texgs.cli.main import main
 from texgs.cli.plan import make
+from texgs.config.fields import kinds
 from texgs.core.errors import ConfigError
 
 ON_A_GPU = ("fit=plenoxels", "device=cuda")
@@ -21,10 +24,6 @@ CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
             ["gaussians", "fit=quick"],
             "fit.field: texgs gaussians fits gaussians, but fit=quick has field surfels; run texgs texture",
         ),
-        (
-            ["mesh", "fit=plenoxels_quick"],
-            "fit.field: texgs mesh expects a fit of gaussians or surfels, but fit=plenoxels_quick has field",
-        ),
         (["voxels", *ON_A_GPU], CPU_ONLY),
         (["compose", *ON_A_GPU], CPU_ONLY),
     ],
@@ -33,6 +32,15 @@ def test_a_verb_wants_a_fit_that_it_can_work_on(tmp_path, monkeypatch, capsys, w
     monkeypatch.chdir(tmp_path)
     assert main([*words, "dataset=sphere", "dataset.volume.size=16", "tracking=none"]) == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_mesh_wants_a_field_with_depth(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setitem(kinds(), "voxels", replace(kinds()["voxels"], depth=""))
+    assert main(["mesh", "fit=plenoxels_quick", "dataset=sphere", "tracking=none"]) == 2
+    said = capsys.readouterr().err
+    assert "fit.field: texgs mesh expects a fit of gaussians or surfels, but fit=plenoxels_quick has" in said
     assert not list(tmp_path.iterdir())
 
 

@@ -61,7 +61,7 @@ def test_what_only_surfels_can(grid, change, message):
     ("words", "message"),
     [
         (["render", "--mode", "unshaded", "--output", "a.png"], "look: expected shaded of voxels"),
-        (["export", "--to", "a.ply"], "expected gaussians or surfels, got voxels, which cannot be exported"),
+        (["export", "--to", "a.ply"], "got voxels, which can be exported as mesh"),
         (["edit", "TF01.palette=#ff0000", "--output", "b.yaml"], "palette: expected a model that can change"),
         (
             ["edit", "TF01.diffuse=2", "--output", "b.yaml"],

@@ -71,8 +71,10 @@ def require_export(field: "Kind[Any]", kind: str) -> None:
 
     if kind not in field.exports:
         able = " or ".join(name for name, other in kinds().items() if kind in other.exports)
-        instead = f"can be exported as {', '.join(field.exports)}" if field.exports else "cannot be exported"
-        raise ArgumentError(f"--kind {kind}: expected {able}, got {field.name}, which {instead}")
+        raise ArgumentError(
+            f"--kind {kind}: expected {able}, got {field.name}, which can be exported as "
+            f"{' or '.join(field.exports) or 'nothing'}"
+        )
 
 
 def chosen(scene: "Scene", name: str) -> "SceneModel":

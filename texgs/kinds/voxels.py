@@ -70,5 +70,7 @@ FIELD = Kind(
     phases=("voxels",),
     settings=VoxelKeys,
     fit=fit,
+    exports=("mesh",),
+    depth="depth",  # the mean
     devices=frozenset({"cpu"}),
 )
