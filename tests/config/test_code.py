@@ -3,7 +3,9 @@ import shutil
 import pytest
 
 from texgs.config import code
+from texgs.config.compose import compose
 from texgs.config.sources import CACHE, Sources, WithoutWords
+from texgs.config.stages import STAGES
 
 
 def forget():
@@ -67,12 +69,32 @@ def test_what_is_not_imported_does_not_count(tree):
 
 
 def test_stages_exist_and_differ():
-    from texgs.config.stages import STAGES
-
-    digests = {stage.code for stage in STAGES.values()}
-    assert len(digests) == len(STAGES)
+    digests = {code.code_digest(stage.module) for stage in STAGES.values()}
+    assert len(digests) == len({stage.module for stage in STAGES.values()})
     for stage in STAGES.values():
         assert code.source(stage.module) is not None, stage.module
+
+
+@pytest.mark.parametrize(
+    ("changed", "stages"),
+    [
+        ("texgs.fields.surfels.composition", {"compose", "timing", "edit_text", "edit_metrics"}),
+        ("texgs.fields.gaussians.composition", set()),
+        ("texgs.methods.text", {"edit_text", "edit_metrics"}),
+    ],
+)
+def test_what_settings_name_counts(monkeypatch, changed, stages):
+    """The kind of field and the method are imported by their names, which no source of a stage tells."""
+    config = compose(("dataset=turbulence", "edit=gold"))
+    names = ("volume", "compose", "timing", "edit_text", "edit_metrics")
+    settings = {name: STAGES[name].settings(config) for name in names}
+    before = {name: STAGES[name].code(settings[name]) for name in names}
+    real = code.essence.__wrapped__
+    other = lambda module: ("changed", ()) if module == changed else real(module)  # noqa: E731
+    monkeypatch.setattr(code, "essence", other)
+    code.code_digest.cache_clear()
+    assert {name for name in names if STAGES[name].code(settings[name]) != before[name]} == stages
+    code.code_digest.cache_clear()
 
 
 def test_help_texts_do_not_count_and_defaults_do(tree):

@@ -56,7 +56,7 @@ class Job:
         return {
             "stage": self.stage.name,
             "settings": settings_digest(self.settings),
-            "code": self.stage.code,
+            "code": self.stage.code(self.settings),
             "inputs": files,
         }
 

@@ -13,9 +13,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.code import ROOT, code_digest, digest
+from texgs.config.code import ROOT, code_digest
 from texgs.config.kept import fingerprint, keep, recall
 from texgs.config.project import folders
+from texgs.config.sources import digest
 from texgs.core.errors import ConfigError, MissingDataError
 
 if TYPE_CHECKING:
@@ -219,7 +220,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "stage": job.stage.name,
         "place": job.stage.place,
         "settings": settings,
-        "code": job.stage.code,
+        "code": job.stage.code(job.settings),
         "inputs": inputs,
     }
 

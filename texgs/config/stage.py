@@ -5,7 +5,7 @@ the digest of the code a parameter, so a changed value or line of code reruns wh
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -13,8 +13,11 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from texgs.config.code import code_digest, digest
+from texgs.config.code import code_digest
+from texgs.config.fields import kinds
+from texgs.config.methods import methods
 from texgs.config.places import PLACES, folder_of
+from texgs.config.sources import digest
 from texgs.core.io import write_atomic
 
 LONG_AGO = 946684800  # the year 2000, in seconds
@@ -31,7 +34,7 @@ class Stage:
     place: str  # of its files, a key of PLACES, and its rule in the workflow
     needs: tuple[str, ...] = ()  # stages that make these files
     applies: Callable[[DictConfig], bool] = lambda config: True  # whether a data set or edit goes through it
-    specification: str = ""  # module of the method of an edit, or of the kind of a field, that the job runs
+    fits: str = ""  # module of the kind of field that it fits
 
     @property
     def per_tf(self) -> bool:
@@ -54,11 +57,17 @@ class Stage:
         """Folder of the job's files."""
         return folder_of(self.place, config, phase=self.name)
 
-    @property
-    def code(self) -> str:
-        """Digest of the code that the job runs."""
-        own = code_digest(self.module)
-        return digest(f"{own} {code_digest(self.specification)}") if self.specification else own
+    def code(self, settings: Mapping[str, Any]) -> str:
+        """Digest of the code that a job runs: that of its stage, its kind of field and its method of editing.
+
+        The last two are imported by the names in its settings, so the sources of the stage do not tell.
+        """
+        modules = [self.module, self.fits] if self.fits else [self.module]
+        if self.place != "phase" and "fit" in settings:
+            modules.append(kinds()[settings["fit"]["field"]].module)
+        if "edit" in settings:
+            modules.append(methods()[settings["edit"]["method"]].module)
+        return digest(" ".join(map(code_digest, modules)))
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:

@@ -64,7 +64,6 @@ def edit_stage(method: Method) -> Stage:
         place="edit",
         needs=("compose", "views"),
         applies=lambda config: config.tf is None and config.edit.method == method.name,
-        specification=method.module,
     )
 
 
@@ -78,7 +77,7 @@ def fit_stage(kind: Kind) -> Stage:
         place="phase",
         needs=("views",),
         applies=is_fit_of(kind.name),
-        specification=kind.module,
+        fits=kind.module,
     )
 
 

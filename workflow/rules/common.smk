@@ -8,7 +8,7 @@ from pathlib import Path
 
 from texgs.cli import fork_client
 from texgs.cli.plan import planned, words_of
-from texgs.config.code import digest
+from texgs.config.sources import digest
 from texgs.config.places import PLACES
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
