@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
 
 LOW, VOXEL, BLOCKS, TRUNCATION = torch.tensor([-0.4, -0.3, -0.5]), 0.03, (3, 2, 4), 0.15
@@ -82,3 +82,7 @@ def test_what_does_not_fit_is_refused():
         lattice.add(view, CHOSEN, 0.0)
     with pytest.raises(ArgumentError, match=r"view: expected depth .* got \(20, 24\) and \(24, 20, 3\)"):
         DepthView(view.camera, view.depth, view.color.transpose(0, 1))
+    with pytest.raises(ArgumentError, match=r"color of uint8, got torch\.float32 and torch\.float32"):
+        DepthView(view.camera, view.depth, view.color.float())
+    with pytest.raises(DeviceError, match="view: expected tensors on cpu, got meta"):
+        DepthView(view.camera, view.depth.to("meta"), view.color)

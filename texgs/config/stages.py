@@ -178,6 +178,7 @@ ROWS = (
             "tf_values": config.dataset.tf_values,
             "points": basic_tf(config),
             "mesh": {name: value for name, value in config.mesh.items() if name != "tfs"},
+            "lens": lens(config),
         },
         inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
         place="mesh",

@@ -12,6 +12,7 @@ from torch import Tensor
 
 from texgs.config.edit import EditKeys
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
 from texgs.edit.parts import edit_parts
 from texgs.fields.surfels.model import Surfels
 from texgs.scene.scene import Scene
@@ -32,6 +33,7 @@ class Task(Generic[Settings]):
     device: torch.device
     reduce: int  # factor by which the views were made smaller for the fit
     clip: str  # backbone
+    lens: Lens  # of the views, but for the size of images
     weights: Mapping[str, str | None]  # checksums; None for those that are not on this machine
     title: str  # of progress bars
 

@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
 
-LENS = Lens()  # of the view that is clicked on
 SHOWN = 3  # views of the segment around the object
 POLAR = 20.0  # of these views, degrees
 DIMMED = 0.15  # opacity of what is not in the segment, in its picture
@@ -64,7 +63,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
 
     settings, device, start = task.settings, task.device, time.monotonic()
     name = model_name(task.scene, settings.model, "edit.segment.model")
-    clicks, lens = clicks_of(settings, device), LENS.square(settings.size)
+    clicks, lens = clicks_of(settings, task.lens, device), task.lens.square(settings.size)
     made = new_segment(
         *(task.scene, f"{name}/{settings.name}", clicks),
         [camera.to(device) for camera in icosphere_of(settings.views, lens)],
@@ -103,8 +102,8 @@ def places_of(settings: SegmentKeys) -> list[list[float]]:
     return places
 
 
-def clicks_of(settings: SegmentKeys, device: torch.device) -> Clicks:
-    """Clicks in pixels.
+def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
+    """Clicks in pixels of a view through a lens.
 
     Raises:
         ArgumentError: if one is no place in the view, or none is on the object.
@@ -115,8 +114,8 @@ def clicks_of(settings: SegmentKeys, device: torch.device) -> Clicks:
     from texgs.edit.clicks import Clicks
 
     places, (azimuth, polar) = places_of(settings), settings.view
-    camera = orbit(azimuth, polar, *LENS).to(device)
-    points = LENS.width * torch.tensor(places, dtype=torch.float32, device=device)
+    camera = orbit(azimuth, polar, *lens).to(device)
+    points = lens.width * torch.tensor(places, dtype=torch.float32, device=device)
     positive = torch.arange(len(points), device=device) < len(settings.points)
     return Clicks(camera, points, positive)
 
@@ -140,7 +139,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
         return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
     marked = overlay(shown(model, clicks.camera), lifted.reference, clicks.points, clicks.positive)
-    around = orbit_path(SHOWN, POLAR, *LENS)
+    around = orbit_path(SHOWN, POLAR, *task.lens)
     pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
     titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
     write_strip(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)

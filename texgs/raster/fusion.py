@@ -12,7 +12,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster import native
 
 BLOCK = 8  # TEXGS_FUSION_BLOCK
@@ -41,11 +41,11 @@ class DepthView:
     """What a view knows of a surface; on the CPU.
 
     Raises:
-        ArgumentError: if the images are not as large as the camera's.
+        ArgumentError, DeviceError: if images are not as large as the camera's, of other types or elsewhere.
     """
 
     camera: Camera
-    depth: Tensor  # [H, W] camera z in world units, 0 where there is no surface
+    depth: Tensor  # [H, W] float32, camera z in world units, 0 where there is no surface
     color: Tensor  # [H, W, 3] uint8
 
     def __post_init__(self) -> None:
@@ -55,6 +55,13 @@ class DepthView:
                 f"view: expected depth {size} and color {(*size, 3)}, got {tuple(self.depth.shape)} and "
                 f"{tuple(self.color.shape)}"
             )
+        if (self.depth.dtype, self.color.dtype) != (torch.float32, torch.uint8):
+            raise ArgumentError(
+                f"view: expected depth of float32 and color of uint8, got {self.depth.dtype} and "
+                f"{self.color.dtype}"
+            )
+        if devices := {x.device.type for x in (self.depth, self.color)} - {"cpu"}:
+            raise DeviceError(f"view: expected tensors on cpu, got {devices.pop()}; move them")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +104,7 @@ class Lattice:
         if len(blocks) and not bool(((blocks >= 0) & (blocks < torch.tensor(self.blocks))).all()):
             raise ArgumentError(f"blocks: expected numbers below {self.blocks}, got others")
         matrices = [matrix.float().contiguous() for matrix in (view.camera.viewmat, view.camera.K)]
-        depth, color = view.depth.float().contiguous(), view.color.contiguous()
+        depth, color = view.depth.contiguous(), view.color.contiguous()
         chosen = blocks.to(torch.int32).contiguous()
         lattice = NativeLattice(
             (c_int32 * 3)(*(BLOCK * n for n in self.blocks)),

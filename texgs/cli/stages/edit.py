@@ -48,6 +48,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         device,
         settings.reduce,
         settings.clip,
+        settings.lens.lens,
         settings.weights,
         title,
     )

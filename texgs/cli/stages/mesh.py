@@ -1,16 +1,14 @@
 """Stage `mesh`: the surface of a fit beside that of its volume, as the paper compares 3DGS and 2DGS."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import torch
-from torch import Tensor
 
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.settings import OfTF, Recipe
+from texgs.cli.stages.settings import Distance, OfTF, Recipe
 from texgs.cli.stages.tf import in_data_values
 from texgs.config.dataset import BasicTF
 from texgs.config.fields import kinds
@@ -21,22 +19,19 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.fields.field import Field
 from texgs.fields.files import open_field
-from texgs.metrics.surface import Points, compare, distances, nearest, sample, seen
+from texgs.metrics.surface import compare, sample, seen
 from texgs.raster import Render
+from texgs.report.mesh_figure import write_mesh_figure
 from texgs.report.results import MeshResult
-from texgs.report.strip import write_strip
 from texgs.scene.mesh import fuse, write_mesh
-from texgs.volume.cameras import orbit_path
 from texgs.volume.isosurface import Mesh, surface_of
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.reduced import smaller
 from texgs.volume.view_set import read_views
 
+SHOWN = "The isosurface of the volume, the mesh of the fit, and its distance from it."
 MEASURED = 200_000  # points on each surface
-SHOWN = 1_000_000  # points of its pictures
 VISIBLE = 200  # pixels of the views that decide what can be seen
-PICTURE = 300  # pixels
-FAR = 0.02  # world units, the brightest colour of an error
 
 
 @dataclass
@@ -47,6 +42,7 @@ class Settings(OfTF):
     tf_values: str
     points: BasicTF
     mesh: MeshKeys
+    lens: Distance
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -70,22 +66,21 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     small = [smaller(camera, max(1, camera.width // VISIBLE)) for camera in cameras]
     visible = seen(whole, small, 2 * keys.voxel)
     errors = compare(points, whole[visible], keys.tolerance)
-    show(output / "mesh.png", mesh, reference, whole[visible], (settings.dataset, settings.tf))
+    title = f"{settings.dataset} {settings.tf}"
+    write_mesh_figure(output / "mesh.png", mesh, reference, whole[visible], settings.lens.lens, title)
     result = MeshResult(
-        errors.chamfer,
-        errors.accuracy,
-        errors.completeness,
-        errors.f_score,
-        errors.normal_angle,
-        len(mesh.vertices),
-        len(mesh.triangles),
-        seconds,
-        keys.tolerance,
-        float(visible.double().mean()),
+        chamfer=errors.chamfer,
+        accuracy=errors.accuracy,
+        completeness=errors.completeness,
+        f_score=errors.f_score,
+        normal_angle=errors.normal_angle,
+        vertices=len(mesh.vertices),
+        triangles=len(mesh.triangles),
+        mesh_seconds=seconds,
+        tolerance=keys.tolerance,
+        visible=float(visible.double().mean()),
     )
-    return Outcome(
-        result, {"mesh.png": "The isosurface of the volume, the mesh of the fit, and its distance from it."}
-    )
+    return Outcome(result, {"mesh.png": SHOWN})
 
 
 def reference_of(settings: Settings, volume: Path) -> Mesh:
@@ -109,35 +104,3 @@ def shown_by(field: Field) -> Callable[[Camera], Render]:
         raise ArgumentError(f"mesh: expected a fit of {able}, got one of {field.kind}, which has no depth")
     black = torch.zeros(3, device=field.device)
     return lambda camera: field.render(camera, background=black, outputs=(output,))
-
-
-def show(path: Path, mesh: Mesh, reference: Mesh, surface: Points, title: Sequence[str]) -> None:
-    """Write the picture: both surfaces under a light at the camera, and the error of the mesh."""
-    from matplotlib import colormaps
-
-    truth, ours = sample(reference, SHOWN), sample(mesh, SHOWN)
-    error = (distances(ours, surface)[0] / FAR).clamp(0, 1).numpy()
-    colored = torch.from_numpy(colormaps["inferno"](error)[:, :3])
-    rows: dict[str, list[np.ndarray]] = {}
-    for camera in orbit_path(2, 20.0, 4.0311, 22.0, PICTURE, PICTURE):
-        name = f"{' '.join(title)}, view {len(rows) + 1}"
-        rows[name] = [
-            picture(truth.places, lit(truth, camera), camera),
-            picture(ours.places, lit(ours, camera), camera),
-            picture(ours.places, colored, camera),
-        ]
-    write_strip(path, rows, ["isosurface of the volume", "mesh of the fit", f"error, 0 to {FAR:g}"])
-
-
-def lit(points: Points, camera: Camera) -> Tensor:
-    """Grey [N, 3] of points under a light at the camera."""
-    to_camera = camera.position.to(points.places) - points.places
-    cosine = (points.normals * to_camera).sum(1) / to_camera.norm(dim=1)
-    return (0.15 + 0.85 * cosine.clamp_min(0))[:, None].expand(-1, 3)
-
-
-def picture(places: Tensor, colors: Tensor, camera: Camera) -> np.ndarray:
-    """An image [H, W, 3] of the nearest points of all pixels, over white."""
-    first, _, _ = nearest(places, camera)
-    image = torch.where((first >= 0)[:, None], colors[first.clamp_min(0)], 1.0)
-    return image.reshape(camera.height, camera.width, 3).numpy()
