@@ -30,7 +30,7 @@ class Options:
     then look the same in images of every size (the antialiased variant of 3DGS, after Mip-Splatting)."""
     alpha_min: float = 1 / 255
     """Fragments with less alpha are skipped, and surfels with less opacity altogether. Above 0, except in the
-    reference; at least 1e-6 for gradients of the median depth, as fainter fragments leave no trace in float32."""
+    reference; at least 1e-6 for gradients of the median depth: fainter fragments vanish in float32."""
     transmittance_min: float = 1e-4
     """A pixel ends before the fragment that would leave less light than this."""
     near: float = 0.2
