@@ -60,12 +60,6 @@ void blend(const GridJob& job, const Row<K>& basis, Pending& pending, GridSample
     pending.n = 0;
 }
 
-template <int K>
-TEXGS_INLINE void prefetch_rows(const GridJob& job, const int32_t rows[8]) {
-    for (int corner = 0; corner < 8; ++corner)
-        for (int i = 0; i < K; i += 16) prefetch(job.grid.rows + int64_t(rows[corner]) * K + i);
-}
-
 // Both loops for one ray; its samples are appended to the chunk.
 template <int K>
 Light march_ray(const GridJob& job, const Ray& ray, GridChunk& chunk, float* basis_floats) {
@@ -75,7 +69,7 @@ Light march_ray(const GridJob& job, const Ray& ray, GridChunk& chunk, float* bas
     Row<K> basis = zero_row<K>();
     GridSample *const begin = chunk.samples + chunk.count, *next = begin;
     light.transmittance = march(job.grid, job.march, ray, [&](const Sample& s) {
-        prefetch_rows<K>(job, s.corners.row);
+        for (const int32_t row : s.corners.row) prefetch_row<K>(job.grid.rows + int64_t(row) * K);
         if (next == begin) {
             row_basis(job.grid.degree, ray.direction, basis_floats);
             basis = load_row<K>(basis_floats);

@@ -31,6 +31,11 @@ TEXGS_INLINE void store_row(float* p, const Row<K>& row) {
         for (int i = 0; i < Row<K>::kVectors; ++i) store(p + i * kLanes, row.v[i]);
 }
 
+template <int K>
+TEXGS_INLINE void prefetch_row(const float* p) {
+    for (int i = 0; i < K; i += 16) prefetch(p + i);
+}
+
 // The row whose floats are body(the floats of other rows).
 template <int K, class Body, class... Rows>
 TEXGS_INLINE Row<K> each(const Body& body, const Rows&... rows) {

@@ -12,6 +12,8 @@ namespace {
 // Which of a record's four gradients each of the first 16 floats of a row has; later extras are not used.
 constexpr int32_t kChannels[16] = {0, 1, 2, 3, 0, 1, 2, 0, 0, 1, 2, 1, 0, 1, 2, 2};
 
+constexpr int kAhead = 8;  // visits between asking for rows and adding to them
+
 template <int K>
 TEXGS_INLINE Row<K> channels_of(const float g[4]) {
     Row<K> out;
@@ -48,21 +50,55 @@ void place_ray(const GridJob& job, const GridSample* samples, int n, int64_t ray
     }
 }
 
+// The records of one ray in one cell, and the rows that they add to.
+struct Visit {
+    const GridRecord *begin, *end;
+    Corners corners;
+};
+
+// The visit that starts with a record; its rows are asked for.
 template <int K>
-void scatter(const GridJob& job, const GridRecord* begin, const GridRecord* end) {
-    for (const GridRecord* r = begin; r < end; ++r) {
-        if (r + 4 < end) prefetch(job.basis + int64_t(r[4].ray) * K);
-        const Corners corners = corners_of(job.grid, unpack(r->cell));
-        const Row<K> g = each<K>([](vf a, vf b) { return a * b; }, channels_of<K>(r->g),
-                                 load_row<K>(job.basis + int64_t(r->ray) * K));
+TEXGS_INLINE Visit visit_from(const GridJob& job, const GridRecord* begin, const GridRecord* end) {
+    const GridRecord* next = begin + 1;
+    while (next < end && next->cell == begin->cell && next->ray == begin->ray) ++next;
+    const Visit visit{begin, next, corners_of(job.grid, unpack(begin->cell))};
+    for (const int32_t row : visit.corners.row) prefetch_row<K>(job.gradient + int64_t(row) * K);
+    prefetch_row<K>(job.basis + int64_t(begin->ray) * K);
+    return visit;
+}
+
+template <int K>
+TEXGS_INLINE void add_visit(const GridJob& job, const Visit& visit) {
+    constexpr int kChannelFloats = K < 16 ? K : 16;  // after which the channels repeat
+    using Channels = Row<kChannelFloats>;
+    Channels sums[8];
+    for (Channels& sum : sums) sum = zero_row<kChannelFloats>();
+    for (const GridRecord* r = visit.begin; r < visit.end; ++r) {
+        const Channels g = channels_of<kChannelFloats>(r->g);
         float w[8];
         corner_weights(r->f, w);
-        for (int i = 0; i < 8; ++i) {
-            if (!corners.row[i]) continue;
-            float* sum = job.gradient + int64_t(corners.row[i]) * K;
-            store_row<K>(sum, each<K>([&](vf a, vf b) { return fma(w[i], a, b); }, g, load_row<K>(sum)));
-            job.touched[corners.block[i]] = 1;
-        }
+        for (int i = 0; i < 8; ++i)
+            sums[i] = each<kChannelFloats>([&](vf a, vf b) { return fma(w[i], a, b); }, g, sums[i]);
+    }
+    const Row<K> basis = load_row<K>(job.basis + int64_t(visit.begin->ray) * K);
+    for (int i = 0; i < 8; ++i) {
+        if (!visit.corners.row[i]) continue;
+        float* at = job.gradient + int64_t(visit.corners.row[i]) * K;
+        Row<K> gradient = load_row<K>(at);
+        for (int v = 0; v < Row<K>::kVectors; ++v)
+            gradient.v[v] = fma(sums[i].v[v % Channels::kVectors], basis.v[v], gradient.v[v]);
+        store_row<K>(at, gradient);
+        job.touched[visit.corners.block[i]] = 1;
+    }
+}
+
+template <int K>
+void scatter(const GridJob& job, const GridRecord* next, const GridRecord* end) {
+    Visit visits[kAhead];
+    for (int64_t listed = 0, added = 0; added < listed || next < end;) {
+        for (; next < end && listed < added + kAhead; next = visits[listed++ % kAhead].end)
+            visits[listed % kAhead] = visit_from<K>(job, next, end);
+        add_visit<K>(job, visits[added++ % kAhead]);
     }
 }
 
