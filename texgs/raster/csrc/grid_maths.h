@@ -20,11 +20,6 @@
 #define TEXGS_MATHS inline
 #endif
 #endif
-#ifdef __CUDACC__
-#define TEXGS_LOOP __device__ inline
-#else
-#define TEXGS_LOOP inline
-#endif
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -158,42 +153,23 @@ TEXGS_MATHS int skipped(const Ray& ray, const Point& p, int distance) {
         const float samples = (static_cast<float>(face - c[a]) - p.f[a]) * ray.samples_per[a];
         leave = samples < leave ? samples : leave;
     }
-    return static_cast<int>(leave) + 1;
+    return static_cast<int>(leave > 0.0f ? leave : 0.0f) + 1;  // rounding may have gone too far
+}
+
+// Below 0 as well: nothing is there.
+TEXGS_MATHS float density_at(const texgs_grid& grid, const Corners& corners, const float f[3]) {
+    float w[8], density = 0.0f;
+    corner_weights(f, w);
+    for (int i = 0; i < 8; ++i) density += w[i] * grid.density[corners.row[i]];
+    return density;
 }
 
 struct Sample {
-    Point point;
-    Corners corners;
+    const Point& point;
+    const Corners& corners;
     float weight, behind;  // in the ray's colour; light that passes on
     float distance;        // from the origin, spacings
 };
-
-// Calls body(sample) where there is any density along a ray, front to back; returns the light that is left.
-template <class Body>
-TEXGS_LOOP float march(const texgs_grid& grid, const texgs_march& how, const Ray& ray, const Body& body) {
-    const float step = how.step;
-    float light = 1.0f;
-    for (int k = 0; k < ray.samples;) {
-        const Point p = sample_point(grid, ray, k, step);
-        const int block = block_of(grid, p.cell);
-        if (const int distance = grid.distance[block]) {
-            k += skipped(ray, p, distance);
-            continue;
-        }
-        ++k;
-        if (!(grid.occupied[block] >> bit_of(p.cell) & 1)) continue;
-        const Corners corners = corners_of(grid, p.cell);
-        float w[8], density = 0.0f;
-        corner_weights(p.f, w);
-        for (int i = 0; i < 8; ++i) density += w[i] * grid.density[corners.row[i]];
-        if (!(density > 0.0f)) continue;
-        const float behind = light * ::expf(-density * step * grid.spacing);
-        body(Sample{p, corners, light - behind, behind, ray.near + (static_cast<float>(k) - 0.5f) * step});
-        light = behind;
-        if (light < how.transmittance_min) break;
-    }
-    return light;
-}
 
 // -- Spherical harmonics ---------------------------------------------------------------------------------------------
 

@@ -3,8 +3,7 @@
 // show something and asks for the rows around them; the second, some samples later, blends their colours.
 #include "grid_kernels.h"
 #include "grid_row.h"
-
-#include "../grid_maths.h"
+#include "grid_walk.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -62,13 +61,13 @@ void blend(const GridJob& job, const Row<K>& basis, Pending& pending, GridSample
 
 // Both loops for one ray; its samples are appended to the chunk.
 template <int K>
-Light march_ray(const GridJob& job, const Ray& ray, GridChunk& chunk, float* basis_floats) {
+Light march_ray(const GridJob& job, const Ray& ray, int first, int end, GridChunk& chunk, float* basis_floats) {
     Light light{{0.0f, 0.0f, 0.0f}, 0.0f, 1.0f};
     Pending pending;
     pending.n = 0;
     Row<K> basis = zero_row<K>();
     GridSample *const begin = chunk.samples + chunk.count, *next = begin;
-    light.transmittance = march(job.grid, job.march, ray, [&](const Sample& s) {
+    light.transmittance = march(job.grid, job.march, ray, first, end, [&](const Sample& s) {
         for (const int32_t row : s.corners.row) prefetch_row<K>(job.grid.rows + int64_t(row) * K);
         if (next == begin) {
             row_basis(job.grid.degree, ray.direction, basis_floats);
@@ -85,22 +84,30 @@ Light march_ray(const GridJob& job, const Ray& ray, GridChunk& chunk, float* bas
     return light;
 }
 
+void write_ray(const GridJob& job, int64_t i, const Light& light) {
+    const float alpha = 1.0f - light.transmittance;
+    if (job.color)
+        for (int c = 0; c < 3; ++c)
+            job.color[3 * i + c] = light.color[c] + light.transmittance * job.march.background[c];
+    if (job.alpha) job.alpha[i] = alpha;
+    if (job.depth) job.depth[i] = alpha > 0.0f ? light.depth * job.grid.spacing / alpha : 0.0f;
+}
+
 template <int K>
 int64_t march_chunk(const GridJob& job, GridChunk& chunk, int64_t begin, int64_t end) {
+    Bundle bundle;
     for (int64_t i = begin; i < end; ++i) {
-        const Ray ray = enter(job.grid, job.march.rays + 6 * i, job.march.step);
+        const int lane = static_cast<int>((i - begin) % kLanes);
+        if (lane == 0) enter_all(job.grid, job.march, i, static_cast<int>(end - i < kLanes ? end - i : kLanes), bundle);
+        const int first = bundle.first[lane], last = bundle.end[lane];
         if (!job.keep) chunk.count = 0;
-        if (chunk.count + ray.samples > chunk.capacity) return i;
+        if (chunk.count + last - first > chunk.capacity) return i;
         const int64_t before = chunk.count;
         float scratch[K];
-        const Light light = march_ray<K>(job, ray, chunk, job.keep ? job.basis + i * K : scratch);
+        const Light light =
+            march_ray<K>(job, bundle.rays[lane], first, last, chunk, job.keep ? job.basis + i * K : scratch);
         if (job.keep) job.lengths[i] = static_cast<int32_t>(chunk.count - before);
-        const float alpha = 1.0f - light.transmittance;
-        if (job.color)
-            for (int c = 0; c < 3; ++c)
-                job.color[3 * i + c] = light.color[c] + light.transmittance * job.march.background[c];
-        if (job.alpha) job.alpha[i] = alpha;
-        if (job.depth) job.depth[i] = alpha > 0.0f ? light.depth * job.grid.spacing / alpha : 0.0f;
+        write_ray(job, i, light);
     }
     return end;
 }

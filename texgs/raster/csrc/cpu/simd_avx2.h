@@ -68,6 +68,17 @@ TEXGS_INLINE vf to_float(vi a) { return _mm256_cvtepi32_ps(a.v); }
 TEXGS_INLINE vi splat(int32_t a) { return {_mm256_set1_epi32(a)}; }
 TEXGS_INLINE vi operator+(vi a, vi b) { return {_mm256_add_epi32(a.v, b.v)}; }
 TEXGS_INLINE vi operator*(vi a, vi b) { return {_mm256_mullo_epi32(a.v, b.v)}; }
+TEXGS_INLINE vi operator&(vi a, vi b) { return {_mm256_and_si256(a.v, b.v)}; }
+TEXGS_INLINE vi operator>>(vi a, int n) { return {_mm256_srli_epi32(a.v, n)}; }
+TEXGS_INLINE vm is_set(vi a, vi bit) {
+    const __m256i sign = _mm256_sllv_epi32(a.v, _mm256_sub_epi32(_mm256_set1_epi32(31), bit.v));
+    return {_mm256_castsi256_ps(_mm256_srai_epi32(sign, 31))};
+}
+TEXGS_INLINE vi byte_of(vi a, vi place) {
+    const __m256i moved = _mm256_srlv_epi32(a.v, _mm256_slli_epi32(place.v, 3));
+    return {_mm256_and_si256(moved, _mm256_set1_epi32(255))};
+}
+TEXGS_INLINE vi gather(const int32_t* p, vi i) { return {_mm256_i32gather_epi32(p, i.v, 4)}; }
 TEXGS_INLINE vi iota() { return {_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)}; }
 TEXGS_INLINE vf gather(const float* p, vi i) { return _mm256_i32gather_ps(p, i.v, 4); }
 TEXGS_INLINE float sum(vf a) {

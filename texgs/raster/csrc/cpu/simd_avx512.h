@@ -70,6 +70,16 @@ TEXGS_INLINE vf to_float(vi a) { return _mm512_cvtepi32_ps(a.v); }
 TEXGS_INLINE vi splat(int32_t a) { return {_mm512_set1_epi32(a)}; }
 TEXGS_INLINE vi operator+(vi a, vi b) { return {_mm512_add_epi32(a.v, b.v)}; }
 TEXGS_INLINE vi operator*(vi a, vi b) { return {_mm512_mullo_epi32(a.v, b.v)}; }
+TEXGS_INLINE vi operator&(vi a, vi b) { return {_mm512_and_si512(a.v, b.v)}; }
+TEXGS_INLINE vi operator>>(vi a, int n) { return {_mm512_srli_epi32(a.v, static_cast<unsigned>(n))}; }
+// Whether bit 0 to 31 of each integer is set.
+TEXGS_INLINE vm is_set(vi a, vi bit) { return {_mm512_test_epi32_mask(a.v, _mm512_sllv_epi32(_mm512_set1_epi32(1), bit.v))}; }
+// Byte 0 to 3 of each integer, from the lowest on.
+TEXGS_INLINE vi byte_of(vi a, vi place) {
+    const __m512i moved = _mm512_srlv_epi32(a.v, _mm512_slli_epi32(place.v, 3));
+    return {_mm512_and_si512(moved, _mm512_set1_epi32(255))};
+}
+TEXGS_INLINE vi gather(const int32_t* p, vi i) { return {_mm512_i32gather_epi32(i.v, p, 4)}; }
 TEXGS_INLINE vi iota() { return {_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)}; }
 TEXGS_INLINE vf gather(const float* p, vi i) { return _mm512_i32gather_ps(i.v, p, 4); }
 TEXGS_INLINE float sum(vf a) { return _mm512_reduce_add_ps(a.v); }

@@ -9,6 +9,32 @@ constexpr int kThreads = 128;
 
 __device__ inline int64_t thread_index() { return int64_t(blockIdx.x) * kThreads + threadIdx.x; }
 
+// Calls body(sample) where there is any density along a ray, front to back; returns the light that is left.
+template <class Body>
+__device__ float march(const texgs_grid& grid, const texgs_march& how, const Ray& ray, const Body& body) {
+    const float step = how.step;
+    float light = 1.0f;
+    for (int k = 0; k < ray.samples && !(light < how.transmittance_min);) {
+        const Point p = sample_point(grid, ray, k, step);
+        const int block = block_of(grid, p.cell);
+        if (const int distance = grid.distance[block]) {
+            k += skipped(ray, p, distance);
+            continue;
+        }
+        if (grid.occupied[block] >> bit_of(p.cell) & 1) {
+            const Corners corners = corners_of(grid, p.cell);
+            const float density = density_at(grid, corners, p.f);
+            if (density > 0.0f) {
+                const float behind = light * ::expf(-density * step * grid.spacing);
+                body(Sample{p, corners, light - behind, behind, ray.near + (static_cast<float>(k) + 0.5f) * step});
+                light = behind;
+            }
+        }
+        ++k;
+    }
+    return light;
+}
+
 __global__ __launch_bounds__(kThreads) void count_kernel(const GridJob job) {
     const int64_t i = thread_index();
     if (i > job.how.n) return;
