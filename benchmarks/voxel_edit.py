@@ -1,7 +1,7 @@
 """Compare a step of an edit of fitted voxel grids between two builds of the CPU library, in turns.
 
 `python -m benchmarks.voxel_edit BEFORE.so AFTER.so JSON GRID VIEWS [GRID VIEWS ...]` takes files of voxels
-and the views that they were fitted to. Each visit is a process with one thread. It takes the processor's time,
+and the views that they were fitted to. Each visit is a process with one thread. It takes processor time,
 which other processes disturb less than the time that passes.
 """
 
