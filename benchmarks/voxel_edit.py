@@ -14,6 +14,7 @@ from collections import defaultdict
 from pathlib import Path
 from statistics import median
 from time import process_time
+from typing import Any
 
 import torch
 
@@ -35,6 +36,7 @@ RATES = VoxelRates(*[1e-12] * 3)  # the grid stays as it is
 
 def main(before: str, after: str, path: str, *scenes: str) -> None:
     """Alternate between the builds; write medians of milliseconds and their ratio."""
+    report: dict[str, Any] = {"machine": machine.describe(torch.device("cpu"))}
     taken: dict[tuple[str, str, int], dict[str, list[float]]] = defaultdict(lambda: defaultdict(list))
     for _ in range(ROUNDS):
         for grid, views in zip(scenes[::2], scenes[1::2], strict=True):
@@ -48,12 +50,7 @@ def main(before: str, after: str, path: str, *scenes: str) -> None:
         | {"ratio": median(builds["after"]) / median(builds["before"])}
         for (grid, name, degree), builds in taken.items()
     ]
-    report = {
-        "machine": machine.describe(torch.device("cpu")),
-        "clock": "process",
-        "size": SIZE,
-        "rows": rows,
-    }
+    report |= {"clock": "process", "size": SIZE, "rows": rows}
     Path(path).write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
