@@ -212,6 +212,19 @@ def test_rays_that_are_not_finite_bring_back_the_background(value, device):
         assert torch.equal(color.cpu(), torch.tensor(scene.march.background).expand(6, 3))
 
 
+@pytest.mark.parametrize("away", [1e4, 1e6, 1e7, 1e9, 1e30])
+def test_rays_from_far_away_stay_inside_of_the_lattice(away, device):
+    """Their places are lost in rounding; what they read must not be."""
+    scene = voxel_scene().to(device)
+    aims = torch.tensor([[1.0, 0.3, 0.2], [-0.2, 1.0, 0.1], [0.3, -0.1, 1.0], [1.0, 1.0, 1.0]], device=device)
+    rays = torch.cat([torch.cat([-away * sign * aims, sign * aims], dim=1) for sign in (1, -1)])
+    rows = scene.grid.rows.requires_grad_()
+    found = render_rays(scene.grid, rays, scene.march)
+    assert found.color.isfinite().all()
+    assert ((found.alpha >= 0) & (found.alpha <= 1)).all()
+    assert torch.autograd.grad(found.color.sum(), rows)[0].isfinite().all()
+
+
 def test_errors_name_the_argument():
     scene = voxel_scene()
     grid, rays = scene.grid, scene.rays

@@ -135,8 +135,12 @@ TEXGS_MATHS Point sample_point(const texgs_grid& g, const Ray& ray, int k, float
     Point p;
     int c[3];
     for (int a = 0; a < 3; ++a) {
-        const float at = ray.entry[a] + t * ray.direction[a];
-        const int cell = static_cast<int>(at), last = g.size[a] - 2;  // rounding may lead out of the lattice
+        // Rounding may lead out of the lattice, and far out for an origin that is far away.
+        const float high = static_cast<float>(g.size[a] - 1);
+        float at = ray.entry[a] + t * ray.direction[a];
+        at = at > 0.0f ? at : 0.0f;
+        at = at < high ? at : high;
+        const int cell = static_cast<int>(at), last = g.size[a] - 2;
         c[a] = cell < last ? cell : last;
         p.f[a] = at - static_cast<float>(c[a]);
     }

@@ -72,7 +72,7 @@ struct Raster {
     texgs_camera camera;
     texgs_options options;
     int tiles_x, tiles_y;
-    int channels;     // constant over a surfel: features (or base), then the normal
+    int channels;     // constant over a surfel: base and features, then the normal
     bool with_depth;  // depth, median or distortion is wanted
     bool with_normal;
 
@@ -86,7 +86,7 @@ struct Raster {
     const uint32_t* slot_begin;  // [N + 1] slots of a surfel, in surfel order
 
     texgs_image image, grad;
-    float* median_stop;         // [tiles, 256] transmittance at which a pixel's median was taken
+    float* median_stop;         // [tiles, 256] alpha behind the fragment that is a pixel's median
     float* distortion_moments;  // [tiles, 3, 256] sum w m', sum w m'^2, origin of m'
 
     float* slots;  // [slots, slot_stride]
