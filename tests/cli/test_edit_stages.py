@@ -16,7 +16,7 @@ from texgs.methods.image import ImageKeys, how, weights, with_what_is_there
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
-CLICK = ("edit=lobe", "edit.segment.model=TF01", "edit.segment.points=[[0.5, 0.5]]")
+CLICK = ("edit=lobe", "edit.segment.model=TF01", "edit.segment.points=[[0.6, 0.5]]")
 
 
 @pytest.fixture(scope="module")
