@@ -109,7 +109,8 @@ def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
     spacing = min(grid.spacing for grid in grids)
     lower = torch.tensor([grid.lower for grid in grids]).amin(0)
     upper = torch.stack([_upper(grid) for grid in grids]).amax(0)
-    size = [SIDE * ceil((float(extent) / spacing + 1) / SIDE) for extent in upper - lower]
+    # Extents are whole numbers of voxels but for rounding, where lattices are the same.
+    size = [SIDE * ceil((round(float(extent) / spacing, 3) + 1) / SIDE) for extent in upper - lower]
     mask = torch.zeros(size, dtype=torch.bool)
     for grid in grids:
         _mark(mask, (grid.points() - lower) / spacing)
@@ -133,12 +134,19 @@ def _mark(mask: Tensor, places: Tensor) -> None:
 
 
 def _blended(grids: Sequence[VoxelGrid], points: Tensor, degree: int) -> Tensor:
-    """Rows [m, K] at points [m, 3]."""
-    total = points.new_zeros(len(points))
+    """Rows [m, K] at points [m, 3].
+
+    A negative density shows nothing at its voxel, but it thins what is interpolated between voxels. It stays
+    where no grid has a positive one.
+    """
+    rows = [unpack_rows(interpolate_rows(grid, points)) for grid in grids]
+    density = torch.stack([each for each, _ in rows])  # [G, m]
+    positive = density.clamp_min(0)
+    shows = positive.sum(0) > 0
+    total = torch.where(shows, positive.sum(0), density.amin(0))
+    weights = torch.where(shows, positive, -density.clamp_max(0))
+    weights = weights / weights.sum(0).clamp_min(1e-12)
     color = points.new_zeros(len(points), (degree + 1) ** 2, 3)
-    for grid in grids:
-        density, sh = unpack_rows(interpolate_rows(grid, points))
-        weight = density.clamp_min(0)
-        total += weight
+    for weight, (_, sh) in zip(weights, rows, strict=True):
         color[:, : sh.shape[1]] += weight[:, None, None] * sh
-    return pack_rows(total, color / total.clamp_min(1e-12)[:, None, None])
+    return pack_rows(total, color)
