@@ -148,6 +148,13 @@ def test_the_lattice_of_equal_lattices_is_theirs():
         assert merged([grid, grid]).size == grid.size
 
 
+def test_merging_makes_no_tensor_on_another_device_than_the_rows():
+    grids = [noise(seed).grid for seed in range(2)]
+    expected = merged(grids)
+    with torch.device("meta"):  # where tensors are made that name no device
+        assert torch.equal(merged(grids).rows, expected.rows)
+
+
 def test_edits_of_opacity_and_visibility():
     fields = [ball((-0.4, 0.0, 0.0), density=8.0), ball((0.4, 0.0, 0.0), density=8.0)]
     scene = VoxelScene(fields)

@@ -26,7 +26,7 @@ class VoxelScene:
     """Grids that are drawn together; edits of opacity and visibility make another merged grid.
 
     Args:
-        fields: at least one, on the CPU.
+        fields: at least one, all on one device.
 
     Raises:
         ArgumentError: if there is none.
@@ -107,11 +107,12 @@ def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
         ShapeError: if the grids lie so far apart that a lattice around them has too many voxels.
     """
     spacing = min(grid.spacing for grid in grids)
-    lower = torch.tensor([grid.lower for grid in grids]).amin(0)
-    upper = torch.stack([_upper(grid) for grid in grids]).amax(0)
+    lower, upper = (torch.stack(ends) for ends in zip(*map(_bounds, grids), strict=True))  # [G, 3]
+    lower = lower.amin(0)
     # Extents are whole numbers of voxels but for rounding, where lattices are the same.
-    size = [SIDE * ceil((round(float(extent) / spacing, 3) + 1) / SIDE) for extent in upper - lower]
-    mask = torch.zeros(size, dtype=torch.bool)
+    extents = ((upper.amax(0) - lower) / spacing).tolist()
+    size = [SIDE * ceil((round(extent, 3) + 1) / SIDE) for extent in extents]
+    mask = torch.zeros(size, dtype=torch.bool, device=lower.device)
     for grid in grids:
         _mark(mask, (grid.points() - lower) / spacing)
     degree = max(grid.degree for grid in grids)
@@ -121,14 +122,17 @@ def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
     return whole.with_rows(torch.cat([whole.rows[:1], *rows]))
 
 
-def _upper(grid: VoxelGrid) -> Tensor:
-    return torch.tensor(grid.lower) + grid.spacing * (torch.tensor(grid.size) - 1)
+def _bounds(grid: VoxelGrid) -> tuple[Tensor, Tensor]:
+    """Places of the first and the last voxel, [3] each."""
+    lower = grid.rows.new_tensor(grid.lower)
+    return lower, lower + grid.spacing * (grid.rows.new_tensor(grid.size) - 1)
 
 
 def _mark(mask: Tensor, places: Tensor) -> None:
     """Set the eight voxels around places [n, 3] in a lattice."""
-    cell, most = places.floor().long(), torch.tensor(mask.shape) - 1
-    for offset in torch.cartesian_prod(*[torch.tensor([0, 1])] * 3):
+    cell = places.floor().long()
+    most = cell.new_tensor(mask.shape) - 1
+    for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
         x, y, z = (cell + offset).clamp_min(0).minimum(most).unbind(1)
         mask[x, y, z] = True
 
