@@ -1,5 +1,6 @@
 """Fits that a verb or a run cannot make are told in one sentence, before anything is written."""
 
+import re
 from dataclasses import replace
 
 import pytest
@@ -32,6 +33,30 @@ def test_a_verb_wants_a_fit_that_it_can_work_on(tmp_path, monkeypatch, capsys, w
     monkeypatch.chdir(tmp_path)
     assert main([*words, "dataset=sphere", "dataset.volume.size=16", "tracking=none"]) == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("keys", "message"),
+    [
+        (["rays=1", "run=2"], r"fit.voxels.run: expected at most rays \(1\), got 2"),
+        (
+            ["stages=[{side: 64}, {side: 100}]"],
+            r"fit.voxels.stages: expected sides that double from one to the next, got \[64, 100\]",
+        ),
+        (["stages=[]"], r"fit.voxels.stages: expected sides that double from one to the next, got \[\]"),
+        (["stages=[{side: 600}, {side: 1200}]"], r"fit.voxels.stages.*side: expected at most 1024, got 1200"),
+        (["step=0.01"], r"fit.voxels.step: expected at least 0.1, got 0.01"),
+        (["step=100"], r"fit.voxels.step: expected at most 8, got 100"),
+    ],
+)
+def test_keys_of_voxels_that_do_not_fit_each_other(tmp_path, monkeypatch, capsys, keys, message):
+    monkeypatch.chdir(tmp_path)
+    words = ["dataset=sphere", "fit=plenoxels_quick", *(f"fit.voxels.{each}" for each in keys)]
+    assert main(["voxels", *words, "tracking=none"]) == 2
+    assert re.search(message, capsys.readouterr().err.splitlines()[-1])
+    with pytest.raises(ConfigError, match=message):
+        make(tuple(words))
     assert not list(tmp_path.iterdir())
 
 

@@ -12,6 +12,8 @@ from texgs.config.typed import typed
 from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
+from texgs.fit import checkpoint
+from texgs.fit.resumable import run_to_end
 from texgs.fit.voxel_rays import AROUND, curve, training_rays, widened
 from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
 from texgs.fit.voxels import VoxelFit
@@ -95,6 +97,19 @@ def test_a_resumed_run_is_as_if_it_had_never_stopped(images, optimizer, stop):
     resumed.restore(state)
     assert [done.step for done in resumed.run()] == list(range(stop + 1, 121))
     assert torch.equal(resumed.grid.rows, whole.grid.rows)
+
+
+@pytest.mark.parametrize("stages", [[GridStage(16, 3), GridStage(32, 0)], [GridStage(16, 3)]])
+def test_a_run_that_stopped_after_its_last_step_ends_as_any_other(images, tmp_path, stages):
+    settings = replace(SETTINGS, stages=stages)
+    whole, stopped, resumed = (VoxelFit(images, settings) for _ in range(3))
+    list(whole.run())
+    for _ in zip(range(3), stopped.run(), strict=False):
+        pass
+    checkpoint.save(tmp_path, stopped)
+    run_to_end(resumed, tmp_path, "resumed")
+    for name in ("rows", "masks", "density", "occupied", "distance"):
+        assert torch.equal(getattr(resumed.grid, name), getattr(whole.grid, name)), name
 
 
 @pytest.mark.parametrize(("optimizer", "rate"), [("rmsprop", 40.0), ("adam", 5.0)])

@@ -155,3 +155,40 @@ def test_the_file_says_what_the_session_says(session, tmp_path):
     path = session.save(tmp_path / "a.yaml")
     assert read_scene(path) == session.scene
     assert write_scene(tmp_path / "b.yaml", session.scene).read_text() == path.read_text()
+
+
+def masks():
+    """Halves of the left ball."""
+    even = torch.arange(len(ball(1))) % 2 == 0
+    return even, ~even
+
+
+def test_a_file_that_was_written_again_is_read_again(session, tmp_path):
+    file, frames = tmp_path / "half", []
+    for mask in masks():
+        write_segment(file, ball(1), mask)
+        if frames:
+            session.remove_segment("left/a")
+        session.add_segment("left/a", file)
+        session.set("left/a", "visible", False)
+        frames.append(session.frame(CAMERA))
+    assert not np.array_equal(*frames)
+
+
+def test_a_new_segment_leaves_the_files_of_earlier_scenes(session, tmp_path):
+    even, odd = masks()
+    session.make_segment("left/a", even, tmp_path / "a", {})
+    session.set("left/a", "visible", False)
+    before = session.frame(CAMERA)
+    session.remove_segment("left/a")
+    with pytest.raises(ArgumentError, match=r"left/b: expected a new file, got .*/a of an earlier scene"):
+        session.make_segment("left/b", odd, tmp_path / "a", {})
+    session.undo()
+    assert np.array_equal(session.frame(CAMERA), before)
+
+
+def test_a_new_segment_replaces_the_file_of_another_session(session, tmp_path):
+    for mask in masks():
+        other = Session(session.scene)
+        other.make_segment("left/a", mask, tmp_path / "a", {})
+        assert torch.equal(other.scene.models["left"].open()[1][0], mask)

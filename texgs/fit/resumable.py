@@ -56,7 +56,8 @@ def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
     saved = time.monotonic()
     start = saved - fit.seconds
     steps = fit.iterations - fit.iteration
-    for _ in progress(fit.run(), steps, title=title, unit="view") if steps else ():
+    run = fit.run()  # to its end even where no steps are left: something may follow the last one
+    for _ in progress(run, steps, title=title, unit="view") if steps else run:
         if time.monotonic() - saved > SAVED_EVERY:
             fit.seconds = time.monotonic() - start
             checkpoint.save(folder, fit)

@@ -41,7 +41,7 @@ class Session:
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [scene], list[Scene]()
         self._device = device
-        self._opened: tuple[list[Path | None], Composed] | None = None
+        self._opened: tuple[list[object], Composed] | None = None
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
@@ -134,13 +134,16 @@ class Session:
         Args:
             part: MODEL/SEGMENT, a new name.
             mask: [N] bool, surfels of the model.
-            file: target.
+            file: target, replaced unless this scene or an earlier one has it: undo brings these back.
             facts: what the segment comes from, JSON.
 
         Raises:
-            ArgumentError: if it is there already, or earlier segments have all of its surfels.
+            ArgumentError: if it is there already, earlier segments have all of its surfels, or the file is
+                one of the history's.
         """
         require_new(self.scene, part)
+        if file.resolve() in {each.resolve() for scene in self._past for each in files_of(scene) if each}:
+            raise ArgumentError(f"{part}: expected a new file, got {file} of an earlier scene; name another")
         name, mask = split(self.scene, part)[0], mask.cpu()
         entry = self.scene.models[name]
         fitted, free = replace(entry, texture=None, segments={}).surfels()[0], mask.clone()
@@ -188,9 +191,9 @@ class Session:
         Raises:
             ArgumentError, ShapeError: naming the model and its file.
         """
-        files = [file for entry in self.scene.models.values() for file in entry.files]
-        if self._opened is None or self._opened[0] != files:
-            self._opened = (files, self.scene.open(self._device))
+        states = [state_of(file) for file in files_of(self.scene)]
+        if self._opened is None or self._opened[0] != states:
+            self._opened = (states, self.scene.open(self._device))
         return self._opened[1]
 
     def frame(self, camera: Camera, mode: Mode = "shaded") -> np.ndarray:
@@ -225,3 +228,16 @@ class Session:
     def _push(self, scene: Scene) -> None:
         self._past.append(scene)
         self._future.clear()
+
+
+def files_of(scene: Scene) -> list[Path | None]:
+    """All that a scene reads; None stands for the textures that parts were fitted with."""
+    return [file for entry in scene.models.values() for file in entry.files]
+
+
+def state_of(file: Path | None) -> tuple[object, ...]:
+    """What is another where a file was written again, or is gone."""
+    if file is None or not file.exists():
+        return (file,)
+    status = file.stat()
+    return (file, status.st_ino, status.st_mtime_ns, status.st_size)

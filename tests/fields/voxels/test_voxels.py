@@ -14,7 +14,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.voxels.composition import VoxelScene, merged
 from texgs.fields.voxels.file import read_voxels, write_voxels
 from texgs.fields.voxels.model import Voxels
-from texgs.raster.voxel_grid import pack_rows, unpack_rows, voxel_grid
+from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
 
 CAMERA = orbit(30, 20, 4.0, 30.0, 48, 40)
 
@@ -106,6 +106,53 @@ def test_densities_add_up_where_grids_overlap():
     inside = grid.points().norm(dim=1) < 0.1
     torch.testing.assert_close(density[1:][inside], torch.full_like(density[1:][inside], 40.0))
     torch.testing.assert_close(sh[1:, 0][inside], torch.full_like(sh[1:, 0][inside], -0.5))
+
+
+def noise(seed=0, side=16, degree=1):
+    """Densities of both signs in a lattice whose places are exact in binary."""
+    generator = torch.Generator().manual_seed(seed)
+    mask = torch.rand([side] * 3, generator=generator) < 0.7
+    grid = voxel_grid(mask, (-0.25, -0.25, -0.25), 1 / 32, degree)
+    density = 30 * torch.randn(len(grid), generator=generator)
+    sh = torch.randn(len(grid), (degree + 1) ** 2, 3, generator=generator)
+    return Voxels(grid.with_rows(torch.cat([grid.rows[:1], pack_rows(density, sh)])))
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_an_empty_grid_changes_nothing(order):
+    field = noise()
+    empty = replace(field, grid=field.grid.with_rows(torch.zeros_like(field.grid.rows)))
+    whole = VoxelScene([field, empty][::order]).render(CAMERA, outputs=("depth",))
+    alone = field.render(CAMERA, outputs=("depth",))
+    assert alone.alpha.max() > 0.5
+    assert torch.equal(whole.alpha, alone.alpha)
+    # Colours are multiplied by their weight and divided by it again.
+    torch.testing.assert_close(whole.color, alone.color, atol=1e-6, rtol=0)
+
+
+def test_a_negative_density_takes_nothing_from_another_grid():
+    grids = [noise(seed).grid for seed in range(3)]
+    whole = merged(grids)
+    density = torch.stack([unpack_rows(interpolate_rows(grid, whole.points()))[0] for grid in grids])
+    positive = density.clamp_min(0).sum(0)
+    expected = torch.where(positive > 0, positive, density.amin(0))
+    torch.testing.assert_close(whole.density[1:], expected)
+
+
+def test_the_lattice_of_equal_lattices_is_theirs():
+    """Sides are multiples of eight, and a lattice of 1024 voxels has no room for rounding."""
+    generator = torch.Generator().manual_seed(0)
+    for spacing in torch.linspace(0.01, 0.1, 20).tolist():
+        lower = torch.randn(3, generator=generator).tolist()
+        grid = voxel_grid(torch.ones(8, 64, 16, dtype=torch.bool), lower, spacing, 0)
+        assert merged([grid, grid]).size == grid.size
+
+
+def test_merging_makes_no_tensor_on_another_device_than_the_rows():
+    grids = [noise(seed).grid for seed in range(2)]
+    expected = merged(grids)
+    with torch.device("meta"):  # where tensors are made that name no device
+        assert torch.equal(merged(grids).rows, expected.rows)
 
 
 def test_edits_of_opacity_and_visibility():

@@ -26,7 +26,7 @@ class VoxelScene:
     """Grids that are drawn together; edits of opacity and visibility make another merged grid.
 
     Args:
-        fields: at least one, on the CPU.
+        fields: at least one, all on one device.
 
     Raises:
         ArgumentError: if there is none.
@@ -107,10 +107,12 @@ def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
         ShapeError: if the grids lie so far apart that a lattice around them has too many voxels.
     """
     spacing = min(grid.spacing for grid in grids)
-    lower = torch.tensor([grid.lower for grid in grids]).amin(0)
-    upper = torch.stack([_upper(grid) for grid in grids]).amax(0)
-    size = [SIDE * ceil((float(extent) / spacing + 1) / SIDE) for extent in upper - lower]
-    mask = torch.zeros(size, dtype=torch.bool)
+    lower, upper = (torch.stack(ends) for ends in zip(*map(_bounds, grids), strict=True))  # [G, 3]
+    lower = lower.amin(0)
+    # Extents are whole numbers of voxels but for rounding, where lattices are the same.
+    extents = ((upper.amax(0) - lower) / spacing).tolist()
+    size = [SIDE * ceil((round(extent, 3) + 1) / SIDE) for extent in extents]
+    mask = torch.zeros(size, dtype=torch.bool, device=lower.device)
     for grid in grids:
         _mark(mask, (grid.points() - lower) / spacing)
     degree = max(grid.degree for grid in grids)
@@ -120,25 +122,35 @@ def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
     return whole.with_rows(torch.cat([whole.rows[:1], *rows]))
 
 
-def _upper(grid: VoxelGrid) -> Tensor:
-    return torch.tensor(grid.lower) + grid.spacing * (torch.tensor(grid.size) - 1)
+def _bounds(grid: VoxelGrid) -> tuple[Tensor, Tensor]:
+    """Places of the first and the last voxel, [3] each."""
+    lower = grid.rows.new_tensor(grid.lower)
+    return lower, lower + grid.spacing * (grid.rows.new_tensor(grid.size) - 1)
 
 
 def _mark(mask: Tensor, places: Tensor) -> None:
     """Set the eight voxels around places [n, 3] in a lattice."""
-    cell, most = places.floor().long(), torch.tensor(mask.shape) - 1
-    for offset in torch.cartesian_prod(*[torch.tensor([0, 1])] * 3):
+    cell = places.floor().long()
+    most = cell.new_tensor(mask.shape) - 1
+    for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
         x, y, z = (cell + offset).clamp_min(0).minimum(most).unbind(1)
         mask[x, y, z] = True
 
 
 def _blended(grids: Sequence[VoxelGrid], points: Tensor, degree: int) -> Tensor:
-    """Rows [m, K] at points [m, 3]."""
-    total = points.new_zeros(len(points))
+    """Rows [m, K] at points [m, 3].
+
+    A negative density shows nothing at its voxel, but it thins what is interpolated between voxels. It stays
+    where no grid has a positive one.
+    """
+    rows = [unpack_rows(interpolate_rows(grid, points)) for grid in grids]
+    density = torch.stack([each for each, _ in rows])  # [G, m]
+    positive = density.clamp_min(0)
+    shows = positive.sum(0) > 0
+    total = torch.where(shows, positive.sum(0), density.amin(0))
+    weights = torch.where(shows, positive, -density.clamp_max(0))
+    weights = weights / weights.sum(0).clamp_min(1e-12)
     color = points.new_zeros(len(points), (degree + 1) ** 2, 3)
-    for grid in grids:
-        density, sh = unpack_rows(interpolate_rows(grid, points))
-        weight = density.clamp_min(0)
-        total += weight
+    for weight, (_, sh) in zip(weights, rows, strict=True):
         color[:, : sh.shape[1]] += weight[:, None, None] * sh
-    return pack_rows(total, color / total.clamp_min(1e-12)[:, None, None])
+    return pack_rows(total, color)
