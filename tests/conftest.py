@@ -16,11 +16,25 @@ settings.load_profile("texgs")
 
 collect_rarely()
 
-# Folders and files below tests/ that take longest, so that no worker is left with one of them at the end.
-LONG = ("workflow", "test_readme.py", "cli", "track", "test_benchmarks.py")
+# What takes longest below tests/, the longest first: no worker is left with one of them at the end.
+LONG = (
+    "test_readme.py",
+    "workflow/test_every_rule.py",
+    "test_wheel.py",
+    "workflow",
+    "raster",
+    "track",
+    "cli",
+    "test_benchmarks.py",
+)
 
 
 def pytest_collection_modifyitems(config, items):
     """Long files first for workers; one process alone begins with what fails fastest, as collected."""
     if config.getoption("numprocesses", None) or hasattr(config, "workerinput"):
-        items.sort(key=lambda item: not any(item.path.is_relative_to(FOLDER / name) for name in LONG))
+        items.sort(key=place)
+
+
+def place(item):
+    """Of a test in the order: that of its file or folder in LONG."""
+    return next((i for i, name in enumerate(LONG) if item.path.is_relative_to(FOLDER / name)), len(LONG))

@@ -37,6 +37,7 @@ SMALL = {
     "fit.gaussians.seeds.count": "300",
     "edit.image.iterations": "5",
     "edit.text.size": "64",
+    "mesh.voxel": "0.02",
     "tracking": "none",
 }
 FILM = ["--width", "32", "--height", "32"]
@@ -129,6 +130,8 @@ def small(words):
     if verb == "render":
         rest = [word for word in rest if word not in ("--width", "1200")] + FILM
         return [verb, *rest, *(("--frames", "3") if "--path" in rest else ())]
+    if verb == "export" and "mesh" in rest:
+        return [*words, "--voxel", "0.02"]
     if verb == "segment":
         return [*words, "--views", "12", "--size", "64"]
     return words

@@ -1,4 +1,4 @@
-"""The tests of losses and shading, once more on every other instruction set of the library."""
+"""The tests of losses, shading and voxel grids, once more on every other instruction set of the library."""
 
 import os
 import subprocess
@@ -9,9 +9,8 @@ import pytest
 
 from texgs.raster import native
 
-FILES = [
-    str(Path(__file__).with_name(f"test_{name}.py")) for name in ("ssim", "normals", "smoothness", "shading")
-]
+NAMES = ("ssim", "normals", "smoothness", "shading", "voxels", "voxel_optimizer")
+FILES = [str(Path(__file__).with_name(f"test_{name}.py")) for name in NAMES]
 
 
 @pytest.mark.parametrize("instruction_set", ["portable", "avx2", "avx512"])

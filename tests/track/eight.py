@@ -12,12 +12,18 @@ from tests.track.jobs import N_JOBS, N_METRICS
 ROOT = Path(__file__).parents[2]
 
 
-def assert_eight_jobs_lose_nothing(uri, folder):
+def assert_eight_jobs_lose_nothing(folder, *uris):
+    """On each of the stores: the child that forks the jobs loads MLflow once for all of them."""
     file = folder / "image.png"
     file.write_bytes(b"pixels")
-    command = [sys.executable, "-m", "tests.track.jobs", uri, str(file)]
+    command = [sys.executable, "-m", "tests.track.jobs", str(file), *uris]
     child = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert (child.returncode, child.stdout, child.stderr) == (0, "", "")
+    for uri in uris:
+        _assert_all_is_there(uri)
+
+
+def _assert_all_is_there(uri):
     client = MlflowClient(tracking_uri=uri)
     experiment = client.get_experiment_by_name("race")
     runs = client.search_runs([experiment.experiment_id])

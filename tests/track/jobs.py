@@ -1,4 +1,7 @@
-"""Eight jobs that start at once: `python -m tests.track.jobs URI FILE`; fails where one of them does."""
+"""Eight jobs that start at once, on one store after another; fails where one of them does.
+
+`python -m tests.track.jobs FILE URI...`
+"""
 
 import multiprocessing
 import sys
@@ -27,12 +30,17 @@ def job(index, barrier, uri, file):
     sys.exit(record.lost)
 
 
-if __name__ == "__main__":
+def failures(uri, file):
+    """How many of the jobs on a store fail."""
     context = multiprocessing.get_context("fork")
     barrier = context.Barrier(N_JOBS)
-    jobs = [context.Process(target=job, args=(index, barrier, *sys.argv[1:])) for index in range(N_JOBS)]
+    jobs = [context.Process(target=job, args=(index, barrier, uri, file)) for index in range(N_JOBS)]
     for process in jobs:
         process.start()
     for process in jobs:
         process.join()
-    sys.exit(sum(process.exitcode != 0 for process in jobs))
+    return sum(process.exitcode != 0 for process in jobs)
+
+
+if __name__ == "__main__":
+    sys.exit(sum(failures(uri, sys.argv[1]) for uri in sys.argv[2:]))

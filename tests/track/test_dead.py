@@ -1,6 +1,7 @@
 """Runs of killed processes are closed by the next process, and no others."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -33,15 +34,30 @@ def statuses(client):
     return {each.info.run_id: each.info.status for each in client.search_runs(experiments)}
 
 
-@pytest.fixture
-def killed(uri, tmp_path):
-    """The run of a process that was killed, and the place of its metrics."""
-    metrics = tmp_path / "views" / "metrics.json"
-    command = [sys.executable, "-c", JOB, uri, str(metrics)]
+@pytest.fixture(scope="module")
+def killed_once(tmp_path_factory, empty_store):
+    """A store with the run of a process that was killed, the run, and the place of its metrics."""
+    folder = tmp_path_factory.mktemp("killed")
+    database, metrics = shutil.copy(empty_store, folder / "mlflow.db"), folder / "views" / "metrics.json"
+    command = [sys.executable, "-c", JOB, f"sqlite:///{database}", str(metrics)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as child:
         recorded = child.stdout.readline().strip()
         child.send_signal(signal.SIGKILL)
-    return recorded, metrics
+    return database, recorded, metrics
+
+
+@pytest.fixture
+def database(tmp_path, killed_once):
+    """A store with that run for each test."""
+    return shutil.copy(killed_once[0], tmp_path / "mlflow.db")
+
+
+@pytest.fixture
+def killed(killed_once):
+    """The run of a process that was killed, and the place of its metrics."""
+    _, recorded, metrics = killed_once
+    yield recorded, metrics
+    metrics.unlink(missing_ok=True)
 
 
 def test_the_next_run_closes_those_of_killed_processes(uri, client, killed, tmp_path):

@@ -64,7 +64,7 @@ def stop(process):
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the jobs are forked")
 def test_eight_jobs_and_then_the_server_dies(server, tmp_path, monkeypatch, caplog, capfd):
     address, process = server
-    assert_eight_jobs_lose_nothing(address, tmp_path)
+    assert_eight_jobs_lose_nothing(tmp_path, address)
     capfd.readouterr()
 
     monkeypatch.setattr(record, "SECONDS_BETWEEN_BATCHES", 0)

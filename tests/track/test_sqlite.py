@@ -29,11 +29,12 @@ with engine.begin() as connection:
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="the jobs are forked")
-@pytest.mark.parametrize("trial", range(3))
-def test_eight_jobs_on_a_store_that_does_not_exist_yet(tmp_path, trial):
-    assert_eight_jobs_lose_nothing(f"sqlite:///{tmp_path}/new folder 100%/mlflow.db", tmp_path)
-    left = {path.name for path in (tmp_path / "new folder 100%").iterdir()}
-    assert left == {"mlflow.db", "mlartifacts", ".mlflow.db.lock"}
+def test_eight_jobs_on_a_store_that_does_not_exist_yet(tmp_path):
+    folders = [tmp_path / f"new folder {trial}%" for trial in range(3)]
+    assert_eight_jobs_lose_nothing(tmp_path, *(f"sqlite:///{folder}/mlflow.db" for folder in folders))
+    for folder in folders:
+        left = {path.name for path in folder.iterdir()}
+        assert left == {"mlflow.db", "mlartifacts", ".mlflow.db.lock"}
 
 
 def test_current_store_takes_no_lock(database, monkeypatch):

@@ -14,6 +14,8 @@ from texgs.core.errors import ArgumentError
 from texgs.track.errors import TrackingError, reason
 
 ARTIFACTS = "mlartifacts"
+# `mlflow db upgrade`, without the imports of all other commands of MLflow: a third of its time.
+UPGRADE = "from mlflow.db import upgrade; upgrade()"
 
 
 def path_of(uri: str) -> Path:
@@ -106,7 +108,7 @@ def _bring_up(database: Path, newest: str | None) -> None:
 
 def _upgrade(database: Path) -> None:
     """Run MLflow's own upgrade, in a child because it sets up logging and prints."""
-    command = [sys.executable, "-P", "-m", "mlflow", "db", "upgrade", f"sqlite:///{database}"]
+    command = [sys.executable, "-P", "-c", UPGRADE, f"sqlite:///{database}"]
     child = subprocess.run(command, capture_output=True, text=True, check=False)
     if child.returncode:
         last = (child.stderr.strip().splitlines() or ["no message"])[-1]
