@@ -120,6 +120,7 @@ def own_process() -> None:
     for stream in (sys.stdout, sys.stderr):  # what a terminal cannot show is no reason to stop
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # read by torch: threads that spin cost others much
     keep_freed_memory()
     collect_rarely()
 
