@@ -46,7 +46,7 @@ def test_each_view_has_a_row_of_fits_and_one_of_their_errors(tmp_path, views, dr
     error = ((image - planes[:3].permute(1, 2, 0)) ** 2).mean().item()
     of_b = float(drawn[0].panels[2].words.split()[1])
     assert of_b == pytest.approx(-10 * math.log10(error), abs=0.05)  # the views have 8 bits
-    assert len({panel.pixels.shape for row in drawn for panel in row.panels if panel.words[:3] != "red"}) == 1
+    assert len({panel.pixels.shape for row in drawn for panel in row.panels if panel.pixels is not None}) == 1
 
 
 def test_more_recipes_than_a_row_has_room_for_go_on_below(tmp_path, views, drawn):

@@ -32,7 +32,18 @@ FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
 AFTER_FITS = {"figure", "comparison", "mesh", "compose", "pse", "timing", "edit", "edit_metrics"}
 TABLES = {"tables", "sweep", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
-GROUPS = {"all", "volumes", "sheets", "figures", "fits", "comparisons", "meshes", "scenes", "edits", "phase"}  # only names
+GROUPS = {
+    "all",
+    "volumes",
+    "sheets",
+    "figures",
+    "fits",
+    "comparisons",
+    "meshes",
+    "scenes",
+    "edits",
+    "phase",
+}  # only names
 
 
 def changed(project, extra=""):

@@ -15,7 +15,7 @@ from texgs.report.figure_page import COLUMNS, Panel, PanelRow
 from texgs.report.fit_figure import compare, draw_visible
 from texgs.volume.view_set import View
 
-KEY = Panel("", words="red: too bright\nblue: too dark")
+KEY = Panel("", words="of the worst channel\nred: too bright\nblue: too dark")
 
 
 @torch.no_grad()
