@@ -1,4 +1,4 @@
-"""Contact sheet of several fits: views that they have not seen, each recipe beside the truth, and its error."""
+"""Contact sheet of several fits: in views that they have not seen, each beside the truth, and its error."""
 
 from __future__ import annotations
 
