@@ -27,6 +27,7 @@ rule all:
         rules.volumes.input,
         rules.sheets.input,
         rules.figures.input,
+        rules.comparisons.input,
         rules.meshes.input,
         rules.scenes.input,
         rules.tables.output,

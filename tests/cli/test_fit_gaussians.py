@@ -73,6 +73,20 @@ def test_a_scene_opens_and_fades(results, tmp_path):
         composed.render(camera, edits=[PartEdit(palette=(1, 0, 0))])
 
 
+def test_two_recipes_side_by_side_are_fitted_first(results, monkeypatch):
+    monkeypatch.chdir(results.parent)
+    few = ["fits=[gaussians_quick,demo]", "fit.shading.iterations=10"]
+    assert main(["comparison", *TINY, *few]) == 0
+    folder = results / "sphere" / "TF01"
+    numbers = json.loads((folder / "comparison" / "metrics.json").read_text())["numbers"]
+    assert numbers == {
+        "recipes": ["gaussians_quick", "demo"],
+        "shown": ["test view 0", "test view 1"],
+    }
+    assert (folder / "comparison" / "comparison.png").stat().st_size > 1000
+    assert (folder / "demo" / "texture" / "model.safetensors").exists()
+
+
 def test_seeds_that_need_a_volume_are_one_sentence(results, monkeypatch, capsys):
     monkeypatch.chdir(results.parent)
     words = ["fit.gaussians.seeds.kind=voxels", "fit.name=other"]

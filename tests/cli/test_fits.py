@@ -25,6 +25,8 @@ CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
             ["gaussians", "fit=quick"],
             "fit.field: texgs gaussians fits gaussians, but fit=quick has field surfels; run texgs texture",
         ),
+        (["comparison", "fit=quick"], "fits: expected several recipes to compare, such as fits=[quick,demo]"),
+        (["comparison", "fits=[quick,plenoxels]", "device=cuda"], CPU_ONLY),
         (["voxels", *ON_A_GPU], CPU_ONLY),
         (["compose", *ON_A_GPU], CPU_ONLY),
     ],

@@ -12,6 +12,7 @@ from texgs.config.typed import typed
 TF = ("dataset=turbulence", "tf=TF01")
 WORDS = {  # of stages that read more than the data set
     **dict.fromkeys(("views", "sheet", "surfels", "shading", "texture", "figure", "mesh"), TF),
+    "comparison": (*TF, "fits=[quick,demo]"),
     "gaussians": (*TF, "fit=gaussians_quick"),
     "voxels": (*TF, "fit=plenoxels_quick"),
     "edit_text": ("dataset=turbulence", "edit=gold"),

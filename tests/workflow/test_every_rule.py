@@ -29,10 +29,21 @@ SMALL = (
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
-AFTER_FITS = {"figure", "mesh", "compose", "pse", "timing", "edit", "edit_metrics"}
+AFTER_FITS = {"figure", "comparison", "mesh", "compose", "pse", "timing", "edit", "edit_metrics"}
 TABLES = {"tables", "sweep", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
-GROUPS = {"all", "volumes", "sheets", "figures", "fits", "meshes", "scenes", "edits", "phase"}  # only names
+GROUPS = {
+    "all",
+    "volumes",
+    "sheets",
+    "figures",
+    "fits",
+    "comparisons",
+    "meshes",
+    "scenes",
+    "edits",
+    "phase",
+}  # only names
 
 
 def changed(project, extra=""):
@@ -94,7 +105,8 @@ def sources(project):
 def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
     of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
-    assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep
+    compared = 1
+    assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep + compared
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert (results / "tables" / f"{name}.csv").stat().st_size > 0
     assert "red" in (results / "tables" / "looks.md").read_text()
@@ -122,6 +134,9 @@ def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project)
     report = (results / "report.html").read_text()
     assert "<b>ball fade</b>" in report
     assert "<b>TF01 ball</b>" in report
+    compared = json.loads((results / "sphere" / "TF01" / "comparison" / "metrics.json").read_text())
+    assert compared["numbers"]["recipes"] == ["demo", "ball"]
+    assert compared["pictures"]["comparison.png"] in report
     words = ("edit_fade", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")
     assert "edit.method: expected fade, got image (edit=glass)" in project.texgs(*words).stderr
     refused = project.texgs("edit_image", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")
@@ -140,9 +155,9 @@ def test_a_changed_value_runs_what_reads_it(project):
 
 def test_a_changed_line_runs_the_stages_that_import_it(project, sources):
     sources("texgs/report/fit_figure.py", "import annotations\n", "import annotations\n\nCHANGED = True\n")
-    assert changed(project) == {"figure", "report"}
+    assert changed(project) == {"figure", "comparison", "report"}
     sources("texgs/config/fit.py", '"random numbers', '"seed of the random numbers')
-    assert changed(project) == {"figure", "report"}, "help texts do not count"
+    assert changed(project) == {"figure", "comparison", "report"}, "help texts do not count"
 
 
 def test_changed_native_sources_run_what_calls_them_and_want_a_new_library(project, sources):

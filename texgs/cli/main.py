@@ -26,6 +26,7 @@ STAGE_VERBS = {
     "texture": "give relightable surfels textures",
     **{kind.name: kind.summary for kind in kinds().values() if kind.fit is not None},
     "figure": "show a fit beside test views, with its maps",
+    "comparison": "show the fits of several recipes side by side in test views",
     "mesh": "make a mesh of a fit, and compare it with the isosurface of its volume",
     "compose": "make one scene of the basic models of a data set",
     "pse": "edit colours, opacities and lights of a scene beside those of its volume",
@@ -119,6 +120,7 @@ def own_process() -> None:
     for stream in (sys.stdout, sys.stderr):  # what a terminal cannot show is no reason to stop
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # read by torch: threads that spin cost others much
     keep_freed_memory()
     collect_rarely()
 

@@ -65,10 +65,35 @@ def run(arguments: argparse.Namespace) -> int:
     if stage.place == "edit" or stage.name == "edit_metrics":
         require_edit(stage, config)
         require_base(tuple(arguments.overrides))
+    if stage.name == "comparison":
+        ensure_fits(tuple(arguments.overrides))
     for name in tf_names(config) if stage.per_tf else [None]:
         chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
         ensure(arguments.verb, chosen, force=arguments.force)
     return 0
+
+
+def ensure_fits(words: tuple[str, ...]) -> None:
+    """Run the fits of all recipes of an experiment, unless they are there already.
+
+    Raises:
+        ConfigError: if there are not several, or one is not fitted on the device.
+    """
+    from texgs.cli.fits import check_device
+    from texgs.config.compose import compose
+    from texgs.config.inputs import last_phase
+    from texgs.config.locate import tf_names
+    from texgs.core.errors import ConfigError
+
+    config = compose(words)
+    if len(config.fits) < 2:
+        raise ConfigError("fits: expected several recipes to compare, such as fits=[quick,demo]")
+    configs = [compose((*words, f"fit={recipe}")) for recipe in config.fits]
+    for each in configs:
+        check_device(each)
+    for recipe, each in zip(config.fits, configs, strict=True):
+        for tf in tf_names(each):
+            ensure(last_phase(each), compose((*words, f"fit={recipe}", f"tf={tf}")))
 
 
 def require_edit(stage: Stage, config: DictConfig) -> None:

@@ -5,9 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
-from texgs.config.compose import is_scene_file
+from texgs.config.compose import compose, is_scene_file
 from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
@@ -113,6 +113,24 @@ def models(config: DictConfig) -> dict[str, Path]:
         **{name: made("phase", config, name) for name in phases},
         **view_set(config),
     }
+
+
+def compared_models(config: DictConfig) -> dict[str, Path]:
+    """The models of all recipes of the experiment after their last phases, by recipe, and the views."""
+    fits = [with_recipe(config, name) for name in config.fits]
+    return {
+        **{each.fit.name: made("phase", each, last_phase(each)) for each in fits},
+        **view_set(config),
+    }
+
+
+def with_recipe(config: DictConfig, name: str) -> DictConfig:
+    """The same configuration with the name and field of another recipe: what decides where its models are."""
+    recipe, chosen = compose((f"fit={name}",)).fit, config.copy()
+    OmegaConf.set_readonly(chosen, False)
+    chosen.fit.name, chosen.fit.field = recipe.name, recipe.field
+    OmegaConf.set_readonly(chosen, True)
+    return chosen
 
 
 def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:

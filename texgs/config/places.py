@@ -27,6 +27,7 @@ PLACES = {
     ),
     "sheet": Place("{dataset}/{tf}/sheet", ("sheet.png",)),
     "phase": Place("{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",)),
+    "comparison": Place("{dataset}/{tf}/comparison", ("comparison.png",)),
     "figure": Place("{dataset}/{tf}/{fit}/figure", ("figure.png",)),
     "mesh": Place("{dataset}/{tf}/{fit}/mesh", ("mesh.ply", "reference.ply", "mesh.png")),
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),

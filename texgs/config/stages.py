@@ -7,6 +7,7 @@ from omegaconf import DictConfig
 from texgs.config.fields import Kind, kinds
 from texgs.config.inputs import (
     all_models,
+    compared_models,
     edit_settings,
     edited_scene,
     fit_label,
@@ -23,6 +24,7 @@ from texgs.config.inputs import (
     view_set,
     view_settings,
     volume_inputs,
+    with_recipe,
 )
 from texgs.config.locate import basic_tf
 from texgs.config.methods import NO_METHOD, Method, methods
@@ -47,6 +49,13 @@ def has_volume(config: DictConfig) -> bool:
 def has_mesh(config: DictConfig) -> bool:
     """Whether a mesh is made of the fit of a basic TF."""
     return has_volume(config) and config.tf in config.mesh.tfs and bool(kinds()[config.fit.field].depth)
+
+
+def is_compared(config: DictConfig) -> bool:
+    """Whether this is the first of several recipes: its configuration stands for all of them."""
+    if not is_fit(config) or config.sweep.variants or len(config.fits) < 2:
+        return False
+    return bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
 
 def has_scene(config: DictConfig) -> bool:
@@ -169,6 +178,15 @@ ROWS = (
         place="figure",
         needs=tuple(kind.phases[-1] for kind in kinds().values()),  # which need those before
         applies=is_fit,
+    ),
+    Stage(
+        "comparison",
+        "texgs.cli.stages.comparison",
+        select=lambda config: {"reduce": config.fit.reduce},
+        inputs=compared_models,
+        place="comparison",
+        needs=("views", *(kind.phases[-1] for kind in kinds().values())),
+        applies=is_compared,
     ),
     Stage(
         "mesh",

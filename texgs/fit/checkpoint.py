@@ -9,7 +9,7 @@ from typing import Protocol
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
+from texgs.core.tensors import write_tensors
 from texgs.core.reading import reading
 from texgs.fit.loop import require_finite
 
@@ -41,11 +41,9 @@ def save(folder: str | Path, fit: Stateful) -> Path:
         FitError: if a value is NaN or infinite; the last good checkpoint stays.
         ArgumentError: if the folder cannot be written to, or the disk is full.
     """
-    from safetensors.torch import save as serialize
-
     state = {name: x.contiguous() for name, x in fit.state().items()}
     require_finite(fit.iteration, state)
-    return write_bytes(Path(folder) / NAME, serialize(state))
+    return write_tensors(Path(folder) / NAME, state)
 
 
 def latest(folder: str | Path) -> dict[str, Tensor] | None:

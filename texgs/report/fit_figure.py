@@ -65,7 +65,12 @@ def write_fit_figure(
     rows = [PanelRow(name, panels) for name, (panels, _) in zip(views, compared, strict=True)]
     name, view = next(iter(views.items()))
     rows.append(PanelRow(name, maps(last, view, reduce)))
-    box = frame(torch.stack([visible for _, visible in compared]).any(dim=0))
+    return draw_visible(path, rows, torch.stack([visible for _, visible in compared]).any(dim=0), title)
+
+
+def draw_visible(path: str | Path, rows: list[PanelRow], visible: Tensor, title: str) -> Path:
+    """Draw of all panels the part around what is visible [H, W]."""
+    box = frame(visible)
     return draw(path, [PanelRow(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
 
 

@@ -1,64 +1,88 @@
-"""Picture of a mesh beside the isosurface that it should be, and its error."""
+"""Figure of a mesh: the surface that it should be, the mesh, and how far it is from that surface."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.lens import Lens
-from texgs.metrics.surface import Points, distances, nearest, sample
-from texgs.report.strip import write_strip
+from texgs.metrics.surface import Points, distances, sample
+from texgs.raster import Render, rasterize
+from texgs.report.figure_page import Panel, PanelRow, Scale
+from texgs.report.fit_figure import VISIBLE, draw_visible
 from texgs.volume.cameras import orbit_path
 from texgs.volume.isosurface import Mesh
 
-SHOWN = 1_000_000  # points of the pictures
-PICTURE = 300  # pixels
-POLAR = 20.0  # of the two views, degrees
+COUNT = 300_000  # discs that a surface is drawn with
+SIZE = 640  # pixels of a view
+POLAR = 20.0  # of the cameras, degrees
 FAR = 0.02  # world units, the brightest colour of an error
+CLAY, AMBIENT = 0.8, 0.2  # colour of a surface, and its share without light
 
 
 def write_mesh_figure(
-    path: Path, mesh: Mesh, reference: Mesh, surface: Points, lens: Lens, title: str
+    path: str | Path, mesh: Mesh, reference: Mesh, surface: Points, lens: Lens, title: str
 ) -> Path:
-    """Draw both surfaces under a light at the camera, and the distance of the mesh from the other, as PNG.
+    """Draw a mesh beside the surface that it should be as PNG, in one step, from two sides.
 
     Args:
-        path: the file to write, in one step.
-        mesh: of a fit.
-        reference: the isosurface.
-        surface: points of the reference that the mesh is compared with.
-        lens: of the cameras, but for the size of images.
-        title: beside each view.
-    """
-    from matplotlib import colormaps
+        path: the file to write.
+        mesh: to show.
+        reference: the surface that it should be.
+        surface: points on what counts of that; errors are distances from them.
+        lens: of the pictures, but for their size.
+        title: line at the top.
 
-    truth, ours = sample(reference, SHOWN), sample(mesh, SHOWN)
-    error = (distances(ours, surface)[0] / FAR).clamp(0, 1).numpy()
-    colored = torch.from_numpy(colormaps["inferno"](error)[:, :3])
-    rows: dict[str, list[np.ndarray]] = {}
-    for camera in orbit_path(2, POLAR, *lens.square(PICTURE)):
-        name = f"{title}, view {len(rows) + 1}"
-        rows[name] = [
-            picture(truth.places, lit(truth, camera), camera),
-            picture(ours.places, lit(ours, camera), camera),
-            picture(ours.places, colored, camera),
+    Returns:
+        The path.
+    """
+    truth, ours = sample(reference, COUNT), sample(mesh, COUNT)
+    error = Scale(0, FAR, "inferno")
+    errors, rows, visible = error(distances(ours, surface)[0]), [], []
+    for index, camera in enumerate(orbit_path(2, POLAR, *lens.square(SIZE)), start=1):
+        views = [
+            drawn(truth, reference, lit(truth, camera), camera),
+            drawn(ours, mesh, lit(ours, camera), camera),
+            drawn(ours, mesh, errors, camera),
         ]
-    return write_strip(path, rows, ["isosurface of the volume", "mesh of the fit", f"error, 0 to {FAR:g}"])
+        names = {"isosurface of the volume": None, "mesh of the fit": None, "error, world units": error}
+        panels = [
+            Panel(name, view.color.clamp(0, 1), scale=scale)
+            for (name, scale), view in zip(names.items(), views, strict=True)
+        ]
+        rows.append(PanelRow(f"view {index}", panels))
+        visible += [view.alpha > VISIBLE for view in views]
+    return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
 
 
 def lit(points: Points, camera: Camera) -> Tensor:
     """Grey [N, 3] of points under a light at the camera."""
     to_camera = camera.position.to(points.places) - points.places
     cosine = (points.normals * to_camera).sum(1) / to_camera.norm(dim=1)
-    return (0.15 + 0.85 * cosine.clamp_min(0))[:, None].expand(-1, 3)
+    return (CLAY * (AMBIENT + (1 - AMBIENT) * cosine.clamp_min(0)))[:, None].expand(-1, 3)
 
 
-def picture(places: Tensor, colors: Tensor, camera: Camera) -> np.ndarray:
-    """An image [H, W, 3] of the nearest points of all pixels, over white."""
-    first, _, _ = nearest(places, camera)
-    image = torch.where((first >= 0)[:, None], colors[first.clamp_min(0)], 1.0)
-    return image.reshape(camera.height, camera.width, 3).numpy()
+def drawn(points: Points, mesh: Mesh, colors: Tensor, camera: Camera) -> Render:
+    """Points of a mesh over white, each as an opaque disc that reaches to its neighbours."""
+    a, b, c = torch.from_numpy(mesh.corners).unbind(1)
+    area = torch.linalg.cross(b - a, c - a).norm(dim=1).sum() / 2
+    spacing = float((area / len(points.places)).sqrt())
+    return rasterize(
+        points.places.float(),
+        facing(points.normals).float(),
+        torch.full((len(points.places), 2), spacing),
+        torch.ones(len(points.places)),
+        *(camera.viewmat, camera.K, camera.width, camera.height),
+        features=colors.float().contiguous(),
+        background=torch.ones(3),
+    )
+
+
+def facing(normals: Tensor) -> Tensor:
+    """Rotations [N, 4] wxyz of discs whose normal is +- the given one [N, 3]."""
+    up = torch.where(normals[:, 2:] < 0, -normals, normals)
+    x, y, z = up.unbind(1)
+    return torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)

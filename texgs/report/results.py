@@ -81,8 +81,16 @@ class FitResult:
 class FigureResult:
     """A figure of a fit."""
 
-    shown: list[int]  # views
+    shown: list[str]  # views
     primitives: int
+
+
+@dataclass(frozen=True)
+class ComparisonResult:
+    """Fits side by side."""
+
+    recipes: list[str]
+    shown: list[str]  # views
 
 
 @dataclass(frozen=True)
@@ -184,6 +192,7 @@ Result = (
     | SheetResult
     | FitResult
     | FigureResult
+    | ComparisonResult
     | MeshResult
     | SceneResult
     | PseResult

@@ -11,6 +11,11 @@ rule figures:
         PLAN.done("figure"),
 
 
+rule comparisons:
+    input:
+        PLAN.done("comparison"),
+
+
 rule meshes:
     input:
         PLAN.done("mesh"),
@@ -44,6 +49,21 @@ rule figure:
     params:
         code=code("figure"),
         words=words("figure"),
+    shell:
+        RUN
+
+
+rule comparison:
+    input:
+        reads("comparison"),
+    output:
+        writes("comparison"),
+    log:
+        log_of("comparison"),
+    threads: 4
+    params:
+        code=code("comparison"),
+        words=words("comparison"),
     shell:
         RUN
 

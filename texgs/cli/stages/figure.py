@@ -9,7 +9,7 @@ from texgs.fields.files import open_field
 from texgs.fields.surfels.model import Surfels
 from texgs.report.fit_figure import write_fit_figure
 from texgs.report.results import FigureResult
-from texgs.volume.view_set import read_views
+from texgs.volume.view_set import View, ViewSet, read_views
 
 SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
 
@@ -37,9 +37,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             views training views are shown.
         output: folder.
     """
-    fit, views = settings.fit, read_views(inputs["views"].parent)
-    split, candidates = ("test", views.test) if views.test else ("training", views.train)
-    shown = sorted({0, len(candidates) // 3})
+    fit, shown = settings.fit, shown_views(read_views(inputs["views"].parent))
     models = {phase: open_field(path) for phase, path in inputs.items() if phase != "views"}
     last = next(reversed(models.values()))
     counts = {last.kind: len(last)}
@@ -50,11 +48,17 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_fit_figure(
         output / "figure.png",
         {phase: model if is_fitted(phase, fit) else None for phase, model in models.items()},
-        {f"{split} view {index}": candidates[index] for index in shown},
+        shown,
         fit.reduce,
         title,
     )
-    return Outcome(FigureResult(shown, len(last)), {"figure.png": SHOWN})
+    return Outcome(FigureResult(list(shown), len(last)), {"figure.png": SHOWN})
+
+
+def shown_views(views: ViewSet) -> dict[str, View]:
+    """Two test views by the names that stand beside them; training views where there are none."""
+    split, candidates = ("test", views.test) if views.test else ("training", views.train)
+    return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
 
 
 def is_fitted(phase: str, fit: ShownFit) -> bool:

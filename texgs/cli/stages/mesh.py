@@ -66,7 +66,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     small = [smaller(camera, max(1, camera.width // VISIBLE)) for camera in cameras]
     visible = seen(whole, small, 2 * keys.voxel)
     errors = compare(points, whole[visible], keys.tolerance)
-    title = f"{settings.dataset} {settings.tf}"
+    title = f"{settings.dataset}/{settings.tf}, recipe {settings.fit.name}: {len(mesh.triangles):,} triangles"
     write_mesh_figure(output / "mesh.png", mesh, reference, whole[visible], settings.lens.lens, title)
     result = MeshResult(
         chamfer=errors.chamfer,

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
-from texgs.core.io import write_bytes
+from texgs.core.tensors import write_tensors
 from texgs.core.tensor_file import read_tensor_file
 from texgs.fields.voxels.model import Voxels
 from texgs.raster.voxel_grid import VoxelGrid, pack_rows, unpack_rows, voxel_grid
@@ -32,8 +32,6 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
     Raises:
         ArgumentError: if a value is not finite, or the file cannot be written.
     """
-    from safetensors.torch import save
-
     grid = field.grid
     density, sh = unpack_rows(grid.rows.detach())
     tensors = {"masks": grid.masks, "density": density.contiguous(), "sh": sh.contiguous()}
@@ -46,7 +44,7 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
         "transmittance_min": field.march.transmittance_min,
         "metadata": dict(field.metadata),
     }
-    return write_bytes(path, save(tensors, {FORMAT: json.dumps(description, allow_nan=False)}))
+    return write_tensors(path, tensors, {FORMAT: json.dumps(description, allow_nan=False)})
 
 
 def read_voxels(path: str | Path) -> Voxels:
