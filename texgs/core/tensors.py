@@ -1,6 +1,7 @@
-"""Tensors in a file in the format of safetensors, written without a copy of them in memory.
+"""Tensors in a file in the format of safetensors, written in one step and without a copy of them in memory.
 
-The library needs two more times their size for it, which for the checkpoint of a grid is most of a fit's memory.
+The library writes either to bytes, which for the checkpoint of a grid is most of a fit's memory, or to a file
+that it opens itself, of which nobody can say when it is whole.
 """
 
 from __future__ import annotations

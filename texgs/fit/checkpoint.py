@@ -9,8 +9,8 @@ from typing import Protocol
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.tensors import write_tensors
 from texgs.core.reading import reading
+from texgs.core.tensors import write_tensors
 from texgs.fit.loop import require_finite
 
 NAME = "checkpoint.safetensors"

@@ -12,8 +12,8 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
 from texgs.core.tensor_file import read_tensor_file
+from texgs.core.tensors import write_tensors
 from texgs.fields.surfels.model import Surfels
 
 FORMAT = "texgs-segment"
@@ -37,8 +37,6 @@ def write_segment(
         ArgumentError, ShapeError: if the mask is not one of this model or empty, or the file cannot be
             written.
     """
-    from safetensors.torch import save
-
     check.shape("mask", mask, "N", N=len(model))
     if mask.dtype != torch.bool or not bool(mask.any()):
         raise ArgumentError(
@@ -48,7 +46,7 @@ def write_segment(
     description = {"version": VERSION, "metadata": dict(sorted((metadata or {}).items()))}
     header = {FORMAT: json.dumps(description, allow_nan=False)}
     tensors = {"mask": mask.cpu().contiguous(), "anchors": _anchors(model)}
-    return write_bytes(path, save(tensors, header))
+    return write_tensors(path, tensors, header)
 
 
 def read_segment(path: str | Path, model: Surfels) -> Tensor:

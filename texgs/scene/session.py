@@ -191,10 +191,12 @@ class Session:
         Raises:
             ArgumentError, ShapeError: naming the model and its file.
         """
-        states = [state_of(file) for file in files_of(self.scene)]
-        if self._opened is None or self._opened[0] != states:
-            self._opened = (states, self.scene.open(self._device))
-        return self._opened[1]
+        states: list[object] = [state_of(file) for file in files_of(self.scene)]
+        if self._opened is not None and self._opened[0] == states:
+            return self._opened[1]
+        composition = self.scene.open(self._device)
+        self._opened = (states, composition)
+        return composition
 
     def frame(self, camera: Camera, mode: Mode = "shaded") -> np.ndarray:
         """One frame [H, W, 3], uint8; see `texgs.scene.frame.frame`."""

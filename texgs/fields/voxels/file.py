@@ -11,8 +11,8 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
-from texgs.core.tensors import write_tensors
 from texgs.core.tensor_file import read_tensor_file
+from texgs.core.tensors import write_tensors
 from texgs.fields.voxels.model import Voxels
 from texgs.raster.voxel_grid import VoxelGrid, pack_rows, unpack_rows, voxel_grid
 from texgs.raster.voxels import March
