@@ -8,7 +8,7 @@ import pytest
 from texgs.cli.main import main
 from texgs.cli.plan import make
 from texgs.config.fields import kinds
-from texgs.core.errors import ConfigError
+from texgs.core.errors import ConfigError, TexgsError
 
 ON_A_GPU = ("fit=plenoxels", "device=cuda")
 CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
@@ -57,7 +57,7 @@ def test_keys_of_voxels_that_do_not_fit_each_other(tmp_path, monkeypatch, capsys
     words = ["dataset=sphere", "fit=plenoxels_quick", *(f"fit.voxels.{each}" for each in keys)]
     assert main(["voxels", *words, "tracking=none"]) == 2
     assert re.search(message, capsys.readouterr().err.splitlines()[-1])
-    with pytest.raises(ConfigError, match=message):
+    with pytest.raises(TexgsError, match=message):
         make(tuple(words))
     assert not list(tmp_path.iterdir())
 

@@ -5,21 +5,25 @@ from omegaconf import DictConfig
 from texgs.config.fields import kinds
 from texgs.config.places import PLACES
 from texgs.config.stage import Stage
+from texgs.config.typed import typed
 from texgs.core.errors import ConfigError
 
 
-def check_device(config: DictConfig) -> None:
-    """Require a device that the field of the fit is fitted on.
+def check_fit(config: DictConfig) -> None:
+    """Require settings of the fit that fit each other, and a device that its field is fitted on.
 
     Raises:
         ConfigError: if it is fitted on others.
+        ArgumentError: naming the key that is not as it should be.
     """
-    fit, able = config.fit, kinds()[config.fit.field].devices
-    if config.device.name not in able:
+    fit, kind = config.fit, kinds()[config.fit.field]
+    if config.device.name not in kind.devices:
         raise ConfigError(
-            f"device: expected {' or '.join(sorted(able))} for fit={fit.name}, which fits {fit.field}, "
-            f"got {config.device.name}; choose another device or fit"
+            f"device: expected {' or '.join(sorted(kind.devices))} for fit={fit.name}, "
+            f"which fits {fit.field}, got {config.device.name}; choose another device or fit"
         )
+    if kind.settings is not None:
+        kind.check(typed(kind.settings, fit[kind.name]))
 
 
 def require_fit(stage: Stage, config: DictConfig) -> None:
@@ -27,6 +31,7 @@ def require_fit(stage: Stage, config: DictConfig) -> None:
 
     Raises:
         ConfigError: if its field goes through other phases, has no surface, or is not fitted on the device.
+        ArgumentError: if settings of the fit do not fit each other.
     """
     if "{fit}" not in PLACES[stage.place].folder:
         return
@@ -43,4 +48,4 @@ def require_fit(stage: Stage, config: DictConfig) -> None:
             f"fit.field: texgs mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
             "choose another fit"
         )
-    check_device(config)
+    check_fit(config)

@@ -172,8 +172,9 @@ def add_jobs(
 
     Raises:
         ConfigError: if two different jobs have one folder, or a field is not fitted on the device.
+        ArgumentError: if settings of a fit do not fit each other.
     """
-    from texgs.cli.fits import check_device
+    from texgs.cli.fits import check_fit
     from texgs.cli.job import Job
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.locate import tf_names
@@ -183,7 +184,7 @@ def add_jobs(
     folders = []
     for config in configs:
         check_basic_tfs(config.dataset)
-        check_device(config)
+        check_fit(config)
         try:
             names = tf_names(config)
         except MissingDataError as error:

@@ -78,8 +78,9 @@ def ensure_fits(words: tuple[str, ...]) -> None:
 
     Raises:
         ConfigError: if there are not several, or one is not fitted on the device.
+        ArgumentError: if settings of one do not fit each other.
     """
-    from texgs.cli.fits import check_device
+    from texgs.cli.fits import check_fit
     from texgs.config.compose import compose
     from texgs.config.inputs import last_phase
     from texgs.config.locate import tf_names
@@ -90,7 +91,7 @@ def ensure_fits(words: tuple[str, ...]) -> None:
         raise ConfigError("fits: expected several recipes to compare, such as fits=[quick,demo]")
     configs = [compose((*words, f"fit={recipe}")) for recipe in config.fits]
     for each in configs:
-        check_device(each)
+        check_fit(each)
     for recipe, each in zip(config.fits, configs, strict=True):
         for tf in tf_names(each):
             ensure(last_phase(each), compose((*words, f"fit={recipe}", f"tf={tf}")))

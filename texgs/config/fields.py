@@ -44,6 +44,8 @@ class Kind(Generic[Settings]):
     """Dataclass of the keys of its fit, `fit.NAME`; None for surfels, whose keys are `fit` itself."""
     fit: Callable[[Any], Any] | None = None
     """Fits a field in one phase: from a `FitTask[Settings]` of texgs/fit/task.py to a `Fitted`."""
+    check: Callable[[Settings], None] = lambda settings: None
+    """Requires settings that fit each other: ArgumentError, with the key, if they do not."""
     exports: tuple[str, ...] = ()
     """What `texgs export` writes of it."""
     depth: str = ""

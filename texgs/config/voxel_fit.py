@@ -1,16 +1,20 @@
 """Settings of the fit of a voxel grid, and the schedule of its rates."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import pi, sin
 
 from texgs.config.keys import key
+from texgs.core.errors import ArgumentError
 
 
 @dataclass
 class GridStage:
     """Part of a fit at one resolution."""
 
-    side: int = key(64, "voxels along the longest side of the box; twice those of the stage before", least=8)
+    side: int = key(
+        64, "voxels along the longest side of the box; twice those of the stage before", least=8, most=1024
+    )
     steps: int = key(100, "at this resolution", least=0)
     total_variation: bool = key(True, "whether total variation is held down")
 
@@ -60,10 +64,24 @@ class VoxelKeys:
     prune_weight: float = key(2e-3, "voxels whose largest blending weight is below are removed", least=0)
     prune_share: float = key(0.1, "of the training rays that pruning looks at", above=0, most=1)
     occupy_every: int = key(50, "steps between looks at which cells show anything", least=1)
-    step: float = key(0.5, "between samples", "voxels", above=0)
+    step: float = key(0.5, "between samples", "voxels", least=0.1, most=8)
     transmittance_min: float = key(1e-3, "a ray ends where less is left", least=0, below=1)
 
     @property
     def steps(self) -> int:
         """Of all stages."""
         return sum(stage.steps for stage in self.stages)
+
+    def check(self) -> None:
+        """Require values that fit each other.
+
+        Raises:
+            ArgumentError: if the stages do not double, or runs are longer than a step has rays.
+        """
+        sides = [stage.side for stage in self.stages]
+        if not sides or any(b != 2 * a for a, b in pairwise(sides)):
+            raise ArgumentError(
+                f"fit.voxels.stages: expected sides that double from one to the next, got {sides}"
+            )
+        if self.run > self.rays:
+            raise ArgumentError(f"fit.voxels.run: expected at most rays ({self.rays}), got {self.run}")

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
-from itertools import pairwise
 
 import torch
 from torch import Tensor
 
 from texgs.config.voxel_fit import GridStage, VoxelKeys
-from texgs.core.errors import ArgumentError, FitError
+from texgs.core.errors import FitError
 from texgs.fit.loop import require_finite
 from texgs.fit.voxel_rays import training_rays
 from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
@@ -40,13 +39,11 @@ class VoxelFit:
         seed: of rays and blocks; with the same one, machine and versions results are equal.
 
     Raises:
-        ArgumentError: if the stages do not double, or the views show nothing.
+        ArgumentError: if settings do not fit each other, or the views show nothing.
     """
 
     def __init__(self, images: Images, settings: VoxelKeys, seed: int = 0) -> None:
-        sides = [stage.side for stage in settings.stages]
-        if not sides or any(b != 2 * a for a, b in pairwise(sides)):
-            raise ArgumentError(f"stages: expected sides that double from one to the next, got {sides}")
+        settings.check()
         self.settings = settings
         self.march = March(step=settings.step, transmittance_min=settings.transmittance_min)
         self.rays = training_rays(images)
@@ -54,7 +51,11 @@ class VoxelFit:
         self.iteration = 0  # steps that are done
         self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
         self.losses: list[float] = []  # that were looked at
-        self._begin(hull_grid(images, sides[0], settings.half_size, settings.degree, settings.start_density))
+        self._begin(
+            hull_grid(
+                images, settings.stages[0].side, settings.half_size, settings.degree, settings.start_density
+            )
+        )
 
     def _begin(self, grid: VoxelGrid) -> None:
         """Go on with another grid; the optimiser starts anew."""

@@ -70,6 +70,7 @@ FIELD = Kind(
     phases=("voxels",),
     settings=VoxelKeys,
     fit=fit,
+    check=VoxelKeys.check,
     exports=("mesh",),
     depth="depth",  # the mean
     devices=frozenset({"cpu"}),
