@@ -155,7 +155,7 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatc
     assert (reduce, title.partition(":")[0]) == (1, "sphere/TF01, recipe demo")
     assert path == Path("results/sphere/TF01/demo/.figure.work/figure.png")
     assert (fitted / "figure" / "figure.png").stat().st_size > 10_000
-    assert numbers(fitted, "figure")["shown"] == [0, 1]
+    assert numbers(fitted, "figure")["shown"] == ["test view 0", "test view 1"]
 
 
 def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):

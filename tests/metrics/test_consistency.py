@@ -7,11 +7,13 @@ import pytest
 import torch
 
 from tests.edit.lift_scenes import two_balls
+from tests.fields.voxels.test_voxels import ball as voxel_ball
 from tests.raster.scenes import random_scene
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
 from texgs.fields.surfels.composition import Composition
+from texgs.fields.voxels.composition import VoxelScene
 from texgs.metrics.consistency import SeenFrame, consistency, frames_of, warp
 
 SIZE = 64
@@ -123,6 +125,16 @@ def test_a_scene_is_consistent_without_light_and_less_so_under_a_light_that_move
     assert flat.covered > 0.5
     assert flat.rmse < 0.03
     assert lit.rmse > flat.rmse
+
+
+def test_voxels_are_compared_by_their_mean_depth():
+    scene = VoxelScene([voxel_ball(density=500.0)])
+    views = [orbit(-90 + 3 * i, 10, 2.0, 22.0, 64, 64) for i in range(4)]
+    measured = consistency(list(frames_of(scene, views, Light("headlight"), depth="depth")), tolerance=0.02)
+    assert measured.covered > 0.5
+    assert measured.rmse < 0.01
+    with pytest.raises(ArgumentError, match="median"):
+        list(frames_of(scene, views, Light("headlight")))
 
 
 def test_frames_that_cannot_be_compared():

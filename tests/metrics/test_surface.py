@@ -87,6 +87,15 @@ def test_the_nearest_point_of_a_pixel():
     assert z.tolist() == pytest.approx([4.3, 3.7, 4.0, -96.0], abs=1e-5)
 
 
+@pytest.mark.parametrize("empty", [0, 1])
+def test_a_surface_that_no_view_sees(empty):
+    surfaces = [sphere(RADIUS, 100), sphere(RADIUS, 100)]
+    surfaces[empty] = surfaces[empty][:0]
+    name = ("mesh", "surface")[empty]
+    with pytest.raises(ArgumentError, match=f"{name}: expected points to compare, got none"):
+        compare(*surfaces, tolerance=0.01)
+
+
 def test_a_mesh_without_area_is_refused():
     flat = Mesh(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.int32))
     with pytest.raises(ArgumentError, match="expected triangles with an area, got none"):

@@ -268,6 +268,15 @@ def test_transposed_matrix(name):
         replace(scene, **{name: getattr(scene, name).T}).render(rasterize)
 
 
+@pytest.mark.parametrize(("axis", "focal"), [(0, 0.0), (0, -10.0), (1, -1.0)])
+def test_a_focal_length_that_is_none(axis, focal):
+    scene = random_scene()
+    K = scene.K.clone()
+    K[axis, axis] = focal
+    with pytest.raises(ArgumentError, match=rf"K: expected focal lengths above 0, got .*= {focal}"):
+        replace(scene, K=K).render(rasterize)
+
+
 def test_camera_changed_before_backward():
     scene = random_scene()
     scene = replace(scene, viewmat=scene.viewmat.clone(), means=scene.means.clone().requires_grad_())

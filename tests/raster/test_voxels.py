@@ -1,5 +1,6 @@
 """Voxel grids against the dense definition: images, gradients, memory, errors."""
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -56,8 +57,8 @@ def test_a_slab_by_hand(device):
     color = torch.tensor([0.5, 0.5 + 0.28209479, 0.0])
     torch.testing.assert_close(out.alpha, torch.stack([alpha, torch.tensor(0.0)]))
     torch.testing.assert_close(out.color, torch.stack([alpha * color + 1 - alpha, torch.ones(3)]))
-    assert 3.0 < out.depth[0] < 4.75  # in front of the middle of the slab: nearer samples weigh more
-    assert out.depth[1] == 0
+    assert 3.0 < out.distance[0] < 4.75  # in front of the middle of the slab: nearer samples weigh more
+    assert out.distance[1] == 0
 
 
 def test_samples_kept_or_marched_again(monkeypatch, device):
@@ -147,7 +148,7 @@ def test_a_view_is_its_rays():
     assert torch.equal(view.alpha, rays.alpha.reshape(7, 9))
     y, x = divmod(int(view.alpha.argmax()), 9)
     ray = camera_rays(camera)[y, x]
-    point = ray[:3] + rays.depth[9 * y + x] * ray[3:] / ray[3:].norm()
+    point = ray[:3] + rays.distance[9 * y + x] * ray[3:] / ray[3:].norm()
     depth = (camera.viewmat[:3, :3] @ point + camera.viewmat[:3, 3])[2]
     torch.testing.assert_close(view.depth[y, x], depth)
 
@@ -270,5 +271,9 @@ def test_grids_that_cannot_be():
         voxel_grid(mask.float(), LOWER, SPACING)
     with pytest.raises(ArgumentError, match="degree: expected 0, 1 or 2, got 3"):
         voxel_grid(mask, LOWER, SPACING, 3)
-    with pytest.raises(ArgumentError, match="spacing: expected more than 0, got 0"):
-        voxel_grid(mask, LOWER, 0)
+    for spacing in (0, -1, math.inf, math.nan):
+        with pytest.raises(ArgumentError, match=f"spacing: expected a length above 0, got {spacing}"):
+            voxel_grid(mask, LOWER, spacing)
+    for lower in (LOWER[:2], (0, 0, math.nan)):
+        with pytest.raises(ArgumentError, match="lower: expected 3 finite numbers, got"):
+            voxel_grid(mask, lower, SPACING)

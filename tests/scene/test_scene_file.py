@@ -117,7 +117,9 @@ def test_models_and_variants_that_do_not_belong(folder):
     with pytest.raises(ArgumentError, match=r"models\.B: .*expected a texture of this model, got one of 150"):
         Scene({"B": entry}).open()
     entry = replace(entry, texture=folder / "a" / "model.safetensors")
-    with pytest.raises(ArgumentError, match="expected a texgs-texture file, got safetensors of another kind"):
+    with pytest.raises(
+        ArgumentError, match="expected a texgs-texture file, got safetensors of another program"
+    ):
         Scene({"B": entry}).open()
     with pytest.raises(ArgumentError, match="expected a model of stage texture, got shading"):
         write_texture(folder / "x", sample("shading"))
@@ -128,13 +130,15 @@ def test_a_variant_that_is_damaged(folder):
     entry = SceneModel(folder / "a" / "model.safetensors", texture=style)
     whole = style.read_bytes()
     style.write_bytes(whole[:100])
-    with pytest.raises(ArgumentError, match="expected a texgs-texture file, got"):
+    with pytest.raises(ArgumentError, match="got one cut short or damaged"):
         Scene({"A": entry}).open()
     style.write_bytes(whole)
     tensors = load_file(style)
-    save_file({**tensors, "texels": tensors["texels"][1:]}, style, {"texgs-texture": "{}"})
+    save_file({**tensors, "texels": tensors["texels"][1:]}, style, {"texgs-texture": '{"version": 1}'})
     with pytest.raises(ArgumentError, match="expected texels and sizes that fit each other"):
         Scene({"A": entry}).open()
-    save_file({**tensors, "texels": tensors["texels"] * torch.nan}, style, {"texgs-texture": "{}"})
+    save_file(
+        {**tensors, "texels": tensors["texels"] * torch.nan}, style, {"texgs-texture": '{"version": 1}'}
+    )
     with pytest.raises(ArgumentError, match="texels"):
         Scene({"A": entry}).open()

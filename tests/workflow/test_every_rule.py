@@ -155,9 +155,10 @@ def test_a_changed_value_runs_what_reads_it(project):
 
 def test_a_changed_line_runs_the_stages_that_import_it(project, sources):
     sources("texgs/report/fit_figure.py", "import annotations\n", "import annotations\n\nCHANGED = True\n")
-    assert changed(project) == {"figure", "comparison", "report"}
+    pictures = {"figure", "comparison", "mesh", "tables", "report"}
+    assert changed(project) == pictures
     sources("texgs/config/fit.py", '"random numbers', '"seed of the random numbers')
-    assert changed(project) == {"figure", "comparison", "report"}, "help texts do not count"
+    assert changed(project) == pictures, "help texts do not count"
 
 
 def test_changed_native_sources_run_what_calls_them_and_want_a_new_library(project, sources):

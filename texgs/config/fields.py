@@ -17,8 +17,16 @@ from texgs.core.errors import ConfigError
 
 PACKAGE = "texgs.kinds"
 Settings = TypeVar("Settings")
-Capability = Literal["relight", "unlit", "palette", "texture", "opacity", "segments", "normals"]
-ALL = frozenset(get_args(Capability))
+Capability = Literal[
+    "relight",  # light and material may change
+    "unlit",  # it has colours without light
+    "palette",  # its colour may be replaced
+    "texture",  # looks may change within a primitive
+    "opacity",  # it may become fainter
+    "segments",  # parts of it may be edited
+    "normals",  # it renders normals
+]
+ALL: frozenset[Capability] = frozenset(get_args(Capability))
 
 
 @dataclass(frozen=True)
@@ -30,7 +38,7 @@ class Kind(Generic[Settings]):
     """What its fit does, in `texgs --help`."""
     formats: tuple[str, ...]
     """Entries of headers by which its files are known."""
-    can: frozenset[str]
+    can: frozenset[Capability]
     """What edits may do with it, of `Capability`."""
     read: Callable[[Path], Any]
     """The `Field` in a file."""
@@ -48,7 +56,7 @@ class Kind(Generic[Settings]):
     """Requires settings that fit each other: ArgumentError, with the key, if they do not."""
     exports: tuple[str, ...] = ()
     """What `texgs export` writes of it."""
-    depth: str = ""
+    depth: Literal["", "median", "depth"] = ""
     """Which of its outputs meshes are made of, "median" or "depth"; empty where it has neither."""
     devices: frozenset[str] = frozenset({"cpu", "cuda"})
     """Where it is fitted."""

@@ -1,8 +1,12 @@
-"""Files of tensors that say in their header of which kind they are."""
+"""Files of tensors as safetensors, with what belongs to them as JSON in the header.
+
+The header has one entry, whose name is that of the format: safetensors keeps no order of entries.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,27 +14,92 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.reading import reading
+from texgs.core.tensors import write_tensors
 
 
-def read_tensor_file(path: Path, kind: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """All tensors of a safetensors file by name, and the JSON of its header.
+def write_tensor_file(
+    path: str | Path, format: str, description: Mapping[str, Any], tensors: Mapping[str, Tensor]
+) -> Path:
+    """Create or replace a file in one step; the same contents give the same bytes.
+
+    Args:
+        path: target.
+        format: entry of the header, such as "texgs-model".
+        description: JSON with a `version`, and `metadata` of the caller's.
+        tensors: by name, on any device.
+
+    Raises:
+        ArgumentError: if the description is no JSON, or the file cannot be written.
+    """
+    require_json(path, description)
+    return write_tensors(path, tensors, {format: json.dumps(description)})
+
+
+def require_json(path: str | Path, description: Mapping[str, Any]) -> None:
+    """Require a description that JSON can hold.
+
+    Raises:
+        ArgumentError: naming the file; all but the metadata is ours.
+    """
+    try:
+        json.dumps(description, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{path}: metadata cannot be written as JSON: {error}") from error
+
+
+def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, Any], dict[str, Tensor]]:
+    """Description and tensors, bit for bit, on the CPU. Nothing in the file is executed.
+
+    The description is judged before any tensor is looked at.
 
     Args:
         path: of the file.
-        kind: a key of its header, such as "texgs-texture".
+        format: entry of its header.
+        version: the newest that can be read.
 
     Raises:
-        ArgumentError: if the file is missing, damaged or of another kind.
+        ArgumentError: if the file is missing, no safetensors, cut short, of another program or a newer
+            version.
     """
-    from safetensors import safe_open
+    from safetensors import SafetensorError, safe_open
 
-    with reading(path, f"a {kind} file"), safe_open(path, framework="pt") as file:
-        header = file.metadata() or {}
-        if kind not in header:
-            raise ArgumentError(f"{path}: expected a {kind} file, got safetensors of another kind")
-        tensors = {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+    with reading(path, f"a {format} file", "write it again"):
+        try:
+            with safe_open(path, framework="pt") as file:
+                description = _description(path, format, version, file.metadata() or {})
+                # A copy is aligned in memory and does not depend on the file any more.
+                return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
+        except SafetensorError as error:
+            raise ArgumentError(f"{path}: {_damage(path, format)}") from error
+
+
+def short(value: object) -> str:
+    """Enough of a value to recognise it in a message."""
+    return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
+
+
+def _damage(path: Path, format: str) -> str:
+    """What is wrong with a file that safetensors cannot open; a good one begins with a length and JSON."""
+    with path.open("rb") as file:
+        start = file.read(9)
+    if start[8:] == b"{":
+        return "expected a whole safetensors file, got one cut short or damaged; copy or write it again"
+    return f"expected a {format} file, got one of another format; check the path"
+
+
+def _description(path: Path, format: str, newest: int, header: dict[str, str]) -> dict[str, Any]:
+    if format not in header:
+        raise ArgumentError(f"{path}: expected a {format} file, got safetensors of another program")
     try:
-        description = json.loads(header[kind])
-    except (ValueError, RecursionError) as error:
-        raise ArgumentError(f"{path}: expected JSON in the header, got something else") from error
-    return tensors, description if isinstance(description, dict) else {}
+        description: dict[str, Any] = json.loads(header[format])
+        version = int(str(description["version"]))
+    except (KeyError, RecursionError, TypeError, ValueError) as error:
+        raise ArgumentError(
+            f"{path}: expected JSON with a version in the header, got {short(header[format])}; "
+            "write the file again"
+        ) from error
+    if version > newest:
+        raise ArgumentError(
+            f"{path}: expected version {newest} of the format at most, got {version}; update texgs"
+        )
+    return description

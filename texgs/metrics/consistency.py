@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean
+from typing import Literal
 
 import torch
 from torch import Tensor
@@ -29,7 +30,7 @@ class SeenFrame:
     """One rendered view."""
 
     image: Tensor  # [H, W, 3] in [0, 1]
-    depth: Tensor  # [H, W] camera z, world units: the rasterizer's median depth
+    depth: Tensor  # [H, W] camera z, world units
     alpha: Tensor  # [H, W]
     camera: Camera
 
@@ -91,6 +92,7 @@ def frames_of(
     light: Light,
     edits: Sequence[PartEdit] | None = None,
     look: Look = "shaded",
+    depth: Literal["median", "depth"] = "median",
 ) -> Iterator[SeenFrame]:
     """Views of a scene with what `consistency` needs.
 
@@ -100,10 +102,11 @@ def frames_of(
         light: shines on it.
         edits: as for `Composition.render`.
         look: "unshaded" measures textures alone.
+        depth: which of its outputs says where a pixel's surface is.
     """
     for camera in cameras:
-        shown = scene.render(camera, light, edits, look=look, outputs=("median",))
-        yield SeenFrame(shown.color.clamp(0, 1), shown.median, shown.alpha, camera)  # type: ignore[arg-type]
+        shown = scene.render(camera, light, edits, look=look, outputs=(depth,))
+        yield SeenFrame(shown.color.clamp(0, 1), getattr(shown, depth), shown.alpha, camera)
 
 
 @torch.no_grad()

@@ -110,7 +110,13 @@ def compare(mesh: Points, surface: Points, tolerance: float) -> SurfaceErrors:
         mesh: points of the mesh.
         surface: points of the surface, of what can be seen of it.
         tolerance: distance below which a point counts as right, world units.
+
+    Raises:
+        ArgumentError: if there is no point on one of them.
     """
+    for name, points in (("mesh", mesh), ("surface", surface)):
+        if not len(points.places):
+            raise ArgumentError(f"{name}: expected points to compare, got none; no training view sees it")
     forth, angles_forth = distances(mesh, surface)
     back, angles_back = distances(surface, mesh)
     return SurfaceErrors(

@@ -108,6 +108,10 @@ def splat(
 
     Returns:
         Sums [N, C] over all pixels of blending weight times image, and the sums [N] of the weights.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+        OutOfMemoryError: if a GPU has too little memory.
     """
     size = check.shape("image", image, "H W C")
     n = check.shape("means", means, "N 3")["N"]

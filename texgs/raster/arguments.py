@@ -137,12 +137,16 @@ def _check_camera(camera: dict[str, Tensor], surfels: SurfelTensors) -> None:
 def pinhole(viewmat: Tensor, K: Tensor) -> None:
     """Require the entries that the library takes for granted. On the CPU only: a GPU would have to wait.
 
+    Focal lengths are above 0, there is no skew, and last rows are those of homogeneous coordinates.
+
     Raises:
         ArgumentError: naming the matrix and the row. NaN and infinity pass, they have a check of their own.
     """
     if K.device.type != "cpu":
         return
-    (_, skew, _), (tilt, _, _), last_row = K.tolist()
+    (fx, skew, _), (tilt, fy, _), last_row = K.tolist()
+    if fx <= 0 or fy <= 0:
+        raise ArgumentError(f"K: expected focal lengths above 0, got K[0, 0] = {fx} and K[1, 1] = {fy}")
     if skew != 0 and isfinite(skew):
         raise ArgumentError(f"K: expected no skew, got K[0, 1] = {skew}")
     for name, row in (("K[1, 0] and K[2]", [tilt, *last_row]), ("viewmat[3]", viewmat[3].tolist())):

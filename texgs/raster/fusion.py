@@ -22,7 +22,7 @@ class NativeLattice(Structure):
     """`texgs_lattice`."""
 
     _fields_ = [
-        *(("shape", c_int32 * 3), ("low", c_float * 3), ("voxel", c_float)),
+        *(("shape", c_int32 * 3), ("lower", c_float * 3), ("spacing", c_float)),
         *((name, c_void_p) for name in ("distance", "views", "color")),
     ]
 
@@ -70,16 +70,16 @@ class Lattice:
 
     Attributes:
         blocks: along x, y and z.
-        low: place of the first voxel [3], world units.
-        voxel: distance of voxels, world units.
+        lower: place of the first voxel [3], world units.
+        spacing: distance of voxels, world units.
         distance: to the surface in truncations [Z, Y, X], from -1, behind it, to 1.
         views: how many saw a voxel [Z, Y, X].
         color: [Z, Y, X, 3], 0 to 255.
     """
 
     blocks: tuple[int, int, int]
-    low: Tensor
-    voxel: float
+    lower: Tensor
+    spacing: float
     distance: Tensor = field(init=False)
     views: Tensor = field(init=False)
     color: Tensor = field(init=False)
@@ -108,8 +108,8 @@ class Lattice:
         chosen = blocks.to(torch.int32).contiguous()
         lattice = NativeLattice(
             (c_int32 * 3)(*(BLOCK * n for n in self.blocks)),
-            (c_float * 3)(*self.low.tolist()),
-            self.voxel,
+            (c_float * 3)(*self.lower.tolist()),
+            self.spacing,
             *(values.data_ptr() for values in (self.distance, self.views, self.color)),
         )
         size = (view.camera.width, view.camera.height)

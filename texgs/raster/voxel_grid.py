@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf, isfinite
 from typing import Any
 
 import torch
@@ -82,7 +83,11 @@ class VoxelGrid:
         )
 
     def with_rows(self, rows: Tensor) -> VoxelGrid:
-        """The same voxels with other rows, [n, 4, 16 or 32]."""
+        """The same voxels with other rows, [n, 4, 16 or 32].
+
+        Raises:
+            ShapeError, ArgumentError: if they are not as many, of another length or not float32.
+        """
         check.shape("rows", rows, "n K", n=len(self.rows))
         check.floating("rows", rows)
         if rows.shape[1] not in DEGREES:
@@ -139,8 +144,10 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
         )
     if degree not in FLOATS:
         raise ArgumentError(f"degree: expected 0, 1 or 2, got {degree}")
-    if not spacing > 0:
-        raise ArgumentError(f"spacing: expected more than 0, got {spacing}")
+    if not 0 < spacing < inf:
+        raise ArgumentError(f"spacing: expected a length above 0, got {spacing}")
+    if len(lower) != 3 or not all(map(isfinite, lower)):
+        raise ArgumentError(f"lower: expected 3 finite numbers, got {list(lower)}")
     bits = _blocks(mask)  # [X / 4, Y / 4, Z / 4, 64]
     masks = (bits.long() << torch.arange(64, device=mask.device)).sum(-1)
     counts = bits.sum(-1)
@@ -185,7 +192,7 @@ def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None)
     Args:
         grid: any.
         points: in any number.
-        out: where to write them.
+        out: [m, K] where to write them.
     """
     links = grid.links()
     out = points.new_empty(len(points), grid.rows.shape[1]) if out is None else out

@@ -39,7 +39,7 @@ class Rays(NamedTuple):
 
     color: Tensor  # [N, 3] over the background
     alpha: Tensor  # [N]
-    depth: Tensor  # [N] expected distance from the origin, world units; 0 where alpha is 0
+    distance: Tensor  # [N] expected distance from the origin, world units; 0 where alpha is 0
 
 
 class RowGradient:
@@ -76,7 +76,7 @@ class Samples:
         grid: its density and occupancy up to date.
         march: how rays are sampled.
         rays: [N, 6] dense.
-        out: where colour, alpha and depth are written, dense; None: nowhere.
+        out: where colour, alpha and distance are written, dense; None: nowhere.
 
     Raises:
         ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
@@ -97,7 +97,11 @@ class Samples:
         self._call("texgs_grid_backward", color, alpha, into.rows, into.touched)
 
     def mark(self, weights: Tensor) -> None:
-        """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel."""
+        """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel.
+
+        Raises:
+            ShapeError: if there are not as many weights as rows.
+        """
         check.shape("weights", weights, "n", n=len(self.grid.rows))
         self._call("texgs_grid_mark", weights)
 
@@ -134,7 +138,7 @@ def render_rays(
 
     Density and coefficients are interpolated trilinearly every `march.step`, from half a step after the ray
     enters the lattice; alpha = 1 - exp(-max(0, density) length), colour = max(0, 0.5 + Y(direction) . sh).
-    Differentiable in `grid.rows`, but for depth. For a definition see `texgs.raster.reference.voxels`.
+    Differentiable in `grid.rows`, but for distance. For a definition see `texgs.raster.reference.voxels`.
 
     Args:
         grid: its density and occupancy up to date, see `VoxelGrid.refresh`.
@@ -171,7 +175,11 @@ def render_view(
     into: RowGradient | None = None,
     keep: bool = True,
 ) -> GridView:
-    """Render all pixels of a camera; see `render_rays`."""
+    """Render all pixels of a camera, differentiable in the grid's rows; see `render_rays`.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: as `render_rays`.
+    """
     size = (camera.height, camera.width)
     rays = camera_rays(camera).flatten(0, 1)
     color, alpha, distance = render_rays(grid, rays, march, into=into, keep=keep)
@@ -206,9 +214,9 @@ class _Render(torch.autograd.Function):
             _march(grid, march, rays, out, None)
         ctx.grid, ctx.march, ctx.rays, ctx.into = grid, march, rays, into
         ctx.save_for_backward(rows)  # autograd refuses a backward pass after they were changed
-        ctx.mark_non_differentiable(out.depth)
+        ctx.mark_non_differentiable(out.distance)
         ctx.set_materialize_grads(False)
-        return out.color, out.alpha, out.depth
+        return out.color, out.alpha, out.distance
 
     @staticmethod
     @torch.autograd.function.once_differentiable

@@ -95,7 +95,11 @@ def model_size(records: Iterable[Record[Any]]) -> Table:
         own = [len(parts), sum(part.result.primitives for part in parts), *sums]
         theirs = numbers(published.get((name,), {}), *groups)
         rows.append(Row([name, recipe, *own, *theirs], [part.path for part in parts]))
-    return Table("Sums over the basic scenes, 32 bits a value.", columns, rows)
+    return Table(
+        "Sums over the basic scenes, 32 bits a value; 16 for harmonics of voxels.",
+        columns,
+        rows,
+    )
 
 
 def edits(records: Iterable[Record[Any]]) -> Table:

@@ -27,7 +27,7 @@ LEAST_VIEWS = 1  # more views than this must have seen a voxel
 CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
-def points(view: DepthView) -> Tensor:
+def unproject(view: DepthView) -> Tensor:
     """Where the surface is that the pixels of a view show [P, 3], world units."""
     v, u = view.depth.nonzero().T
     z, camera = view.depth[v, u], view.camera
@@ -47,29 +47,29 @@ def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
     return Lattice((x, y, z), low, voxel)
 
 
-def add(lattice: Lattice, view: DepthView) -> None:
+def fuse_view(lattice: Lattice, view: DepthView) -> None:
     """Update the voxels close to what a view sees."""
     near = torch.zeros(lattice.blocks)
-    near[((points(view) - lattice.low) / (BLOCK * lattice.voxel)).long().unbind(1)] = 1
+    near[((unproject(view) - lattice.lower) / (BLOCK * lattice.spacing)).long().unbind(1)] = 1
     blocks = F.max_pool3d(near[None], 3, stride=1, padding=1)[0].nonzero()
-    lattice.add(view, blocks, TRUNCATION * lattice.voxel)
+    lattice.add(view, blocks, TRUNCATION * lattice.spacing)
 
 
-def surface(lattice: Lattice) -> Mesh:
+def zero_surface(lattice: Lattice) -> Mesh:
     """Where the distance is 0, in cells all of whose corners were seen."""
     values = -lattice.distance.numpy()  # inside is positive
-    mesh = isosurface(values, 0.0, (lattice.voxel,) * 3, tuple(lattice.low.tolist()))
+    mesh = isosurface(values, 0.0, (lattice.spacing,) * 3, tuple(lattice.lower.tolist()))
     seen = (lattice.views > LEAST_VIEWS).float()
     whole = -F.max_pool3d(-seen[None], 2, stride=1)[0]
-    cells = ((torch.from_numpy(mesh.corners).mean(1) - lattice.low) / lattice.voxel).floor().long()
+    cells = ((torch.from_numpy(mesh.corners).mean(1) - lattice.lower) / lattice.spacing).floor().long()
     kept = whole[tuple(cells.clamp_min(0).T.flip(0))] > 0
-    return compact(mesh, kept.numpy())
+    return with_triangles(mesh, kept.numpy())
 
 
 def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
     """Colours [V, 3] of places [V, 3] on edges of the lattice, uint8."""
     last = BLOCK * torch.tensor(lattice.blocks) - 1
-    grid = (torch.from_numpy(places) - lattice.low) / lattice.voxel / last * 2 - 1
+    grid = (torch.from_numpy(places) - lattice.lower) / lattice.spacing / last * 2 - 1
     volume = lattice.color[None].permute(0, 4, 1, 2, 3)
     colors = F.grid_sample(volume, grid.float()[None, :, None, None], align_corners=True)
     return colors[0, :, :, 0, 0].T.round().clamp(0, 255).to(torch.uint8).numpy()
@@ -93,7 +93,7 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     if not voxel > 0:
         raise ArgumentError(f"voxel: expected a length above 0, got {voxel}")
     views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
-    boxes = [points(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
+    boxes = [unproject(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
     if not boxes:
         raise ArgumentError(
             "mesh: expected a surface that lets less than half of the light through, got none"
@@ -102,8 +102,8 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     low, high = (torch.stack(ends) for ends in zip(*boxes, strict=True))
     lattice = lattice_of(low.amin(0) - margin, high.amax(0) + margin, voxel)
     for view in progress(views, title="fuse", unit="view"):
-        add(lattice, view)
-    mesh = largest_clusters(surface(lattice))
+        fuse_view(lattice, view)
+    mesh = largest_clusters(zero_surface(lattice))
     return Mesh(mesh.vertices, mesh.triangles, colors_at(lattice, mesh.vertices))
 
 
@@ -128,10 +128,10 @@ def largest_clusters(mesh: Mesh) -> Mesh:
     cluster = connected_components(edges, directed=False)[1][a]  # of each triangle
     sizes = np.bincount(cluster) if len(cluster) else np.zeros(1, int)
     least = max(np.sort(sizes)[-CLUSTERS:][0], min(LEAST_TRIANGLES, sizes.max()))
-    return compact(mesh, sizes[cluster] >= least)
+    return with_triangles(mesh, sizes[cluster] >= least)
 
 
-def compact(mesh: Mesh, kept: np.ndarray) -> Mesh:
+def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
     """The triangles that stay [F] bool, and the vertices that they need."""
     used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
     return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.int32))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,8 +11,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.core.tensor_file import read_tensor_file
-from texgs.core.tensors import write_tensors
+from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.surfels.model import Surfels
 
 FORMAT = "texgs-segment"
@@ -34,8 +32,8 @@ def write_segment(
         metadata: JSON, such as the clicks that it came from.
 
     Raises:
-        ArgumentError, ShapeError: if the mask is not one of this model or empty, or the file cannot be
-            written.
+        ArgumentError, ShapeError: if the mask is not one of this model or empty, metadata is no JSON, or the
+            file cannot be written.
     """
     check.shape("mask", mask, "N", N=len(model))
     if mask.dtype != torch.bool or not bool(mask.any()):
@@ -44,9 +42,7 @@ def write_segment(
             f"{int(mask.count_nonzero())}"
         )
     description = {"version": VERSION, "metadata": dict(sorted((metadata or {}).items()))}
-    header = {FORMAT: json.dumps(description, allow_nan=False)}
-    tensors = {"mask": mask.cpu().contiguous(), "anchors": _anchors(model)}
-    return write_tensors(path, tensors, header)
+    return write_tensor_file(path, FORMAT, description, {"mask": mask, "anchors": _anchors(model)})
 
 
 def read_segment(path: str | Path, model: Surfels) -> Tensor:
@@ -76,7 +72,7 @@ def _anchors(model: Surfels) -> Tensor:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    tensors, _ = read_tensor_file(path, FORMAT)
+    _, tensors = read_tensor_file(path, FORMAT, VERSION)
     mask, anchors = tensors.get("mask"), tensors.get("anchors")
     is_whole = mask is not None and anchors is not None and mask.dtype == torch.bool and mask.ndim == 1
     if not is_whole or bool((mask.view(torch.uint8) > 1).any()):  # type: ignore[union-attr]

@@ -12,7 +12,7 @@ from texgs.cli.stages.edit import Settings as EditSettings
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.timing import milliseconds
 from texgs.config.edit import Edit
-from texgs.config.fields import kinds
+from texgs.config.fields import Kind, kinds
 from texgs.config.methods import method_of
 from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
@@ -20,7 +20,7 @@ from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.edit.parts import parts_of
-from texgs.fields.field import Composed
+from texgs.fields.field import Composed, Look
 from texgs.metrics.clip import clip_scores
 from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
 from texgs.metrics.style import likeness
@@ -50,7 +50,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         output: folder.
     """
     edit, views, weights = settings.edit, settings.views, settings.weights
-    title, can = f"{settings.dataset}: {edit.name}", kinds()[settings.fit.field].can
+    title, kind = f"{settings.dataset}: {edit.name}", kinds()[settings.fit.field]
     device = torch_device(settings.fit.device)
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
     scenes = after.open(device), before.open(device)
@@ -64,8 +64,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         max(frames),
         len(scenes[0]),
         megabytes=sum(size_of(after)) * 2**20 / 1e6,
-        geometry_kept=is_geometry_kept(*scenes, some, "normals" in can),
-        **agreement(scenes[0], after, cameras, settings.compared, weights, "unlit" in can),
+        geometry_kept=is_geometry_kept(*scenes, some, "normals" in kind.can),
+        **agreement(scenes[0], after, cameras, settings.compared, weights, kind),
         **style_distance(after, edit, some, device, weights, title),
         **clip_numbers(settings, (after, before), scenes, cameras, title),
     )
@@ -97,17 +97,16 @@ def agreement(
     cameras: Sequence[Camera],
     count: int,
     weights: Mapping[str, str | None],
-    is_unlit: bool = True,
+    kind: Kind[Any],
 ) -> dict[str, Any]:
-    """Consistency of consecutive views in the middle of the path, near and far; `is_unlit`: without light.
+    """Consistency of views in the middle of the path, near and far; without light where the kind can.
 
     None where no two views see the same, as of a scene that is nowhere opaque.
     """
     start = max(0, (len(cameras) - count - LONG) // 2)
     some = cameras[start : start + count + LONG]
-    frames = list(
-        frames_of(composition, some, scene.light, scene.edits, look="unshaded" if is_unlit else "shaded")
-    )
+    look: Look = "unshaded" if "unlit" in kind.can else "shaded"
+    frames = list(frames_of(composition, some, scene.light, scene.edits, look, kind.depth or "median"))
     perceptual = None
     if weights["vgg16"] and weights["lpips_vgg"]:
         lpips = Lpips.load(device=composition.device)

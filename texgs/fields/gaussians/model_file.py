@@ -12,7 +12,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.fields.described_file import read_described, require_json, short, write_described
+from texgs.core.tensor_file import read_tensor_file, short, write_tensor_file
 from texgs.fields.gaussians.model import Baked, Gaussians
 
 FORMAT = "texgs-gaussians"
@@ -42,8 +42,7 @@ def write_gaussians(path: str | Path, model: Gaussians) -> Path:
         "filter": asdict(model.shading),
         "metadata": dict(model.metadata),
     }
-    require_json(path, description)
-    return write_described(path, FORMAT, description, model.parameters)
+    return write_tensor_file(path, FORMAT, description, model.parameters)
 
 
 def read_gaussians(path: str | Path) -> Gaussians:
@@ -54,7 +53,7 @@ def read_gaussians(path: str | Path) -> Gaussians:
             newer version, or a tensor is missing, unknown, not finite or of another type or shape.
     """
     path = Path(path)
-    description, tensors = read_described(path, FORMAT, VERSION)
+    description, tensors = read_tensor_file(path, FORMAT, VERSION)
     model = _model(path, description, tensors)
     _check(path, model)
     return model

@@ -13,7 +13,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.fields.described_file import read_described, require_json, short, write_described
+from texgs.core.tensor_file import read_tensor_file, require_json, short, write_tensor_file
 from texgs.fields.surfels.groups import GEOMETRY, TEXTURE
 from texgs.fields.surfels.model import SHAPES, Surfels
 from texgs.fields.surfels.shading import MATERIAL, ShadingModel
@@ -44,7 +44,7 @@ def write_model(path: str | Path, model: Surfels) -> Path:
         ArgumentError, ShapeError: if the model could not be read back (a tensor is missing, unknown, not
             finite or of another type, textures overlap, metadata is no JSON), or the file cannot be written.
     """
-    return write_described(path, FORMAT, describe(path, model), model.parameters)
+    return write_tensor_file(path, FORMAT, describe(path, model), model.parameters)
 
 
 def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
@@ -72,7 +72,7 @@ def read_model(path: str | Path) -> Surfels:
             newer version, or a tensor is missing, unknown, not finite or of another type or shape.
     """
     path = Path(path)
-    return model_of(path, *read_described(path, FORMAT, VERSION))
+    return model_of(path, *read_tensor_file(path, FORMAT, VERSION))
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Surfels:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +12,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.io import write_bytes
-from texgs.core.tensor_file import read_tensor_file
+from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.surfels.model import Surfels
 
 FORMAT = "texgs-texture"
@@ -30,17 +28,13 @@ def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] 
         metadata: JSON, such as what the style is.
 
     Raises:
-        ArgumentError: if the model has no texture, or the file cannot be written.
+        ArgumentError: if the model has no texture, metadata is no JSON, or the file cannot be written.
     """
-    from safetensors.torch import save
-
     if model.stage != "texture":
         raise ArgumentError(f"{path}: expected a model of stage texture, got {model.stage}")
-    header = {FORMAT: json.dumps({"version": VERSION, "metadata": dict(metadata or {})}, allow_nan=False)}
-    tensors = {
-        name: model.parameters[name].detach().cpu().contiguous() for name in ("texels", "colors", "sizes")
-    }
-    return write_bytes(path, save(tensors, header))
+    description = {"version": VERSION, "metadata": dict(metadata or {})}
+    tensors = {name: model.parameters[name] for name in ("texels", "colors", "sizes")}
+    return write_tensor_file(path, FORMAT, description, tensors)
 
 
 def with_texture(model: Surfels, path: str | Path) -> Surfels:
@@ -67,7 +61,7 @@ def with_texture(model: Surfels, path: str | Path) -> Surfels:
 
 
 def _read(path: Path) -> dict[str, Tensor]:
-    texture, _ = read_tensor_file(path, FORMAT)
+    _, texture = read_tensor_file(path, FORMAT, VERSION)
     shapes = [texture[name].shape[1:] for name in ("texels", "sizes") if name in texture]
     if shapes != [(3,), (2,)] or len(texture["texels"]) != int(texture["sizes"].long().prod(1).sum()):
         raise ArgumentError(f"{path}: expected texels and sizes that fit each other; make it again")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -11,8 +10,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
-from texgs.core.tensor_file import read_tensor_file
-from texgs.core.tensors import write_tensors
+from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.voxels.model import Voxels
 from texgs.raster.voxel_grid import VoxelGrid, pack_rows, unpack_rows, voxel_grid
 from texgs.raster.voxels import March
@@ -30,7 +28,7 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
         field: to write. Its metadata must be JSON.
 
     Raises:
-        ArgumentError: if a value is not finite, or the file cannot be written.
+        ArgumentError: if a value is not finite, metadata is no JSON, or the file cannot be written.
     """
     grid = field.grid
     density, sh = unpack_rows(grid.rows.detach())
@@ -44,7 +42,7 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
         "transmittance_min": field.march.transmittance_min,
         "metadata": dict(field.metadata),
     }
-    return write_tensors(path, tensors, {FORMAT: json.dumps(description, allow_nan=False)})
+    return write_tensor_file(path, FORMAT, description, tensors)
 
 
 def read_voxels(path: str | Path) -> Voxels:
@@ -54,10 +52,8 @@ def read_voxels(path: str | Path) -> Voxels:
         ArgumentError, ShapeError: if the file is missing, damaged, of another kind or a newer version.
     """
     path = Path(path)
-    tensors, description = read_tensor_file(path, FORMAT)
+    description, tensors = read_tensor_file(path, FORMAT, VERSION)
     try:
-        if int(description["version"]) > VERSION:
-            raise ArgumentError(f"expected version {VERSION} of the format at most; update texgs")
         _require_finite(tensors)
         march = March(
             step=float(description["step"]), transmittance_min=float(description["transmittance_min"])

@@ -16,8 +16,8 @@ enum { TEXGS_FUSION_BLOCK = 8 }; /* voxels along each side of a block */
 /* What is known of voxels [z, y, x] of a lattice: means over the views that saw them. */
 typedef struct {
     int32_t shape[3]; /* voxels along x, y, z: multiples of TEXGS_FUSION_BLOCK */
-    float low[3];     /* place of voxel 0, 0, 0 */
-    float voxel;      /* distance of voxels */
+    float lower[3];   /* place of voxel 0, 0, 0 */
+    float spacing;    /* distance of voxels */
     float* distance;  /* to the surface in truncations, -1 to 1, negative behind it */
     float* views;     /* how many saw a voxel */
     float* color;     /* [z, y, x, 3] */

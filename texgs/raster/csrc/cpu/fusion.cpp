@@ -25,8 +25,8 @@ struct Projection {
                 for (int k = 0; k < 3; ++k) world[j] += double(view.K[3 * i + k]) * view.viewmat[4 * k + j];
             double offset = world[3];
             for (int j = 0; j < 3; ++j) {
-                row[i][j] = static_cast<float>(world[j] * lattice.voxel);
-                offset += world[j] * lattice.low[j];
+                row[i][j] = static_cast<float>(world[j] * lattice.spacing);
+                offset += world[j] * lattice.lower[j];
             }
             row[i][3] = static_cast<float>(offset);
         }
