@@ -118,7 +118,7 @@ def test_files_that_are_no_model_are_named(tmp_path):
     path = tmp_path / "m"
     for content in (b"ply\nformat ascii 1.0\nend_header\n", b"\x80\x04K\x01.", bytes(100)):
         path.write_bytes(content)
-        with pytest.raises(ArgumentError, match="expected a safetensors file, got one of another format"):
+        with pytest.raises(ArgumentError, match="expected a texgs-model file, got one of another format"):
             read_model(path)
     for header in (None, {"format": "pt"}):
         path.write_bytes(save({"weight": torch.zeros(3)}, header))
