@@ -1,8 +1,7 @@
 """Compare a step of an edit of fitted voxel grids between two builds of the CPU library, in turns.
 
 `python -m benchmarks.voxel_edit BEFORE.so AFTER.so JSON GRID VIEWS [GRID VIEWS ...]` takes files of voxels
-and the views that they were fitted to. Each visit is a process with one thread. It takes processor time,
-which other processes disturb less than the time that passes.
+and the views that they were fitted to. Each visit is a process with `OMP_NUM_THREADS` threads.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import sys
 from collections import defaultdict
 from pathlib import Path
 from statistics import median
-from time import process_time
+from time import perf_counter
 from typing import Any
 
 import torch
@@ -50,7 +49,7 @@ def main(before: str, after: str, path: str, *scenes: str) -> None:
         | {"ratio": median(builds["after"]) / median(builds["before"])}
         for (grid, name, degree), builds in taken.items()
     ]
-    report |= {"clock": "process", "size": SIZE, "rows": rows}
+    report |= {"size": SIZE, "rows": rows}
     Path(path).write_text(json.dumps(report, indent=1) + "\n", encoding="utf-8")
 
 
@@ -64,7 +63,6 @@ def measure(library: str, path: str, views: str) -> dict[int, dict[str, list[flo
     """The same with one build of the library."""
     native.library_path = lambda device_type="cpu": Path(library)
     native._require_own_sources = lambda lib: None  # the build before has other sources
-    torch.set_num_threads(1)
     test = read_views(views).test[::EVERY]
     factor = test[0].load().shape[1] // SIZE
     cameras = load(test, reduce=factor).cameras
@@ -84,15 +82,15 @@ def steps(grid: VoxelGrid, march: March, cameras: list[Camera]) -> dict[str, lis
     taken: dict[str, list[float]] = defaultdict(list)
     for camera in cameras:
         for run in range(RUNS + 1):
-            clock = [process_time()]
+            clock = [perf_counter()]
             rays = camera_rays(camera).flatten(0, 1)
             out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
             samples = Samples(grid, march, rays, out)
-            clock.append(process_time())
+            clock.append(perf_counter())
             samples.add_gradient(torch.full_like(out.color, 1e-6), None, optimizer.gradient)
-            clock.append(process_time())
+            clock.append(perf_counter())
             optimizer.step(RATES)
-            clock.append(process_time())
+            clock.append(perf_counter())
             if run:  # the first one warms up
                 for name, begin, end in zip(PHASES, clock[:-1], clock[1:], strict=True):
                     taken[name].append(1e3 * (end - begin))
