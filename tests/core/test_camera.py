@@ -8,9 +8,26 @@ from texgs.core.errors import ArgumentError, ShapeError
 
 
 def project(camera, point):
+    """The definition: matrices and homogeneous coordinates."""
     x, y, z = camera.viewmat[:3, :3] @ torch.tensor(point) + camera.viewmat[:3, 3]
     u, v, w = camera.K @ torch.stack([x, y, z])
     return float(u / w), float(v / w), float(z)
+
+
+def test_points_go_to_the_pixels_of_the_definition_and_back():
+    camera = orbit(30, 20, radius=3, fov_y=40, width=7, height=5).crop(1, 1, 6, 5)
+    depth = 2 + torch.rand(4, 5)
+    points = camera.unproject(depth)
+    pixels, z = camera.project(points)
+    torch.testing.assert_close(z, depth)
+    for row in range(4):
+        for column in range(5):
+            expected = (column + 0.5, row + 0.5, float(depth[row, column]))
+            assert project(camera, points[row, column].tolist()) == pytest.approx(expected, abs=1e-4)
+            assert pixels[row, column].tolist() == pytest.approx(expected[:2], abs=1e-4)
+    torch.testing.assert_close(camera.position + depth[..., None] * camera.rays(), points)
+    with pytest.raises(ShapeError, match=r"depth: expected \[4, 5\], got \[5, 4\]"):
+        camera.unproject(depth.T)
 
 
 def test_look_at_along_minus_z_flips_y_and_z():

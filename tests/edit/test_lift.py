@@ -6,7 +6,7 @@ import torch
 from tests.edit.lift_scenes import BLUE, RED, cameras, joined, nested, overlap, shell, truth, two_balls
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.edit.clicks import Clicks, is_visible, projected, prompts_at
+from texgs.edit.clicks import Clicks, is_visible, prompts_at
 from texgs.edit.lift import HEADLIGHT, ViewMasks, lift, middle_of
 from texgs.edit.preview import preview
 from texgs.models.grabcut import GrabCut
@@ -33,7 +33,7 @@ class Alike:
 
 
 def pixel_of(place, camera=FRONT):
-    return projected(torch.tensor([place]), camera)[0][0]
+    return camera.project(torch.tensor([place]))[0][0]
 
 
 def clicks(*places, negative=(), camera=FRONT):
@@ -90,12 +90,12 @@ def test_places_are_visible_where_nothing_is_in_front_of_them():
     for azimuth, seen in expected.items():
         camera = orbit(azimuth, 0, 4.0, 22.0, SIZE, SIZE)
         median = model.render(camera, outputs=("median",)).median
-        assert is_visible(*projected(places, camera), median, 0.03).tolist() == seen
+        assert is_visible(*camera.project(places), median, 0.03).tolist() == seen
     above = orbit(-90, 50, 4.0, 22.0, SIZE, SIZE)
     median = model.render(above, outputs=("median",)).median
-    assert is_visible(*projected(places, above), median, 0.03).tolist() == [True, True, False]
+    assert is_visible(*above.project(places), median, 0.03).tolist() == [True, True, False]
     outside = torch.tensor([[50.0, 0.0, 0.0], [0.0, 0.0, 9.0]])
-    assert not is_visible(*projected(outside, FRONT), median, 0.03).any(), "beside and behind the camera"
+    assert not is_visible(*FRONT.project(outside), median, 0.03).any(), "beside and behind the camera"
 
 
 @pytest.mark.parametrize("vote", ["contribution", "centre"])

@@ -10,7 +10,7 @@ from tests.edit.textured import RADIUS, around, shell
 from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
-from texgs.edit.target_views import render_views, require_texture, unproject
+from texgs.edit.target_views import render_views, require_texture
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners
@@ -65,7 +65,7 @@ def test_points_lie_on_the_sphere_and_normals_point_from_it():
 def test_unprojected_pixels_are_projected_back():
     camera = around(3)[1]
     depth = torch.rand(camera.height, camera.width, generator=torch.Generator().manual_seed(0)) + 1
-    points = unproject(depth, camera).reshape(-1, 3)
+    points = camera.unproject(depth).reshape(-1, 3)
     local = points @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
     pixels = (local @ camera.K.T)[:, :2] / local[:, 2:]
     assert_close(local[:, 2], depth.flatten(), atol=1e-5, rtol=0)

@@ -38,6 +38,29 @@ class Camera:
         R_cw, t_cw = self.viewmat[:3, :3], self.viewmat[:3, 3]
         return -R_cw.T @ t_cw
 
+    def rays(self) -> Tensor:
+        """World directions [H, W, 3] through the pixel centres, of length 1 along the camera's axis."""
+        return self._rays_in_camera() @ self.viewmat[:3, :3]
+
+    def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
+        """Pixels [..., 2] and camera z [...] of world points [..., 3]; behind it pixels mean nothing."""
+        viewmat, K = self.viewmat.to(points), self.K.to(points)
+        x, y, z = (points @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(-1)
+        return torch.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], dim=-1), z
+
+    def unproject(self, depth: Tensor) -> Tensor:
+        """World points [H, W, 3] that the pixel centres see at camera z [H, W], world units."""
+        check.shape("depth", depth, "H W", H=self.height, W=self.width)
+        R_cw, t_cw = self.viewmat[:3, :3], self.viewmat[:3, 3]
+        return (self._rays_in_camera() * depth[..., None] - t_cw) @ R_cw
+
+    def _rays_in_camera(self) -> Tensor:
+        K = self.K
+        sides = (torch.arange(side, device=K.device) for side in (self.height, self.width))
+        y, x = torch.meshgrid(*sides, indexing="ij")
+        right, down = (x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1]
+        return torch.stack([right, down, torch.ones_like(right)], dim=-1)
+
     def to(self, device: torch.device | str) -> Camera:
         """The same camera with its matrices on another device."""
         return replace(self, viewmat=self.viewmat.to(device), K=self.K.to(device))

@@ -114,13 +114,6 @@ def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> 
     return hits, hits @ camera.viewmat[2, :3] + camera.viewmat[2, 3]
 
 
-def projected(places: Tensor, camera: Camera) -> tuple[Tensor, Tensor]:
-    """Pixels [P, 2] and camera z [P] of places [P, 3] in a view; behind the camera, pixels mean nothing."""
-    x, y, z = (places @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]).unbind(1)
-    K = camera.K
-    return torch.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], dim=1), z
-
-
 def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float) -> Tensor:
     """Whether more than half of the light reaches places in a view, [P] bool.
 

@@ -12,7 +12,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, projected, prompts_at
+from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, prompts_at
 from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
 from texgs.fields.bounds import screen_box
@@ -134,7 +134,7 @@ def _mask(views: ViewMasks, so_far: ContributionVotes, prompts: Prompts, camera:
     values = torch.stack([so_far.seen.float(), so_far.shares], dim=1)
     shown = so_far.shown(camera, values, ("median",))
     (has_votes, is_object), alpha = shown.color.unbind(2), shown.alpha
-    pixels, depths = projected(prompts.places, camera)
+    pixels, depths = camera.project(prompts.places)
     seen = is_visible(pixels, depths, shown.median, TOLERANCE * extent(model))  # type: ignore[arg-type]
     points, positive = pixels[seen], prompts.positive[seen]
     if not bool(positive.any()):

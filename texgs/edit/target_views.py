@@ -94,7 +94,7 @@ def render_views(
         )
         images.append(seen.color.clamp(0, 1))
         alphas.append(seen.alpha)
-        points.append(unproject(seen.depth, camera))  # type: ignore[arg-type]
+        points.append(camera.unproject(seen.depth))  # type: ignore[arg-type]
         normals.append(seen.normal)
     shown = torch.stack(images)
     return EditViews(
@@ -105,15 +105,3 @@ def render_views(
         torch.stack(normals),  # type: ignore[arg-type]
         list(cameras),
     )
-
-
-def unproject(depth: Tensor, camera: Camera) -> Tensor:
-    """Places in the world [H, W, 3] of pixels at a camera z [H, W], world units."""
-    height, width = depth.shape
-    x = torch.arange(width, dtype=depth.dtype, device=depth.device) + 0.5
-    y = torch.arange(height, dtype=depth.dtype, device=depth.device) + 0.5
-    K, R_cw, t_cw = camera.K, camera.viewmat[:3, :3], camera.viewmat[:3, 3]
-    columns = ((x - K[0, 2]) / K[0, 0]).expand(height, width)
-    rows = ((y - K[1, 2]) / K[1, 1])[:, None].expand(height, width)
-    local = torch.stack([columns, rows, torch.ones_like(depth)], dim=-1) * depth[..., None]
-    return (local - t_cw) @ R_cw

@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.edit.clicks import projected
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import Render, rasterize, splat
 
@@ -132,7 +131,7 @@ class CentreVotes:
 
     def add(self, camera: Camera, mask: Tensor) -> None:
         """Count the mask [H, W] of a view."""
-        pixels, depths = projected(self.means, camera)
+        pixels, depths = camera.project(self.means)
         x, y = pixels.floor().unbind(1)
         is_there = (depths > 0) & (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
         x, y = (torch.where(is_there, at, 0.0).long() for at in (x, y))

@@ -62,18 +62,10 @@ def is_covered(alpha: Tensor, camera: Camera, points: Tensor) -> Tensor:
 
 def project(camera: Camera, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """Column and row [n] of the pixels that points fall on, and whether these are in the view."""
-    in_camera = points @ camera.viewmat[:3, :3].T + camera.viewmat[:3, 3]
-    depth = in_camera[:, 2].clamp_min(1e-6)
-    places = (in_camera @ camera.K.T)[:, :2] / depth[:, None]
+    places, z = camera.project(points)
     columns, rows = places.floor().long().unbind(dim=1)
-    is_inside = (
-        (in_camera[:, 2] > 0)
-        & (columns >= 0)
-        & (columns < camera.width)
-        & (rows >= 0)
-        & (rows < camera.height)
-    )
-    return columns, rows, is_inside
+    on_image = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
+    return columns, rows, on_image & (z > 0)
 
 
 def mean_colors(images: Images, points: Tensor) -> Tensor:

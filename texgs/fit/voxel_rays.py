@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
 
 AROUND = 6  # pixels around what is visible; the visual hull keeps all others empty
@@ -50,7 +49,7 @@ def training_rays(images: Images) -> TrainingRays:
     for index, camera in enumerate(images.cameras):
         planes = images.planes[index].flatten(1)[:, order]  # [4, H W]
         near = widened(images.planes[index, 3], AROUND).flatten()[order]
-        directions.append(camera_rays(camera)[..., 3:].reshape(-1, 3)[order[near]])
+        directions.append(camera.rays().reshape(-1, 3)[order[near]])
         colors.append(planes[:3, near].T.contiguous())
         views.append(torch.full((int(near.sum()),), index, dtype=torch.int16))
     if not any(map(len, views)):

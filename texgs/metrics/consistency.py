@@ -134,7 +134,7 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
         check.shape("image", frame.image, "H W 3", **size)
         check.shape("depth", frame.depth, "H W", **size)
         check.shape("alpha", frame.alpha, "H W", **size)
-    pixels, z = reprojected(target, source.camera)
+    pixels, z = source.camera.project(target.camera.unproject(target.depth))
     height, width = source.depth.shape
     x, y = (pixels - 0.5).unbind(-1)
     warped = remap(source.image.permute(2, 0, 1)[None], x[None], y[None], align_corners=True)
@@ -146,16 +146,3 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
             at = (down.clamp(0, height - 1), right.clamp(0, width - 1))
             same &= (source.alpha[at] >= OPAQUE) & ((source.depth[at] - z).abs() <= tolerance * z)
     return warped[0].permute(1, 2, 0), same
-
-
-def reprojected(frame: SeenFrame, camera: Camera) -> tuple[Tensor, Tensor]:
-    """Where another camera sees the points of a view's pixels: pixels [H, W, 2] and camera z [H, W]."""
-    from kornia.geometry import depth_to_3d_v2, project_points, transform_points
-
-    here = frame.camera
-    K = here.K.clone()
-    K[:2, 2] -= 0.5  # kornia counts from the centres of pixels
-    points = depth_to_3d_v2(frame.depth[None], K[None]).flatten(1, 2)  # [1, H * W, 3] in the view's axes
-    relative = camera.viewmat @ torch.linalg.inv(here.viewmat)
-    moved = transform_points(relative[None], points).reshape(*frame.depth.shape, 3)
-    return project_points(moved, camera.K), moved[..., 2]

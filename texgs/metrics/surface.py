@@ -76,12 +76,11 @@ def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
         [H * W] the nearest point of each pixel, -1 where there is none; [N] the pixel of each point, -1
         outside of the image; [N] their camera z.
     """
-    viewmat, K = camera.viewmat.to(points), camera.K.to(points)
-    seen = points @ viewmat[:3, :3].T + viewmat[:3, 3]
-    u, v = ((seen @ K.T)[:, :2] / seen[:, 2:]).floor().long().unbind(1)
-    on_image = (seen[:, 2] > 0) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
+    places, z = camera.project(points)
+    u, v = places.floor().long().unbind(1)
+    on_image = (z > 0) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
     pixel = torch.where(on_image, v * camera.width + u, -1)
-    z, index = seen[:, 2], torch.arange(len(points))
+    index = torch.arange(len(points))
     key = ((z * STEPS).long() << 32) + index
     first = torch.full((camera.width * camera.height,), torch.iinfo(torch.int64).max)
     first.scatter_reduce_(0, pixel[on_image], key[on_image], "amin")

@@ -189,11 +189,7 @@ def render_view(
 
 def camera_rays(camera: Camera) -> Tensor:
     """Rays [H, W, 6] through the pixel centres of a camera; directions have length 1 along its axis."""
-    K, R_cw = camera.K, camera.viewmat[:3, :3]
-    sides = (torch.arange(side, device=K.device) for side in (camera.height, camera.width))
-    y, x = torch.meshgrid(*sides, indexing="ij")
-    right, down = (x + 0.5 - K[0, 2]) / K[0, 0], (y + 0.5 - K[1, 2]) / K[1, 1]
-    direction = torch.stack([right, down, torch.ones_like(right)], dim=-1) @ R_cw
+    direction = camera.rays()
     return torch.cat([camera.position.expand_as(direction), direction], dim=-1)
 
 

@@ -27,12 +27,9 @@ LEAST_VIEWS = 1  # more views than this must have seen a voxel
 CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
-def unproject(view: DepthView) -> Tensor:
+def points(view: DepthView) -> Tensor:
     """Where the surface is that the pixels of a view show [P, 3], world units."""
-    v, u = view.depth.nonzero().T
-    z, camera = view.depth[v, u], view.camera
-    rays = torch.stack([u + 0.5, v + 0.5, torch.ones_like(z)], dim=1) @ camera.K.inverse().T
-    return (z[:, None] * rays - camera.viewmat[:3, 3]) @ camera.viewmat[:3, :3]
+    return view.camera.unproject(view.depth)[view.depth > 0]
 
 
 def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
@@ -50,7 +47,7 @@ def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
 def fuse_view(lattice: Lattice, view: DepthView) -> None:
     """Update the voxels close to what a view sees."""
     near = torch.zeros(lattice.blocks)
-    near[((unproject(view) - lattice.lower) / (BLOCK * lattice.spacing)).long().unbind(1)] = 1
+    near[((points(view) - lattice.lower) / (BLOCK * lattice.spacing)).long().unbind(1)] = 1
     blocks = F.max_pool3d(near[None], 3, stride=1, padding=1)[0].nonzero()
     lattice.add(view, blocks, TRUNCATION * lattice.spacing)
 
@@ -93,7 +90,7 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
     if not voxel > 0:
         raise ArgumentError(f"voxel: expected a length above 0, got {voxel}")
     views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
-    boxes = [unproject(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
+    boxes = [points(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
     if not boxes:
         raise ArgumentError(
             "mesh: expected a surface that lets less than half of the light through, got none"
