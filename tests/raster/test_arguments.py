@@ -11,6 +11,7 @@ from tests.raster.scenes import gaussians, random_scene, textured, textured_with
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
+from texgs.raster.autograd import Frame
 from texgs.raster.inputs import SurfelTensors, View
 from texgs.raster.reference import rasterize as reference
 from texgs.raster.types import Options, Texture
@@ -154,6 +155,31 @@ def test_library_refuses_what_gaussians_do_not_have():
     five = SurfelTensors(*geometry, features=scene.features)._replace(scales=torch.rand(N, 5))
     with pytest.raises(ArgumentError, match="surfels: expected 2 scales of surfels or 3 of 3D Gaussians"):
         forward(five)
+
+
+def test_library_refuses_what_is_not_of_the_forward_call():
+    scene = random_scene()
+    view = View(scene.viewmat, scene.K, 8, 8, None, None, None, frozenset(), Options())
+    surfels = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
+    color, alpha = torch.empty(scene.features.shape[1], 8, 8), torch.empty(8, 8)
+    image = native.Image(color=native.address(color), alpha=native.address(alpha))
+    handle = ctypes.c_void_p()
+
+    def call(name, *arguments, of=surfels, view=view):
+        native.call(name, handle, *view.structures(of), *arguments, device=torch.device("cpu"))
+
+    native.call(
+        *("texgs_forward", *view.structures(surfels), image, ctypes.byref(handle)), device=torch.device("cpu")
+    )
+    for name in ("depth", "median", "distortion"):
+        with pytest.raises(ArgumentError, match="a gradient of depth, median or distortion without"):
+            call("texgs_backward", image, native.Image(**{name: native.address(alpha)}), native.Gradients())
+    fewer = SurfelTensors(*(None if x is None else x[1:] for x in surfels))
+    with pytest.raises(ArgumentError, match="frame: expected as many surfels, scales and channels as"):
+        call("texgs_backward", image, native.Image(), native.Gradients(), of=fewer)
+    with pytest.raises(ArgumentError, match="frame: expected an image as large as in the forward call"):
+        call("texgs_contribute", native.Contributions(), view=replace(view, width=9))
+    Frame(handle.value, torch.device("cpu"))  # gives it back
 
 
 def test_library_refuses_colours_that_do_not_add_up():

@@ -42,10 +42,21 @@ inline void check_scene(const texgs_surfels& s, const texgs_camera& c, const tex
     require(s.axes == 2 || !i.normal, "normal: 3D Gaussians have none");
 }
 
+// What follows a forward call is of its surfels and its image: `made` is what the frame was made of.
+template <class Raster>
+void check_frame(const Raster& made, const texgs_surfels& s, const texgs_camera& c) {
+    require(s.n == made.surfels.n && s.axes == made.surfels.axes && s.channels == made.surfels.channels,
+            "frame: expected as many surfels, scales and channels as in the forward call");
+    require(c.width == made.camera.width && c.height == made.camera.height,
+            "frame: expected an image as large as in the forward call");
+}
+
 // `with_normal`: whether the forward call rendered normals.
 inline void check_gradients(const texgs_image& image, const texgs_image& grad, bool with_normal) {
     require(image.color && image.alpha, "backward: the forward colour and alpha are needed");
     require(!grad.normal || with_normal, "backward: a normal gradient without a forward normal");
+    require((!grad.depth || image.depth) && (!grad.median || image.median) && (!grad.distortion || image.distortion),
+            "backward: a gradient of depth, median or distortion without the forward one");
 }
 
 inline void check_contributions(const texgs_contributions& c) {

@@ -58,24 +58,24 @@ struct Corners {
 };
 TEXGS_MATHS Corners corners_of(const texgs_grid& g, Cell c) {
     const int depth = g.size[2] >> 2, plane = (g.size[1] >> 2) * depth, z = c.z & 3;
-    Corners found;
+    Corners corners;
     for (int i = 0; i < 8; i += 2) {  // two corners along z at a time: mostly of one block
         const int x = c.x + (i >> 2), y = c.y + (i >> 1 & 1), column = (x & 3) << 4 | (y & 3) << 2;
         const int block = (x >> 2) * plane + (y >> 2) * depth + (c.z >> 2);
         const uint64_t from = g.masks[block] >> (column | z);
         const int32_t row = g.first[block] + popcount(g.masks[block]) - popcount(from);
-        found.block[i] = found.block[i + 1] = block;
-        found.row[i] = from & 1 ? row : 0;
+        corners.block[i] = corners.block[i + 1] = block;
+        corners.row[i] = from & 1 ? row : 0;
         if (z < 3) {
-            found.row[i + 1] = from & 2 ? row + static_cast<int32_t>(from & 1) : 0;
+            corners.row[i + 1] = from & 2 ? row + static_cast<int32_t>(from & 1) : 0;
         } else {
             const uint64_t next = g.masks[block + 1];
             const uint64_t own = uint64_t(1) << column;
-            found.block[i + 1] = block + 1;
-            found.row[i + 1] = next & own ? g.first[block + 1] + popcount(next & (own - 1)) : 0;
+            corners.block[i + 1] = block + 1;
+            corners.row[i + 1] = next & own ? g.first[block + 1] + popcount(next & (own - 1)) : 0;
         }
     }
-    return found;
+    return corners;
 }
 
 // Trilinear weights of a point's eight corners; the last axis is the fastest.

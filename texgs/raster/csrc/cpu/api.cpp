@@ -76,6 +76,7 @@ int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const t
                        const texgs_options* options, const texgs_image* image, const texgs_image* grad,
                        const texgs_gradients* out, void*) {
     return guarded([&] {
+        check_frame(frame->raster, *surfels, *camera);
         check_gradients(*image, *grad, frame->raster.with_normal);
         frame->attach(*surfels, *camera, *options);
         frame->differentiate(*image, *grad, *out);
@@ -85,6 +86,7 @@ int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const t
 int32_t texgs_contribute(texgs_frame* frame, const texgs_surfels* surfels, const texgs_camera* camera,
                          const texgs_options* options, const texgs_contributions* out, void*) {
     return guarded([&] {
+        check_frame(frame->raster, *surfels, *camera);
         check_contributions(*out);
         frame->attach(*surfels, *camera, *options);
         frame->contribute(*out);

@@ -55,6 +55,7 @@ int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const t
                        const texgs_options* options, const texgs_image* image, const texgs_image* grad,
                        const texgs_gradients* out, void* on) {
     return guarded([&] {
+        check_frame(frame->raster, *surfels, *camera);
         check_gradients(*image, *grad, frame->raster.with_normal);
         const auto stream = static_cast<cudaStream_t>(on);
         const DeviceScope scope(frame->device);
@@ -67,6 +68,7 @@ int32_t texgs_backward(texgs_frame* frame, const texgs_surfels* surfels, const t
 int32_t texgs_contribute(texgs_frame* frame, const texgs_surfels* surfels, const texgs_camera* camera,
                          const texgs_options* options, const texgs_contributions* out, void* on) {
     return guarded([&] {
+        check_frame(frame->raster, *surfels, *camera);
         check_contributions(*out);
         const auto stream = static_cast<cudaStream_t>(on);
         const DeviceScope scope(frame->device);

@@ -175,9 +175,9 @@ void choose(const Raster& r, Visit visit) {
 }  // namespace
 
 int backward_slot_width(const Raster& r) {
-    int found = 0;
-    choose(r, [&](auto, int width) { found = width; });
-    return found;
+    int chosen = 0;
+    choose(r, [&](auto, int width) { chosen = width; });
+    return chosen;
 }
 
 void backward(const Raster& r, cudaStream_t stream) {

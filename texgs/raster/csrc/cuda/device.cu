@@ -21,11 +21,11 @@ DeviceScope::~DeviceScope() {
 }
 
 int device_of(const void* pointer) {
-    cudaPointerAttributes found{};
-    check(cudaPointerGetAttributes(&found, pointer), "looking up a pointer");
-    if (found.type != cudaMemoryTypeDevice && found.type != cudaMemoryTypeManaged)
+    cudaPointerAttributes attributes{};
+    check(cudaPointerGetAttributes(&attributes, pointer), "looking up a pointer");
+    if (attributes.type != cudaMemoryTypeDevice && attributes.type != cudaMemoryTypeManaged)
         throw std::runtime_error("expected tensors in the memory of a CUDA device");
-    return found.device;
+    return attributes.device;
 }
 
 }  // namespace texgs::cuda

@@ -88,7 +88,7 @@ __global__ __launch_bounds__(kThreads) void render_kernel(const GridJob job) {
         shade<K>(job.grid, s, basis, own);
         for (int c = 0; c < 3; ++c) color[c] = fma(s.weight, own[c], color[c]);
         depth = fma(s.weight, s.distance, depth);
-        if (Keep)
+        if (Keep && next < job.samples + job.begin[i + 1])  // as many as were counted, whatever the compiler does
             *next++ = {
                 pack(s.point.cell), static_cast<uint32_t>(i), {s.point.f[0], s.point.f[1], s.point.f[2]}, s.weight,
                 s.behind,           {own[0], own[1], own[2]}};

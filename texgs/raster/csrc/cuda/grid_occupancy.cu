@@ -22,11 +22,11 @@ __device__ inline int64_t thread_index() { return int64_t(blockIdx.x) * kThreads
 __global__ __launch_bounds__(kThreads) void dense_kernel(const texgs_grid grid, Blocks blocks, uint64_t* dense) {
     const int64_t i = thread_index();
     if (i >= blocks.count()) return;
-    uint64_t found = 0;
+    uint64_t occupied = 0;
     const float* density = grid.density + grid.first[i];
     for (int bit = 0; bit < kBlockSide * kBlockSide * kBlockSide; ++bit)
-        if (grid.masks[i] >> bit & 1) found |= uint64_t(*density++ > 0.0f) << bit;
-    dense[i] = found;
+        if (grid.masks[i] >> bit & 1) occupied |= uint64_t(*density++ > 0.0f) << bit;
+    dense[i] = occupied;
 }
 
 // Blocks of voxels, and the same moved by one towards lower x, y or z, in one.

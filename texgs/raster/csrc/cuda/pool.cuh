@@ -18,9 +18,9 @@ public:
         std::lock_guard lock(mutex_);
         for (auto idle = idle_.rbegin(); idle != idle_.rend(); ++idle)
             if ((*idle)->device == device) {
-                std::unique_ptr<T> found = std::move(*idle);
+                std::unique_ptr<T> taken = std::move(*idle);
                 idle_.erase(std::next(idle).base());
-                return found;
+                return taken;
             }
         return std::make_unique<T>(device);
     }
