@@ -15,9 +15,9 @@ from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import MATERIAL
 from texgs.fields.surfels.texels import owners
 from texgs.models.vgg import Vgg
+from texgs.raster.shading import MATERIAL
 
 CHANGED = {"texels", "colors"}
 

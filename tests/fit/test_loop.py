@@ -6,12 +6,13 @@ from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.shading import MATERIAL, raw_material
+from texgs.fields.surfels.shading import raw_material
 from texgs.fit import checkpoint
 from texgs.fit.harmonics import split, zeroth
 from texgs.fit.loop import CHECKED_EVERY, extent
 from texgs.fit.seeds import seed_surfels
 from texgs.metrics.quality import evaluate, mean
+from texgs.raster.shading import MATERIAL
 from texgs.volume.images import load
 from texgs.volume.view_set import View, ViewSet, read_views, write_transforms
 

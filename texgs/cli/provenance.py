@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs import __version__
-from texgs.core.memory import peak_memory
+from texgs.core.memory import MIB, peak_memory
 
 PACKAGES = (  # whose code decides results
     *("torch", "numpy", "scipy", "kornia", "opencv-python-headless", "pillow", "matplotlib", "av"),
@@ -33,7 +33,7 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
         **{key: settings[key] for key in ("stage", "dataset", "tf") if key in settings},
         **recipe(settings),
         "seconds": seconds,
-        "peak_memory_mib": peak_memory() / 2**20,
+        "peak_memory_mib": peak_memory() / MIB,
         "device": device(settings),
         "seed": seed(settings),
         "config_sha": identity["settings"],

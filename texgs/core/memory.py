@@ -15,7 +15,7 @@ from texgs.core.errors import OutOfMemoryError
 STATUS = Path("/proc/self/status")
 CGROUP = Path("/sys/fs/cgroup")
 CONTAINER = ("memory.max", "memory.current", "memory.stat")  # what it may have, what it has, and which kinds
-GIB = 1 << 30
+MIB, GIB = 1 << 20, 1 << 30
 SMALL = 64 << 20  # bytes that are there without asking
 NEW_OBJECTS = 50_000  # before the garbage collector looks at them
 GLIBC_OPTIONS = {-1: 1 << 30, -3: 32 << 20}  # M_TRIM_THRESHOLD; M_MMAP_THRESHOLD, the most it takes

@@ -7,8 +7,8 @@ from torch import Tensor
 
 from texgs.config.phase import Densify
 from texgs.core.rotation import quats_to_matrices
-from texgs.fields.surfels.shading import MATERIAL
 from texgs.fit.optimizer import Optimizer
+from texgs.raster.shading import MATERIAL
 
 CHILDREN = 2  # of a split
 SHRINK = 1.6  # by which children are smaller

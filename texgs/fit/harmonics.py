@@ -7,17 +7,17 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-C0 = 0.28209479177387814  # of the zeroth harmonic
+from texgs.raster.spherical_harmonics import Y00
 
 
 def zeroth(colors: Tensor) -> Tensor:
     """Coefficients [N, 1, 3] that show a colour [N, 3] from everywhere."""
-    return ((colors - 0.5) / C0)[:, None]
+    return ((colors - 0.5) / Y00)[:, None]
 
 
 def base_color(sh: Tensor) -> Tensor:
     """Colour [N, 3] without the direction: c_ind of the shading phase (paper, section Relightable 2DGS)."""
-    return (0.5 + C0 * sh[:, 0]).clamp_min(0)
+    return (0.5 + Y00 * sh[:, 0]).clamp_min(0)
 
 
 def split(sh: Tensor) -> dict[str, Tensor]:

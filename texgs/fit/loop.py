@@ -12,11 +12,11 @@ from texgs.config.phase import Phase, Rates
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.bounds import visible_part
-from texgs.fields.surfels.shading import MATERIAL
 from texgs.fit.densify import DensityControl
 from texgs.fit.harmonics import join
 from texgs.fit.losses import Shading, view_loss
 from texgs.fit.optimizer import Optimizer, Rate
+from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
 USUAL_DISTANCE = 4.0  # of cameras, in radii of the object

@@ -12,9 +12,10 @@ from texgs.config.phase import Losses
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.model import geometry
-from texgs.fields.surfels.shading import MATERIAL, ShadingModel, material
+from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.raster import Options, Render, Texture, rasterize
 from texgs.raster.normals import normal_consistency
+from texgs.raster.shading import MATERIAL
 from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.ssim import l1_dssim, ssim
 from texgs.volume.images import Target

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi, sqrt
 from typing import Any
 
 import torch
@@ -11,6 +12,7 @@ from texgs.core import check
 from texgs.core.errors import ShapeError
 from texgs.raster.losses_abi import call
 
+Y00 = 0.5 / sqrt(pi)  # the constant harmonic
 DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # by number of coefficients
 
 

@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
+from texgs.raster.spherical_harmonics import Y00
 from texgs.raster.voxel_grid import VoxelGrid, pack_rows, unpack_rows
 
-Y0 = 0.28209479177387814  # the zeroth harmonic
 GREY = 0.5  # colour of coefficients that are 0
 
 
@@ -16,8 +16,8 @@ GREY = 0.5  # colour of coefficients that are 0
 def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
     """A grid whose every colour c is matrix @ c + offset, wherever neither is clamped to 0.
 
-    Colour is 0.5 + Y0 s_0 + sum_k Y_k s_k. So the coefficients s_k become A s_k, and s_0 becomes
-    A s_0 + (0.5 A 1 + b - 0.5) / Y0; ARF's own colour transfer leaves the last term as b. Voxels without a
+    Colour is 0.5 + Y00 s_0 + sum_k Y_k s_k. So the coefficients s_k become A s_k, and s_0 becomes
+    A s_0 + (0.5 A 1 + b - 0.5) / Y00; ARF's own colour transfer leaves the last term as b. Voxels without a
     row change as well, so that the colours between them and others do. The background is the caller's.
 
     Args:
@@ -32,7 +32,7 @@ def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
     check.shape("offset", offset, "3")
     density, sh = unpack_rows(grid.rows)
     sh = sh @ matrix.T
-    sh[:, 0] += (GREY * matrix.sum(1) + offset - GREY) / Y0
+    sh[:, 0] += (GREY * matrix.sum(1) + offset - GREY) / Y00
     return grid.with_rows(pack_rows(density, sh))
 
 

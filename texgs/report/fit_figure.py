@@ -13,10 +13,11 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels, geometry
-from texgs.fields.surfels.shading import MATERIAL, material
+from texgs.fields.surfels.shading import material
 from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
+from texgs.raster.shading import MATERIAL
 from texgs.report.figure_page import Panel, PanelRow, Scale, draw
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View

@@ -18,6 +18,7 @@ from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
+from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.edit.parts import parts_of
 from texgs.fields.field import Composed, Look
@@ -63,7 +64,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         fmean(frames),
         max(frames),
         len(scenes[0]),
-        megabytes=sum(size_of(after)) * 2**20 / 1e6,
+        megabytes=sum(size_of(after)) * MIB / 1e6,
         geometry_kept=is_geometry_kept(*scenes, some, "normals" in kind.can),
         **agreement(scenes[0], after, cameras, settings.compared, weights, kind),
         **style_distance(after, edit, some, device, weights, title),

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from texgs.config.phase import Phase
+from texgs.core.memory import MIB
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
@@ -21,7 +22,7 @@ from texgs.volume.view_set import ViewSet
 
 def gpu_memory(device: torch.device) -> float | None:
     """Peak memory of the GPU in this process, MiB; None on a CPU."""
-    return torch.cuda.max_memory_allocated(device) / 2**20 if device.type == "cuda" else None
+    return torch.cuda.max_memory_allocated(device) / MIB if device.type == "cuda" else None
 
 
 def run_phase(

@@ -10,6 +10,7 @@ from texgs.cli.stages.settings import OfDataset
 from texgs.config.dataset import Volume
 from texgs.config.locate import cached_volume
 from texgs.core.io import write_json
+from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
 from texgs.volume.download import require_whole
@@ -59,7 +60,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             summary.minimum,
             summary.maximum,
             summary.voxels,
-            volume_mib=(output / "volume.nrrd").stat().st_size / 2**20,
+            volume_mib=(output / "volume.nrrd").stat().st_size / MIB,
         )
     )
 

@@ -13,8 +13,9 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.memory import MIB
 from texgs.fields.field import Role
-from texgs.fields.surfels.groups import GEOMETRY, MIB
+from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import geometry
 from texgs.raster import Options, Render, rasterize
 from texgs.raster.spherical_harmonics import DEGREES, spherical_harmonics

@@ -17,9 +17,9 @@ from texgs.fields.field import Look
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.segment import labels_of
-from texgs.fields.surfels.shading import MATERIAL, light_direction, material, viewer
+from texgs.fields.surfels.shading import light_direction, material, viewer
 from texgs.raster import Render, Texture, rasterize
-from texgs.raster.shading import blinn_phong_texture
+from texgs.raster.shading import MATERIAL, blinn_phong_texture
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from collections.abc import Collection, Mapping
 
 from torch import Tensor
 
-from texgs.fields.surfels.shading import MATERIAL
+from texgs.core.memory import MIB
+from texgs.raster.shading import MATERIAL
 
 GEOMETRY = ("means", "quats", "scales", "opacities")
 TEXTURE = ("palette", "texels", "sizes", "offsets")
-MIB = 2**20
 # What the paper counts, and what we store; every tensor of a model is in one group.
 COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
 STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", *MATERIAL), "texture": TEXTURE}

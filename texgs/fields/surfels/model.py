@@ -16,8 +16,9 @@ from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Role
 from texgs.fields.surfels import groups
 from texgs.fields.surfels.groups import GEOMETRY
-from texgs.fields.surfels.shading import MATERIAL, ShadingModel
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render, Texture, rasterize
+from texgs.raster.shading import MATERIAL
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,9 +16,10 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.tensor_file import read_tensor_file, require_json, short, write_tensor_file
 from texgs.fields.surfels.groups import GEOMETRY, TEXTURE
 from texgs.fields.surfels.model import SHAPES, Surfels
-from texgs.fields.surfels.shading import MATERIAL, ShadingModel
+from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Texture
 from texgs.raster.atlas import check_texture
+from texgs.raster.shading import MATERIAL
 
 FORMAT = "texgs-model"
 VERSION = 1

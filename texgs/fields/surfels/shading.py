@@ -13,10 +13,9 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.raster import Options, Texture
-from texgs.raster.shading import blinn_phong, blinn_phong_texture
+from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture
 from texgs.raster.spherical_harmonics import spherical_harmonics
 
-MATERIAL = ("ambient", "diffuse", "specular", "shininess")
 SHININESS = (1.0, 100.0)  # range of the bounded exponent
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
 

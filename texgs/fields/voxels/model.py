@@ -12,12 +12,12 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.memory import MIB
 from texgs.fields.field import Role
 from texgs.raster import Render
 from texgs.raster.voxel_grid import VoxelGrid, unpack_rows
 from texgs.raster.voxels import March, render_view
 
-MIB = 2**20
 OUTPUTS = ("depth",)
 
 
