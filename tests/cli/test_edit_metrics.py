@@ -4,6 +4,7 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.edit_metrics import agreement
+from texgs.config.fields import kinds
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.scene.scene import Scene, SceneModel
@@ -22,6 +23,7 @@ def test_a_scene_that_is_nowhere_opaque_has_no_consistency(tmp_path):
             cameras,
             4,
             missing,
+            kinds()["surfels"],
         )
         for change in ({}, {"opacities": faint})
     )

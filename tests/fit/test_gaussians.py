@@ -8,12 +8,12 @@ from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fit import checkpoint
 from texgs.fit.densify import SHRINK, DensityControl
 from texgs.fit.gaussian_seeds import seed_gaussians
-from texgs.fit.harmonics import C0
 from texgs.fit.loop import Fit
 from texgs.fit.optimizer import Optimizer, Rate
 from texgs.fit.task import FitTask
 from texgs.kinds.gaussians import FIELD, GaussianKeys
 from texgs.metrics.quality import evaluate, mean
+from texgs.raster.spherical_harmonics import Y00
 from texgs.volume.view_set import View, ViewSet
 
 from .scenes import SIZE, ball_images, is_finite, run
@@ -98,7 +98,7 @@ def test_seeds_are_grey_from_everywhere_and_as_thick_as_wide(tmp_path):
     assert torch.equal(found["scales"][:, 2], found["scales"][:, :2].amin(dim=1))
     assert found["sh_rest"].shape == (80, 8, 3)
     assert not found["sh_rest"].any()
-    shown = 0.5 + C0 * found["sh"]
+    shown = 0.5 + Y00 * found["sh"]
     assert bool(((shown > -1e-6) & (shown < 1 + 1e-6)).all())
 
 
