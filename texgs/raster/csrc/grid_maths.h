@@ -136,13 +136,12 @@ TEXGS_MATHS Point sample_point(const texgs_grid& g, const Ray& ray, int k, float
     int c[3];
     for (int a = 0; a < 3; ++a) {
         // Rounding may lead out of the lattice, and far out for an origin that is far away.
-        const float high = static_cast<float>(g.size[a] - 1);
-        float at = ray.entry[a] + t * ray.direction[a];
-        at = at > 0.0f ? at : 0.0f;
-        at = at < high ? at : high;
-        const int cell = static_cast<int>(at), last = g.size[a] - 2;
+        const int last = g.size[a] - 2;
+        const float at = ray.entry[a] + t * ray.direction[a], most = static_cast<float>(last) + 1.0f;
+        const float inside = at > 0.0f ? at < most ? at : most : 0.0f;
+        const int cell = static_cast<int>(inside);
         c[a] = cell < last ? cell : last;
-        p.f[a] = at - static_cast<float>(c[a]);
+        p.f[a] = inside - static_cast<float>(c[a]);
     }
     p.cell = {c[0], c[1], c[2]};
     return p;
