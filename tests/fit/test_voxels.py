@@ -12,9 +12,9 @@ from texgs.config.typed import typed
 from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
+from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
 from texgs.fit import checkpoint
 from texgs.fit.resumable import run_to_end
-from texgs.fit.voxel_rays import AROUND, curve, training_rays, widened
 from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
 from texgs.fit.voxels import VoxelFit
 from texgs.metrics.image import psnr

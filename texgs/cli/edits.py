@@ -35,5 +35,5 @@ def check_edit(config: DictConfig) -> None:
     """
     if config.edit.method != NO_METHOD:
         method = method_of(config.edit)
-        require(config.fit.field, method.needs, f"edit {config.edit.name}")
+        require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
         method.check(method.of(config.edit))

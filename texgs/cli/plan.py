@@ -159,10 +159,9 @@ def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
 
 def is_possible(config: DictConfig, several: Sequence[str]) -> bool:
     """Whether the field of a fit can be edited so; of a single fit that is told as a mistake later."""
-    from texgs.config.fields import kinds
     from texgs.config.methods import method_of
 
-    return len(several) < 2 or method_of(config.edit).needs <= kinds()[config.fit.field].can
+    return len(several) < 2 or method_of(config.edit).takes(config.fit.field)
 
 
 def add_jobs(

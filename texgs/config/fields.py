@@ -72,12 +72,14 @@ def kinds() -> dict[str, Kind[Any]]:
     return specifications(PACKAGE, "FIELD")
 
 
-def require(kind: str, needs: Collection[str], what: str) -> None:
-    """Require of a kind of field that it is capable of something.
+def require(kind: str, needs: Collection[str], what: str, only: Collection[str] = ()) -> None:
+    """Require of a kind of field that it is capable of something, or one of some kinds.
 
     Raises:
         ConfigError: naming what it cannot do.
     """
+    if only and kind not in only:
+        raise ConfigError(f"{what}: expected a fit of {' or '.join(sorted(only))}, got one of {kind}")
     if missing := sorted(set(needs) - kinds()[kind].can):
         able = [name for name, other in kinds().items() if set(needs) <= other.can]
         raise ConfigError(

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from texgs.config.fields import kinds
 from texgs.config.specifications import specifications
 from texgs.config.typed import typed
 
@@ -37,6 +38,8 @@ class Method(Generic[Settings]):
     """Names of the weights that it may use, and whether it must; from its settings and the CLIP to use."""
     needs: frozenset[str] = frozenset()
     """What fields have to be capable of, of `texgs.config.fields.Capability`."""
+    fields: frozenset[str] = frozenset()
+    """Kinds of field that it is made for; empty: all that can what it needs."""
     files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}
     """Files that it reads besides the scene and its views."""
     adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
@@ -55,6 +58,10 @@ class Method(Generic[Settings]):
     def module(self) -> str:
         """Where it is."""
         return self.run.__module__
+
+    def takes(self, kind: str) -> bool:
+        """Whether it can edit a kind of field."""
+        return (not self.fields or kind in self.fields) and self.needs <= kinds()[kind].can
 
     def of(self, edit: Any) -> Settings:
         """Its settings among those of an edit: the schema's `Edit`, or its node in a configuration."""

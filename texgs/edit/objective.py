@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import isfinite
 
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, FitError
 from texgs.edit.recipe import Recipe
 from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
 from texgs.edit.style_picture import StylePicture
@@ -19,6 +20,7 @@ from texgs.models.vgg import Vgg
 FeatureTerm = Callable[[Tensor], Tensor]  # image [H, W, 3] in [0, 1] to a loss []
 STRIDE = 4  # pixels between the positions of VGG's features
 ON_OBJECT = 0.5  # of alpha, from which a feature or a patch counts
+LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +87,7 @@ class Objective:
         """
         recipe, terms = self.recipe, {}
         if self.style is not None and self.vgg is not None:
-            small = F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
-            features = self.vgg.features(small)
+            features = self.vgg.features(self.small(image))
             where = pooled(share, self.reduce * STRIDE, features.shape[1:]) if recipe.foreground else None
             distance = nnfm(features, self.style, where, recipe.queries, iteration)
             terms["nnfm"] = recipe.features * recipe.lambda_s * distance
@@ -98,6 +99,53 @@ class Objective:
                 image, self.patches, where, iteration, iteration
             )
         return terms
+
+    def content(self, image: Tensor, target: Tensor) -> Tensor:
+        """Mean squared distance [] of the features of an image and a target, both [3, h, w], as ARF has it.
+
+        Raises:
+            ArgumentError: if the recipe has no features.
+        """
+        if self.vgg is None:
+            raise ArgumentError("vgg: expected a VGG for the distance of contents, got none; load it")
+        features = self.vgg.features(self.small(image))
+        with torch.no_grad():
+            wanted = self.vgg.features(self.small(target))
+        return F.mse_loss(features.float(), wanted.float())
+
+    def small(self, image: Tensor) -> Tensor:
+        """The image [3, h, w] as features see it."""
+        return F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
+
+
+def view_order(views: int, recipe: Recipe) -> list[int]:
+    """Which view each iteration looks at: all of them in random order once before any again."""
+    generator = torch.Generator().manual_seed(recipe.seed)
+    order: list[int] = []
+    while len(order) < recipe.iterations:
+        order += torch.randperm(views, generator=generator).tolist()
+    return order[: recipe.iterations]
+
+
+def finite_values(terms: Mapping[str, Tensor], iteration: int) -> dict[str, float]:
+    """Values of the terms of a loss.
+
+    Raises:
+        FitError: if one is not finite.
+    """
+    values = {name: float(term.detach()) for name, term in terms.items()}
+    if not all(map(isfinite, values.values())):
+        raise FitError(
+            f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower "
+            "the rate, and look for values that are not finite in the model"
+        )
+    return values
+
+
+def differentiated(terms: Mapping[str, Tensor], image: Tensor) -> Tensor:
+    """Gradient of the sum of some terms, of the shape of the image that they are of."""
+    total = LOSS_SCALE * torch.stack(list(terms.values())).sum()
+    return torch.autograd.grad(total, image)[0] / LOSS_SCALE
 
 
 def pooled(share: Tensor, side: int, size: torch.Size) -> Tensor:

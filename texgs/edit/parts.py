@@ -9,8 +9,10 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.names import part_file
+from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of
 from texgs.fields.surfels.texture_file import write_texture
@@ -82,6 +84,33 @@ def edit_parts(
         edited = edit(part, model, surfels_of(part, entry, masks, model))
         path = write_texture(output / part.file, edited, {"part": part.name})
         scene = replaced(scene, part.name, replace(entry_of(scene, part.name), texture=path))
+    return scene
+
+
+def edit_fields(
+    scene: Scene,
+    names: Sequence[str],
+    output: Path,
+    device: torch.device,
+    edit: Callable[[str, Field], Field],
+) -> Scene:
+    """Edit whole models of any kind one after the other, each alone, and write them.
+
+    Args:
+        scene: as it is before.
+        names: of the models; all by default.
+        output: folder of the files.
+        device: that works.
+        edit: from the name of a model and the model, to the edited one.
+
+    Returns:
+        The scene with the new models.
+    """
+    for part in parts_of(scene, names):
+        entry = scene.models[part.model]
+        edited = edit(part.name, entry.open()[0].to(device))
+        path = kinds()[edited.kind].write(output / part.file, edited)
+        scene = replaced(scene, part.name, replace(entry, file=path))
     return scene
 
 

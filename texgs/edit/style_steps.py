@@ -7,24 +7,20 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from math import isfinite
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import FitError
 from texgs.core.light import Light
 from texgs.edit.canvas import paint, visible_part
-from texgs.edit.objective import FeatureTerm, Objective
+from texgs.edit.objective import FeatureTerm, Objective, differentiated, finite_values
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels, owners, recolored
 from texgs.models.vgg import Vgg
-
-LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
 
 
 @dataclass(eq=False)
@@ -112,15 +108,9 @@ class StyleSteps:
         with watch.part("losses"):
             share = alpha if canvas.share is None else canvas.share[part]
             terms = self.objective.terms(image, share, iteration)
-            values = {name: float(term.detach()) for name, term in terms.items()}
-            if not all(map(isfinite, values.values())):
-                raise FitError(
-                    f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower "
-                    "the rate, and look for values that are not finite in the model"
-                )
+            values = finite_values(terms, iteration)
         with watch.part("losses, backward"):
-            total = LOSS_SCALE * torch.stack(list(terms.values())).sum()
-            gradient = torch.autograd.grad(total, image)[0] / LOSS_SCALE
+            gradient = differentiated(terms, image)
         with watch.part("render, backward"):
             color.backward(gradient)
         with watch.part("update"):

@@ -14,7 +14,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.edit.objective import FeatureTerm
+from texgs.edit.objective import FeatureTerm, view_order
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_steps import Stopwatch, StyleSteps
@@ -76,22 +76,13 @@ def stylize(
     with watch.part("start"):
         steps = StyleSteps.prepare(model, cameras, style, recipe, vgg, clip, surfels)
     losses: dict[str, list[float]] = defaultdict(list)
-    order = _order(len(cameras), recipe)
+    order = view_order(len(cameras), recipe)
     for iteration, index in enumerate(progress(order, title=title, unit="iteration")):
         camera = cameras[index].to(watch.device)
         terms = steps.step(camera, lights[index], iteration, watch)
         for name, value in terms.items():
             losses[name].append(value)
     return Stylized(steps.result(), History(dict(losses), dict(watch.seconds)))
-
-
-def _order(views: int, recipe: Recipe) -> list[int]:
-    """Views in random order, all of them once before any again."""
-    generator = torch.Generator().manual_seed(recipe.seed)
-    order: list[int] = []
-    while len(order) < recipe.iterations:
-        order += torch.randperm(views, generator=generator).tolist()
-    return order[: recipe.iterations]
 
 
 def _check(

@@ -13,7 +13,8 @@ from torch import Tensor
 from texgs.config.edit import EditKeys
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
-from texgs.edit.parts import edit_parts
+from texgs.edit.parts import edit_fields, edit_parts
+from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
@@ -60,6 +61,17 @@ class Task(Generic[Settings]):
         return edit_parts(
             *(self.scene, self.edit.parts, self.output, self.device),
             lambda part, model, surfels: one(part.name, model, surfels, self.training_views(part.model)),
+        )
+
+    def each_model(self, one: Callable[[str, Field, Sequence[View]], Field]) -> Scene:
+        """Edit whole models of any kind one after the other; the scene with the new ones, which are written.
+
+        Args:
+            one: from the name of a model, the model and training views, to the edited model.
+        """
+        return edit_fields(
+            *(self.scene, self.edit.parts, self.output, self.device),
+            lambda name, model: one(name, model, self.training_views(name)),
         )
 
 

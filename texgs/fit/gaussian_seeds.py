@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from texgs.config.phase import Seeds
-from texgs.fit.harmonics import split, zeroth
+from texgs.fields.harmonics import split, zeroth
 from texgs.fit.seeds import seed_surfels
 from texgs.volume.images import Images
 from texgs.volume.view_set import ViewSet

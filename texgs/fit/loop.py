@@ -12,8 +12,8 @@ from texgs.config.phase import Phase, Rates
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.bounds import visible_part
+from texgs.fields.harmonics import join
 from texgs.fit.densify import DensityControl
-from texgs.fit.harmonics import join
 from texgs.fit.losses import Shading, view_loss
 from texgs.fit.optimizer import Optimizer, Rate
 from texgs.raster.shading import MATERIAL

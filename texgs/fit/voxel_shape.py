@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.fields.voxels.rays import TrainingRays, widened
 from texgs.fit.hull import Box, is_covered
-from texgs.fit.voxel_rays import TrainingRays, widened
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxels import March, Samples
 from texgs.volume.images import Images

@@ -10,8 +10,8 @@ from torch import Tensor
 
 from texgs.config.voxel_fit import GridStage, VoxelKeys
 from texgs.core.errors import FitError
+from texgs.fields.voxels.rays import training_rays
 from texgs.fit.loop import require_finite
-from texgs.fit.voxel_rays import training_rays
 from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import VoxelGrid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_total_variation

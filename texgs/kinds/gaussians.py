@@ -75,9 +75,9 @@ def compose(fields: Sequence[Gaussians], segments: Sequence[Sequence[Tensor]]) -
 def fit(task: FitTask[GaussianKeys]) -> Fitted:
     """Fit Gaussians to the views, from the last checkpoint if there is one."""
     from texgs.fields.gaussians.model import Baked, Gaussians
+    from texgs.fields.harmonics import join
     from texgs.fit import checkpoint
     from texgs.fit.gaussian_seeds import seed_gaussians
-    from texgs.fit.harmonics import join
     from texgs.fit.loop import Fit
     from texgs.fit.resumable import run_to_end
     from texgs.fit.task import Fitted

@@ -65,7 +65,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
         scene,
         how(recipe, wanted),
         sum(each["all"] for each in seconds.values()),
-        {"style.png": "The style picture.", "convergence.png": "Terms of the loss in each iteration."},
+        style.SHOWN,
         recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
         {"seconds": seconds},
     )

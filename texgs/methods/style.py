@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,8 +10,14 @@ from texgs.config.keys import key
 from texgs.core.errors import ArgumentError
 from texgs.methods.shares import shares
 
+SHOWN = {"style.png": "The style picture.", "convergence.png": "Terms of the loss in each iteration."}
+
 if TYPE_CHECKING:
+    from texgs.edit.recipe import Recipe
     from texgs.edit.style_picture import StylePicture
+    from texgs.edit.task import EditedScene, Task
+    from texgs.models.vgg import Vgg
+    from texgs.scene.scene import Scene
 
 
 @dataclass
@@ -23,6 +29,78 @@ class StyleKeys:
     masks: str = key(
         "mobile_sam", "what finds that object; grabcut needs no weights", choices=("mobile_sam", "grabcut")
     )
+
+
+@dataclass
+class FeatureKeys(StyleKeys):
+    """How views that learn the style are compared with it."""
+
+    nnfm: float = key(1.0, "weight of NNFM on VGG-16; 0 needs no weights", least=0)
+    patches: float = key(0.0, "weight of the sliced Wasserstein distance of patches", least=0)
+    foreground: bool = key(True, "only what is on the object counts, not what is behind")
+    sampled: bool = key(False, "features are drawn at random and searched roughly, for CPUs")
+
+    def recipe(self, iterations: int, seed: int, reduce: int) -> Recipe:
+        """Its losses, for features that see averages of `reduce` pixels each way."""
+        from texgs.edit.recipe import DEFAULT, Recipe
+
+        drawn = (DEFAULT.queries, DEFAULT.positions, DEFAULT.dimensions) if self.sampled else (None,) * 3
+        queries, positions, dimensions = drawn
+        return Recipe(
+            iterations=iterations,
+            features=self.nnfm,
+            patches=self.patches,
+            behind="white",
+            cropped=False,
+            foreground=self.foreground,
+            queries=queries,
+            positions=positions,
+            dimensions=dimensions,
+            reduce=reduce,
+            seed=seed,
+        )
+
+    def weights(self) -> dict[str, bool]:
+        """VGG where features are compared, and what finds the object."""
+        return {**({"vgg16": True} if self.nnfm > 0 else {}), **weights(self)}
+
+    @property
+    def how(self) -> str:
+        """What the edit works with, for tables."""
+        used = {"VGG-16": self.nnfm > 0, "patches": self.patches > 0}
+        return " + ".join(name for name, is_used in used.items() if is_used)
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A picture on its way onto a scene, and how the losses fell."""
+
+    task: Task[Any]
+    picture: StylePicture
+    vgg: Vgg | None
+    losses: dict[str, dict[str, list[float]]] = field(default_factory=dict)  # by model and term
+
+    @classmethod
+    def of(cls, task: Task[Any], where: str) -> Look:
+        """What an edit with `FeatureKeys` follows; `where` are its keys, such as edit.arf."""
+        from texgs.models.vgg import Vgg
+
+        vgg = Vgg.load(device=task.device) if task.settings.nnfm > 0 else None
+        return cls(task, style_of(task.settings, where), vgg)
+
+    def title(self, model: str) -> str:
+        """Of a progress bar."""
+        return f"{self.task.title} {self.task.edit.name}, {model}"
+
+    def result(self, scene: Scene, seconds: float) -> EditedScene:
+        """The edited scene; writes style.png and convergence.png."""
+        from texgs.core.image import write_png
+        from texgs.edit.task import EditedScene
+        from texgs.report.convergence import write_convergence
+
+        write_png(self.task.output / "style.png", self.picture.image.permute(1, 2, 0))
+        write_convergence(self.task.output / "convergence.png", self.losses)
+        return EditedScene(scene, self.task.settings.how, seconds, SHOWN)
 
 
 def files(settings: StyleKeys) -> dict[str, Path]:

@@ -10,11 +10,11 @@ from texgs.cli.stages.phase import gpu_memory, quality, run_phase
 from texgs.cli.stages.settings import OfTF, Recipe
 from texgs.config.phase import Phase, Seeds
 from texgs.core.device import torch_device
+from texgs.fields.harmonics import join, split, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit import checkpoint
-from texgs.fit.harmonics import join, split, zeroth
 from texgs.fit.seeds import seed_surfels
 from texgs.report.results import FitResult
 from texgs.volume.images import load

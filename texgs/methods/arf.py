@@ -1,0 +1,91 @@
+"""ARF (Zhang et al. 2022), one of the paper's baselines: the style of a picture for voxel grids."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from texgs.config.keys import key
+from texgs.config.methods import Method
+from texgs.methods import style
+from texgs.methods.style import FeatureKeys
+
+if TYPE_CHECKING:
+    from texgs.edit.recipe import Recipe
+    from texgs.edit.style_picture import StylePicture
+    from texgs.edit.task import EditedScene, Task
+    from texgs.fields.voxels.model import Voxels
+    from texgs.volume.view_set import View
+
+KEYS = "edit.arf"  # where its keys stand
+
+
+@dataclass
+class ArfKeys(FeatureKeys):
+    """How colours of voxels take on a style."""
+
+    epochs: float = key(10.0, "rounds through the training views, for the style", least=0)
+    recoloured_epochs: float = key(1.0, "rounds through the rays of recoloured views before that", least=0)
+    content: float = key(5e-3, "weight of the features that views have as recoloured", least=0)
+    variation: float = key(1.0, "weight of total variation of the image", least=0)
+    sh_variation: float = key(5e-3, "weight of total variation of the coefficients", least=0)
+    exact: bool = key(True, "colours are moved, not their coefficients as if they were colours (ARF's code)")
+
+
+def run(task: Task[ArfKeys]) -> EditedScene:
+    """Give the models the style; write style.png and convergence.png."""
+    from texgs.edit.voxel_style import ArfWeights, stylize_voxels
+    from texgs.volume.images import load
+
+    keys, look, start = task.settings, style.Look.of(task, KEYS), time.monotonic()
+    added = ArfWeights(keys.content, keys.variation, keys.sh_variation, keys.recoloured_epochs, keys.exact)
+
+    def one(name: str, model: Voxels, views: Sequence[View]) -> Voxels:
+        recipe = recipe_of(keys, len(views), task.edit.seed)
+        edited, look.losses[name] = stylize_voxels(
+            *(model, load(views, task.reduce), look.picture, recipe, added, look.vgg), title=look.title(name)
+        )
+        return edited
+
+    scene = task.each_model(one)  # type: ignore[arg-type]
+    return look.result(scene, time.monotonic() - start)
+
+
+def recipe_of(settings: ArfKeys, views: int, seed: int = 0) -> Recipe:
+    """Its losses for a number of views: features see half of the resolution, and the style too."""
+    return settings.recipe(round(settings.epochs * views), seed, reduce=2)
+
+
+def check(settings: ArfKeys) -> None:
+    """Require a loss, and a picture.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    recipe_of(settings, 1)
+    style.check(settings, KEYS)
+
+
+def weights(settings: ArfKeys, clip: str) -> Mapping[str, bool]:
+    """VGG where features are compared."""
+    return settings.weights()
+
+
+def style_of(settings: ArfKeys) -> StylePicture:
+    """The picture, of it the object that was clicked on."""
+    return style.style_of(settings, KEYS)
+
+
+METHOD = Method(
+    "arf",
+    "give a scene of voxels the style of a picture, as ARF does",
+    ArfKeys,
+    run,
+    check,
+    weights,
+    fields=frozenset({"voxels"}),
+    files=style.files,
+    style=style_of,
+)

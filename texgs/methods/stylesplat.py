@@ -1,0 +1,86 @@
+"""StyleSplat (Jain et al. 2024), one of the paper's baselines: the style of a picture for 3D Gaussians."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from texgs.config.keys import key
+from texgs.config.methods import Method
+from texgs.methods import style
+from texgs.methods.style import FeatureKeys
+
+if TYPE_CHECKING:
+    from texgs.edit.recipe import Recipe
+    from texgs.edit.style_picture import StylePicture
+    from texgs.edit.task import EditedScene, Task
+    from texgs.fields.gaussians.model import Gaussians
+    from texgs.volume.view_set import View
+
+KEYS = "edit.stylesplat"  # where its keys stand
+
+
+@dataclass
+class StyleSplatKeys(FeatureKeys):
+    """How colours of 3D Gaussians take on a style."""
+
+    iterations: int = key(2000, "views, one each", least=0)
+    rate: float = key(0.005, "of zeroth harmonics; the others have a twentieth", above=0)
+
+
+def run(task: Task[StyleSplatKeys]) -> EditedScene:
+    """Give the models the style; write style.png and convergence.png."""
+    from texgs.edit.gaussian_style import stylize_gaussians
+    from texgs.volume.reduced import smaller
+
+    recipe, look = recipe_of(task.settings, task.edit.seed), style.Look.of(task, KEYS)
+    start = time.monotonic()
+
+    def one(name: str, model: Gaussians, views: Sequence[View]) -> Gaussians:
+        cameras = [smaller(view.camera, task.reduce) for view in views]
+        edited, look.losses[name] = stylize_gaussians(
+            *(model, cameras, look.picture, recipe, look.vgg), title=look.title(name)
+        )
+        return edited
+
+    return look.result(task.each_model(one), time.monotonic() - start)  # type: ignore[arg-type]
+
+
+def recipe_of(settings: StyleSplatKeys, seed: int = 0) -> Recipe:
+    """Its losses: features see every pixel."""
+    return replace(settings.recipe(settings.iterations, seed, reduce=1), rate=settings.rate)
+
+
+def check(settings: StyleSplatKeys) -> None:
+    """Require a loss, and a picture.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    recipe_of(settings)
+    style.check(settings, KEYS)
+
+
+def weights(settings: StyleSplatKeys, clip: str) -> Mapping[str, bool]:
+    """VGG where features are compared."""
+    return settings.weights()
+
+
+def style_of(settings: StyleSplatKeys) -> StylePicture:
+    """The picture, of it the object that was clicked on."""
+    return style.style_of(settings, KEYS)
+
+
+METHOD = Method(
+    "stylesplat",
+    "give a scene of 3D Gaussians the style of a picture, as StyleSplat does",
+    StyleSplatKeys,
+    run,
+    check,
+    weights,
+    fields=frozenset({"gaussians"}),
+    files=style.files,
+    style=style_of,
+)
