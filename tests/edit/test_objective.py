@@ -1,22 +1,12 @@
 import pytest
 import torch
 
-from tests.models.networks import random_weights
 from texgs.edit.objective import Objective, pooled
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import preset
 from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
 from texgs.edit.style_picture import StylePicture
 from texgs.models.nnfm import StyleFeatures, nnfm
-from texgs.models.vgg import Vgg
-
-
-@pytest.fixture(scope="module")
-def vgg(tmp_path_factory):
-    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
-    torch.save(random_weights(last=14), path)
-    return Vgg.load(path, dtype=torch.float32)
-
 
 STYLE = StylePicture.of(picture("weave", 64))
 EXACT = {"positions": None, "dimensions": None, "queries": None}

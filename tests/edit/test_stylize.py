@@ -23,13 +23,6 @@ CHANGED = {"texels", "colors"}
 
 
 @pytest.fixture(scope="module")
-def vgg(tmp_path_factory):
-    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
-    torch.save(random_weights(last=14), path)
-    return Vgg.load(path, dtype=torch.float32)
-
-
-@pytest.fixture(scope="module")
 def style():
     return StylePicture.of(picture("dots", 96))
 

@@ -4,18 +4,9 @@ import pytest
 import torch
 
 from tests.edit.scenes import ball, views
-from tests.models.networks import random_weights
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.metrics.style import gram, likeness
-from texgs.models.vgg import Vgg
-
-
-@pytest.fixture(scope="module")
-def vgg(tmp_path_factory):
-    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
-    torch.save(random_weights(last=14), path)
-    return Vgg.load(path, dtype=torch.float32)
 
 
 def test_gram_matrices_are_mean_products():

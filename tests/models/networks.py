@@ -1,7 +1,10 @@
 """Random weights in the format of torchvision's VGG-16, and that network built of modules."""
 
+import pytest
 import torch
 from torch import nn
+
+from texgs.models.vgg import Vgg
 
 LAYOUT = (64, 64, "M", 128, 128, "M", 256, 256, 256, "M", 512, 512, 512, "M", 512, 512, 512)
 
@@ -28,3 +31,11 @@ def random_weights(seed=0, last=None):
             scale = (2 / fan) ** 0.5 if len(shape) == 4 else 0.1
             found[f"features.{name}"] = scale * torch.randn(shape, generator=generator)
     return found
+
+
+@pytest.fixture(scope="module")
+def vgg(tmp_path_factory):
+    """A VGG with random weights up to block 3."""
+    path = tmp_path_factory.mktemp("vgg") / "vgg.pth"
+    torch.save(random_weights(last=14), path)
+    return Vgg.load(path, dtype=torch.float32)

@@ -1,0 +1,95 @@
+"""Baselines of the paper on small fits of their own fields, from the volume to the measures of the edit."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from tests.cli.test_fit_gaussians import TINY
+from texgs.cli.main import main
+from texgs.scene.scene_file import read_scene
+
+COMMON = [word for word in TINY if not word.startswith(("fit=", "fit."))]
+FITS = {
+    "stylesplat": [word for word in TINY if word.startswith(("fit=", "fit."))],
+    "arf": [
+        "fit=plenoxels_quick",
+        "fit.voxels.stages=[{side: 16, steps: 30}, {side: 32, steps: 40}]",
+        "fit.voxels.rays=512",
+        "fit.voxels.degree=1",
+    ],
+}
+FEW = {"stylesplat": ["edit.stylesplat.iterations=4"], "arf": ["edit.arf.epochs=0.2"]}
+
+
+@pytest.fixture(scope="module", params=list(FITS))
+def edited(request, tmp_path_factory):
+    """The folder of an edit without weights, its method, and the words that made it."""
+    method = request.param
+    words = [*COMMON, *FITS[method], f"edit={method}", f"edit.{method}.nnfm=0", f"edit.{method}.patches=20"]
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp(method)
+        patch.chdir(folder)
+        patch.setenv("TEXGS_WEIGHTS", str(folder / "none"))
+        patch.setenv("TORCH_HOME", str(folder / "none"))
+        assert main([f"edit_{method}", *words, *FEW[method]]) == 0
+        assert main(["edit_metrics", *words, *FEW[method]]) == 0
+        (scene,) = Path("results/sphere/scene").iterdir()
+        yield folder / scene / "edits" / method, method
+
+
+def numbers(folder):
+    return json.loads((folder / "metrics.json").read_text())["numbers"]
+
+
+def test_geometry_is_kept_and_colours_are_not(edited):
+    folder, method = edited
+    before, after = (
+        read_scene(path / "scene.yaml").models["TF01"].open()[0]
+        for path in (folder.parents[1] / "compose", folder)
+    )
+    for name, x in before.tensors("geometry").items():
+        assert torch.equal(x, after.tensors("geometry")[name]), name
+    (one, two) = (field.tensors("appearance")["sh"] for field in (before, after))
+    assert one.shape != two.shape or not torch.equal(one, two)
+    assert numbers(folder)["how"] == "patches"
+    assert numbers(folder)["method"] == method
+
+
+def test_it_is_shown_and_measured(edited):
+    folder, _ = edited
+    for name in ("style.png", "convergence.png", "edit.png"):
+        assert np.asarray(Image.open(folder / name).convert("RGB")).std() > 5, f"{name} shows nothing"
+    assert (folder / "turntable.mp4").stat().st_size > 1000
+    measures = [numbers(path.parent) for path in folder.parent.rglob("metrics.json")]
+    (measured,) = (each for each in measures if "geometry_kept" in each)
+    assert measured["geometry_kept"] is True
+    assert measured["frame_mean_ms"] > 0
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["edit_arf", "fit=quick", "edit=arf"], "edit arf: expected a fit of voxels, got one of surfels"),
+        (
+            ["edit_stylesplat", "fit=plenoxels_quick", "edit=stylesplat"],
+            "edit stylesplat: expected a fit of gaussians, got one of voxels",
+        ),
+        (
+            ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.nnfm=0"],
+            "features, patches: expected a weight above 0 for one of them, got 0 for both",
+        ),
+        (
+            ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.style=none.png"],
+            "edit.arf.style: expected the file of a picture, or one of strokes",
+        ),
+    ],
+)
+def test_what_cannot_be_is_one_sentence(tmp_path, monkeypatch, capsys, words, message):
+    monkeypatch.chdir(tmp_path)
+    assert main([*words, "dataset=sphere", "tracking=none"]) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,71 @@
+"""StyleSplat on a small ball of 3D Gaussians."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.edit.scenes import RADIUS, sphere_points
+from tests.fit.scenes import cameras
+from texgs.core.errors import ArgumentError
+from texgs.edit.gaussian_style import HIGHER, stylize_gaussians
+from texgs.edit.objective import Objective
+from texgs.edit.pictures import picture
+from texgs.edit.recipe import Recipe
+from texgs.edit.style_picture import StylePicture
+from texgs.fields.gaussians.model import Gaussians
+
+RECIPE = Recipe(iterations=4, rate=0.01, features=0.0, patches=1.0, behind="white", cropped=False, reduce=1)
+STYLE = StylePicture.of(picture("dots", 96))
+
+
+def ball(count=300, degree=1):
+    """Gaussians on a sphere."""
+    generator = torch.Generator().manual_seed(0)
+    return Gaussians(
+        {
+            "means": RADIUS * sphere_points(count),
+            "quats": torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
+            "scales": torch.full((count, 3), -3.5),
+            "opacities": torch.full((count,), 3.0),
+            "sh": 0.3 * torch.rand(count, (degree + 1) ** 2, 3, generator=generator),
+        }
+    )
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+def test_only_harmonics_change(vgg, degree):
+    model = ball(degree=degree)
+    before = {name: x.clone() for name, x in model.parameters.items()}
+    recipe = replace(RECIPE, features=1.0)
+    edited, losses = stylize_gaussians(model, cameras(3, 48), STYLE, recipe, vgg)
+    assert all(torch.equal(model.parameters[name], x) for name, x in before.items()), "left alone"
+    same = {name for name, x in before.items() if torch.equal(x, edited.parameters[name])}
+    assert same == set(before) - {"sh"}
+    assert edited.parameters["sh"].shape == before["sh"].shape
+    assert set(losses) == {"nnfm", "patches"}
+
+
+def test_the_first_step_goes_against_the_gradient_by_its_rate():
+    """Adam's first step is the rate times the sign: a twentieth for the higher harmonics."""
+    model, views = ball(), cameras(1, 48)
+    edited, _ = stylize_gaussians(model, views, STYLE, replace(RECIPE, iterations=1))
+    sh = model.parameters["sh"].clone().requires_grad_()
+    shown = replace(model, parameters={**model.parameters, "sh": sh}).render(views[0])
+    objective = Objective.of(RECIPE, STYLE.scaled(48), 1, None, None)
+    sum(objective.terms(shown.color.permute(2, 0, 1), shown.alpha.detach(), 0).values()).backward()
+    step, clear = edited.parameters["sh"] - model.parameters["sh"], sh.grad.abs() > 1e-7
+    rates = torch.tensor([1, HIGHER, HIGHER, HIGHER])[:, None] * RECIPE.rate
+    expected = (-rates * sh.grad.sign())[clear]
+    torch.testing.assert_close(step[clear], expected, rtol=1e-3, atol=1e-6)
+
+
+def test_the_loss_falls():
+    _, losses = stylize_gaussians(ball(), cameras(4, 48), STYLE, replace(RECIPE, iterations=40, rate=0.02))
+    values = losses["patches"]
+    assert sum(values[-4:]) < 0.7 * sum(values[:4])
+
+
+def test_features_need_a_network():
+    with pytest.raises(ArgumentError, match="vgg: expected a VGG for this recipe, got none"):
+        stylize_gaussians(ball(), cameras(1, 48), STYLE, replace(RECIPE, features=1.0))

@@ -1,0 +1,3 @@
+from tests.models.networks import vgg
+
+__all__ = ["vgg"]
