@@ -61,9 +61,13 @@ def test_the_first_step_goes_against_the_gradient_by_its_rate():
 
 
 def test_the_loss_falls():
-    _, losses = stylize_gaussians(ball(), cameras(4, 48), STYLE, replace(RECIPE, iterations=40, rate=0.02))
-    values = losses["patches"]
-    assert sum(values[-4:]) < 0.7 * sum(values[:4])
+    """Against Gaussians that hardly learn: patches are drawn anew in each iteration."""
+    ends = []
+    for rate in (1e-9, 0.03):
+        recipe = replace(RECIPE, iterations=40, rate=rate)
+        _, losses = stylize_gaussians(ball(), cameras(4, 48), STYLE, recipe)
+        ends.append(sum(losses["patches"][-8:]))
+    assert ends[1] < 0.7 * ends[0]
 
 
 def test_features_need_a_network():

@@ -48,7 +48,8 @@ def stylize_gaussians(
     width, height = cameras[0].width, cameras[0].height
     scaled = style.to(model.device).scaled(recipe.pattern * max(width, height))
     objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, None)
-    geometry, learned = model.tensors("geometry"), split(model.parameters["sh"].clone())
+    geometry, harmonics = model.tensors("geometry"), split(model.parameters["sh"])
+    learned = {name: x.clone(memory_format=torch.contiguous_format) for name, x in harmonics.items()}
     rates = {"sh": recipe.rate, "sh_rest": HIGHER * recipe.rate}
     groups = [{"params": [x.requires_grad_()], "lr": rates[name]} for name, x in learned.items()]
     adam = torch.optim.Adam(groups, eps=1e-15, fused=True)

@@ -156,7 +156,7 @@ class ArfSteps:
             samples, out = self.render(camera_rays(target.camera).flatten(0, 1))
             image = out.color.unflatten(0, (height, width)).permute(2, 0, 1).contiguous().requires_grad_()
             terms = objective.terms(image, out.alpha.reshape(height, width), iteration)
-            if self.weights.content and objective.vgg is not None:
+            if self.weights.content and recipe.needs_vgg:
                 content = objective.content(image, target.color.permute(2, 0, 1))
                 terms["content"] = self.weights.content * content
             terms["variation"] = self.weights.variation * image_variation(image)
