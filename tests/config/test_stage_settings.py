@@ -6,6 +6,7 @@ from importlib import import_module
 import pytest
 
 from texgs.config.compose import compose
+from texgs.config.project import members
 from texgs.config.stages import STAGES
 from texgs.config.typed import typed
 
@@ -15,9 +16,10 @@ WORDS = {  # of stages that read more than the data set
     "comparison": (*TF, "fits=[quick,demo]"),
     "gaussians": (*TF, "fit=gaussians_quick"),
     "voxels": (*TF, "fit=plenoxels_quick"),
-    "edit_text": ("dataset=turbulence", "edit=gold"),
-    "edit_image": ("dataset=turbulence", "edit=glass"),
-    "edit_segment": ("dataset=turbulence", "edit=lobe"),
+    **{
+        f"edit_{compose((f'edit={name}',)).edit.method}": ("dataset=turbulence", f"edit={name}")
+        for name in members("edit")
+    },
     "edit_metrics": ("dataset=turbulence", "edit=gold"),
 }
 

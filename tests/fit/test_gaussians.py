@@ -5,7 +5,6 @@ from texgs.config.phase import CommonRates, Densify, Seeds
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.fields.gaussians.model import Baked, Gaussians
-from texgs.fields.harmonics import C0
 from texgs.fit import checkpoint
 from texgs.fit.densify import SHRINK, DensityControl
 from texgs.fit.gaussian_seeds import seed_gaussians
