@@ -79,7 +79,7 @@ def test_it_is_shown_and_measured(edited):
         ),
         (
             ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.nnfm=0"],
-            "features, patches: expected a weight above 0 for one of them, got 0 for both",
+            "edit.arf.nnfm, edit.arf.patches: expected a weight above 0 for one of them, got 0 for both",
         ),
         (
             ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.style=none.png"],

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.config.keys import key
-from texgs.config.methods import Method
 from texgs.methods import style
 from texgs.methods.style import FeatureKeys
 
 if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe
-    from texgs.edit.style_picture import StylePicture
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.voxels.model import Voxels
     from texgs.volume.view_set import View
-
-KEYS = "edit.arf"  # where its keys stand
 
 
 @dataclass
@@ -27,7 +23,7 @@ class ArfKeys(FeatureKeys):
     """How colours of voxels take on a style."""
 
     epochs: float = key(10.0, "rounds through the training views, for the style", least=0)
-    recoloured_epochs: float = key(1.0, "rounds through the rays of recoloured views before that", least=0)
+    ray_epochs: float = key(1.0, "rounds through the rays of recoloured views before that", least=0)
     content: float = key(5e-3, "weight of the features that views have as recoloured", least=0)
     variation: float = key(1.0, "weight of total variation of the image", least=0)
     sh_variation: float = key(5e-3, "weight of total variation of the coefficients", least=0)
@@ -39,8 +35,8 @@ def run(task: Task[ArfKeys]) -> EditedScene:
     from texgs.edit.voxel_style import ArfWeights, stylize_voxels
     from texgs.volume.images import load
 
-    keys, look, start = task.settings, style.Look.of(task, KEYS), time.monotonic()
-    added = ArfWeights(keys.content, keys.variation, keys.sh_variation, keys.recoloured_epochs, keys.exact)
+    keys, look, start = task.settings, style.Look.of(task), time.monotonic()
+    added = ArfWeights(keys.content, keys.variation, keys.sh_variation, keys.ray_epochs, keys.exact)
 
     def one(name: str, model: Voxels, views: Sequence[View]) -> Voxels:
         recipe = recipe_of(keys, len(views), task.edit.seed)
@@ -58,34 +54,6 @@ def recipe_of(settings: ArfKeys, views: int, seed: int = 0) -> Recipe:
     return settings.recipe(round(settings.epochs * views), seed, reduce=2)
 
 
-def check(settings: ArfKeys) -> None:
-    """Require a loss, and a picture.
-
-    Raises:
-        ArgumentError: naming what is not as it should be.
-    """
-    recipe_of(settings, 1)
-    style.check(settings, KEYS)
-
-
-def weights(settings: ArfKeys, clip: str) -> Mapping[str, bool]:
-    """VGG where features are compared."""
-    return settings.weights()
-
-
-def style_of(settings: ArfKeys) -> StylePicture:
-    """The picture, of it the object that was clicked on."""
-    return style.style_of(settings, KEYS)
-
-
-METHOD = Method(
-    "arf",
-    "give a scene of voxels the style of a picture, as ARF does",
-    ArfKeys,
-    run,
-    check,
-    weights,
-    fields=frozenset({"voxels"}),
-    files=style.files,
-    style=style_of,
+METHOD = style.look_method(
+    "arf", "give a scene of voxels the style of a picture, as ARF does", ArfKeys, run, "voxels"
 )

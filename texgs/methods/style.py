@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from texgs.config.keys import key
+from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
 from texgs.methods.shares import shares
 
@@ -71,6 +73,9 @@ class FeatureKeys(StyleKeys):
         return " + ".join(name for name, is_used in used.items() if is_used)
 
 
+Keys = TypeVar("Keys", bound=FeatureKeys)
+
+
 @dataclass(frozen=True, eq=False)
 class Look:
     """A picture on its way onto a scene, and how the losses fell."""
@@ -81,12 +86,12 @@ class Look:
     losses: dict[str, dict[str, list[float]]] = field(default_factory=dict)  # by model and term
 
     @classmethod
-    def of(cls, task: Task[Any], where: str) -> Look:
-        """What an edit with `FeatureKeys` follows; `where` are its keys, such as edit.arf."""
+    def of(cls, task: Task[Any]) -> Look:
+        """What an edit with `FeatureKeys` follows."""
         from texgs.models.vgg import Vgg
 
         vgg = Vgg.load(device=task.device) if task.settings.nnfm > 0 else None
-        return cls(task, style_of(task.settings, where), vgg)
+        return cls(task, style_of(task.settings, f"edit.{task.edit.method}"), vgg)
 
     def title(self, model: str) -> str:
         """Of a progress bar."""
@@ -101,6 +106,32 @@ class Look:
         write_png(self.task.output / "style.png", self.picture.image.permute(1, 2, 0))
         write_convergence(self.task.output / "convergence.png", self.losses)
         return EditedScene(scene, self.task.settings.how, seconds, SHOWN)
+
+
+def look_method(
+    name: str, summary: str, settings: type[Keys], run: Callable[[Task[Keys]], EditedScene], field: str
+) -> Method[Keys]:
+    """The specification of a method that gives a kind of field the style of a picture."""
+    where = f"edit.{name}"
+
+    def checked(values: Keys) -> None:
+        if not values.nnfm and not values.patches:
+            raise ArgumentError(
+                f"{where}.nnfm, {where}.patches: expected a weight above 0 for one of them, got 0 for both"
+            )
+        check(values, where)
+
+    return Method(
+        name,
+        summary,
+        settings,
+        run,
+        checked,
+        lambda values, clip: values.weights(),
+        fields=frozenset({field}),
+        files=files,
+        style=lambda values: style_of(values, where),
+    )
 
 
 def files(settings: StyleKeys) -> dict[str, Path]:

@@ -3,23 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from texgs.config.keys import key
-from texgs.config.methods import Method
 from texgs.methods import style
 from texgs.methods.style import FeatureKeys
 
 if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe
-    from texgs.edit.style_picture import StylePicture
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.gaussians.model import Gaussians
     from texgs.volume.view_set import View
-
-KEYS = "edit.stylesplat"  # where its keys stand
 
 
 @dataclass
@@ -35,7 +31,7 @@ def run(task: Task[StyleSplatKeys]) -> EditedScene:
     from texgs.edit.gaussian_style import stylize_gaussians
     from texgs.volume.reduced import smaller
 
-    recipe, look = recipe_of(task.settings, task.edit.seed), style.Look.of(task, KEYS)
+    recipe, look = recipe_of(task.settings, task.edit.seed), style.Look.of(task)
     start = time.monotonic()
 
     def one(name: str, model: Gaussians, views: Sequence[View]) -> Gaussians:
@@ -53,34 +49,10 @@ def recipe_of(settings: StyleSplatKeys, seed: int = 0) -> Recipe:
     return replace(settings.recipe(settings.iterations, seed, reduce=1), rate=settings.rate)
 
 
-def check(settings: StyleSplatKeys) -> None:
-    """Require a loss, and a picture.
-
-    Raises:
-        ArgumentError: naming what is not as it should be.
-    """
-    recipe_of(settings)
-    style.check(settings, KEYS)
-
-
-def weights(settings: StyleSplatKeys, clip: str) -> Mapping[str, bool]:
-    """VGG where features are compared."""
-    return settings.weights()
-
-
-def style_of(settings: StyleSplatKeys) -> StylePicture:
-    """The picture, of it the object that was clicked on."""
-    return style.style_of(settings, KEYS)
-
-
-METHOD = Method(
+METHOD = style.look_method(
     "stylesplat",
     "give a scene of 3D Gaussians the style of a picture, as StyleSplat does",
     StyleSplatKeys,
     run,
-    check,
-    weights,
-    fields=frozenset({"gaussians"}),
-    files=style.files,
-    style=style_of,
+    "gaussians",
 )
