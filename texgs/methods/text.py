@@ -44,6 +44,9 @@ class TextKeys:
     image_scale: float = key(1.25, "guidance by the views, of the diffusion model", least=0)
     negative: str | None = key(None, "what views should not show; default words for light and shadow")
     epipolar: bool = key(False, "views are edited together, along epipolar lines")
+    disagreement: float = key(
+        0.0, "by which edited views differ at random, as a share of their colours and in world units", least=0
+    )
 
 
 def run(task: Task[TextKeys]) -> EditedScene:
@@ -93,6 +96,18 @@ def guidance_of(settings: TextKeys, device: torch.device) -> Guidance:
 
     Raises:
         MissingDataError: if its weights are not on this machine.
+    """
+    from texgs.models.disagreement import Disagreeing
+
+    guidance = editor_of(settings, device)
+    return Disagreeing(guidance, settings.disagreement) if settings.disagreement else guidance
+
+
+def editor_of(settings: TextKeys, device: torch.device) -> Guidance:
+    """The same, whose views agree as well as they can.
+
+    Raises:
+        MissingDataError: as `guidance_of`.
     """
     from texgs.models.filters.guidance import ProceduralFilters
     from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
