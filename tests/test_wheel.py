@@ -38,9 +38,14 @@ def texgs(sdist, tmp_path_factory):
     """The installed command. Packages that texgs needs are those of the Python that runs this test."""
     folder = tmp_path_factory.mktemp("wheel")
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "--no-input"]
-    options = ["--no-deps", "--no-build-isolation", "-C", "cmake.define.TEXGS_CUDA=OFF"]
+    options = ["--no-deps", "--no-build-isolation", "--config-settings", "cmake.define.TEXGS_CUDA=OFF"]
     # Compiles in a fraction of the time.
-    options += ["-C", "cmake.build-type=Debug", "-C", "cmake.define.CMAKE_CXX_FLAGS_DEBUG=-O0"]
+    options += [
+        "--config-settings",
+        "cmake.build-type=Debug",
+        "--config-settings",
+        "cmake.define.CMAKE_CXX_FLAGS_DEBUG=-O0",
+    ]
     run(*pip, "wheel", sdist, *options, "--wheel-dir", folder, cwd=folder)
     (wheel,) = folder.glob("*.whl")
     venv.create(folder / "venv", with_pip=False)
