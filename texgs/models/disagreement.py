@@ -6,7 +6,7 @@ on machines without a diffusion model.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import torch
 from torch import Tensor
@@ -15,30 +15,22 @@ from texgs.core.errors import ArgumentError
 from texgs.models.guidance import EditViews, Guidance, require_edited
 
 
-@dataclass(frozen=True)
 class Disagreeing:
     """Another guidance, whose patterns lie elsewhere and whose colours are off in each view of each call.
+
+    Args:
+        guidance: that edits.
+        amount: standard deviation of shifts of patterns, world units, and of factors on colours.
 
     Raises:
         ArgumentError: if the amount is below 0.
     """
 
-    guidance: Guidance
-    amount: float  # standard deviation of shifts of patterns, world units, and of factors on colours
-
-    def __post_init__(self) -> None:
-        if not self.amount >= 0:
-            raise ArgumentError(f"disagreement: expected 0 or more, got {self.amount}")
-
-    @property
-    def name(self) -> str:
-        """For reports."""
-        return f"{self.guidance.name} that disagree by {self.amount:g}"
-
-    @property
-    def lit(self) -> bool:
-        """As the other guidance."""
-        return self.guidance.lit
+    def __init__(self, guidance: Guidance, amount: float) -> None:
+        if not amount >= 0:
+            raise ArgumentError(f"disagreement: expected 0 or more, got {amount}")
+        self.guidance, self.amount = guidance, amount
+        self.name, self.lit = f"{guidance.name} that disagree by {amount:g}", guidance.lit
 
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Edited images [V, H, W, 3] over white; see `Guidance`.
