@@ -169,7 +169,7 @@ def test_other_views_take_over_from_the_key(unet):
 def test_keys_attend_to_the_tokens_of_all_keys(unet):
     name = "down_blocks.0.attentions.0.transformer_blocks.0.attn1"
     attention = unet.get_submodule(name)
-    consistency = Consistency(unet, keys=2)
+    consistency = Consistency(unet)
     consistency.role, consistency.key_ids = "key", [0, 1]
     hidden = torch.randn(6, 16, 32, generator=torch.Generator().manual_seed(2))
     output = attention(hidden).unflatten(0, (3, 2))

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from itertools import pairwise
 
 import pytest
 import torch
@@ -58,17 +59,17 @@ def test_denoising_undoes_noise_that_is_predicted_exactly(folder):
     clean = torch.randn(1, 4, 8, 8, generator=seeded(1))
     noise = torch.randn(clean.shape, generator=seeded(2))  # what the loop will draw
     model.predict = lambda *_: noise
-    found = model.denoise(clean, clean, torch.zeros(3, 1, 1), seeded(2))
+    found = model.denoise(clean, clean, torch.zeros(3, 1, 1), model.times(None), seeded(2))
     last = float(model.alphas[0])
     assert_close(found, math.sqrt(last) * clean + math.sqrt(1 - last) * noise, atol=1e-5, rtol=1e-4)
 
 
 def test_steps_start_at_the_level_of_the_noise_and_end_at_none(folder):
     model = InstructPix2Pix.open(folder)
-    assert model.times[0] == 998
-    assert model.times[-1] == 0
-    assert len(model.times) == 21
-    assert all(a > b for a, b in zip(model.times, model.times[1:], strict=False))
+    for level, first in ((None, 998), (1.0, 999), (0.3, 300), (0.0, 20)):
+        times = model.times(level)
+        assert (times[0], times[-1], len(times)) == (first, 0, 21)
+        assert all(a > b for a, b in pairwise(times))
 
 
 def test_noise_levels_are_those_of_stable_diffusion(folder):

@@ -148,11 +148,12 @@ class _Targets:
     def views(self) -> EditViews:
         """What was edited, in the order of views."""
         newest = [self.latest[index][:2] for index in sorted(self.latest)]
-        tensors = {
-            name: torch.stack([getattr(views, name)[place] for views, place in newest])
+        images, conditions, alphas, points, normals = (
+            torch.stack([getattr(views, name)[place] for views, place in newest])
             for name in ("images", "conditions", "alphas", "points", "normals")
-        }
-        return EditViews(**tensors, cameras=[views.cameras[place] for views, place in newest])
+        )
+        cameras = [views.cameras[place] for views, place in newest]
+        return EditViews(images, conditions, alphas, points, normals, cameras)
 
     @property
     def rows(self) -> list[list[Exposure]]:

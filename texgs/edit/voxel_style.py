@@ -21,13 +21,12 @@ from texgs.models.vgg import Vgg
 from texgs.raster.spherical_harmonics import Y00
 from texgs.raster.voxel_colors import GREY, drop_sh, recolored
 from texgs.raster.voxel_grid import VoxelGrid
-from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_total_variation
+from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import Rays, Samples, camera_rays
 from texgs.volume.images import Images
 
 RAYS, RUN = 5000, 2  # a step of the first phase, and neighbours among them
 RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # of coefficients, log-linear
-SHARE = 0.01  # of the blocks whose total variation a step looks at
 COUNTED = 1_000_000  # pixels that statistics of colours look at
 
 
@@ -128,7 +127,6 @@ class ArfSteps:
         self, grid: VoxelGrid, field: Voxels, weights: ArfWeights, generator: torch.Generator
     ) -> None:
         self.grid, self.march, self.weights, self.generator = grid, field.march, weights, generator
-        self.blocks = grid.masks.flatten().nonzero()[:, 0].int()
         self.optimizer = VoxelOptimizer(grid)
 
     def learn_rays(self, images: Images, title: str) -> None:
@@ -183,11 +181,8 @@ class ArfSteps:
 
     def update(self, step: int) -> None:
         """A step of RMSProp on the colours, with total variation of some random blocks."""
-        count = max(round(SHARE * len(self.blocks)), 1)
-        drawn = self.blocks[torch.randint(len(self.blocks), (count,), generator=self.generator)]
-        voxels = count * len(self.grid) / len(self.blocks)
-        weight = self.weights.sh_variation / voxels
-        add_total_variation(self.grid, drawn, 0.0, weight, self.optimizer.gradient)
+        variation = (0.0, self.weights.sh_variation, self.generator, self.optimizer.gradient)
+        add_variation_of_some(self.grid, *variation)
         rate = RATE * (LAST_RATE / RATE) ** (step / RATE_STEPS)
         self.optimizer.step(VoxelRates(0.0, rate, rate))
 

@@ -14,7 +14,7 @@ from texgs.fields.voxels.rays import training_rays
 from texgs.fit.loop import require_finite
 from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import VoxelGrid
-from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_total_variation
+from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import March, Rays, Samples
 from texgs.volume.images import Images
 
@@ -61,7 +61,6 @@ class VoxelFit:
         """Go on with another grid; the optimiser starts anew."""
         self.grid = grid
         self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
-        self.filled_blocks = grid.masks.flatten().nonzero()[:, 0].int()
 
     @property
     def iterations(self) -> int:
@@ -133,7 +132,8 @@ class VoxelFit:
         error = out.color - target
         samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
         if stage.total_variation:
-            self._smooth()
+            variation = (s.tv_density, s.tv_sh, self.generator, self.optimizer.gradient, s.tv_share)
+            add_variation_of_some(self.grid, *variation)
         self.optimizer.step(self.rates())
         self.iteration += 1
         is_looked_at = self.iteration % CHECKED_EVERY == 0 or self.iteration == s.steps
@@ -149,13 +149,3 @@ class VoxelFit:
         s = self.settings
         sh = s.sh.at(self.iteration, s.steps)
         return VoxelRates(s.density.at(self.iteration, s.steps), sh, sh)
-
-    def _smooth(self) -> None:
-        """The gradient of total variation in some random blocks."""
-        s, blocks = self.settings, self.filled_blocks
-        count = max(round(s.tv_share * len(blocks)), 1)
-        drawn = blocks[torch.randint(len(blocks), (count,), generator=self.generator)]
-        voxels = count * len(self.grid) / len(blocks)  # on average: weights do not depend on what is drawn
-        add_total_variation(
-            self.grid, drawn, s.tv_density / voxels, s.tv_sh / voxels, self.optimizer.gradient
-        )

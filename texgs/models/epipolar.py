@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
+from math import exp
 from typing import Any
 
 import torch
@@ -12,6 +14,7 @@ from torch.nn.functional import normalize, scaled_dot_product_attention
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 
+GROUP = 5  # views that follow each other, one of them a key
 LAST = 100  # timestep below which views get their own details
 BAND = 1.0  # tokens: largest distance of a match from its epipolar line
 BRANCH = 1  # of the three, whose features are compared: with the image, without the instruction
@@ -72,30 +75,28 @@ def _centers(camera: Camera) -> Tensor:
 class Consistency:
     """Puts attention across views into a UNet of diffusers; plain attention until views are run together.
 
-    In each denoising step a key view is drawn. Keys attend to the tokens of all keys; every other view takes
-    over the attention output of the token of the nearest key that looks most alike and lies on the epipolar
-    line (Chen et al. 2024, section 4). Similarities are not masked by 0 but excluded.
+    In each denoising step a key view is drawn from each group of `GROUP` views that follow each other. Keys
+    attend to the tokens of all keys; every other view takes over the attention outputs of the tokens of the
+    two nearest keys that look most alike and lie on the epipolar line (Chen et al. 2024, section 4).
+    Similarities are not masked by 0 but excluded.
 
     Args:
         unet: whose self-attention, of the modules named attn1, is replaced.
-        keys: how many views are keys in each step.
 
     Raises:
         ArgumentError: if the UNet has no self-attention.
     """
 
-    def __init__(self, unet: Any, keys: int = 1) -> None:
+    def __init__(self, unet: Any) -> None:
         processors = dict(unet.attn_processors)
         mine = {name: _SelfAttention(self) for name in processors if ".attn1." in name}
-        if not mine or keys < 1:
-            raise ArgumentError(
-                f"epipolar: expected a UNet with self-attention and 1 key or more, got {len(mine)} and {keys}"
-            )
+        if not mine:
+            raise ArgumentError("epipolar: expected a UNet with self-attention, got none; turn epipolar off")
         unet.set_attn_processor({**processors, **mine})
-        self.keys = keys
         self.cameras: Sequence[Camera] = ()
         self.image: tuple[int, int] = (0, 0)
-        self.role, self.view, self.nearest = "alone", 0, 0
+        self.role, self.view = "alone", 0
+        self.nearest: list[tuple[int, float]] = []
         self.key_ids: list[int] = []
         self.masks: dict[tuple[int, int, int], Tensor] = {}
         self.stored: dict[int, tuple[Tensor, Tensor]] = {}
@@ -120,13 +121,13 @@ class Consistency:
             if time < LAST:
                 self.role = "alone"
                 return torch.cat([branches([index]) for index in range(count)], dim=1)
-            self.key_ids = sorted(torch.randperm(count, generator=generator)[: self.keys].tolist())
+            self.key_ids = drawn_keys(count, generator)
             self.role, self.stored = "key", {}
             by_view = dict(zip(self.key_ids, branches(self.key_ids).unbind(dim=1), strict=True))
             self.role = "view"
             for index in range(count):
                 if index not in by_view:
-                    self.view, self.nearest = index, self._nearest_key(index)
+                    self.view, self.nearest = index, self._nearest_keys(index)
                     by_view[index] = branches([index])[:, 0]
             return torch.stack([by_view[index] for index in range(count)], dim=1)
         finally:
@@ -141,11 +142,22 @@ class Consistency:
             self.masks[view, key, tokens] = epipolar_mask(*pair)
         return self.masks[view, key, tokens]
 
-    def _nearest_key(self, view: int) -> int:
-        """Place among the keys of the one whose camera is nearest."""
+    def _nearest_keys(self, view: int) -> list[tuple[int, float]]:
+        """Places among the keys of the one or two whose cameras are nearest, and their shares."""
         position = self.cameras[view].position
-        distances = [float((self.cameras[key].position - position).norm()) for key in self.key_ids]
-        return distances.index(min(distances))
+        distances = torch.stack([(self.cameras[key].position - position).norm() for key in self.key_ids])
+        order = distances.argsort(stable=True)[:2].tolist()
+        if len(order) == 1:
+            return [(order[0], 1.0)]
+        near, far = distances[order].tolist()
+        share = 1 / (1 + exp(-far / max(near + far, 1e-12)))  # of the nearer, as in DGE: 0.62 to 0.73
+        return [(order[0], share), (order[1], 1 - share)]
+
+
+def drawn_keys(count: int, generator: torch.Generator) -> list[int]:
+    """One of each group of views, of a number of views; groups are as equal as they can be."""
+    bounds = torch.linspace(0, count, max(1, count // GROUP) + 1).round().long().tolist()
+    return [int(torch.randint(low, high, (), generator=generator)) for low, high in pairwise(bounds)]
 
 
 class _SelfAttention:
@@ -166,9 +178,11 @@ class _SelfAttention:
             shared.stored[id(self)] = (branches[BRANCH], output.unflatten(0, (3, len(shared.key_ids))))
             return output
         features, outputs = shared.stored[id(self)]
-        key = shared.nearest
-        allowed = shared.mask(shared.view, shared.key_ids[key], hidden_states.shape[1])
-        return outputs[:, key][:, match(hidden_states[BRANCH], features[key], allowed)]
+        mixed = torch.zeros_like(hidden_states)
+        for key, share in shared.nearest:
+            allowed = shared.mask(shared.view, shared.key_ids[key], hidden_states.shape[1])
+            mixed += share * outputs[:, key][:, match(hidden_states[BRANCH], features[key], allowed)]
+        return mixed
 
 
 def match(view: Tensor, key: Tensor, allowed: Tensor) -> Tensor:

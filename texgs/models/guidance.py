@@ -30,11 +30,16 @@ class EditViews:
     """[V, H, W, 3] world axes, facing the camera; 0 where alpha is 0."""
     cameras: Sequence[Camera]
     """One for each view."""
+    level: float | None = None
+    """Share of the noise schedule that images are noised to before they are edited, 0 to 1: how far from them
+    an edit may go. By default as the guidance does; filters take no notice."""
 
     def __post_init__(self) -> None:
         size = check.shape("images", self.images, "V H W 3")
         if len(self.cameras) != size["V"]:
             raise ArgumentError(f"cameras: expected {size['V']} as images, got {len(self.cameras)}")
+        if self.level is not None and not 0 <= self.level <= 1:
+            raise ArgumentError(f"level: expected a share of the noise from 0 to 1, got {self.level}")
         check.shape("alphas", self.alphas, "V H W", **size)
         for name in ("conditions", "points", "normals"):
             check.shape(name, getattr(self, name), "V H W 3", **size)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +34,8 @@ class InstructPix2Pix:
         text_scale: s_T, how strongly edits follow the instruction; the paper's value.
         image_scale: s_I, how closely they keep to the condition; the paper's value.
         steps: of denoising (DDIM, eta 0).
-        level: timestep of the noise that denoising starts from, below the length of the schedule; the image
-            now is noised and not pure noise taken, so that large shapes carry over.
+        level: timestep of the noise that denoising starts from, below the length of the schedule, where views
+            do not say; the image now is noised and not pure noise taken, so that large shapes carry over.
         negative: what edits should not show, in words.
         epipolar: whether views are edited together, with attention across views along epipolar lines, which
             makes them agree more (DGE, Chen et al. 2024); otherwise one by one.
@@ -66,7 +67,7 @@ class InstructPix2Pix:
         self.text_encoder, self.tokenizer = modules["text_encoder"], modules["tokenizer"]
         self.alphas = alphas.double().cpu()
         self.text_scale, self.image_scale, self.negative = text_scale, image_scale, negative
-        self.times = torch.linspace(level, 0, steps + 1).round().long().tolist()
+        self.steps, self.level = steps, level
         self.consistency = Consistency(self.unet) if epipolar else None
 
     @classmethod
@@ -118,7 +119,7 @@ class InstructPix2Pix:
         kept = torch.cat([self.encode(image[None], None) for image in conditions])
         if self.consistency is not None:
             self.consistency.aim(views.cameras, images.shape[2:])
-        latents = self.denoise(clean, kept, texts, generator)
+        latents = self.denoise(clean, kept, texts, self.times(views.level), generator)
         edited = torch.cat([self.decode(latent[None]) for latent in latents])
         return unfit(edited, views.images.shape[1:3]).permute(0, 2, 3, 1).to(views.images)
 
@@ -153,15 +154,22 @@ class InstructPix2Pix:
         scaled = (latents / self.vae.config.scaling_factor).to(self.vae.dtype)
         return (self.vae.decode(scaled).sample.float() / 2 + 0.5).clamp(0, 1)
 
-    def denoise(self, clean: Tensor, kept: Tensor, texts: Tensor, generator: torch.Generator) -> Tensor:
-        """Noise latents [V, 4, h, w] to the first level and denoise them step by step (DDIM)."""
+    def times(self, level: float | None) -> list[int]:
+        """Timesteps that denoising visits, from that of a share of the noise schedule down to 0."""
+        longest = len(self.alphas) - 1
+        first = self.level if level is None else min(max(round(level * longest), self.steps), longest)
+        return torch.linspace(first, 0, self.steps + 1).round().long().tolist()
+
+    def denoise(
+        self, clean: Tensor, kept: Tensor, texts: Tensor, times: list[int], generator: torch.Generator
+    ) -> Tensor:
+        """Noise latents [V, 4, h, w] to the first timestep and denoise them step by step (DDIM)."""
         if clean.dtype == torch.float16:
             clean = clean.float()  # the networks alone are in half precision
-        first = float(self.alphas[self.times[0]])
+        first = float(self.alphas[times[0]])
         noise = torch.randn(clean.shape, generator=generator).to(clean)
         latents = first**0.5 * clean + (1 - first) ** 0.5 * noise
-        pairs = zip(self.times[:-1], self.times[1:], strict=True)
-        for time, after in progress(pairs, len(self.times) - 1, title=self.name, unit="step"):
+        for time, after in progress(pairwise(times), len(times) - 1, title=self.name, unit="step"):
             predicted = self.predict(latents, kept, texts, time, generator)
             now, then = float(self.alphas[time]), float(self.alphas[after])
             start = (latents - (1 - now) ** 0.5 * predicted) / now**0.5

@@ -50,23 +50,25 @@ class Lpips:
         """How different two images look []: 0 for equal ones; differentiable in both.
 
         Args:
-            image: [H, W, 3] in [0, 1], at least 16 pixels each way.
+            image: [H, W, 3] in [0, 1], at least 16 pixels each way; or [N, H, W, 3], for the mean of N.
             other: the same shape.
 
         Raises:
             ShapeError: if the shapes do not fit.
         """
-        size = check.shape("image", image, "H W 3")
-        check.shape("other", other, "H W 3", H=size["H"], W=size["W"])
-        ours, others = (self.vgg.layers(x.permute(2, 0, 1)) for x in (image, other))
+        if image.ndim == 3:
+            image, other = image[None], other[None]
+        size = check.shape("image", image, "N H W 3")
+        check.shape("other", other, "N H W 3", **size)
+        ours, others = (self.vgg.layers(x.permute(0, 3, 1, 2)) for x in (image, other))
         total = image.new_zeros(())
         for a, b, head in zip(ours, others, self.heads, strict=True):
-            difference = (unit(a) - unit(b)).square()  # [1, C, h, w]
+            difference = (unit(a) - unit(b)).square()  # [N, C, h, w]
             total = total + (difference * head[:, None, None]).sum(dim=1).mean()
         return total
 
 
 def unit(features: Tensor) -> Tensor:
-    """Features [1, C, h, w] of length 1 at each position, float32."""
+    """Features [N, C, h, w] of length 1 at each position, float32."""
     features = features.float()
     return features / (features.square().sum(dim=1, keepdim=True).sqrt() + EPSILON)

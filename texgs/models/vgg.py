@@ -71,16 +71,16 @@ class Vgg:
         """That features are computed in."""
         return self.weights[0].dtype
 
-    def layers(self, image: Tensor) -> list[Tensor]:
-        """Outputs [1, C, H/s, W/s] of the wanted layers, s = 1, 2, 4 ... by block; differentiable.
+    def layers(self, images: Tensor) -> list[Tensor]:
+        """Outputs [N, C, H/s, W/s] of the wanted layers, s = 1, 2, 4 ... by block; differentiable.
 
         Args:
-            image: [3, H, W], red, green and blue in [0, 1].
+            images: [N, 3, H, W], red, green and blue in [0, 1].
         """
         from kornia.enhance import normalize
 
-        check.shape("image", image, "3 H W")
-        x = normalize(image[None], torch.tensor(MEAN), torch.tensor(DEVIATION))
+        check.shape("images", images, "N 3 H W")
+        x = normalize(images, torch.tensor(MEAN), torch.tensor(DEVIATION))
         x = x.to(self.dtype, memory_format=torch.channels_last)
         features = []
         for name, weight, bias in zip(self.names, self.weights, self.biases, strict=True):
@@ -97,7 +97,7 @@ class Vgg:
         Args:
             image: [3, H, W] in [0, 1].
         """
-        return torch.cat(self.layers(image), dim=1)[0]
+        return torch.cat(self.layers(image[None]), dim=1)[0]
 
 
 def place(name: str) -> int:

@@ -94,3 +94,33 @@ def add_total_variation(
         into.touched,
         device=grid.rows.device,
     )
+
+
+def add_variation_of_some(
+    grid: VoxelGrid,
+    density: float,
+    sh: float,
+    generator: torch.Generator,
+    into: RowGradient,
+    share: float = 0.01,
+) -> None:
+    """Add the gradient of total variation of a share of the blocks with voxels, drawn at random.
+
+    Weights are those of a mean over voxels, on average: they do not depend on how many are drawn.
+
+    Args:
+        grid: any.
+        density: weight of the density's variation.
+        sh: weight of the coefficients'.
+        generator: of the blocks.
+        into: where the gradient is added.
+        share: of the blocks, as Plenoxels does.
+
+    Raises:
+        ShapeError: as `add_total_variation`.
+    """
+    blocks = grid.masks.flatten().nonzero()[:, 0]
+    count = max(round(share * len(blocks)), 1)
+    drawn = blocks[torch.randint(len(blocks), (count,), generator=generator)]
+    voxels = count * len(grid) / len(blocks)
+    add_total_variation(grid, drawn, density / voxels, sh / voxels, into)

@@ -1,0 +1,145 @@
+"""Edit views of a field again and again while it learns from them: IN2N, Instruct-GS2GS and DGE alike."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Protocol
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import FitError
+from texgs.core.progress import progress
+from texgs.edit.field_views import field_views
+from texgs.edit.turns import Schedule, turns
+from texgs.fields.field import Field
+from texgs.models.guidance import Guidance, require_edited
+from texgs.models.instruction import require_instruction
+from texgs.volume.images import Images
+
+
+class Learner(Protocol):
+    """A field that learns from views."""
+
+    @property
+    def original(self) -> Field:
+        """As it was at first."""
+        ...
+
+    @property
+    def field(self) -> Field:
+        """As it is now."""
+        ...
+
+    def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
+        """Learn from some of these views, all that memory and method allow; the loss."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Updated:
+    """What an edit gives."""
+
+    field: Field
+    views: dict[int, tuple[Tensor, Tensor]]
+    """Each view that was edited, as it was and as it was edited the last time; [H, W, 3]."""
+    losses: list[float]
+    """In each iteration."""
+    edits: int
+    """Of single views."""
+    guided: float
+    """Seconds that edits of views took, of all."""
+
+
+def update_field(
+    learner: Learner,
+    images: Images,
+    guidance: Guidance,
+    instruction: str,
+    schedule: Schedule,
+    *,
+    keeps_renders: bool = False,
+    seed: int = 0,
+    title: str = "edit",
+) -> Updated:
+    """Edit a field by editing its training views, which it learns from as they are then.
+
+    Args:
+        learner: with the field, and how it learns.
+        images: training views, which stay as they are.
+        guidance: edits views.
+        instruction: to the guidance.
+        schedule: of edits and iterations.
+        keeps_renders: edits stay close to views of the field as it was, as in DGE; or to the training views.
+        seed: of all random numbers.
+        title: of the progress bar.
+
+    Raises:
+        ArgumentError, ShapeError: if the instruction is empty, or what the guidance returned is not as it
+            should be.
+        FitError: if the loss is no longer finite.
+    """
+    instruction, generator = require_instruction(instruction), torch.Generator().manual_seed(seed)
+    edits = _Edits(learner, images, guidance, instruction, keeps_renders, generator)
+    losses: list[float] = []
+    planned = progress(turns(schedule, len(images), generator), schedule.iterations, title=title, unit="step")
+    for iteration, turn in enumerate(planned):
+        if turn.edited:
+            edits.make(turn.edited, turn.level)
+        losses.append(learner.step(edits.images, turn.learned, generator))
+        if not isfinite(losses[-1]):
+            raise FitError(
+                f"iteration {iteration}: expected a finite loss, got {losses[-1]}; lower the rates"
+            )
+    return Updated(learner.field, edits.views, losses, edits.count, edits.seconds)
+
+
+class _Edits:
+    """The views that are learned from, as they are edited."""
+
+    def __init__(
+        self,
+        learner: Learner,
+        images: Images,
+        guidance: Guidance,
+        instruction: str,
+        keeps_renders: bool,
+        generator: torch.Generator,
+    ) -> None:
+        self.learner, self.guidance, self.instruction = learner, guidance, instruction
+        self.generator = generator
+        self.images = replace(images, planes=images.planes.clone())
+        self.original = learner.original if keeps_renders else None
+        self.before: dict[int, Tensor] = {}
+        self.count, self.seconds = 0, 0.0
+
+    @torch.no_grad()
+    def make(self, ids: Sequence[int], level: float) -> None:
+        """Edit some views together, as the field shows them now."""
+        start, field = time.monotonic(), self.learner.field
+        cameras = [self.images.cameras[view].to(field.device) for view in ids]
+        conditions = torch.stack([self._condition(view) for view in ids]).to(field.device)
+        views = field_views(field, cameras, conditions, level)
+        guided = self.guidance(views, self.instruction, self.generator)
+        for view, image in zip(ids, require_edited(guided, views, self.guidance.name), strict=True):
+            self.images.planes[view, :3] = image.permute(2, 0, 1).mul(255).round().to(torch.uint8)
+        self.count, self.seconds = self.count + len(ids), self.seconds + time.monotonic() - start
+
+    def _condition(self, view: int) -> Tensor:
+        """What edits of a view stay close to [H, W, 3]: how it was before the first of them."""
+        if view not in self.before:
+            target = self.images.target(view)
+            if self.original is not None:
+                camera = target.camera.to(self.original.device)
+                self.before[view] = self.original.render(camera).color.clamp(0, 1).cpu()
+            else:
+                self.before[view] = target.color
+        return self.before[view]
+
+    @property
+    def views(self) -> dict[int, tuple[Tensor, Tensor]]:
+        """Each view that was edited, as it was and as it is, by number."""
+        return {view: (old, self.images.target(view).color) for view, old in sorted(self.before.items())}

@@ -1,0 +1,80 @@
+"""What methods share that follow an instruction: what it says, and what edits views by it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from texgs.config.keys import key
+
+if TYPE_CHECKING:
+    import torch
+
+    from texgs.models.guidance import Guidance
+
+SHOWN = 6  # edited views in the picture of them
+PICTURE = {"views.png": "Views before and after they were edited as the instruction says."}
+
+
+@dataclass
+class InstructionKeys:
+    """What to do, and what edits the views. The scales are those of TexGS-VolVis."""
+
+    instruction: str = key("", "what to do, such as 'make it gold'")
+    guidance: str = key(
+        "instruct_pix2pix",
+        "what edits the views: a diffusion model, or procedural filters with a vocabulary of their own",
+        choices=("instruct_pix2pix", "filters"),
+    )
+    text_scale: float = key(12.5, "guidance by the instruction, of the diffusion model", least=0)
+    image_scale: float = key(1.25, "guidance by the views, of the diffusion model", least=0)
+    negative: str | None = key(None, "what views should not show; default words for light and shadow")
+    epipolar: bool = key(False, "views are edited together, along epipolar lines")
+    disagreement: float = key(
+        0.0, "by which edited views differ at random, as a share of their colours and in world units", least=0
+    )
+
+    def opened(self, device: torch.device) -> Guidance:
+        """What edits the views.
+
+        Raises:
+            MissingDataError: if its weights are not on this machine.
+        """
+        from texgs.models.disagreement import Disagreeing
+
+        editor = self._editor(device)
+        return Disagreeing(editor, self.disagreement) if self.disagreement else editor
+
+    def _editor(self, device: torch.device) -> Guidance:
+        """The same, whose views agree as well as they can."""
+        from texgs.models.filters.guidance import ProceduralFilters
+        from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
+        from texgs.models.weights import locate
+
+        if self.guidance == "filters":
+            return ProceduralFilters()
+        return InstructPix2Pix.open(
+            locate("instruct-pix2pix"),
+            device,
+            text_scale=self.text_scale,
+            image_scale=self.image_scale,
+            negative=NO_LIGHT if self.negative is None else self.negative,
+            epipolar=self.epipolar,
+        )
+
+    def check(self) -> None:
+        """Require an instruction that the guidance understands.
+
+        Raises:
+            ArgumentError: if there is none.
+        """
+        from texgs.models.filters.vocabulary import understand
+        from texgs.models.instruction import require_instruction
+
+        instruction = require_instruction(self.instruction)
+        if self.guidance == "filters":
+            understand(instruction)
+
+    def weights(self) -> dict[str, bool]:
+        """The diffusion model, where it edits the views."""
+        return {"instruct-pix2pix": True} if self.guidance == "instruct_pix2pix" else {}
