@@ -44,7 +44,7 @@ def test_a_changed_value_holds_for_the_edit():
     ("words", "message"),
     [
         (("edits=[glass, glass]",), "edits: expected different names, got glass twice"),
-        (("edits=[glas]",), "edit: expected one of .*crimson, glass, "),
+        (("edits=[glas]",), "edit: expected one of .*crimson, .*glass, "),
         (("edit=glass", "edit.base=glass"), "edit.base: glass starts from itself"),
         (("edit=glass", "edit.base=lobes"), "edit.base: expected the file of a scene or one of .* mean lobe"),
         (("edit=glass", "edit.parts=[TF09]"), "edit.parts: expected some of TF01, .*, got TF09"),

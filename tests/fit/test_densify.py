@@ -4,8 +4,8 @@ import pytest
 import torch
 
 from texgs.config.phase import Densify
+from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fit.densify import RESET_OPACITY, SHRINK, DensityControl
-from texgs.fit.optimizer import Optimizer, Rate
 
 from .scenes import logit
 

@@ -5,11 +5,11 @@ from texgs.config.phase import CommonRates, Densify, Seeds
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.fields.gaussians.model import Baked, Gaussians
+from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fit import checkpoint
 from texgs.fit.densify import SHRINK, DensityControl
 from texgs.fit.gaussian_seeds import seed_gaussians
 from texgs.fit.loop import Fit
-from texgs.fit.optimizer import Optimizer, Rate
 from texgs.fit.task import FitTask
 from texgs.kinds.gaussians import FIELD, GaussianKeys
 from texgs.metrics.quality import evaluate, mean

@@ -6,10 +6,11 @@ from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
 from texgs.fields.harmonics import split, zeroth
+from texgs.fields.rates import extent
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
 from texgs.fit import checkpoint
-from texgs.fit.loop import CHECKED_EVERY, extent
+from texgs.fit.loop import CHECKED_EVERY
 from texgs.fit.seeds import seed_surfels
 from texgs.metrics.quality import evaluate, mean
 from texgs.raster.shading import MATERIAL
@@ -120,10 +121,10 @@ def test_progress_is_told_after_every_iteration():
 def test_the_extent_is_that_of_the_cameras_or_four_times_that_of_the_surfels():
     views = [orbit(azimuth, 0, 2.0, 50, SIZE, SIZE) for azimuth in (0, 90, 180, 270)]
     means = torch.tensor([[0.5, 0.0, 0.0], [-0.5, 0.0, 0.0]])
-    assert extent(flat_images([1.0] * 3, 1.0, views=views), means) == pytest.approx(2.2)
+    assert extent(flat_images([1.0] * 3, 1.0, views=views).cameras, means) == pytest.approx(2.2)
     one = flat_images([1.0] * 3, 1.0, views=views[:1])
-    assert extent(one, means) == pytest.approx(2.2)
-    assert extent(one, means[:0]) > 0
+    assert extent(one.cameras, means) == pytest.approx(2.2)
+    assert extent(one.cameras, means[:0]) > 0
 
 
 # --- hard cases -------------------------------------------------------------

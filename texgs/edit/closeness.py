@@ -57,4 +57,4 @@ def differentiated(closeness: Closeness, image: Tensor, wanted: Tensor) -> tuple
     leaf = image.detach().requires_grad_()
     loss = closeness(leaf, wanted)
     (gradient,) = torch.autograd.grad(loss, leaf)
-    return float(loss), gradient
+    return float(loss.detach()), gradient

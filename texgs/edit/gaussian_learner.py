@@ -13,9 +13,9 @@ from texgs.core.camera import Camera
 from texgs.edit.closeness import Closeness, differentiated
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.harmonics import join, split
+from texgs.fields.optimizer import Optimizer
+from texgs.fields.rates import extent, rates
 from texgs.fields.surfels.groups import GEOMETRY
-from texgs.fit.loop import extent, rates
-from texgs.fit.optimizer import Optimizer
 from texgs.volume.images import Images
 
 PRUNE_EVERY = 100  # iterations
@@ -50,7 +50,7 @@ class GaussianLearner:
     ) -> None:
         self.original, self.closeness, self.iterations = model, closeness, iterations
         self.prunes = prunes and not is_frozen
-        self.extent = extent(images, model.parameters["means"].cpu())
+        self.extent = extent(images.cameras, model.parameters["means"].cpu())
         raw = {**model.parameters, **split(model.parameters["sh"])}
         chosen = rates(raw, Rates(**asdict(learning)), self.extent)
         learned = {name: rate for name, rate in chosen.items() if not (is_frozen and name in GEOMETRY)}

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from texgs.config.phase import Densify
 from texgs.core.rotation import quats_to_matrices
-from texgs.fit.optimizer import Optimizer
+from texgs.fields.optimizer import Optimizer
 from texgs.raster.shading import MATERIAL
 
 CHILDREN = 2  # of a split

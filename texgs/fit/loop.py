@@ -2,25 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Phase, Rates
+from texgs.config.phase import Phase
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.bounds import visible_part
 from texgs.fields.harmonics import join
+from texgs.fields.optimizer import Optimizer
+from texgs.fields.rates import extent, rates
 from texgs.fit.densify import DensityControl
 from texgs.fit.losses import Shading, view_loss
-from texgs.fit.optimizer import Optimizer, Rate
-from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
 
-USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
-SMALLEST = 1e-3  # distance, world units
 CHECKED_EVERY = 100  # iterations between looks at the loss and all parameters
 
 
@@ -31,31 +29,6 @@ class Progress:
     iteration: int  # done, from 1
     n_surfels: int
     loss: float | None  # where it was looked at
-
-
-def extent(images: Images, means: Tensor) -> float:
-    """The length that rates of means, and sizes of density control, refer to.
-
-    1.1 times the largest distance of a camera from the cameras' mean. One camera, or some inside of the
-    object, have none to speak of: they count as far away as an object is usually seen from.
-    """
-    around = spread(torch.stack([camera.position for camera in images.cameras]))
-    radius = spread(means)
-    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST)
-
-
-def spread(points: Tensor) -> float:
-    """Largest distance of points [N, 3] from their mean; 0 for none."""
-    return float((points - points.mean(dim=0)).norm(dim=1).max()) if len(points) else 0.0
-
-
-def rates(names: Iterable[str], r: Rates, size: float) -> dict[str, Rate]:
-    """Learning rate of each parameter that learns; `size` is the extent of the cameras."""
-    starts = {"quats": r.quats, "scales": r.scales, "opacities": r.opacities, "colors": r.colors}
-    starts |= {"sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
-    chosen = {name: Rate(starts[name], r.final) for name in names if name in starts}
-    chosen["means"] = Rate(size * r.means, r.means_final)
-    return {name: rate for name, rate in chosen.items() if rate.start > 0}
 
 
 class Fit:
@@ -81,7 +54,7 @@ class Fit:
         self.iteration = 0
         self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
         self.losses: list[float] = []  # that were looked at, every CHECKED_EVERY iterations and at the end
-        size = extent(images, parameters["means"])
+        size = extent(images.cameras, parameters["means"])
         self.optimizer = Optimizer(parameters, rates(parameters, phase.rates, size))
         means = self.parameters["means"]
         self.control = DensityControl(phase.densify, len(means), size, means.device)

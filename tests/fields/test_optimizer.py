@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from texgs.fit.optimizer import Optimizer, Rate
+from texgs.fields.optimizer import Optimizer, Rate
 
 
 def parameters(n=6, seed=0):

@@ -1,0 +1,225 @@
+"""Fields that learn from views that are edited again and again: balls of Gaussians and of voxels."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+from texgs.fit.optimizer import Rate
+
+from tests.edit.guidances import Returns, Tint, Watching
+from tests.edit.test_gaussian_style import ball as gaussians
+from tests.edit.test_voxel_style import seen
+from tests.fields.voxels.test_voxels import ball as voxels
+from tests.fit.scenes import HEADLIGHT, cameras
+from texgs.config.phase import CommonRates
+from texgs.core.errors import ArgumentError, FitError
+from texgs.edit.closeness import Closeness, differentiated
+from texgs.edit.dataset_update import update_field
+from texgs.edit.field_views import field_views
+from texgs.edit.gaussian_learner import GaussianLearner, radii
+from texgs.edit.turns import Schedule
+from texgs.edit.voxel_learner import VoxelLearner, VoxelLearning, corner
+from texgs.raster.ssim import ssim
+from texgs.volume.boxes import Box
+from texgs.volume.images import Images
+
+COLOR = (0.8, 0.3, 0.1)
+RATES = CommonRates(means=1e-4, sh=0.05, sh_rest=0.0025, means_final=1.0, final=1.0)
+PIXELS = Closeness(0.8, 0.2)
+PATCHES = Closeness(1.0, 0.0)
+
+
+@torch.no_grad()
+def views_of(field, count=5, size=48):
+    planes = []
+    views = cameras(count, size)
+    for camera in views:
+        shown = field.render(camera)
+        planes.append(torch.cat([shown.color, shown.alpha[..., None]], dim=2).permute(2, 0, 1))
+    stack = torch.stack(planes).clamp(0, 1).mul(255).round().to(torch.uint8)
+    return Images(stack, views, [HEADLIGHT] * count)
+
+
+def splats(**options):
+    model = gaussians(degree=1)
+    images = views_of(model)
+    return GaussianLearner(model, images, RATES, PIXELS, 100, **options), images
+
+
+def grid(density=0.05):
+    field = voxels(degree=1)
+    learning = VoxelLearning(density=density, sh=0.05, patches=4, side=16)
+    return VoxelLearner(field, learning, PATCHES), seen(field.grid, count=5)
+
+
+LEARNERS = {"gaussians": splats, "voxels": grid}
+FROZEN = {"gaussians": lambda: splats(is_frozen=True), "voxels": lambda: grid(density=0.0)}
+
+
+def color_of(field):
+    """Mean colour where the field is opaque, from a place that is none of the training views'."""
+    shown = field.render(cameras(7, 48)[3])
+    return shown.color[shown.alpha > 0.9].mean(0)
+
+
+@pytest.mark.parametrize("kind", LEARNERS)
+@pytest.mark.parametrize(
+    "schedule",
+    [
+        Schedule(10, 8, views=1),
+        Schedule(2, 40, learned="newest"),
+        Schedule(2, 40, views=3, group=3, order="random", learned="round"),
+    ],
+    ids=["in2n", "igs2gs", "dge"],
+)
+def test_fields_take_on_the_colour_that_views_are_given(kind, schedule):
+    learner, images = LEARNERS[kind]()
+    before = images.planes.clone()
+    start = color_of(learner.original)
+    updated = update_field(learner, images, Tint(COLOR, lit=True), "anything", schedule)
+    goal = torch.tensor(COLOR)
+    assert (color_of(updated.field) - goal).norm() < 0.5 * (start - goal).norm()
+    assert torch.equal(images.planes, before), "the training views stay as they are"
+    assert torch.equal(color_of(learner.original), start), "so does the field before"
+    assert len(updated.losses) == schedule.iterations
+    assert updated.edits == schedule.rounds * (schedule.views or len(images))
+
+
+@pytest.mark.parametrize("kind", FROZEN)
+def test_frozen_geometry_is_kept_bit_for_bit(kind):
+    learner, images = FROZEN[kind]()
+    field = update_field(learner, images, Tint(COLOR), "anything", Schedule(3, 5, views=2)).field
+    for name, x in learner.original.tensors("geometry").items():
+        assert torch.equal(x, field.tensors("geometry")[name]), name
+    assert not torch.equal(learner.original.tensors("appearance")["sh"], field.tensors("appearance")["sh"])
+    learner, images = LEARNERS[kind]()
+    field = update_field(learner, images, Tint(COLOR), "anything", Schedule(3, 5, views=2)).field
+    assert any(
+        not torch.equal(x, field.tensors("geometry")[n])
+        for n, x in learner.original.tensors("geometry").items()
+    )
+
+
+def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was():
+    for keeps, expected in ((False, 0.2), (True, None)):
+        learner, images = splats()
+        images.planes[:, :3] = round(0.2 * 255)
+        guidance = Watching(COLOR)
+        update_field(
+            *(learner, images, guidance, "anything", Schedule(3, 4, views=5, group=5)), keeps_renders=keeps
+        )
+        first, *_, last = guidance.seen
+        assert torch.equal(first.conditions, last.conditions), "of all edits, whatever the field is by then"
+        assert not torch.equal(first.images, last.images)
+        if expected is None:
+            torch.testing.assert_close(first.conditions, first.images, atol=1e-6, rtol=0)
+        else:
+            torch.testing.assert_close(first.conditions, torch.full_like(first.conditions, 0.2))
+
+
+def test_the_guidance_is_told_how_much_noise_to_use():
+    learner, images = splats()
+    guidance = Watching(COLOR)
+    schedule = Schedule(2, 2, views=1, levels=((0.9, 0.9), (0.3, 0.3)))
+    update_field(learner, images, guidance, "anything", schedule)
+    assert [views.level for views in guidance.seen] == [0.9, 0.3]
+
+
+def test_views_of_a_field_say_where_its_pixels_are():
+    field = voxels().to("cpu")
+    views = field_views(field, cameras(3, 64), torch.zeros(3, 64, 64, 3))
+    inside = views.alphas > 0.95
+    away = views.points[inside]
+    facing = torch.nn.functional.cosine_similarity(views.normals[inside], away, dim=1)
+    assert float(facing.median()) > 0.9, "normals of a ball point away from its middle"
+    assert float(away.norm(dim=1).std()) < 0.1
+    assert (views.normals[views.alphas == 0] == 0).all()
+
+
+def test_the_first_step_of_gaussians_goes_against_the_gradient_of_the_loss_written_out():
+    learner, images = splats()
+    model = learner.original
+    leaves = {name: x.clone().requires_grad_() for name, x in model.parameters.items()}
+    images = replace(images, planes=images.planes[:1] // 2, cameras=images.cameras[:1])
+    image = replace(model, parameters=leaves).render(images.cameras[0]).color
+    wanted = images.target(0).color
+    (0.8 * (image - wanted).abs().mean() + 0.2 * (1 - ssim(image, wanted))).backward()
+    learner.step(images, [0], torch.Generator())
+    after = learner.field.parameters
+    for name, rate in (("opacities", RATES.opacities), ("means", RATES.means * learner.extent)):
+        step, gradient = after[name] - model.parameters[name], leaves[name].grad
+        clear = gradient.abs() > 1e-7
+        torch.testing.assert_close(step[clear], -rate * gradient.sign()[clear], rtol=2e-3, atol=1e-6)
+
+
+def test_gaussians_that_are_faint_or_large_are_removed():
+    learner, images = splats(prunes=True)
+    model = learner.original
+    parameters = {name: x.clone() for name, x in model.parameters.items()}
+    parameters["opacities"][:10] = -9.0
+    parameters["scales"][10:30, 0] = 0.5
+    learner = GaussianLearner(replace(model, parameters=parameters), images, RATES, PIXELS, 200, prunes=True)
+    learner.optimizer._rates = {name: Rate(0.0, 1.0) for name in learner.optimizer._rates}
+    for _ in range(100):
+        learner.step(images, [0], torch.Generator())
+    assert len(learner.field) == len(model) - 30
+    assert len(splats(prunes=True, is_frozen=True)[0].field) == len(model)
+
+
+def test_radii_are_those_of_a_sphere_on_the_axis():
+    (camera,) = cameras(1, 48)
+    ahead = camera.position + 2 * camera.viewmat[2, :3]
+    behind = camera.position - camera.viewmat[2, :3]
+    found = radii(torch.stack([ahead, behind]), torch.tensor([[0.1, 0.2, 0.05]] * 2).log(), camera)
+    torch.testing.assert_close(found, torch.tensor([3 * 0.2 * float(camera.K[1, 1]) / 2, 0.0]))
+
+
+def test_patches_lie_inside_of_the_image_and_around_what_is_visible():
+    generator = torch.Generator().manual_seed(0)
+    corners = torch.tensor([corner(Box(30, 2, 40, 8), 16, (48, 64), generator) for _ in range(400)])
+    assert (corners >= 0).all()
+    assert (corners[:, 0] <= 48 - 16).all()
+    assert int(corners[:, 0].min()) == 30 - 8
+    assert int(corners[:, 0].max()) == 39 - 8
+    assert int(corners[:, 1].max()) == 0
+
+
+def test_a_loss_and_its_gradient_are_those_of_its_terms():
+    image, wanted = (
+        torch.rand(2, 20, 24, 3, generator=torch.Generator().manual_seed(1))
+        .permute(0, 3, 1, 2)
+        .contiguous()
+        .permute(0, 2, 3, 1)
+    )
+    loss, gradient = differentiated(Closeness(3.0, 1.0), image, wanted)
+    leaf = image.clone().requires_grad_()
+    expected = 3 * (leaf - wanted).abs().mean() + 1 - ssim(leaf, wanted)
+    (exact,) = torch.autograd.grad(expected, leaf)
+    assert loss == pytest.approx(float(expected.detach()), rel=1e-5)
+    torch.testing.assert_close(gradient, exact, atol=1e-7, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ((0.0, 0.0, 0.0), "l1, dssim, lpips: expected weights of 0 or more and one above"),
+        ((1.0, -1.0, 0.0), "l1, dssim, lpips: expected weights of 0 or more"),
+        ((1.0, 0.0, 1.0), "network: expected one for LPIPS, got none"),
+    ],
+)
+def test_weights_that_make_no_loss(values, message):
+    with pytest.raises(ArgumentError, match=message):
+        Closeness(*values)
+
+
+def test_what_a_guidance_returns_is_checked_and_a_loss_has_to_be_finite():
+    learner, images = splats()
+    with pytest.raises(ArgumentError, match="images edited by broken"):
+        update_field(
+            *(learner, images, Returns(lambda views: views.images * float("nan")), "anything", Schedule(1, 1))
+        )
+    with pytest.raises(ArgumentError, match="instruction: expected what to do in words"):
+        update_field(learner, images, Tint(COLOR), " ", Schedule(1, 1))
+    learner.step = lambda *_: float("nan")
+    with pytest.raises(FitError, match="iteration 0: expected a finite loss, got nan; lower the rates"):
+        update_field(learner, images, Tint(COLOR), "anything", Schedule(1, 1))
