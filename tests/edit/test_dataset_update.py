@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 import torch
-from texgs.fit.optimizer import Rate
 
 from tests.edit.guidances import Returns, Tint, Watching
 from tests.edit.test_gaussian_style import ball as gaussians
@@ -19,6 +18,7 @@ from texgs.edit.field_views import field_views
 from texgs.edit.gaussian_learner import GaussianLearner, radii
 from texgs.edit.turns import Schedule
 from texgs.edit.voxel_learner import VoxelLearner, VoxelLearning, corner
+from texgs.fields.optimizer import Rate
 from texgs.raster.ssim import ssim
 from texgs.volume.boxes import Box
 from texgs.volume.images import Images
