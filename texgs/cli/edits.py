@@ -6,6 +6,7 @@ from texgs.config.compose import compose
 from texgs.config.edits import lineage
 from texgs.config.fields import require
 from texgs.config.inputs import scene_before
+from texgs.config.looks import looks_of
 from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.core.errors import MissingDataError
@@ -36,4 +37,5 @@ def check_edit(config: DictConfig) -> None:
     if config.edit.method != NO_METHOD:
         method = method_of(config.edit)
         require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
-        method.check(method.of(config.edit))
+        for look in looks_of(config).values() or [None]:
+            method.check(method.of(config.edit, look))

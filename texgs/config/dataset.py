@@ -46,6 +46,17 @@ class BasicTF:
 
 
 @dataclass
+class LookKeys:
+    """What the edits of a whole experiment make of a basic scene."""
+
+    style: str = key("strokes", "picture that texgs paints, or a picture file, of edits by a picture")
+    instruction: str = key("make it gold", "of edits by an instruction")
+    caption: str = key("a rendering of a volume", "the basic scene in words, for CLIP's metrics")
+    styled: str = key("a painting with brush strokes", "the same after an edit by the picture")
+    instructed: str = key("a sculpture of gold", "the same after an edit by the instruction")
+
+
+@dataclass
 class Dataset:
     """A volume with its basic transfer functions, or a folder of views."""
 
@@ -64,4 +75,7 @@ class Dataset:
     basic_tfs: dict[str, BasicTF] = field(
         default_factory=dict,
         metadata={"help": "basic transfer functions by name; their ranges must not overlap"},
+    )
+    looks: dict[str, LookKeys] = field(
+        default_factory=dict, metadata={"help": "by basic TF, what edits with edit.looks make of it"}
     )

@@ -21,6 +21,9 @@ class EditKeys:
     parts: list[str] = key(
         [], "MODEL/SEGMENT, or models without their segments, that get the new look; default all models"
     )
+    looks: bool = key(
+        False, "each model follows the picture or the instruction that dataset.looks has for its basic TF"
+    )
     seed: int = key(0, "random numbers")
     source_caption: str = key("", "the scene before, in words, for CLIP's metrics")
     target_caption: str = key("", "the scene afterwards, in words, for CLIP's metrics")

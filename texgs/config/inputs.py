@@ -11,6 +11,7 @@ from texgs.config.compose import compose, is_scene_file
 from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
+from texgs.config.looks import captions, looks_of
 from texgs.config.methods import method_of
 from texgs.config.places import folder_of, made
 from texgs.core.errors import ConfigError, MissingDataError
@@ -153,7 +154,13 @@ def edited_scene(config: DictConfig) -> dict[str, Path]:
     views = {f"views.{name}": view_set(config, name)["views"] for name in tf_names(config)}
     method = method_of(config.edit)
     models = {} if is_scene_file(config.edit.base or "") else models_of_scene(config)
-    return {"scene": scene_before(config), **models, **views, **method.files(method.of(config.edit))}
+    looks: dict[str, str | None] = {**looks_of(config)} or {"": None}
+    files = {
+        f"{key}.{name}" if name else key: path
+        for name, look in looks.items()
+        for key, path in method.files(method.of(config.edit, look)).items()
+    }
+    return {"scene": scene_before(config), **models, **views, **files}
 
 
 def scene_before(config: DictConfig) -> Path:
@@ -173,13 +180,19 @@ def scene_before(config: DictConfig) -> Path:
 
 
 def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:
-    """The scene as fitted and as edited, and the views of all basic TFs."""
-    return {**edited_scene(config), "scene": made("edit", config), "before": made("compose", config)}
+    """The scene as edited and as fitted, what says where its surfaces are, and the views of all basic TFs.
+
+    Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
+    """
+    first = with_recipe(config, config.fits[0]) if config.fits else config
+    scenes = {"scene": made("edit", config), "before": made("compose", config)}
+    return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
 
 
 def edit_settings(config: DictConfig) -> dict[str, Any]:
     """What jobs of edits read: what all edits have, and the keys of this one's method."""
     keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
-    edit = {name: config.edit[name] for name in keys}
+    edit = {name: config.edit[name] for name in keys} | captions(config)
     given = {"reduce": config.fit.reduce, "clip": config.metric.clip, "lens": lens(config)}
+    given["followed"] = looks_of(config)
     return {"edit": edit, **fit_label(config), **given}

@@ -8,7 +8,7 @@ of its values.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -46,6 +46,8 @@ class Method(Generic[Settings]):
     """Parts that the scene has afterwards in addition, from the names of its models."""
     style: Callable[[Settings], Any] | None = None
     """The `StylePicture` that it follows, which the result is compared with."""
+    follows: str = ""
+    """Which of its keys, "style" or "instruction", looks of a data set have an own value of."""
     is_look: bool = True
     """Whether the scene looks different afterwards."""
 
@@ -63,10 +65,16 @@ class Method(Generic[Settings]):
         """Whether it can edit a kind of field."""
         return (not self.fields or kind in self.fields) and self.needs <= kinds()[kind].can
 
-    def of(self, edit: Any) -> Settings:
-        """Its settings among those of an edit: the schema's `Edit`, or its node in a configuration."""
+    def of(self, edit: Any, look: str | None = None) -> Settings:
+        """Its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
+
+        Args:
+            edit: to do.
+            look: what it follows, where that is not what its settings say.
+        """
         values = getattr(edit, self.name)
-        return values if isinstance(values, self.settings) else typed(self.settings, values)
+        settings: Any = values if isinstance(values, self.settings) else typed(self.settings, values)
+        return settings if look is None else replace(settings, **{self.follows: look})
 
 
 def methods() -> dict[str, Method[Any]]:

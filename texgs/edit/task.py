@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from texgs.config.edit import EditKeys
+from texgs.config.methods import method_of
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.edit.parts import edit_fields, edit_parts
@@ -37,6 +38,13 @@ class Task(Generic[Settings]):
     lens: Lens  # of the views, but for the size of images
     weights: Mapping[str, str | None]  # checksums; None for those that are not on this machine
     title: str  # of progress bars
+    followed: Mapping[str, str] = field(default_factory=dict)  # by model, where not as settings say
+
+    def settings_for(self, model: str) -> Settings:
+        """Settings with the picture or the instruction that a model follows."""
+        method = method_of(self.edit)
+        look = self.followed.get(model)
+        return self.settings if look is None else replace(self.settings, **{method.follows: look})  # type: ignore[type-var]
 
     def training_views(self, model: str) -> Sequence[View]:
         """Training views of a model.

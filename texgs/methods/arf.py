@@ -41,7 +41,8 @@ def run(task: Task[ArfKeys]) -> EditedScene:
     def one(name: str, model: Voxels, views: Sequence[View]) -> Voxels:
         recipe = recipe_of(keys, len(views), task.edit.seed)
         edited, look.losses[name] = stylize_voxels(
-            *(model, load(views, task.reduce), look.picture, recipe, added, look.vgg), title=look.title(name)
+            *(model, load(views, task.reduce), look.picture(name), recipe, added, look.vgg),
+            title=look.title(name),
         )
         return edited
 

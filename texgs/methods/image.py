@@ -50,22 +50,21 @@ class ImageKeys(StyleKeys):
 
 def run(task: Task[ImageKeys]) -> EditedScene:
     """Give the parts the style; write style.png and convergence.png."""
-    from texgs.core.image import write_png
     from texgs.edit.task import EditedScene
     from texgs.report.convergence import write_convergence
 
     wanted = recipe_of(task.settings, task.edit.seed)
-    recipe, picture = with_what_is_there(wanted, task.clip, task.weights), style_of(task.settings)
+    recipe = with_what_is_there(wanted, task.clip, task.weights)
+    pictures: dict[str, StylePicture] = {}
     curves: dict[str, dict[str, list[float]]] = {}
     seconds: dict[str, dict[str, float]] = {}
-    scene = task.each_part(stylist(task, recipe, picture, curves, seconds))
-    write_png(task.output / "style.png", picture.image.permute(1, 2, 0))
+    scene = task.each_part(stylist(task, recipe, pictures, curves, seconds))
     write_convergence(task.output / "convergence.png", curves)
     return EditedScene(
         scene,
         how(recipe, wanted),
         sum(each["all"] for each in seconds.values()),
-        style.SHOWN,
+        style.CONVERGENCE | style.write_styles(task.output, pictures),
         recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
         {"seconds": seconds},
     )
@@ -74,23 +73,25 @@ def run(task: Task[ImageKeys]) -> EditedScene:
 def stylist(
     task: Task[ImageKeys],
     recipe: Recipe,
-    picture: StylePicture,
+    pictures: dict[str, StylePicture],
     curves: dict[str, dict[str, list[float]]],
     seconds: dict[str, dict[str, float]],
 ) -> Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]:
-    """What gives one part the style, for `Task.each_part`; it notes its losses and its seconds by name."""
+    """What gives one part the style, for `Task.each_part`; it notes picture, losses and seconds by name."""
     from texgs.edit.clip_loss import ClipLoss
     from texgs.edit.stylize import stylize
     from texgs.models.clip import Clip
     from texgs.models.vgg import Vgg
     from texgs.volume.reduced import smaller
 
-    pixels = picture.image.permute(1, 2, 0).to(task.device)
     vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
-    clip = ClipLoss(Clip.load(task.clip, task.device), pixels) if recipe.needs_clip else None
+    network = Clip.load(task.clip, task.device) if recipe.needs_clip else None
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
         start = time.monotonic()
+        picture = pictures[name] = style_of(task.settings_for(name.split("/")[0]))
+        pixels = picture.image.permute(1, 2, 0).to(task.device)
+        clip = ClipLoss(network, pixels) if network else None
         result = stylize(
             model,
             [smaller(view.camera, task.reduce) for view in views],
@@ -184,4 +185,5 @@ METHOD = Method(
     needs=frozenset({"texture", "relight"}),
     files=style.files,
     style=style_of,
+    follows="style",
 )

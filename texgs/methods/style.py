@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,7 +12,7 @@ from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
 from texgs.methods.shares import shares
 
-SHOWN = {"style.png": "The style picture.", "convergence.png": "Terms of the loss in each iteration."}
+CONVERGENCE = {"convergence.png": "Terms of the loss in each iteration."}
 
 if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe
@@ -78,11 +78,11 @@ Keys = TypeVar("Keys", bound=FeatureKeys)
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """A picture on its way onto a scene, and how the losses fell."""
+    """Pictures on their way onto the models of a scene, and how the losses fell."""
 
     task: Task[Any]
-    picture: StylePicture
     vgg: Vgg | None
+    pictures: dict[str, StylePicture] = field(default_factory=dict)  # by model
     losses: dict[str, dict[str, list[float]]] = field(default_factory=dict)  # by model and term
 
     @classmethod
@@ -91,21 +91,43 @@ class Look:
         from texgs.models.vgg import Vgg
 
         vgg = Vgg.load(device=task.device) if task.settings.nnfm > 0 else None
-        return cls(task, style_of(task.settings, f"edit.{task.edit.method}"), vgg)
+        return cls(task, vgg)
+
+    def picture(self, model: str) -> StylePicture:
+        """What a model follows."""
+        method = self.task.edit.method
+        self.pictures[model] = style_of(self.task.settings_for(model), f"edit.{method}")
+        return self.pictures[model]
 
     def title(self, model: str) -> str:
         """Of a progress bar."""
         return f"{self.task.title} {self.task.edit.name}, {model}"
 
     def result(self, scene: Scene, seconds: float) -> EditedScene:
-        """The edited scene; writes style.png and convergence.png."""
-        from texgs.core.image import write_png
+        """The edited scene; writes its style pictures and convergence.png."""
         from texgs.edit.task import EditedScene
         from texgs.report.convergence import write_convergence
 
-        write_png(self.task.output / "style.png", self.picture.image.permute(1, 2, 0))
         write_convergence(self.task.output / "convergence.png", self.losses)
-        return EditedScene(scene, self.task.settings.how, seconds, SHOWN)
+        shown = CONVERGENCE | write_styles(self.task.output, self.pictures)
+        return EditedScene(scene, self.task.settings.how, seconds, shown)
+
+
+def write_styles(folder: Path, pictures: Mapping[str, StylePicture]) -> dict[str, str]:
+    """Write style.png, or one for each model where they follow different pictures; what they show."""
+    import torch
+
+    from texgs.core.image import write_png
+
+    first, *others = (picture.image for picture in pictures.values())
+    if all(torch.equal(first, other) for other in others):
+        pictures = {"": next(iter(pictures.values()))}
+    shown = {}
+    for name, picture in pictures.items():
+        file = f"style-{name.replace('/', '-')}.png" if name else "style.png"
+        write_png(folder / file, picture.image.permute(1, 2, 0))
+        shown[file] = f"The style picture{f' of {name}' if name else ''}."
+    return shown
 
 
 def look_method(
@@ -131,6 +153,7 @@ def look_method(
         fields=frozenset({field}),
         files=files,
         style=lambda values: style_of(values, where),
+        follows="style",
     )
 
 

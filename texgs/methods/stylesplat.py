@@ -37,7 +37,7 @@ def run(task: Task[StyleSplatKeys]) -> EditedScene:
     def one(name: str, model: Gaussians, views: Sequence[View]) -> Gaussians:
         cameras = [smaller(view.camera, task.reduce) for view in views]
         edited, look.losses[name] = stylize_gaussians(
-            *(model, cameras, look.picture, recipe, look.vgg), title=look.title(name)
+            *(model, cameras, look.picture(name), recipe, look.vgg), title=look.title(name)
         )
         return edited
 

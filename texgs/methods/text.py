@@ -51,7 +51,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
             guidance,
-            settings.instruction,
+            task.settings_for(name.split("/")[0]).instruction,
             settings.recipe,
             light=views[0].light,
             surfels=surfels,
@@ -71,7 +71,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
         f"{guidance.name}, {settings.recipe}",
         sum(seconds.values()),
         PICTURE,
-        notes={"instruction": settings.instruction, "seconds": seconds, "seen": seen},
+        notes={"instruction": task.followed or settings.instruction, "seconds": seconds, "seen": seen},
     )
 
 
@@ -83,4 +83,5 @@ METHOD = Method(
     lambda settings: settings.check(),
     lambda settings, clip: settings.weights(),
     needs=frozenset({"texture", "relight"}),
+    follows="instruction",
 )

@@ -85,6 +85,7 @@ def update_method(
         *(name, summary, settings, run, checked),
         lambda values, clip: values.weights(),
         fields=frozenset({field}),
+        follows="instruction",
     )
 
 
@@ -114,7 +115,8 @@ def edit_by_updates(
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
         images = load(views, task.reduce)
         updates[name] = update_field(
-            *(learner(keys, model, images, closeness), images, guidance, keys.instruction),
+            *(learner(keys, model, images, closeness), images, guidance),
+            task.settings_for(name).instruction,
             schedule(keys, len(views)),
             keeps_renders=keeps_renders,
             seed=task.edit.seed,
@@ -127,10 +129,13 @@ def edit_by_updates(
     losses = {name: {"loss": each.losses} for name, each in updates.items()}
     write_convergence(task.output / "convergence.png", losses)
     _write_views(task.output / "views.png", updates)
-    notes = {name: {"edits": each.edits, "seconds of them": each.guided} for name, each in updates.items()}
+    notes: dict[str, Any] = {
+        name: {"edits": each.edits, "seconds of them": each.guided} for name, each in updates.items()
+    }
+    notes["instruction"] = task.followed or keys.instruction
     how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
     pictures = {**PICTURE, "convergence.png": "The loss in each iteration."}
-    return EditedScene(scene, how, seconds, pictures, notes={"instruction": keys.instruction, **notes})
+    return EditedScene(scene, how, seconds, pictures, notes=notes)
 
 
 def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:

@@ -91,8 +91,9 @@ def frames_of(
     cameras: Iterable[Camera],
     light: Light,
     edits: Sequence[PartEdit] | None = None,
-    look: Look = "shaded",
+    geometry: Composed | None = None,
     depth: Literal["median", "depth"] = "median",
+    look: Look = "shaded",
 ) -> Iterator[SeenFrame]:
     """Views of a scene with what `consistency` needs.
 
@@ -101,12 +102,15 @@ def frames_of(
         cameras: along a path, on the scene's device.
         light: shines on it.
         edits: as for `Composition.render`.
-        look: "unshaded" measures textures alone.
+        geometry: scene whose depth and alpha say where surfaces are; by default this one. Different edits of
+            one volume are compared on one geometry.
         depth: which of its outputs says where a pixel's surface is.
+        look: "unshaded" measures textures alone.
     """
     for camera in cameras:
-        shown = scene.render(camera, light, edits, look=look, outputs=(depth,))
-        yield SeenFrame(shown.color.clamp(0, 1), getattr(shown, depth), shown.alpha, camera)
+        shown = scene.render(camera, light, edits, look=look)
+        surface = (geometry or scene).render(camera, outputs=(depth,))
+        yield SeenFrame(shown.color.clamp(0, 1), getattr(surface, depth), surface.alpha, camera)
 
 
 @torch.no_grad()

@@ -27,6 +27,7 @@ class Settings(OfDataset):
     clip: str
     lens: Distance
     weights: dict[str, str | None]
+    followed: dict[str, str]  # by model: what it follows, where that is not what the edit says
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -51,6 +52,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         settings.lens.lens,
         settings.weights,
         title,
+        settings.followed,
     )
     edited = method.run(task)
     write_scene(output / "scene.yaml", edited.scene)

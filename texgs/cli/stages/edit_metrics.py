@@ -11,8 +11,7 @@ import torch
 from texgs.cli.stages.edit import Settings as EditSettings
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.timing import milliseconds
-from texgs.config.edit import Edit
-from texgs.config.fields import Kind, kinds
+from texgs.config.fields import kinds
 from texgs.config.methods import method_of
 from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
@@ -21,7 +20,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.edit.parts import parts_of
-from texgs.fields.field import Composed, Look
+from texgs.fields.field import Composed
 from texgs.metrics.clip import clip_scores
 from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
 from texgs.metrics.style import likeness
@@ -47,7 +46,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     Args:
         settings: of the job.
-        inputs: `scene`, edited, and `before`, as fitted.
+        inputs: `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth says where surfaces
+            are.
         output: folder.
     """
     edit, views, weights = settings.edit, settings.views, settings.weights
@@ -66,8 +66,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         len(scenes[0]),
         megabytes=sum(size_of(after)) * MIB / 1e6,
         geometry_kept=is_geometry_kept(*scenes, some, "normals" in kind.can),
-        **agreement(scenes[0], after, cameras, settings.compared, weights, kind),
-        **style_distance(after, edit, some, device, weights, title),
+        **agreement(scenes[0], after, inputs["geometry"], cameras, settings.compared, weights),
+        **style_distance(settings, after, some, device, title),
         **clip_numbers(settings, (after, before), scenes, cameras, title),
     )
     return Outcome(result)
@@ -95,19 +95,22 @@ def is_geometry_kept(after: Composed, before: Composed, cameras: Sequence[Camera
 def agreement(
     composition: Composed,
     scene: Scene,
+    geometry: Path,
     cameras: Sequence[Camera],
     count: int,
     weights: Mapping[str, str | None],
-    kind: Kind[Any],
 ) -> dict[str, Any]:
-    """Consistency of views in the middle of the path, near and far; without light where the kind can.
+    """Consistency of views in the middle of the path, near and far, as they look with the scene's light.
 
-    None where no two views see the same, as of a scene that is nowhere opaque.
+    Fields that have light in their colours can be compared with others so. None where no two views see the
+    same, as of a scene that is nowhere opaque.
     """
     start = max(0, (len(cameras) - count - LONG) // 2)
     some = cameras[start : start + count + LONG]
-    look: Look = "unshaded" if "unlit" in kind.can else "shaded"
-    frames = list(frames_of(composition, some, scene.light, scene.edits, look, kind.depth or "median"))
+    surfaces = read_scene(geometry)
+    depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
+    shown = surfaces.open(composition.device)
+    frames = list(frames_of(composition, some, scene.light, scene.edits, shown, depth))
     perceptual = None
     if weights["vgg16"] and weights["lpips_vgg"]:
         lpips = Lpips.load(device=composition.device)
@@ -125,31 +128,32 @@ def agreement(
 
 
 def style_distance(
+    settings: Settings,
     scene: Scene,
-    edit: Edit,
     cameras: Sequence[Camera],
     device: torch.device,
-    weights: Mapping[str, str | None],
     title: str,
 ) -> dict[str, Any]:
     """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
+    edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
-    if method.style is None or any(part.segment for part in parts) or not weights["vgg16"]:
+    if method.style is None or any(part.segment for part in parts) or not settings.weights["vgg16"]:
         return {}
-    vgg = Vgg.load(device=device)
-    style = method.style(method.of(edit)).scaled(max(cameras[0].width, cameras[0].height))
-    likenesses = [
-        likeness(
-            scene.models[part.model].open()[0].to(device),
-            cameras,
-            [scene.light] * len(cameras),
-            style.image,
-            vgg,
-            style.region,
-            f"{title}, {part.name}",
+    vgg, likenesses = Vgg.load(device=device), []
+    for part in parts:
+        picture = method.style(method.of(edit, settings.followed.get(part.model)))
+        style = picture.scaled(max(cameras[0].width, cameras[0].height))
+        likenesses.append(
+            likeness(
+                scene.models[part.model].open()[0].to(device),
+                cameras,
+                [scene.light] * len(cameras),
+                style.image,
+                vgg,
+                style.region,
+                f"{title}, {part.name}",
+            )
         )
-        for part in parts
-    ]
     return {
         "style_nnfm": fmean(each.nnfm for each in likenesses),
         "style_gram": fmean(each.gram for each in likenesses),
