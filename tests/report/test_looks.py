@@ -22,7 +22,7 @@ def rows(table):
 
 
 def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
-    paths = [metrics(tmp_path, "edit_image", EditResult("glass", "image", "patches", 90.0))]
+    paths = [metrics(tmp_path, "edit_image", EditResult("glass", "image", "patches", 90.0, follows="style"))]
     measured = replace(MEASURES, edit="glass", method="image", similarity=0.3, clip="B/32")
     paths.append(metrics(tmp_path, "edit_metrics", measured))
     table = looks(read(paths))
@@ -31,18 +31,33 @@ def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
     assert first["geometry kept"] == "bit for bit"
     assert table.rows[0].sources == paths
     assert "CLIP: B/32." in table.caption
-    by_method = {(row["edit"][:5], row["method"]): row for row in theirs}
-    assert len(theirs) == 8
-    assert by_method["image", "TexGS-VolVis"]["minutes"] == 8.0
-    assert by_method["text-", "TexGS-VolVis"]["CLIP direction"] == 0.174
-    assert by_method["image", "ARF"]["primitives"] is None
+    by_method = {row["method"]: row for row in theirs}
+    assert len(theirs) == 4, "the paper's text-driven methods are beside those that follow words"
+    assert by_method["TexGS-VolVis"]["minutes"] == 8.0
+    assert by_method["ARF"]["primitives"] is None
+
+
+def test_a_method_has_a_mean_row_over_its_data_sets(tmp_path):
+    words = {"TF01": "turn it into gold", "TF02": "a mosaic"}
+    paths = []
+    for dataset, ms in (("engine", 4.0), ("jets", 8.0)):
+        edit = EditResult("gold", "text", "filters", 60.0, follows="instruction", followed=words)
+        for stage, result in (("edit_text", edit), ("edit_metrics", replace(MEASURES, frame_mean_ms=ms))):
+            path = metrics(tmp_path, stage, result)
+            path.write_text(path.read_text().replace('"engine"', f'"{dataset}"'))
+            paths.append(path)
+    one, two, mean, *theirs = rows(looks(read(paths)))
+    assert one["follows"] == two["follows"] == "TF01: turn it into gold, TF02: a mosaic"
+    assert (mean["data set"], mean["mean ms"], mean["minutes"]) == ("mean of 2", 6.0, 1.0)
+    assert (mean["geometry kept"], mean["NNFM"]) == ("bit for bit", None)
+    assert {row["method"]: row for row in theirs}["TexGS-VolVis"]["CLIP direction"] == 0.174
 
 
 def test_what_was_not_measured_says_so_and_why(tmp_path):
     missing = replace(MEASURES, clip_missing="the weights of x are not on this machine")
     paths = [
         metrics(tmp_path, "edit_segment", EditResult("pick", "segment", "grabcut", 6.0)),
-        metrics(tmp_path, "edit_text", EditResult("gold", "text", "filters", 6.0)),
+        metrics(tmp_path, "edit_text", EditResult("gold", "text", "filters", 6.0, follows="instruction")),
         metrics(tmp_path, "edit_metrics", missing),
     ]
     table = looks(read(paths))
@@ -50,7 +65,7 @@ def test_what_was_not_measured_says_so_and_why(tmp_path):
     assert "CLIP not measured: the weights of x are not on this machine." in text
     line = next(line for line in text.splitlines() if "| gold |" in line)
     assert line.count("not measured") == 8, "CLIP, style and consistency"
-    assert rows(table)[1]["geometry kept"] is None, "the segment was not measured"
+    assert rows(table)[-1]["geometry kept"] is None, "the segment was not measured"
 
 
 def test_without_edits_there_are_no_rows(tmp_path):

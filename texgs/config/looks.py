@@ -4,7 +4,6 @@ from omegaconf import DictConfig
 
 from texgs.config.locate import tf_names
 from texgs.config.methods import method_of
-from texgs.config.slips import close
 from texgs.core.errors import ConfigError
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
@@ -14,8 +13,8 @@ def looks_of(config: DictConfig) -> dict[str, str]:
     """What each model of a scene follows; empty where all follow what the edit itself says.
 
     Raises:
-        ConfigError: naming the basic TF that has no look, or one that is none of the data set's; or if the
-            method follows neither a picture nor an instruction.
+        ConfigError: naming the basic TF that has no look; or if the method follows neither a picture nor an
+            instruction.
     """
     edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
     if not edit.looks:
@@ -30,12 +29,6 @@ def looks_of(config: DictConfig) -> dict[str, str]:
             raise ConfigError(
                 f"dataset.looks of {dataset}: expected a look for each of {', '.join(names)}, got none for "
                 f"{name}; add one, or set edit.looks=false"
-            )
-    for name in table:
-        if name not in names and config.tf is None:
-            raise ConfigError(
-                f"dataset.looks of {dataset}: expected looks of {', '.join(names)}, got one of {name}"
-                f"{close(name, names)}"
             )
     return {name: table[name][follows] for name in names}
 

@@ -30,6 +30,7 @@ class TextKeys(InstructionKeys):
         "Instruct-NeRF2NeRF",
         choices=("default", "paper", "iterative"),
     )
+    textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
     size: int = key(512, "longer side of the edited views", "pixels", least=64)
 
 
@@ -37,6 +38,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
+    from texgs.fields.surfels.texels import untextured
     from texgs.report.strip import write_strip
     from texgs.volume.reduced import smaller
 
@@ -61,14 +63,14 @@ def run(task: Task[TextKeys]) -> EditedScene:
         seconds[name], seen[name] = time.monotonic() - start, result.seen
         rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN]]
         rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN]]
-        return result.model
+        return result.model if settings.textured else untextured(result.model, surfels)
 
     scene = task.each_part(one)
     titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]
     write_strip(task.output / "views.png", rows, titles)
     return EditedScene(
         scene,
-        f"{guidance.name}, {settings.recipe}",
+        f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),
         sum(seconds.values()),
         PICTURE,
         notes={"instruction": task.followed or settings.instruction, "seconds": seconds, "seen": seen},

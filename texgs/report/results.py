@@ -160,6 +160,8 @@ class EditResult:
     edit_seconds: float
     lambda_s: float | None = None
     notes: dict[str, Any] = field(default_factory=dict)  # for people
+    follows: str = ""  # "style" or "instruction"
+    followed: dict[str, str] = field(default_factory=dict)  # the picture or the words, by model
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.settings import Distance, FitLabel, OfDataset
 from texgs.config.edit import Edit
 from texgs.config.methods import method_of
 from texgs.core.device import torch_device
+from texgs.edit.parts import parts_of
 from texgs.edit.task import Task
 from texgs.report.before_after import write_before_and_after
 from texgs.report.results import EditResult
@@ -61,6 +63,17 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         write_before_and_after(before, edited.scene, settings.lens.lens, output, device, title)
         pictures["edit.png"] = SHOWN
     result = EditResult(
-        task.edit.name, method.name, edited.how, edited.seconds, edited.lambda_s, dict(edited.notes)
+        *(task.edit.name, method.name, edited.how, edited.seconds, edited.lambda_s, dict(edited.notes)),
+        method.follows,
+        followed(task),
     )
     return Outcome(result, pictures)
+
+
+def followed(task: Task[Any]) -> dict[str, str]:
+    """The picture or the words that each part follows; none where the method follows neither."""
+    follows = method_of(task.edit).follows
+    if not follows:
+        return {}
+    parts = [part.name for part in parts_of(task.scene, task.edit.parts)]
+    return {name: Path(getattr(task.settings_for(name.split("/")[0]), follows)).name for name in parts}

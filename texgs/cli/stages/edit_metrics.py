@@ -46,8 +46,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     Args:
         settings: of the job.
-        inputs: `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth says where surfaces
-            are.
+        inputs: `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
         output: folder.
     """
     edit, views, weights = settings.edit, settings.views, settings.weights

@@ -28,6 +28,16 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
     return (running[offsets + counts] - running[offsets]) / counts[:, None]
 
 
+def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
+    """The model with the mean of their texels in all texels of some surfels [N] bool; of all by default."""
+    p = model.parameters
+    place, surfel = owners(p)
+    texels = p["texels"].clone()
+    mine = torch.ones_like(surfel, dtype=torch.bool) if surfels is None else surfels[surfel]
+    texels[place[mine]] = mean_texels(p).to(texels)[surfel[mine]]
+    return replace(model, parameters={**p, "texels": texels})
+
+
 def bare_colors(model: Surfels) -> Tensor:
     """c_ind of all texels [T, 3], each in its place in the list: palette + offset of its surfel + texel."""
     p = model.parameters
