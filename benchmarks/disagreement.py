@@ -1,7 +1,8 @@
 """One edit of six views against views that are edited again and again, by a guidance whose views disagree.
 
 `python -m benchmarks.disagreement SURFELS GAUSSIANS VOXELS VIEWS OUTPUT` takes fitted models of one basic
-scene in three fields and its views; it writes OUTPUT.csv and OUTPUT.png. Methods that iterate run with several lengths.
+scene in three fields and its views; it writes OUTPUT.csv and OUTPUT.png. Methods that iterate run longer and
+longer.
 """
 
 from __future__ import annotations

@@ -13,32 +13,39 @@ from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
 
 COMMON = [word for word in TINY if not word.startswith(("fit=", "fit."))]
-FITS = {
-    "stylesplat": [word for word in TINY if word.startswith(("fit=", "fit."))],
-    "arf": [
-        "fit=plenoxels_quick",
-        "fit.voxels.stages=[{side: 16, steps: 30}, {side: 32, steps: 40}]",
-        "fit.voxels.rays=512",
-        "fit.voxels.degree=1",
-    ],
+GAUSSIANS = [word for word in TINY if word.startswith(("fit=", "fit."))]
+VOXELS = [
+    "fit=plenoxels_quick",
+    "fit.voxels.stages=[{side: 16, steps: 30}, {side: 32, steps: 40}]",
+    "fit.voxels.rays=512",
+    "fit.voxels.degree=1",
+]
+PATCHES = ["nnfm=0", "patches=20"]
+FILTERS = ["guidance=filters", "lpips=0", "instruction=turn it into gold"]
+BASELINES = {  # fit and settings by edit
+    "stylesplat": (GAUSSIANS, [*PATCHES, "iterations=4"]),
+    "arf": (VOXELS, [*PATCHES, "epochs=0.2"]),
+    "in2n_frozen": (VOXELS, [*FILTERS, "every=1", "passes=0.5"]),
+    "igs2gs_frozen": (GAUSSIANS, [*FILTERS, "every=50", "passes=1"]),
+    "dge": (GAUSSIANS, [*FILTERS, "every=4", "rounds=2", "views=3"]),
 }
-FEW = {"stylesplat": ["edit.stylesplat.iterations=4"], "arf": ["edit.arf.epochs=0.2"]}
 
 
-@pytest.fixture(scope="module", params=list(FITS))
+@pytest.fixture(scope="module", params=list(BASELINES))
 def edited(request, tmp_path_factory):
-    """The folder of an edit without weights, its method, and the words that made it."""
-    method = request.param
-    words = [*COMMON, *FITS[method], f"edit={method}", f"edit.{method}.nnfm=0", f"edit.{method}.patches=20"]
+    """The folder of an edit without weights, and its method."""
+    edit, (fit, values) = request.param, BASELINES[request.param]
+    method = edit.removesuffix("_frozen")
+    words = [*COMMON, *fit, f"edit={edit}", *(f"edit.{method}.{value}" for value in values)]
     with pytest.MonkeyPatch.context() as patch:
         folder = tmp_path_factory.mktemp(method)
         patch.chdir(folder)
         patch.setenv("TEXGS_WEIGHTS", str(folder / "none"))
         patch.setenv("TORCH_HOME", str(folder / "none"))
-        assert main([f"edit_{method}", *words, *FEW[method]]) == 0
-        assert main(["edit_metrics", *words, *FEW[method]]) == 0
+        assert main([f"edit_{method}", *words]) == 0
+        assert main(["edit_metrics", *words]) == 0
         (scene,) = Path("results/sphere/scene").iterdir()
-        yield folder / scene / "edits" / method, method
+        yield folder / scene / "edits" / edit, method
 
 
 def numbers(folder):
@@ -51,21 +58,22 @@ def test_geometry_is_kept_and_colours_are_not(edited):
         read_scene(path / "scene.yaml").models["TF01"].open()[0]
         for path in (folder.parents[1] / "compose", folder)
     )
-    for name, x in before.tensors("geometry").items():
-        assert torch.equal(x, after.tensors("geometry")[name]), name
+    kept = [torch.equal(x, after.tensors("geometry")[n]) for n, x in before.tensors("geometry").items()]
+    assert not any(kept) if method == "dge" else all(kept)
     (one, two) = (field.tensors("appearance")["sh"] for field in (before, after))
     assert one.shape != two.shape or not torch.equal(one, two)
-    assert numbers(folder)["how"] == "patches"
+    assert numbers(folder)["how"].startswith(("patches", "procedural filters, geometry "))
     assert numbers(folder)["method"] == method
 
 
 def test_it_is_shown_and_measured(edited):
-    folder, _ = edited
-    for name in ("style.png", "convergence.png", "edit.png"):
+    folder, method = edited
+    pictures = ["views.png"] if method in ("in2n", "igs2gs", "dge") else ["style.png"]
+    for name in (*pictures, "convergence.png", "edit.png"):
         assert np.asarray(Image.open(folder / name).convert("RGB")).std() > 5, f"{name} shows nothing"
     assert (folder / "turntable.mp4").stat().st_size > 1000
     measured = numbers(folder.parents[1] / "edit_metrics" / folder.name)
-    assert measured["geometry_kept"] is True
+    assert measured["geometry_kept"] is (method != "dge")
     assert measured["frame_mean_ms"] > 0
 
 
@@ -84,6 +92,33 @@ def test_it_is_shown_and_measured(edited):
         (
             ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.style=none.png"],
             "edit.arf.style: expected the file of a picture, or one of strokes",
+        ),
+        (["edit_dge", "fit=quick", "edit=dge"], "edit dge: expected a fit of gaussians, got one of surfels"),
+        (
+            ["edit_dge", "fit=gaussians_quick", "edit=dge_quick", "edit.dge.instruction=make it odd"],
+            "instruction: expected",
+        ),
+        (
+            ["edit_in2n", "fit=plenoxels_quick", "edit=in2n_quick", "edit.in2n.noise=[0.9,0.1]"],
+            "edit.in2n.noise: expected two shares from 0 to 1, the smaller one first, got [0.9, 0.1]",
+        ),
+        (
+            [
+                "edit_igs2gs",
+                "fit=gaussians_quick",
+                "edit=igs2gs_quick",
+                "edit.igs2gs.l1=0",
+                "edit.igs2gs.dssim=0",
+            ],
+            "edit.igs2gs.l1, dssim, lpips: expected a weight above 0 for one of them, got 0 for all",
+        ),
+        (
+            ["edit_igs2gs", "fit=gaussians_quick", "edit=igs2gs_quick", "edit.looks=true"],
+            "dataset.looks of sphere: expected a look for each of TF01, got none for TF01; add one",
+        ),
+        (
+            ["edit_segment", "fit=quick", "edit=lobe", "edit.segment.model=TF01", "edit.looks=true"],
+            "edit.looks: expected a method that follows a picture or an instruction, got segment",
         ),
     ],
 )
