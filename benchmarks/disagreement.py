@@ -81,7 +81,7 @@ def runs(fitted: dict[str, Any], images: Images) -> Iterator[tuple[str, float, C
         for length in (1, 2, 4):
             grid = in2n.In2nKeys(lpips=0, every=5, density=1, sh=0.02, frozen=frozen, passes=length / 2)
             splats = igs2gs.Igs2gsKeys(every=150, rates=RATES, frozen=frozen, passes=length)
-            some = dge.DgeKeys(lpips=0, every=100, rates=RATES, frozen=frozen, rounds=length)
+            some = dge.DgeKeys(lpips=0, every=100, rates=RATES, prune=False, frozen=frozen, rounds=length)
             yield f"IN2N{twin}", length / 2, partial(again, in2n, grid, fitted["v"])
             yield f"Instruct-GS2GS{twin}", length, partial(again, igs2gs, splats, fitted["g"])
             yield f"DGE{twin}", length, partial(again, dge, some, fitted["g"])
