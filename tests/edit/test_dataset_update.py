@@ -13,7 +13,7 @@ from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.config.phase import CommonRates
 from texgs.core.errors import ArgumentError, FitError
 from texgs.edit.closeness import Closeness, differentiated
-from texgs.edit.dataset_update import update_field
+from texgs.edit.dataset_update import azimuth, update_field
 from texgs.edit.field_views import field_views
 from texgs.edit.gaussian_learner import GaussianLearner, radii
 from texgs.edit.turns import Schedule
@@ -123,6 +123,16 @@ def test_the_guidance_is_told_how_much_noise_to_use():
     schedule = Schedule(2, 2, views=1, levels=((0.9, 0.9), (0.3, 0.3)))
     update_field(learner, images, guidance, "anything", schedule)
     assert [views.level for views in guidance.seen] == [0.9, 0.3]
+
+
+def test_views_that_are_edited_together_go_around_the_object():
+    learner, images = splats()
+    guidance = Watching(COLOR)
+    update_field(learner, images, guidance, "anything", Schedule(1, 1, group=5))
+    (views,) = guidance.seen
+    angles = [azimuth(camera) for camera in views.cameras]
+    assert angles == sorted(angles)
+    assert len(angles) == 5
 
 
 def test_views_of_a_field_say_where_its_pixels_are():

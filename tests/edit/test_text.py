@@ -8,7 +8,7 @@ from tests.edit.textured import around, shell
 from texgs.core.errors import ArgumentError
 from texgs.edit.target_views import render_views
 from texgs.edit.text import RECIPES, edit_by_text
-from texgs.fields.surfels.texels import bare_colors
+from texgs.fields.surfels.texels import bare_colors, untextured
 from texgs.models.filters.guidance import ProceduralFilters
 
 
@@ -58,6 +58,17 @@ def test_refinement_keeps_some_of_the_first_style(model):
     pattern = torch.corrcoef(torch.stack([ink.mean(dim=1), blue.mean(dim=1)]))[0, 1]
     assert pattern > 0.6
     assert blue.std(dim=0).mean() > 2 * alone.std(dim=0).mean()
+
+
+def test_without_texture_each_surfel_has_the_mean_of_its_texels(model):
+    half = torch.arange(len(model)) % 2 == 0
+    plain = untextured(model, half)
+    p, offsets = plain.parameters, model.parameters["offsets"].tolist()
+    for n, count in enumerate(model.parameters["sizes"].prod(1).tolist()):
+        own, now = (q["texels"][offsets[n] : offsets[n] + count] for q in (model.parameters, p))
+        expected = own.double().mean(0).float().expand_as(own) if half[n] else own
+        torch.testing.assert_close(now, expected, atol=1e-6, rtol=1e-6)
+    assert (untextured(model).parameters["texels"] != model.parameters["texels"]).any()
 
 
 def test_bad_arguments(model):

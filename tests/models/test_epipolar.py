@@ -1,5 +1,7 @@
 """Epipolar lines against projected points, and attention across views against plain attention."""
 
+import math
+
 import pytest
 import torch
 from kornia.geometry.epipolar import essential_from_Rt, fundamental_from_essential
@@ -8,7 +10,15 @@ from torch.testing import assert_close
 from tests.models.tiny_diffusion import save_tiny
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
-from texgs.models.epipolar import Consistency, attend, epipolar_mask, fundamental, match, token_camera
+from texgs.models.epipolar import (
+    Consistency,
+    attend,
+    drawn_keys,
+    epipolar_mask,
+    fundamental,
+    match,
+    token_camera,
+)
 
 PAIRS = [((0, 0), (40, 10)), ((0, 0), (180, 0)), ((-90, 0), (0, 90)), ((30, -60), (200, 45))]
 
@@ -178,6 +188,42 @@ def test_keys_attend_to_the_tokens_of_all_keys(unet):
         both = views[branch].flatten(0, 1)[None]
         exact = attend(attention, both, both)[0].unflatten(0, (2, 16))
         assert_close(output[branch], exact, atol=1e-5, rtol=1e-5)
+
+
+@pytest.mark.parametrize(("count", "keys"), [(1, 1), (6, 1), (10, 2), (20, 4), (23, 4)])
+def test_one_view_of_each_group_is_a_key(count, keys):
+    generator = torch.Generator().manual_seed(0)
+    drawn = torch.tensor([drawn_keys(count, generator) for _ in range(200)])
+    assert drawn.shape == (200, keys)
+    bounds = torch.linspace(0, count, keys + 1).round()
+    assert (drawn >= bounds[:-1]).all()
+    assert (drawn < bounds[1:]).all()
+    assert len(drawn.unique()) == count, "any may be one"
+
+
+def test_the_two_nearest_keys_share_by_their_distances(unet):
+    consistency = Consistency(unet)
+    consistency.aim([orbit(angle, 0, 3.0, 35, 64, 64) for angle in range(0, 100, 10)], (64, 64))
+    consistency.key_ids = [0, 4, 9]
+    (near, share), (far, rest) = consistency._nearest_keys(3)
+    assert (near, far) == (1, 0)
+    a, b = (6 * math.sin(math.radians(angle / 2)) for angle in (10, 30))  # chords
+    assert share == pytest.approx(1 / (1 + math.exp(-b / (a + b))), abs=1e-5)
+    assert share + rest == pytest.approx(1)
+    consistency.key_ids = [5]
+    assert consistency._nearest_keys(3) == [(0, 1.0)]
+
+
+def test_outputs_of_two_keys_are_blended(unet):
+    """Two keys of one camera with the same latents give what either would."""
+    latents, texts = inputs(10, same=True)
+    plain = branches_of(unet, latents, texts)([0])[:, 0]
+    consistency = Consistency(unet)
+    consistency.aim([orbit(0, 0, 3.0, 35, 64, 64)] * 10, (64, 64))
+    found = consistency.run(branches_of(unet, latents, texts), 10, 500, torch.Generator().manual_seed(0))
+    assert len(consistency.key_ids) == 2
+    for view in range(10):
+        assert_close(found[:, view], plain, atol=1e-5, rtol=1e-5)
 
 
 def test_a_network_without_self_attention_is_refused():

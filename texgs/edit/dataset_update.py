@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import atan2, isfinite
 from typing import Protocol
 
 import torch
 from torch import Tensor
 
+from texgs.core.camera import Camera
 from texgs.core.errors import FitError
 from texgs.core.progress import progress
 from texgs.edit.field_views import field_views
@@ -120,6 +121,7 @@ class _Edits:
     def make(self, ids: Sequence[int], level: float) -> None:
         """Edit some views together, as the field shows them now."""
         start, field = time.monotonic(), self.learner.field
+        ids = sorted(ids, key=lambda view: azimuth(self.images.cameras[view]))  # those that follow are alike
         cameras = [self.images.cameras[view].to(field.device) for view in ids]
         conditions = torch.stack([self._condition(view) for view in ids]).to(field.device)
         views = field_views(field, cameras, conditions, level)
@@ -143,3 +145,9 @@ class _Edits:
     def views(self) -> dict[int, tuple[Tensor, Tensor]]:
         """Each view that was edited, as it was and as it is, by number."""
         return {view: (old, self.images.target(view).color) for view, old in sorted(self.before.items())}
+
+
+def azimuth(camera: Camera) -> float:
+    """Angle of a camera around the world's y axis, radians."""
+    x, _, z = camera.position.tolist()
+    return atan2(z, x)
