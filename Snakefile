@@ -30,6 +30,7 @@ rule all:
         rules.comparisons.input,
         rules.meshes.input,
         rules.scenes.input,
+        rules.galleries.input,
         rules.tables.output,
         rules.report.output if TABLES else [],
         collect("<results>/tables/sweep-{sweep}.csv", sweep=SWEEPS),

@@ -29,7 +29,7 @@ SMALL = (
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
-AFTER_FITS = {"figure", "comparison", "mesh", "compose", "pse", "timing", "edit", "edit_metrics"}
+AFTER_FITS = {"figure", "comparison", "mesh", "compose", "pse", "timing", "edit", "edit_metrics", "gallery"}
 TABLES = {"tables", "sweep", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
 GROUPS = {
@@ -42,6 +42,7 @@ GROUPS = {
     "meshes",
     "scenes",
     "edits",
+    "galleries",
     "phase",
 }  # only names
 

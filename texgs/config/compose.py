@@ -28,6 +28,7 @@ from texgs.core.errors import ConfigError
 RESERVED = (
     "volume",
     "transfer",
+    "gallery",
     "logs",
     "mlartifacts",
     "tables",

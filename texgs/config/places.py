@@ -33,6 +33,7 @@ PLACES = {
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
     "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
     "timing": Place("{dataset}/scene/{fit}/timing"),
+    "gallery": Place("{dataset}/gallery", ("gallery.png",)),
     "edit": Place("{dataset}/scene/{fit}/edits/{edit}", ("scene.yaml", "edit.png")),
     "edit_metrics": Place("{dataset}/scene/{fit}/edit_metrics/{edit}"),
 }

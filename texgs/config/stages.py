@@ -6,6 +6,7 @@ from omegaconf import DictConfig
 
 from texgs.config.fields import Kind, kinds
 from texgs.config.inputs import (
+    all_looks,
     all_models,
     compared_models,
     edit_settings,
@@ -61,6 +62,13 @@ def is_compared(config: DictConfig) -> bool:
 def has_scene(config: DictConfig) -> bool:
     """Whether the configuration is of all basic TFs."""
     return is_fit(config) and config.tf is None
+
+
+def has_gallery(config: DictConfig) -> bool:
+    """Whether this is the first of the recipes of an experiment with several edits."""
+    if not has_scene(config) or config.sweep.variants or len(config.edits) < 2:
+        return False
+    return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
 
 def edit_stage(method: Method) -> Stage:
@@ -235,6 +243,15 @@ ROWS = (
         applies=has_scene,
     ),
     *map(edit_stage, methods().values()),
+    Stage(
+        "gallery",
+        "texgs.cli.stages.gallery",
+        select=lambda config: {"lens": lens(config)},
+        inputs=all_looks,
+        place="gallery",
+        needs=("compose", *(method.stage for method in methods().values())),
+        applies=has_gallery,
+    ),
     Stage(
         "edit_metrics",
         "texgs.cli.stages.edit_metrics",

@@ -94,6 +94,13 @@ class ComparisonResult:
 
 
 @dataclass(frozen=True)
+class GalleryResult:
+    """Looks side by side."""
+
+    looks: list[str]
+
+
+@dataclass(frozen=True)
 class MeshResult:
     """The surface of a fit against that of its volume; lengths in world units."""
 
@@ -195,6 +202,7 @@ Result = (
     | FitResult
     | FigureResult
     | ComparisonResult
+    | GalleryResult
     | MeshResult
     | SceneResult
     | PseResult

@@ -1,9 +1,15 @@
-# New looks for scenes and new parts of them, by any method; and what can be measured of them.
+# New looks for scenes and new parts of them, by any method; what can be measured of them, and all of
+# them side by side.
 
 
 rule edits:
     input:
         PLAN.done("edit", "edit_metrics"),
+
+
+rule galleries:
+    input:
+        PLAN.done("gallery"),
 
 
 rule edit:
@@ -36,5 +42,20 @@ rule edit_metrics:
     params:
         code=code("edit_metrics"),
         words=words("edit_metrics"),
+    shell:
+        RUN
+
+
+rule gallery:
+    input:
+        reads("gallery"),
+    output:
+        writes("gallery"),
+    log:
+        log_of("gallery"),
+    threads: 4
+    params:
+        code=code("gallery"),
+        words=words("gallery"),
     shell:
         RUN
