@@ -107,7 +107,7 @@ def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
     of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
     compared = 1
-    assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep + compared
+    assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep + side_by_side
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert (results / "tables" / f"{name}.csv").stat().st_size > 0
     assert "red" in (results / "tables" / "looks.md").read_text()
@@ -204,7 +204,7 @@ def test_what_is_damaged_is_made_again_and_nothing_else(project):
 def test_a_failed_edit_keeps_the_earlier_one(project, sources):
     folder = project.work / "results" / "sphere" / "scene" / "demo" / "edits" / "red"
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    sources("texgs/methods/text.py", "guidance_of(task.settings", "no_guidance(task.settings")
+    sources("texgs/methods/text.py", "task.settings.opened(", "task.settings.no_guidance(")
     failed = project.snakemake(**OPTIONS)
     assert failed.returncode != 0
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
