@@ -39,13 +39,13 @@ def found(vgg, request):
 
 
 def test_features_come_closer_to_the_style_than_its_projection_is(found):
-    """Measured: .462 to .420 opaque, .531 to .470 translucent; .596 by the recipe for opaque scenes."""
+    """Measured: .462 to .420 opaque, .531 to .473 translucent; .596 by the recipe for opaque scenes."""
     fall = 0.03 if found["opacity"] == OPAQUE else 0.045
     assert found["edit"].nnfm < found["start"].nnfm - fall
 
 
 def test_features_occur_together_more_as_in_the_style(found):
-    """Measured: .900 to .802 opaque, .952 to .908 translucent; nothing optimises Gram matrices."""
+    """Measured: .900 to .802 opaque, .952 to .902 translucent; nothing optimises Gram matrices."""
     fall = 0.06 if found["opacity"] == OPAQUE else 0.02
     assert found["edit"].gram < found["start"].gram - fall
 

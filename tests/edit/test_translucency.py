@@ -26,5 +26,7 @@ def test_recipes_follow_it_but_for_the_papers():
     assert recipe.adapted(0.8) is recipe
     other = recipe.adapted(0.5)
     assert (other.opacity, other.chroma) == (8, 2)
-    assert other.distribution == 8 * recipe.distribution
+    assert (other.distribution, other.patches) == (8 * recipe.distribution, 0)
+    weightless = preset("patches")
+    assert weightless.adapted(0.5).patches == weightless.patches
     assert preset("paper").adapted(0.5) == preset("paper")

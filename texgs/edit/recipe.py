@@ -96,13 +96,18 @@ class Recipe:
         """The recipe for a scene of which pixels have this alpha, see `translucency.mean_alpha`.
 
         Layers are averaged in a pixel of a translucent scene. Each learns as if it were opaque. A pixel shows
-        the share alpha of the differences between its colours, so these are divided by it beforehand. What
-        tells a style is then how often its features occur more than which: their distribution weighs more.
+        the share alpha of the differences between its colours, so these are divided by it beforehand.
+        Distributions of features weigh more, as they tell what is left of a pattern; those of pixels, which
+        an average cannot have, do not count beside them.
         """
         if not self.adapts or alpha >= OPAQUE:
             return self
         return replace(
-            self, opacity=8 * self.opacity, chroma=self.chroma / alpha, distribution=8 * self.distribution
+            self,
+            opacity=8 * self.opacity,
+            chroma=self.chroma / alpha,
+            distribution=8 * self.distribution,
+            patches=0.0 if self.features > 0 else self.patches,
         )
 
 
