@@ -23,7 +23,7 @@ from texgs.models.vgg import CHANNELS, STYLE_LAYERS, Vgg
 
 ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick
 LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)
-RECIPES = ("default", "patches", "translucent")
+RECIPES = ("default", "patches")
 
 
 def run(settings: Settings) -> Section:

@@ -15,7 +15,16 @@ from texgs.edit.recipe import Recipe
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 
-RECIPE = Recipe(iterations=4, rate=0.01, features=0.0, patches=1.0, behind="white", cropped=False, reduce=1)
+RECIPE = Recipe(
+    iterations=4,
+    rate=0.01,
+    features=0.0,
+    distribution=0.0,
+    patches=1.0,
+    behind="white",
+    cropped=False,
+    reduce=1,
+)
 STYLE = StylePicture.of(picture("dots", 96))
 
 

@@ -1,6 +1,7 @@
 import pytest
 import torch
 
+from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.objective import Objective, pooled
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import preset
@@ -14,11 +15,21 @@ EXACT = {"positions": None, "dimensions": None, "queries": None}
 
 def test_terms_are_the_losses_times_their_weights(vgg):
     image, share = torch.rand(3, 48, 40), torch.rand(48, 40).round()
-    recipe = preset("default", features=2.0, lambda_s=0.75, patches=3.0, **EXACT)
+    recipe = preset("default", features=2.0, lambda_s=0.75, distribution=0.5, patches=3.0, **EXACT)
     terms = Objective.of(recipe, STYLE, 1, vgg, lambda x: x[0, 0, 0]).terms(image, share, 5)
     where = pooled(share, 4, torch.Size((12, 10)))
     exact = nnfm(vgg.features(image), StyleFeatures.of(vgg.features(STYLE.image)), where)
     assert float(terms["nnfm"]) == pytest.approx(2 * 0.75 * float(exact), rel=1e-5)
+    layers = ("relu1_2", "relu2_2")
+    ours, others = ([x[0] for x in vgg.layers(each, layers)] for each in (image, STYLE.image))
+    ours.append(vgg.features(image))
+    others.append(vgg.features(STYLE.image))
+    distances = [
+        FeatureDistribution.of(other).distance(our, pooled(share, 48 // our.shape[1], our.shape[1:]), 5, 5)
+        for our, other in zip(ours, others, strict=True)
+    ]
+    mean = sum(map(float, distances)) / 3
+    assert float(terms["distribution"]) == pytest.approx(2 * 0.75 * 0.5 * mean, rel=1e-5)
     assert float(terms["clip"]) == pytest.approx(2 * 0.25 * float(image[0, 0, 0]))
     distance = sliced_wasserstein(image, PatchStatistics.of(STYLE.image), share, bank=5, seed=5)
     assert float(terms["patches"]) == pytest.approx(3 * float(distance), rel=1e-5)

@@ -6,7 +6,7 @@ from texgs.edit.recipe import PRESETS, Recipe, preset
 
 def test_presets_say_what_they_need():
     needs = {name: (recipe.needs_vgg, recipe.needs_clip) for name, recipe in PRESETS.items()}
-    assert needs["default"] == needs["translucent"] == (True, False)
+    assert needs["default"] == (True, False)
     assert needs["patches"] == needs["preview"] == (False, False)
     assert needs["paper"] == (True, True)
     assert preset("paper", lambda_s=0.0).needs_vgg is False
@@ -25,6 +25,8 @@ def test_features_see_a_reduced_image_of_a_large_view():
         ({"features": 0, "patches": 0}, "features, patches: expected a weight above 0 for one of them"),
         ({"lambda_s": 1.5}, "lambda_s: expected a share from 0 to 1, got 1.5"),
         ({"pattern": 0}, "pattern: expected more than 0, got 0"),
+        ({"chroma": 0}, "chroma: expected more than 0, got 0"),
+        ({"distribution": -1}, "distribution: expected 0 or more, got -1"),
         ({"positions": 0}, "positions: expected more than 0, got 0"),
         ({"start": "noise"}, "start: expected one of projected, mean, random, transfer, got 'noise'"),
         ({"behind": "black"}, "behind: expected one of style, white, got 'black'"),

@@ -4,7 +4,7 @@ import torch
 from PIL import Image
 
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.edit.style_picture import filled, mirrored_crop, read_style
+from texgs.edit.style_picture import StylePicture, filled, mirrored_crop, read_style
 
 
 def pixels(height, width, channels=3, seed=0):
@@ -99,3 +99,11 @@ def test_a_crop_is_one_of_the_mirrored_plane():
     image = torch.rand(3, 5, 4)
     plane = torch.from_numpy(np.pad(image.numpy(), ((0, 0), (0, 30), (0, 30)), mode="symmetric"))
     assert torch.equal(mirrored_crop(image, 7, 3, 12, 20), plane[:, 7:19, 3:23])
+
+
+def test_a_vivid_style_has_its_greys_and_twice_its_differences_from_them():
+    image = torch.full((3, 40, 40), 0.5)
+    image[:, :, 20:] = torch.tensor([0.2, 0.3, 0.7])[:, None, None]
+    vivid = StylePicture.of(image).vivid(2.0).image
+    assert torch.equal(vivid[:, :, :20], image[:, :, :20])
+    torch.testing.assert_close(vivid[:, 0, 30], torch.tensor([0.0, 0.2, 1.0]))

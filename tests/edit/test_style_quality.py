@@ -12,17 +12,23 @@ from texgs.metrics.style import likeness
 from texgs.models.vgg import Vgg
 
 SIZE = 96
+OPAQUE, TRANSLUCENT = 4.0, -0.5  # logits of the surfels' opacity; mean alpha .96 and .65
 
 
 @pytest.fixture(scope="module")
-def found():
-    """Likeness of views not trained on: of the style laid onto the surface, and of the edit."""
-    vgg = Vgg.load(real_data("weights") / "vgg16_features_fp16.safetensors")
+def vgg():
+    """The real weights."""
+    return Vgg.load(real_data("weights") / "vgg16_features_fp16.safetensors")
+
+
+@pytest.fixture(scope="module", params=[OPAQUE, TRANSLUCENT], ids=["opaque", "translucent"])
+def found(vgg, request):
+    """Opacity, and likeness of views not trained on: of the style laid onto the surface, and of the edit."""
     style = StylePicture.of(picture("waves", 256))
-    scene, (cameras, lights) = ball(800, 7), views(15, SIZE)
+    scene, (cameras, lights) = ball(800, 7, request.param), views(15, SIZE)
     held, learned = slice(0, None, 5), [i for i in range(15) if i % 5]
     recipe = preset("default", iterations=40, rate=0.1, pattern=2.0)
-    done = {}
+    done = {"opacity": request.param}
     for name, chosen in (("start", preset("preview", pattern=2.0)), ("edit", recipe)):
         edited = stylize(
             scene, [cameras[i] for i in learned], [lights[i] for i in learned], style, chosen, vgg=vgg
@@ -33,8 +39,18 @@ def found():
 
 
 def test_features_come_closer_to_the_style_than_its_projection_is(found):
-    assert found["edit"].nnfm < found["start"].nnfm - 0.02
+    """Measured: .462 to .420 opaque, .531 to .473 translucent; .596 by the recipe for opaque scenes."""
+    fall = 0.03 if found["opacity"] == OPAQUE else 0.045
+    assert found["edit"].nnfm < found["start"].nnfm - fall
+
+
+def test_features_occur_together_more_as_in_the_style(found):
+    """Measured: .900 to .802 opaque, .952 to .902 translucent; nothing optimises Gram matrices."""
+    fall = 0.06 if found["opacity"] == OPAQUE else 0.02
+    assert found["edit"].gram < found["start"].gram - fall
 
 
 def test_colours_are_those_of_the_style(found):
+    if found["opacity"] == TRANSLUCENT:
+        pytest.skip("no pixel is opaque, white shows through all of them")
     assert max(abs(x) for x in found["edit"].color) < 0.05

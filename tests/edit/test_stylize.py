@@ -161,7 +161,7 @@ def test_a_clip_term_is_any_loss_of_an_image(vgg, style):
     red, green, blue = render_unlit(done.model, cameras[0])
     assert red > 0.7 > 0.3 > max(green, blue)
     both = stylize(ball(), cameras, lights, style, short(lambda_s=0.9), vgg=vgg, clip=redness)
-    assert both.history.losses.keys() == {"nnfm", "clip", "patches"}
+    assert both.history.losses.keys() == {"nnfm", "distribution", "clip", "patches"}
 
 
 def test_the_paper_looks_at_the_whole_view_over_white(vgg, style):

@@ -26,7 +26,9 @@ from texgs.raster.voxel_grid import unpack_rows
 from texgs.raster.voxels import render_view
 from texgs.volume.images import Images
 
-RECIPE = Recipe(iterations=8, features=0.0, patches=50.0, behind="white", cropped=False, reduce=2)
+RECIPE = Recipe(
+    iterations=8, features=0.0, distribution=0.0, patches=50.0, behind="white", cropped=False, reduce=2
+)
 WEIGHTS = ArfWeights(content=0.0, variation=0.1)
 STYLE = StylePicture.of(picture("dots", 96))
 A = torch.tensor([[0.6, 0.2, 0.0], [0.1, 0.5, 0.1], [0.0, 0.1, 0.7]])

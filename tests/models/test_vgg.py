@@ -85,3 +85,17 @@ def test_real_weights_tell_an_edge_from_noise():
     noise = torch.rand(2, 3, 64, 64)
     a, b, c = (network.features(x).mean(dim=(1, 2)) for x in (*noise, stripes))
     assert torch.cosine_similarity(a, b, dim=0) > torch.cosine_similarity(a, c, dim=0) + 0.2
+
+
+def test_layers_of_a_block_are_joined_by_their_stride(files):
+    network = Vgg.load(files / "vgg.pth", dtype=torch.float32)
+    image = torch.rand(3, 16, 24)
+    found = network.blocks(image, ("relu1_2", "relu2_2", *STYLE.values()))
+    assert {stride: x.shape for stride, x in found.items()} == {
+        1: (64, 16, 24),
+        2: (128, 8, 12),
+        4: (768, 4, 6),
+    }
+    layers = [x[0] for x in network.layers(image[None], ("relu1_2", "relu2_2"))]
+    assert_close([found[1], found[2]], layers, rtol=0, atol=0)
+    assert_close(found[4], network.features(image), rtol=0, atol=0)

@@ -1,4 +1,4 @@
-"""How far a view is from a style: NNFM of VGG features, a CLIP term, sliced distance of patches."""
+"""How far a view is from a style: NNFM and distribution of VGG features, a CLIP term, patches."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError, FitError
+from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.recipe import Recipe
 from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
 from texgs.edit.style_picture import StylePicture
 from texgs.models.nnfm import StyleFeatures, nnfm
-from texgs.models.vgg import Vgg
+from texgs.models.vgg import STYLE_LAYERS, Vgg
 
 FeatureTerm = Callable[[Tensor], Tensor]  # image [H, W, 3] in [0, 1] to a loss []
-STRIDE = 4  # pixels between the positions of VGG's features
+FINE_LAYERS = ("relu1_2", "relu2_2")  # whose distributions are compared beside that of the style's layers
+STRIDE = 4  # pixels between the positions of the features that NNFM compares
 ON_OBJECT = 0.5  # of alpha, from which a feature or a patch counts
 LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
 
@@ -31,6 +33,7 @@ class Objective:
     reduce: int
     vgg: Vgg | None
     style: StyleFeatures | None
+    distributions: Mapping[int, FeatureDistribution]  # by the stride of their features; none: not compared
     patches: PatchStatistics | None
     clip: FeatureTerm | None
 
@@ -59,23 +62,19 @@ class Objective:
                 f"clip: expected a CLIP term for lambda_s = {recipe.lambda_s:g}, got none; set it to 1"
             )
         features = patches = None
+        distributions: dict[int, FeatureDistribution] = {}
         if recipe.needs_vgg and vgg is not None:
-            small = style.scaled(max(style.region.shape) / reduce)
-            with torch.no_grad():
-                maps = vgg.features(small.image)
-            region = (
-                F.interpolate(small.region[None, None].float(), maps.shape[1:], mode="area")[0, 0] > ON_OBJECT
-            )
+            maps, regions = style_maps(style.scaled(max(style.region.shape) / reduce), recipe, vgg)
             features = StyleFeatures.of(
-                maps,
-                region if bool(region.any()) else None,
-                recipe.positions,
-                recipe.dimensions,
-                recipe.seed,
+                maps[STRIDE], regions[STRIDE], recipe.positions, recipe.dimensions, recipe.seed
             )
+            if recipe.distribution > 0:
+                distributions = {
+                    s: FeatureDistribution.of(x, regions[s], recipe.seed) for s, x in maps.items()
+                }
         if recipe.patches > 0 and recipe.iterations > 0:
             patches = PatchStatistics.of(style.image, style.region, recipe.seed)
-        return cls(recipe, reduce, vgg, features, patches, clip)
+        return cls(recipe, reduce, vgg, features, distributions, patches, clip)
 
     def terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
         """Weighted losses [] by name, differentiable in the image.
@@ -85,12 +84,7 @@ class Objective:
             share: [h, w] how much of each pixel is to look like the style.
             iteration: chooses the directions and the draw of patches.
         """
-        recipe, terms = self.recipe, {}
-        if self.style is not None and self.vgg is not None:
-            features = self.vgg.features(self.small(image))
-            where = pooled(share, self.reduce * STRIDE, features.shape[1:]) if recipe.foreground else None
-            distance = nnfm(features, self.style, where, recipe.queries, iteration)
-            terms["nnfm"] = recipe.features * recipe.lambda_s * distance
+        recipe, terms = self.recipe, self.feature_terms(image, share, iteration)
         if recipe.needs_clip and self.clip is not None:
             terms["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
         if self.patches is not None:
@@ -98,6 +92,24 @@ class Objective:
             terms["patches"] = recipe.patches * sliced_wasserstein(
                 image, self.patches, where, iteration, iteration
             )
+        return terms
+
+    def feature_terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
+        """Those of them that compare features of VGG; see `terms`."""
+        recipe = self.recipe
+        if self.style is None or self.vgg is None:
+            return {}
+        maps = self.vgg.blocks(self.small(image), wanted_layers(recipe))
+        on: dict[int, Tensor | None] = dict.fromkeys(maps)
+        if recipe.foreground:
+            on = {s: pooled(share, self.reduce * s, x.shape[1:]) for s, x in maps.items()}
+        weight = recipe.features * recipe.lambda_s
+        terms = {"nnfm": weight * nnfm(maps[STRIDE], self.style, on[STRIDE], recipe.queries, iteration)}
+        if self.distributions:
+            distances = [
+                each.distance(maps[s], on[s], iteration, iteration) for s, each in self.distributions.items()
+            ]
+            terms["distribution"] = weight * recipe.distribution * torch.stack(distances).mean()
         return terms
 
     def content(self, image: Tensor, target: Tensor) -> Tensor:
@@ -116,6 +128,24 @@ class Objective:
     def small(self, image: Tensor) -> Tensor:
         """The image [3, h, w] as features see it."""
         return F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
+
+
+def wanted_layers(recipe: Recipe) -> tuple[str, ...]:
+    """Names of the layers that the losses of a recipe look at."""
+    return (*FINE_LAYERS, *STYLE_LAYERS) if recipe.distribution > 0 else STYLE_LAYERS
+
+
+@torch.no_grad()
+def style_maps(
+    style: StylePicture, recipe: Recipe, vgg: Vgg
+) -> tuple[dict[int, Tensor], dict[int, Tensor | None]]:
+    """Features [C, h, w] of a style by their stride, and which [h, w] of them count; None: all."""
+    maps = vgg.blocks(style.image, wanted_layers(recipe))
+    regions: dict[int, Tensor | None] = {}
+    for stride, features in maps.items():
+        share = F.interpolate(style.region[None, None].float(), features.shape[1:], mode="area")[0, 0]
+        regions[stride] = share > ON_OBJECT if bool((share > ON_OBJECT).any()) else None
+    return maps, regions
 
 
 def view_order(views: int, recipe: Recipe) -> list[int]:

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 from texgs.core.errors import ArgumentError
 
 Start = Literal["projected", "mean", "random", "transfer"]
+OPAQUE = 0.8  # mean alpha from which on a scene is taken for opaque
 FULL_RESOLUTION = 500  # pixels of the longer side up to which features see every pixel
 
 
@@ -15,7 +16,8 @@ FULL_RESOLUTION = 500  # pixels of the longer side up to which features see ever
 class Recipe:
     """Numbers of an image-driven edit; the defaults are those of `default`.
 
-    The loss is features * (lambda_s * NNFM + (1 - lambda_s) * CLIP) + patches * sliced Wasserstein distance.
+    The loss is features * (lambda_s * (NNFM + distribution * D) + (1 - lambda_s) * CLIP) + patches * P, with
+    the sliced Wasserstein distances D of features and P of patches of pixels.
 
     Raises:
         ArgumentError: naming the value that is out of range.
@@ -28,7 +30,8 @@ class Recipe:
     last_rate: float = 0.1  # at the end, relative to that
     features: float = 1.0  # weight of NNFM and CLIP together; at 0 no weights of VGG are needed
     lambda_s: float = 1.0  # share of NNFM in them; below 1 a CLIP term is needed
-    patches: float = 50.0  # weight of the sliced Wasserstein distance
+    distribution: float = 0.25  # weight of the sliced Wasserstein distance of features
+    patches: float = 50.0  # weight of that of patches of pixels
     pattern: float = 1.0  # size of the style's pattern: its longer side, in longer sides of a view
     behind: Literal["style", "white"] = (
         "style"  # what is behind the object: another part of the style, or white
@@ -40,15 +43,26 @@ class Recipe:
     dimensions: int | None = 64  # of that search, by principal components; None: all, the search is exact
     reduce: int | None = None  # features see averages of so many pixels each way; None: by the views' size
     opacity: float = 1.0  # factor on opacities while stylising, so that what is in front counts more
+    chroma: float = 1.0  # factor on the differences of the style's colours from grey
+    adapts: bool = True  # whether opacity, chroma and weights follow how translucent the scene is
     is_textured: bool = True  # whether each texel learns, or each surfel one colour: the paper's ablation
     is_lit: bool = True  # whether the losses see the light of the views, or colours without any
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for name in ("iterations", "rate", "features", "patches"):
+        for name in ("iterations", "rate", "features", "distribution", "patches"):
             if not getattr(self, name) >= 0:
                 raise ArgumentError(f"{name}: expected 0 or more, got {getattr(self, name)}")
-        for name in ("last_rate", "pattern", "opacity", "queries", "positions", "dimensions", "reduce"):
+        for name in (
+            "last_rate",
+            "pattern",
+            "opacity",
+            "chroma",
+            "queries",
+            "positions",
+            "dimensions",
+            "reduce",
+        ):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise ArgumentError(f"{name}: expected more than 0, got {value}")
@@ -78,14 +92,29 @@ class Recipe:
         """Pixels each way that features see as one, for views of this size."""
         return self.reduce or max(1, round(max(width, height) / FULL_RESOLUTION))
 
+    def adapted(self, alpha: float) -> Recipe:
+        """The recipe for a scene of which pixels have this alpha, see `translucency.mean_alpha`.
+
+        Layers are averaged in a pixel of a translucent scene. Each learns as if it were opaque. A pixel shows
+        the share alpha of the differences between its colours, so these are divided by it beforehand.
+        Distributions of features weigh more, as they tell what is left of a pattern; those of pixels, which
+        an average cannot have, do not count beside them.
+        """
+        if not self.adapts or alpha >= OPAQUE:
+            return self
+        return replace(
+            self,
+            opacity=8 * self.opacity,
+            chroma=self.chroma / alpha,
+            distribution=8 * self.distribution,
+            patches=0.0 if self.features > 0 else self.patches,
+        )
+
 
 DEFAULT = Recipe()
 PRESETS = {
     "default": DEFAULT,
     "patches": replace(DEFAULT, features=0.0, iterations=150, rate=0.025),
-    # Layers are averaged in a pixel: each learns as if it were opaque, and colours are held less tightly,
-    # because an average that has to show all of a style's contrast drives its layers to pure colours.
-    "translucent": replace(DEFAULT, opacity=8.0, patches=20.0),
     "preview": replace(DEFAULT, iterations=0),
     "paper": Recipe(
         iterations=3000,
@@ -93,6 +122,7 @@ PRESETS = {
         rate=0.025,
         last_rate=1.0,
         lambda_s=0.9,
+        distribution=0.0,
         patches=0.0,
         behind="white",
         cropped=False,
@@ -101,6 +131,7 @@ PRESETS = {
         positions=None,
         dimensions=None,
         reduce=1,
+        adapts=False,
     ),
 }
 

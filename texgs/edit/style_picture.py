@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +76,11 @@ class StylePicture:
         image = F.interpolate(self.image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
         region = F.interpolate(self.region[None, None].float(), size, mode="area")[0, 0] > 0.5
         return StylePicture(image, region if bool(region.any()) else torch.ones_like(region))
+
+    def vivid(self, gain: float) -> StylePicture:
+        """The style with the differences of its colours from grey times a gain, as far as they can be."""
+        grey = self.image.mean(0)
+        return replace(self, image=(grey + gain * (self.image - grey)).clamp(0, 1))
 
     def to(self, device: torch.device | str) -> StylePicture:
         """The same on another device."""

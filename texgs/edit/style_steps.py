@@ -18,6 +18,7 @@ from texgs.edit.objective import FeatureTerm, Objective, differentiated, finite_
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_picture import StylePicture, mirrored_crop
 from texgs.edit.style_start import pixel_side, start_colors
+from texgs.edit.translucency import mean_alpha
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels, owners, recolored
 from texgs.models.vgg import Vgg
@@ -68,8 +69,10 @@ class StyleSteps:
     ) -> StyleSteps:
         """Lay the style onto the surface and compute its features."""
         p = model.parameters
+        if recipe.adapts:
+            recipe = recipe.adapted(mean_alpha(model, cameras))
         width, height = cameras[0].width, cameras[0].height
-        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
+        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height)).vivid(recipe.chroma)
         objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
         texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed)
         colors, fixed = -p["palette"].expand_as(p["colors"]), None

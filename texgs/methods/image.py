@@ -31,8 +31,8 @@ class ImageKeys(StyleKeys):
 
     recipe: str = key(
         "default",
-        "default; translucent, for semi-transparent scenes; patches, which needs no weights; preview; paper",
-        choices=("default", "translucent", "patches", "preview", "paper"),
+        "default; patches, which needs no weights; preview, the picture laid onto the surface; paper",
+        choices=("default", "patches", "preview", "paper"),
     )
     iterations: int | None = key(None, "views, one each; default the recipe's", least=0)
     lambda_s: float | None = key(

@@ -51,6 +51,7 @@ class FeatureKeys(StyleKeys):
         return Recipe(
             iterations=iterations,
             features=self.nnfm,
+            distribution=0.0,
             patches=self.patches,
             behind="white",
             cropped=False,

@@ -118,7 +118,7 @@ def nnfm(
         ShapeError: if the shapes do not fit.
     """
     size = check.shape("features", features, "C h w", C=style.unit.shape[1])
-    queries = features.flatten(1).T  # [h w, C]
+    queries = features.permute(1, 2, 0).flatten(0, 1)  # [h w, C], a view where channels are last in memory
     if where is not None:
         check.shape("where", where, "h w", h=size["h"], w=size["w"])
         queries = queries[where.flatten().nonzero()[:, 0]]

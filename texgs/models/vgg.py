@@ -71,33 +71,48 @@ class Vgg:
         """That features are computed in."""
         return self.weights[0].dtype
 
-    def layers(self, images: Tensor) -> list[Tensor]:
-        """Outputs [N, C, H/s, W/s] of the wanted layers, s = 1, 2, 4 ... by block; differentiable.
+    def layers(self, images: Tensor, wanted: Sequence[str] | None = None) -> list[Tensor]:
+        """Outputs [N, C, H/s, W/s] of some layers, s = 1, 2, 4 ... by block; differentiable.
 
         Args:
             images: [N, 3, H, W], red, green and blue in [0, 1].
+            wanted: names of layers up to the last one that was loaded, in order; by default those loaded for.
         """
         from kornia.enhance import normalize
 
         check.shape("images", images, "N 3 H W")
         x = normalize(images, torch.tensor(MEAN), torch.tensor(DEVIATION))
         x = x.to(self.dtype, memory_format=torch.channels_last)
-        features = []
+        wanted, features = self.wanted if wanted is None else wanted, []
         for name, weight, bias in zip(self.names, self.weights, self.biases, strict=True):
             if name.endswith("_1") and name != "relu1_1":
                 x = F.max_pool2d(x, 2)
             x = F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
-            if name in self.wanted:
+            if name in wanted:
                 features.append(x)
         return features
 
+    def blocks(self, image: Tensor, wanted: Sequence[str] | None = None) -> dict[int, Tensor]:
+        """Some layers, those of a block as one [C, H/s, W/s], by s; without copying their channels' order.
+
+        Args:
+            image: [3, H, W] in [0, 1].
+            wanted: as of `layers`.
+        """
+        wanted = self.wanted if wanted is None else wanted
+        joined: dict[int, list[Tensor]] = {}
+        for name, layer in zip(wanted, self.layers(image[None], wanted), strict=True):
+            joined.setdefault(2 ** (int(name[4]) - 1), []).append(layer)
+        return {stride: torch.cat(layers, dim=1)[0] for stride, layers in joined.items()}
+
     def features(self, image: Tensor) -> Tensor:
-        """The wanted layers of one block as one [C, H/s, W/s], without copying their channels' order.
+        """The wanted layers, all of one block, as one [C, H/s, W/s].
 
         Args:
             image: [3, H, W] in [0, 1].
         """
-        return torch.cat(self.layers(image[None]), dim=1)[0]
+        (features,) = self.blocks(image).values()
+        return features
 
 
 def place(name: str) -> int:
