@@ -21,7 +21,7 @@ def test_terms_are_the_losses_times_their_weights(vgg):
     exact = nnfm(vgg.features(image), StyleFeatures.of(vgg.features(STYLE.image)), where)
     assert float(terms["nnfm"]) == pytest.approx(2 * 0.75 * float(exact), rel=1e-5)
     layers = ("relu1_2", "relu2_2")
-    ours, others = ([x[0] for x in vgg.layers(each, layers)] for each in (image, STYLE.image))
+    ours, others = ([x[0] for x in vgg.layers(each[None], layers)] for each in (image, STYLE.image))
     ours.append(vgg.features(image))
     others.append(vgg.features(STYLE.image))
     distances = [

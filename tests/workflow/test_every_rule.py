@@ -106,7 +106,7 @@ def sources(project):
 def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
     of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
-    compared = 1
+    side_by_side = 2  # comparison and gallery
     assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep + side_by_side
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert (results / "tables" / f"{name}.csv").stat().st_size > 0
