@@ -37,3 +37,4 @@ def check_edit(config: DictConfig) -> None:
         method = method_of(config.edit)
         require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
         method.check(method.of(config.edit))
+        method.check_fit(method.of(config.edit), config.fit)
