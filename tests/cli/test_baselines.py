@@ -20,11 +20,24 @@ VOXELS = [
     "fit.voxels.rays=512",
     "fit.voxels.degree=1",
 ]
+PALETTE = [
+    "fit=stylerf_quick",
+    "fit.palette.voxels.stages=[{side: 16, steps: 40}]",
+    "fit.palette.voxels.rays=512",
+    "fit.palette.hash={levels: 3, entries: 1024, finest: 64}",
+    "fit.palette.seed_steps=10",
+    "fit.palette.base_steps=30",
+    "fit.palette.palette_steps=20",
+    "fit.palette.rays=512",
+    "fit.palette.step=8",
+    "fit.palette.colors=2",
+]
 PATCHES = ["nnfm=0", "patches=20"]
 FILTERS = ["guidance=filters", "lpips=0", "instruction=turn it into gold"]
 BASELINES = {  # fit and settings by edit
     "stylesplat": (GAUSSIANS, [*PATCHES, "iterations=4"]),
     "arf": (VOXELS, [*PATCHES, "epochs=0.2"]),
+    "stylerf": (PALETTE, [*PATCHES, "epochs=0.2", "distillation=10", "styles=[strokes,glass]"]),
     "in2n_frozen": (VOXELS, [*FILTERS, "every=1", "passes=0.5"]),
     "igs2gs_frozen": (GAUSSIANS, [*FILTERS, "every=50", "passes=1"]),
     "dge": (GAUSSIANS, [*FILTERS, "every=4", "rounds=2", "views=3"]),
@@ -60,8 +73,11 @@ def test_geometry_is_kept_and_colours_are_not(edited):
     )
     kept = [torch.equal(x, after.tensors("geometry")[n]) for n, x in before.tensors("geometry").items()]
     assert not any(kept) if method == "dge" else all(kept)
-    (one, two) = (field.tensors("appearance")["sh"] for field in (before, after))
-    assert one.shape != two.shape or not torch.equal(one, two)
+    one, two = (field.tensors("appearance") for field in (before, after))
+    assert any(
+        name not in one or one[name].shape != x.shape or not torch.equal(one[name], x)
+        for name, x in two.items()
+    )
     assert numbers(folder)["how"].startswith(("patches", "procedural filters, geometry "))
     assert numbers(folder)["method"] == method
 
@@ -88,6 +104,18 @@ def test_it_is_shown_and_measured(edited):
         (
             ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.nnfm=0"],
             "edit.arf.nnfm, edit.arf.patches: expected a weight above 0 for one of them, got 0 for both",
+        ),
+        (
+            ["edit_stylerf", "fit=quick", "edit=stylerf"],
+            "edit stylerf: expected a fit of palette, got one of surfels",
+        ),
+        (
+            ["edit_stylerf", "fit=stylerf_quick", "edit=stylerf", "edit.stylerf.styles=[dots,none.png]"],
+            "edit.stylerf.styles: expected the file of a picture, or one of strokes",
+        ),
+        (
+            ["edit_stylerf", "fit=stylerf_quick", "edit=stylerf", "edit.stylerf.styles=[dots,glass]"],
+            "edit.stylerf.styles: expected one for each of 1 palette colours of fit=stylerf_quick, got 2; or",
         ),
         (
             ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.style=none.png"],

@@ -29,6 +29,10 @@ CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
         (["comparison", "fits=[quick,plenoxels]", "device=cuda"], CPU_ONLY),
         (["voxels", *ON_A_GPU], CPU_ONLY),
         (["compose", *ON_A_GPU], CPU_ONLY),
+        (
+            ["palette", "fit=stylerf_quick", "device=cuda"],
+            "device: expected cpu for fit=stylerf_quick, which fits palette, got cuda",
+        ),
     ],
 )
 def test_a_verb_wants_a_fit_that_it_can_work_on(tmp_path, monkeypatch, capsys, words, message):
@@ -67,7 +71,10 @@ def test_a_mesh_wants_a_field_with_depth(tmp_path, monkeypatch, capsys):
     monkeypatch.setitem(kinds(), "voxels", replace(kinds()["voxels"], depth=""))
     assert main(["mesh", "fit=plenoxels_quick", "dataset=sphere", "tracking=none"]) == 2
     said = capsys.readouterr().err
-    assert "fit.field: texgs mesh expects a fit of gaussians or surfels, but fit=plenoxels_quick has" in said
+    assert (
+        "fit.field: texgs mesh expects a fit of gaussians or palette or surfels, but fit=plenoxels_quick has"
+        in said
+    )
     assert not list(tmp_path.iterdir())
 
 

@@ -16,6 +16,7 @@ WORDS = {  # of stages that read more than the data set
     "comparison": (*TF, "fits=[quick,demo]"),
     "gaussians": (*TF, "fit=gaussians_quick"),
     "voxels": (*TF, "fit=plenoxels_quick"),
+    "palette": (*TF, "fit=stylerf_quick"),
     **{
         f"edit_{compose((f'edit={name}',)).edit.method}": ("dataset=turbulence", f"edit={name}")
         for name in members("edit")

@@ -14,6 +14,7 @@ import torch
 from PIL import Image
 
 from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
@@ -23,6 +24,7 @@ from texgs.edit.style_picture import read_style
 from texgs.fields.gaussians.model_file import read_gaussians, write_gaussians
 from texgs.fields.gaussians.ply import read_ply as read_gaussian_ply
 from texgs.fields.gaussians.ply import write_ply as write_gaussian_ply
+from texgs.fields.palette.file import read_palette, write_palette
 from texgs.fields.surfels.compact import open_model, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
@@ -240,6 +242,7 @@ READERS: dict[str, Reader] = {
     "gaussians.ply": Reader(
         lambda folder: write_gaussian_ply(folder / "g.ply", gaussians()), read_gaussian_ply
     ),
+    "palette": Reader(lambda folder: write_palette(folder / "p", box()), read_palette),
     "texture": Reader(lambda folder: write_texture(folder / "t", sample()), read_texture_file),
     "segment": Reader(
         lambda folder: write_segment(folder / "s", sample(), torch.arange(7) < 3), read_segment_file

@@ -39,3 +39,4 @@ def check_edit(config: DictConfig) -> None:
         require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
         for look in looks_of(config).values() or [None]:
             method.check(method.of(config.edit, look))
+        method.check_fit(method.of(config.edit), config.fit)

@@ -40,6 +40,8 @@ class Method(Generic[Settings]):
     """What fields have to be capable of, of `texgs.config.fields.Capability`."""
     fields: frozenset[str] = frozenset()
     """Kinds of field that it is made for; empty: all that can what it needs."""
+    check_fit: Callable[[Settings, Any], None] = lambda settings, fit: None
+    """Raises an ArgumentError where its settings do not go with those of the fit, the node `fit`."""
     files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}
     """Files that it reads besides the scene and its views."""
     adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()

@@ -72,8 +72,8 @@ class VoxelKeys:
         """Of all stages."""
         return sum(stage.steps for stage in self.stages)
 
-    def check(self) -> None:
-        """Require values that fit each other.
+    def check(self, where: str = "fit.voxels") -> None:
+        """Require values that fit each other; `where` are the keys.
 
         Raises:
             ArgumentError: if the stages do not double, or runs are longer than a step has rays.
@@ -81,7 +81,7 @@ class VoxelKeys:
         sides = [stage.side for stage in self.stages]
         if not sides or any(b != 2 * a for a, b in pairwise(sides)):
             raise ArgumentError(
-                f"fit.voxels.stages: expected sides that double from one to the next, got {sides}"
+                f"{where}.stages: expected sides that double from one to the next, got {sides}"
             )
         if self.run > self.rays:
-            raise ArgumentError(f"fit.voxels.run: expected at most rays ({self.rays}), got {self.run}")
+            raise ArgumentError(f"{where}.run: expected at most rays ({self.rays}), got {self.run}")

@@ -30,15 +30,21 @@ class Optimizer:
     Args:
         parameters: become leaves that require a gradient.
         rates: name to rate; parameters without one are constant.
+        betas: how much moments keep in a step.
     """
 
-    def __init__(self, parameters: Mapping[str, Tensor], rates: Mapping[str, Rate]) -> None:
+    def __init__(
+        self,
+        parameters: Mapping[str, Tensor],
+        rates: Mapping[str, Rate],
+        betas: tuple[float, float] = (0.9, 0.999),
+    ) -> None:
         self._rates = dict(rates)
         self.parameters = {
             name: x.detach().clone().requires_grad_(name in rates) for name, x in parameters.items()
         }
         groups = [{"params": [self.parameters[name]], "name": name, "lr": 0.0} for name in self._rates]
-        self._adam = torch.optim.Adam(groups, eps=1e-15, fused=True)
+        self._adam = torch.optim.Adam(groups, betas=betas, eps=1e-15, fused=True)
 
     def step(self, progress: float) -> None:
         """One step with the rates of now; forgets the gradients."""

@@ -169,8 +169,8 @@ def weights(settings: StyleKeys) -> dict[str, bool]:
     return {"mobile_sam": True} if settings.region and settings.masks == "mobile_sam" else {}
 
 
-def picture_of(name: str, where: str) -> StylePicture:
-    """The picture of texgs that has this name, or of a file; `where` are its keys, such as edit.image.
+def picture_of(name: str, key: str) -> StylePicture:
+    """The picture of texgs that has this name, or of a file; `key` is where it stands: edit.image.style.
 
     Raises:
         ArgumentError: if there is neither, or the file holds no picture that can be used.
@@ -182,7 +182,7 @@ def picture_of(name: str, where: str) -> StylePicture:
         return StylePicture.of(picture(name))
     if not Path(name).exists():
         raise ArgumentError(
-            f"{where}.style: expected the file of a picture, or one of {', '.join(PICTURES)}; got {name!r}"
+            f"{key}: expected the file of a picture, or one of {', '.join(PICTURES)}; got {name!r}"
         )
     return read_style(name)
 
@@ -196,7 +196,7 @@ def check(settings: StyleKeys, where: str) -> None:
     from texgs.edit.pictures import PICTURES
 
     if settings.style not in PICTURES:
-        picture_of(settings.style, where)
+        picture_of(settings.style, f"{where}.style")
     shares(f"{where}.region", settings.region)
 
 
@@ -211,7 +211,7 @@ def style_of(settings: StyleKeys, where: str) -> StylePicture:
     from texgs.edit.style_picture import StylePicture
     from texgs.models.by_name import mask_model
 
-    style = picture_of(settings.style, where)
+    style = picture_of(settings.style, f"{where}.style")
     if not settings.region:
         return style
     height, width = style.region.shape

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -58,14 +59,20 @@ def read_voxels(path: str | Path) -> Voxels:
         march = March(
             step=float(description["step"]), transmittance_min=float(description["transmittance_min"])
         )
-        return Voxels(_grid(tensors, description), march, dict(description["metadata"]))
+        return Voxels(grid_of(tensors, description), march, dict(description["metadata"]))
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     except (KeyError, TypeError, ValueError) as error:
         raise ArgumentError(f"{path}: expected a grid and its lattice, got others; write it again") from error
 
 
-def _grid(tensors: dict[str, Tensor], description: dict[str, Any]) -> VoxelGrid:
+def grid_of(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> VoxelGrid:
+    """The grid of masks, densities and coefficients, and of a lattice.
+
+    Raises:
+        ArgumentError, ShapeError: naming the value at fault.
+        KeyError, TypeError, ValueError: if one is missing, or something else.
+    """
     masks, density, sh = (tensors[name] for name in ("masks", "density", "sh"))
     check.shape("masks", masks, "X Y Z")
     n = check.shape("density", density, "N")["N"]

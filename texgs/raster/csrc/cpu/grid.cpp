@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "../grid_checks.h"
+#include "../texgs_neural.h"
 #include "grid_samples.h"
 #include "parallel.h"
 
@@ -99,6 +100,17 @@ int32_t texgs_grid_mark(texgs_grid_samples* samples, const texgs_grid* grid, con
         GridJob job = job_of(*grid, *march);
         job.row_weight = weight;
         samples->gather(job);
+    });
+}
+
+int64_t texgs_grid_count(const texgs_grid_samples* samples) { return samples->count(); }
+
+int32_t texgs_grid_points(texgs_grid_samples* samples, const texgs_grid* grid, const texgs_march* march, float* points,
+                          int32_t* lengths, void*) {
+    return guarded([&] {
+        check_grid(*grid);
+        check_march(*march);
+        samples->list(*grid, march->n, points, lengths);
     });
 }
 

@@ -75,7 +75,7 @@ void texgs_grid_samples::render(GridJob& job, bool keep) {
 }
 
 // How many samples each group has in each brick: [group, brick].
-void texgs_grid_samples::count(const GridJob& job) {
+void texgs_grid_samples::count_by_brick(const GridJob& job) {
     const int64_t bricks = brick_count(job);
     auto* counts = cursors_.ensure<uint32_t>(kGroups * bricks);
     parallel_for(kGroups, 1, [&](int64_t begin, int64_t end, int) {
@@ -132,8 +132,24 @@ void texgs_grid_samples::scatter(const GridJob& job) {
 void texgs_grid_samples::gather(GridJob& job) {
     job.basis = basis_.ensure<float>(0);
     job.lengths = lengths_.ensure<int32_t>(0);
-    count(job);
+    count_by_brick(job);
     sum_counts(job);
     place(job);
     scatter(job);
+}
+
+int64_t texgs_grid_samples::count() const {
+    int64_t sum = 0;
+    for (int64_t i = 0; i < n_chunks_; ++i) sum += chunks_[i].list.count;
+    return sum;
+}
+
+void texgs_grid_samples::list(const texgs_grid& grid, int64_t n_rays, float* points, int32_t* lengths) {
+    for (int64_t i = 0; i < n_chunks_; ++i)
+        for (const GridSample *s = chunks_[i].list.samples, *end = s + chunks_[i].list.count; s < end; ++s) {
+            const uint32_t cell[3] = {s->cell >> 20, s->cell >> 10 & 1023, s->cell & 1023};
+            for (int a = 0; a < 3; ++a)
+                *points++ = grid.lower[a] + grid.spacing * (static_cast<float>(cell[a]) + s->f[a]);
+        }
+    std::copy_n(lengths_.ensure<int32_t>(0), n_rays, lengths);
 }

@@ -12,6 +12,9 @@ struct texgs_grid_samples {
     void render(texgs::GridJob& job, bool keep);
     // Adds what the kept samples say: gradients, or weights where `job.row_weight` is given.
     void gather(texgs::GridJob& job);
+    // The number of kept samples; their world positions, and how many each ray has.
+    int64_t count() const;
+    void list(const texgs_grid& grid, int64_t n_rays, float* points, int32_t* lengths);
 
 private:
     struct Chunk {
@@ -21,7 +24,7 @@ private:
     };
 
     void march_chunk(const texgs::GridJob& job, int64_t index, int64_t begin, int64_t end);
-    void count(const texgs::GridJob& job);
+    void count_by_brick(const texgs::GridJob& job);
     void sum_counts(const texgs::GridJob& job);
     void place(const texgs::GridJob& job);
     void scatter(const texgs::GridJob& job);

@@ -1,0 +1,148 @@
+"""StyleRF-VolVis on a small ball: each of its parts against a few lines of its own, and the whole."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.fit.scenes import ball_images, cameras
+from tests.fit.test_palette import SETTINGS
+from texgs.core.errors import ArgumentError
+from texgs.edit import palette_style
+from texgs.edit.objective import Objective
+from texgs.edit.palette_style import PaletteSteps, StyleRfWeights, stylize_palette
+from texgs.edit.pictures import picture
+from texgs.edit.recipe import Recipe
+from texgs.edit.style_picture import StylePicture
+from texgs.fields.palette.networks import free_color, palette_color
+from texgs.fields.palette.rendering import points_on, shown
+from texgs.fit.palette import PaletteFit
+from texgs.raster.voxels import camera_rays
+
+RECIPE = Recipe(iterations=6, rate=0.01, features=0.0, patches=50.0, behind="white", cropped=False, reduce=2)
+WEIGHTS = StyleRfWeights(variation=0.1, distillation=60)
+STYLE = StylePicture.of(picture("dots", 96))
+
+
+@pytest.fixture(scope="module")
+def images():
+    return ball_images(count=6, size=48)
+
+
+@pytest.fixture(scope="module")
+def field(images):
+    """A ball with two palette colours, of which the second is that of its shadows or nothing."""
+    fit = PaletteFit(images, replace(SETTINGS, colors=2))
+    for _ in fit.run():
+        pass
+    return fit.field({})
+
+
+def plain(color):
+    """A style of one colour."""
+    return StylePicture.of(torch.tensor(color)[:, None, None].expand(3, 40, 40).contiguous())
+
+
+def one_colored(field):
+    """The same field with the first palette colour alone."""
+    colors = field.parameters["palette.colors"][:1]
+    mixture = field.parameters["mixture.0"]  # rows: 2 shares, 2 x 3 offsets, radiance
+    kept = torch.cat([mixture[:1], mixture[2:5], mixture[8:]])
+    return replace(field, parameters={**field.parameters, "palette.colors": colors, "mixture.0": kept})
+
+
+@pytest.mark.parametrize("rays", [100, 5000])
+def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypatch, rays):
+    monkeypatch.setattr(palette_style, "RAYS", rays)
+    monkeypatch.setattr(palette_style, "LEAST_WEIGHT", -1.0)
+    field, camera = one_colored(field), images.cameras[0]
+    run = PaletteSteps(field, torch.Generator().manual_seed(0))
+    recipe = replace(RECIPE, features=1.0)
+    objective = Objective.of(recipe, STYLE.scaled(48), 2, vgg, None)
+    (layer,) = run.layers(camera)
+    values = run.gather(layer, 0.4, objective, 0.7, camera, 0)
+    found = {name: x.grad.clone() for name, x in run.free.items()}
+
+    geometry, parameters = field.geometry, field.parameters
+    pixels = camera_rays(camera).flatten(0, 1)
+    points = points_on(pixels, geometry, parameters)
+    shows = shown(points, -1.0)
+    learned = {name: x.detach().requires_grad_() for name, x in run.free.items()}
+    lit = torch.cat([part.light for part in layer])
+    color = shows.blend(free_color(points.at, learned, geometry.levels) + lit, len(pixels))
+    alpha = shows.blend(torch.ones(len(points.ray), 1), len(pixels))
+    raw = (color + 0.4 * (1 - alpha)).T.unflatten(1, (48, 48))
+    image = raw.detach().clamp(0, 1).requires_grad_()
+    terms = objective.terms(image, alpha.reshape(48, 48), 0)
+    down, right = image.diff(dim=1).square().mean(), image.diff(dim=2).square().mean()
+    terms["variation"] = 0.7 * (down + right) / 2
+    assert values == pytest.approx({name: float(x.detach()) for name, x in terms.items()}, rel=1e-4, abs=1e-9)
+    (gradient,) = torch.autograd.grad(sum(terms.values()), image)
+    farther = (raw > 1) & (gradient < 0) | (raw < 0) & (gradient > 0)
+    raw.backward(gradient.masked_fill(farther, 0))
+    for name, x in learned.items():
+        torch.testing.assert_close(found[name], x.grad, atol=1e-6, rtol=1e-3)
+
+
+def test_free_colours_learn_those_of_the_recoloured_palette(field, images):
+    colors = torch.tensor([[0.1, 0.7, 0.3], [0.2, 0.2, 0.9]])
+    recolored = replace(field, parameters={**field.parameters, "palette.colors": colors})
+    run = PaletteSteps(recolored, torch.Generator().manual_seed(0))
+    error = run.distil(images, 150, "test")
+    with torch.no_grad():
+        points = points_on(camera_rays(images.cameras[1]).flatten(0, 1), field.geometry, field.parameters)
+        at = shown(points, 1e-3).points.at
+        wanted = palette_color(at, recolored.parameters, field.geometry.levels).color
+        left = (free_color(at, run.free, field.geometry.levels) - wanted).square().mean().sqrt()
+    assert error < 0.05
+    assert float(left) < 0.05
+    before, after = (each.render(images.cameras[1]).color for each in (recolored, run.field))
+    assert float((before - after).abs().mean()) < 0.01
+
+
+@pytest.mark.parametrize("features", [0.0, 1.0])
+def test_only_colours_change(field, images, vgg, features):
+    before = {name: x.clone() for name, x in field.parameters.items()}
+    recipe = replace(RECIPE, features=features, iterations=2)
+    edited, losses, _ = stylize_palette(field, images, [STYLE, STYLE], recipe, WEIGHTS, vgg)
+    assert all(torch.equal(x, field.parameters[name]) for name, x in before.items()), "the field given"
+    changed = {name for name, x in edited.parameters.items() if name not in before}
+    assert changed == {"free.table", "free.0", "free.1", "free.2"}
+    for name, x in before.items():
+        assert torch.equal(edited.parameters[name], x) == (name != "palette.colors"), name
+    assert edited.geometry is field.geometry
+    assert {len(values) for values in losses.values()} == {2}
+    assert set(losses) == {"patches", "variation"} | ({"nnfm"} if features else set())
+    camera = images.cameras[0]
+    assert torch.equal(edited.render(camera).alpha, field.render(camera).alpha)
+
+
+def test_a_plain_style_becomes_the_colour_of_the_ball(field, images):
+    field, style = one_colored(field), plain([0.2, 0.6, 0.3])
+    edited, *_ = stylize_palette(
+        field, images, [style], replace(RECIPE, iterations=60), replace(WEIGHTS, variation=0.0)
+    )
+    torch.testing.assert_close(edited.colors, style.mean[None])
+    shown = edited.render(cameras(1, 48)[0])
+    color = (shown.color - 1 + shown.alpha[..., None])[shown.alpha > 0.99]
+    torch.testing.assert_close(color.mean(0), style.mean, atol=0.06, rtol=0)  # the rate stays high
+
+
+def test_layers_of_palette_colours_are_apart_and_together_everything(field, images):
+    camera = images.cameras[2]
+    run = PaletteSteps(field, torch.Generator())
+    rays = camera_rays(camera).flatten(0, 1)
+    points = points_on(rays, field.geometry, field.parameters)
+    shares = palette_color(points.at, field.parameters, field.geometry.levels).shares
+    for index, layer in enumerate(run.layers(camera)):
+        sigma = points.depth * (shares.argmax(1) == index)
+        depth = torch.zeros(len(rays)).index_add_(0, points.ray, sigma)
+        alpha = torch.cat([part.values(run.colors(part))[:, 3] for part in layer])
+        torch.testing.assert_close(alpha, 1 - torch.exp(-depth), atol=0.02, rtol=0)  # small weights are left
+
+
+def test_errors(field, images):
+    with pytest.raises(ArgumentError, match="styles: expected one for each of 2 palette colours, got 1"):
+        stylize_palette(field, images, [STYLE], RECIPE, WEIGHTS)
+    with pytest.raises(ArgumentError, match="vgg: expected a VGG for this recipe, got none"):
+        stylize_palette(field, images, [STYLE] * 2, replace(RECIPE, features=1.0), WEIGHTS)

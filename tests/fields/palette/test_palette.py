@@ -1,0 +1,194 @@
+"""Palette fields whose networks say 0: boxes of density 1 and one colour, which have closed forms."""
+
+import json
+from dataclasses import replace
+from math import exp, log
+
+import pytest
+import torch
+from safetensors.torch import load_file, save_file
+
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.fields.files import open_field
+from texgs.fields.palette.colors import cluster_colors
+from texgs.fields.palette.composition import PaletteScene
+from texgs.fields.palette.file import read_palette, write_palette
+from texgs.fields.palette.model import PaletteField
+from texgs.fields.palette.networks import network_shapes, new_networks
+from texgs.fields.palette.rendering import Geometry, blending_weights
+from texgs.fields.part_edit import PartEdit
+from texgs.raster.hash_encoding import HashLevels
+from texgs.raster.voxel_grid import pack_rows, voxel_grid
+from texgs.raster.voxels import March
+
+CAMERA = orbit(0, 0, 4.0, 30.0, 49, 41)
+LEVELS = HashLevels(levels=3, entries=256, coarsest=4, finest=16)
+COLORS = ((0.9, 0.3, 0.1), (0.1, 0.5, 0.7))
+SIDE, SPACING = 16, 0.05
+
+
+def box(center=(0.0, 0.0, 0.0), colors=COLORS, scale=0.0, seed=0, free=False):
+    """A cube full of voxels; tables and layers are random times `scale`, and 0 by default."""
+    lower = [c - 0.5 * SPACING * (SIDE - 1) for c in center]
+    grid = voxel_grid(torch.ones(SIDE, SIDE, SIDE, dtype=torch.bool), lower, SPACING, 0)
+    rows = pack_rows(torch.full((len(grid),), 0.01), torch.zeros(len(grid), 1, 3))
+    geometry = Geometry(grid.with_rows(torch.cat([grid.rows[:1], rows])), March(step=0.5), LEVELS)
+    names = ["density", "trunk", "palette", "mixture", "light"] + ["free"] * free
+    networks = new_networks(names, LEVELS, len(colors), torch.Generator().manual_seed(seed))
+    networks = {name: (100 if "table" in name else 1) * scale * x for name, x in networks.items()}
+    return PaletteField(geometry, {**networks, "palette.colors": torch.tensor(colors)}, {"tf": "TF01"})
+
+
+def middle(image):
+    """The pixel whose ray passes through the centre of the cube along an axis."""
+    return image[20, 24]
+
+
+def test_a_box_has_the_alpha_and_colour_of_its_closed_form():
+    shown = box().render(CAMERA, outputs=("depth",))
+    length = SPACING * (SIDE - 1)
+    alpha = 1 - exp(-length)
+    color = log(2) * torch.tensor(COLORS).mean(0)
+    assert middle(shown.alpha).item() == pytest.approx(alpha, rel=1e-5)
+    torch.testing.assert_close(middle(shown.color), alpha * color + 1 - alpha)
+    start = 4.0 - length / 2  # of the box; the mean of an exponential distribution cut at its end
+    depth = start + 1 - length * (1 - alpha) / alpha
+    assert middle(shown.depth).item() == pytest.approx(depth, abs=0.25 * SPACING)
+    assert float(shown.alpha[0, 0]) == 0
+    assert torch.equal(shown.color[0, 0], torch.ones(3))
+
+
+def test_density_doubles_where_boxes_overlap():
+    scene = PaletteScene([box(), box(colors=((0.0, 0.0, 0.2),))])
+    shown, length = scene.render(CAMERA), SPACING * (SIDE - 1)
+    alpha = 1 - exp(-2 * length)
+    color = log(2) * (torch.tensor(COLORS).mean(0) + torch.tensor([0.0, 0.0, 0.2])) / 2
+    assert middle(shown.alpha).item() == pytest.approx(alpha, rel=1e-5)
+    # Points of both lie at the same places: one is a step in front of the other.
+    torch.testing.assert_close(middle(shown.color), alpha * color + 1 - alpha, atol=0.01, rtol=0)
+    assert scene.palettes == [(0.0, 0.0, 0.0)] * 2
+    assert len(scene) == 2 * len(box()) == 4 * LEVELS.rows
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_scene_of_one_is_the_field(free):
+    field = box(scale=1.0, free=free)
+    assert torch.equal(PaletteScene([field]).render(CAMERA).color, field.render(CAMERA).color)
+
+
+def test_boxes_apart_are_seen_as_each_alone():
+    left, right = box((0.0, 0.0, -0.5), scale=1.0), box((0.0, 0.0, 0.5), scale=1.0, seed=1)
+    together = PaletteScene([left, right]).render(CAMERA).color
+    first, second = (field.render(CAMERA) for field in (left, right))
+    clear = (first.alpha > 0) != (second.alpha > 0)
+    assert bool(clear.any())
+    torch.testing.assert_close(together[clear], (first.color + second.color - 1)[clear], atol=1e-6, rtol=0)
+
+
+def test_edits_of_opacity_and_visibility():
+    scene, length = PaletteScene([box(), box((0.0, 0.0, 0.5))]), SPACING * (SIDE - 1)
+    thin = scene.render(CAMERA, edits=[PartEdit(opacity=3.0), PartEdit(visible=False)])
+    assert middle(thin.alpha).item() == pytest.approx(1 - exp(-3 * length), rel=1e-5)
+    none = scene.render(CAMERA, edits=[PartEdit(visible=False)] * 2, background=torch.tensor([0.1, 0.2, 0.3]))
+    assert torch.equal(middle(none.color), torch.tensor([0.1, 0.2, 0.3]))
+
+
+def test_blending_weights_are_those_of_a_plain_loop():
+    generator = torch.Generator().manual_seed(0)
+    ray = torch.randint(30, (400,), generator=generator).sort().values
+    depth = (20 * torch.rand(400, generator=generator) ** 6).double().requires_grad_()
+    expected, left = [], {}
+    for d, r in zip(depth, ray.tolist(), strict=True):
+        expected.append(left.get(r, 1.0) * (1 - torch.exp(-d)))
+        left[r] = left.get(r, 1.0) * torch.exp(-d)
+    found, expected = blending_weights(depth, ray), torch.stack(expected)
+    torch.testing.assert_close(found.double(), expected, atol=1e-7, rtol=1e-6)
+    values = torch.randn(400, generator=generator).double()
+    gradients = [torch.autograd.grad((x.double() * values).sum(), depth)[0] for x in (found, expected)]
+    torch.testing.assert_close(*gradients, atol=1e-6, rtol=1e-5)
+    assert len(blending_weights(depth[:0], ray[:0])) == 0
+
+
+def test_the_full_configuration_is_as_large_as_the_paper_says():
+    """168.67 MB: three hash grids and two lattices of 128^3; the paper's table has 168."""
+    levels = HashLevels()
+    shapes = network_shapes(levels, 2)
+    parameters = {name: torch.zeros(1).expand(shape) for name, shape in shapes.items()}
+    field = replace(box(), parameters=parameters)
+    assert field.sizes()["total_mib"] * 2**20 / 1e6 == pytest.approx(168.67, abs=0.005)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_files_give_the_same_bits_and_are_known_by_their_header(tmp_path, free):
+    field = box(scale=1.0, free=free)
+    path = write_palette(tmp_path / "model.safetensors", field)
+    found = open_field(path)
+    assert isinstance(found, PaletteField)
+    assert found.metadata == field.metadata
+    assert torch.equal(found.render(CAMERA).color, field.render(CAMERA).color)
+    assert write_palette(tmp_path / "again", found).read_bytes() == path.read_bytes()
+    assert path.stat().st_size == pytest.approx(found.sizes()["stored_total_mib"] * 2**20, abs=4000)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t, h: t.pop("light.1"), "light.1: expected the networks of a palette field"),
+        (lambda t, h: t.update(extra=torch.ones(1)), "extra: expected the networks of a palette field"),
+        (lambda t, h: t.pop("palette.colors"), "expected networks and a grid"),
+        (
+            lambda t, h: t.update({"light.1": t["light.1"][:5]}),
+            r"light.1: expected \[64, 64\], got \[5, 64\]",
+        ),
+        (lambda t, h: t.update({"light.1": t["light.1"].double()}), "light.1: expected float32"),
+        (lambda t, h: t.update({"free.table": t["palette.table"].clone()}), "free.0: expected the networks"),
+        (lambda t, h: t.update(density=t["density"][:-1]), "masks: expected the bits of"),
+        (lambda t, h: t["trunk.0"].fill_(torch.inf), "trunk.0: expected finite"),
+        (lambda t, h: h["hash"].update(entries=100), "entries: expected a power of two"),
+        (lambda t, h: h.pop("step"), "expected networks and a grid"),
+        (lambda t, h: h.update(version=2), "expected version 1"),
+    ],
+)
+def test_damaged_files_are_named(tmp_path, change, message):
+    path = write_palette(tmp_path / "m.safetensors", box())
+    tensors = load_file(path)
+    lattice = {"version": 1, "lower": [0.0] * 3, "spacing": SPACING, "step": 0.5, "transmittance_min": 1e-3}
+    levels = {"levels": 3, "entries": 256, "coarsest": 4, "finest": 16}
+    header = {**lattice, "hash": levels, "metadata": {}}
+    change(tensors, header)
+    save_file(tensors, path, {"texgs-palette": json.dumps(header)})
+    with pytest.raises(TexgsError, match=message) as caught:
+        read_palette(path)
+    assert str(path) in str(caught.value)
+
+
+def test_clusters_are_of_hues_and_the_largest_comes_first():
+    generator = torch.Generator().manual_seed(0)
+    light = 0.3 + 0.7 * torch.rand(900, 1, generator=generator)
+    hues = torch.tensor([[1.0, 0.2, 0.1], [0.1, 0.3, 1.0]])
+    colors = light * hues[(torch.arange(900) % 3 == 0).long()]
+    found = cluster_colors(colors, 2)
+    torch.testing.assert_close(found / found.amax(1, keepdim=True), hues, atol=0.01, rtol=0)
+    one = cluster_colors(torch.tensor([[0.5, 0.5, 0.5], [0.4, 0.4, 0.2]]), 3)
+    torch.testing.assert_close(one.sort(0).values[2], torch.tensor([0.5, 0.5, 0.5]))
+    assert one.shape == (3, 3)
+    torch.testing.assert_close(cluster_colors(torch.full((9, 3), 0.5), 2), torch.full((2, 3), 0.5))
+
+
+@pytest.mark.parametrize(
+    ("render", "message"),
+    [
+        (lambda s: s.render(CAMERA, edits=[]), "edits: expected one for each of 1 models, got 0"),
+        (
+            lambda s: s.render(CAMERA, edits=[PartEdit(diffuse=2)]),
+            "diffuse: .* got one of palette; fit surfels for this",
+        ),
+        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded of palette fields, got ambient"),
+        (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of palette fields, got"),
+        (lambda s: PaletteScene([]), "models: expected at least one"),
+    ],
+)
+def test_what_palette_fields_cannot_show(render, message):
+    with pytest.raises(ArgumentError, match=message):
+        render(PaletteScene([box()]))

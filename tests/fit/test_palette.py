@@ -1,0 +1,162 @@
+"""The fit of a palette field to a small ball, and each of its parts."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.fit.scenes import ball_images, ball_planes, cameras, images_of
+from texgs.config.palette_fit import HashKeys, PaletteKeys
+from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError, FitError
+from texgs.fields.palette.networks import base_color, density, palette_color
+from texgs.fields.palette.rendering import points_on, view_harmonics
+from texgs.fit import checkpoint
+from texgs.fit.palette import PaletteFit
+from texgs.fit.palette_losses import base_loss
+from texgs.fit.palette_start import object_palette
+from texgs.fit.resumable import run_to_end
+from texgs.metrics.image import psnr
+
+VOXELS = VoxelKeys(
+    stages=[GridStage(16, 30), GridStage(32, 30)],
+    degree=0,
+    half_size=0.6,
+    rays=512,
+    density=Decay(40.0, 2.0, 10),
+)
+SETTINGS = PaletteKeys(
+    voxels=VOXELS,
+    hash=HashKeys(levels=4, entries=1024, coarsest=4, finest=32),
+    seed_steps=20,
+    base_steps=60,
+    palette_steps=40,
+    rays=512,
+)
+STEPS = 180
+
+
+@pytest.fixture(scope="module")
+def images():
+    return ball_images(count=8)
+
+
+@pytest.fixture(scope="module")
+def fit(images):
+    """A fit with its progress, and the density networks before palette colours learned."""
+    found = PaletteFit(images, SETTINGS)
+    found.progress = []
+    for done in found.run():
+        found.progress.append(done)
+        if done.step == STEPS - 40:
+            found.before = {name: x.detach().clone() for name, x in found.parameters.items()}
+    return found
+
+
+def quality(field, images):
+    """Mean PSNR over views."""
+    found = [
+        psnr(field.render(camera).color, images.target(i).color) for i, camera in enumerate(images.cameras)
+    ]
+    return sum(found) / len(found)
+
+
+def test_the_ball_is_found(fit, images):
+    assert [done.step for done in fit.progress] == list(range(1, STEPS + 1))
+    field = fit.field({})
+    assert quality(field, images) > 25
+    unseen = orbit(20, 10, 1.5, 50, 32, 32)
+    assert quality(field, images_of([ball_planes(unseen)], [unseen])) > 20
+    assert not any(name.startswith("base") for name in field.parameters)
+    assert fit.progress[-1].loss == fit.losses[-1] < 0.01
+
+
+def test_palette_colours_learn_on_frozen_geometry(fit):
+    for name, x in fit.before.items():
+        if name.startswith(("density", "base")):
+            assert torch.equal(x, fit.parameters[name]), name
+    assert not torch.equal(fit.before["trunk.0"], fit.parameters["trunk.0"])
+
+
+def test_the_palette_has_the_hue_of_the_ball(images):
+    (color,) = object_palette(images, 1, 0)
+    torch.testing.assert_close(color / color[0], torch.tensor([1.0, 0.5, 0.25]), atol=0.02, rtol=0)
+
+
+def test_the_same_seed_gives_the_same_field(fit, images):
+    again = PaletteFit(images, SETTINGS)
+    for _ in again.run():
+        pass
+    assert all(torch.equal(x, fit.parameters[name]) for name, x in again.parameters.items())
+
+
+@pytest.mark.parametrize("stop", [20, 70, 140, STEPS])
+def test_a_resumed_run_is_as_if_it_had_never_stopped(fit, images, tmp_path, stop):
+    """Within the grid's fit and each part of that of networks, and between them."""
+    stopped, resumed = PaletteFit(images, SETTINGS), PaletteFit(images, SETTINGS, seed=1)
+    for _ in zip(range(stop), stopped.run(), strict=False):
+        pass
+    checkpoint.save(tmp_path, stopped)
+    resumed.colors = fit.colors
+    run_to_end(resumed, tmp_path, "resumed")
+    assert resumed.iteration == resumed.iterations == STEPS
+    assert resumed.parameters.keys() == fit.parameters.keys()
+    for name, x in fit.parameters.items():
+        assert torch.equal(resumed.parameters[name], x), name
+    assert torch.equal(resumed.geometry.grid.rows, fit.geometry.grid.rows)
+
+
+def test_the_loss_of_the_base_has_the_gradient_of_a_plain_graph(fit, images):
+    """With every point in one graph; nothing is left out where all weights count."""
+    parameters = {name: x.detach().requires_grad_() for name, x in fit.parameters.items()}
+    rays, target = fit.rays.draw(64, 2, torch.Generator().manual_seed(0))
+    loss = base_loss(rays, target, fit.geometry, parameters, -1.0)
+    names = ["density.table", "density.0", "trunk.0", "base.0"]
+    found = torch.autograd.grad(loss, [parameters[name] for name in names])
+    with torch.no_grad():
+        points = points_on(rays, fit.geometry, parameters)
+    sigma, features = density(points.at, parameters, fit.levels)
+    color = base_color(features, view_harmonics(rays)[points.ray], parameters)
+    total = 0.0
+    for ray in range(64):
+        light, blended = 1.0, 0.0
+        for i in (points.ray == ray).nonzero()[:, 0]:
+            alpha = 1 - torch.exp(-fit.geometry.length * sigma[i])
+            blended = blended + light * alpha * color[i]
+            light = light * (1 - alpha)
+        total = total + (blended + light - target[ray]).square().sum()
+    torch.testing.assert_close(loss, total / (3 * 64), rtol=1e-4, atol=1e-8)
+    expected = torch.autograd.grad(total / (3 * 64), [parameters[name] for name in names])
+    for one, other in zip(found, expected, strict=True):
+        torch.testing.assert_close(one, other, rtol=1e-3, atol=1e-6)
+
+
+def test_shares_of_palette_colours_add_up_to_one():
+    settings = replace(SETTINGS, colors=3, seed_steps=0, base_steps=5, palette_steps=5)
+    fit = PaletteFit(ball_images(count=4), settings)
+    for _ in fit.run():
+        pass
+    mixed = palette_color(torch.rand(50, 3), fit.parameters, fit.levels)
+    torch.testing.assert_close(mixed.shares.sum(1), torch.ones(50))
+    assert mixed.shares.shape == (50, 3)
+    assert bool((mixed.shares > 0.01).all())
+
+
+def test_errors(images):
+    with pytest.raises(ArgumentError, match=r"fit.palette.voxels.stages: expected sides that double"):
+        PaletteFit(images, replace(SETTINGS, voxels=replace(VOXELS, stages=[])))
+    with pytest.raises(ArgumentError, match=r"fit.palette.hash.entries: expected a power of two, got 1000"):
+        PaletteFit(images, replace(SETTINGS, hash=HashKeys(entries=1000)))
+    with pytest.raises(ArgumentError, match=r"fit.palette.hash.finest: expected at least coarsest"):
+        PaletteFit(images, replace(SETTINGS, hash=HashKeys(coarsest=600)))
+    blank = images_of([torch.cat([torch.ones(3, 32, 32), torch.zeros(1, 32, 32)])] * 3, cameras(3))
+    with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
+        PaletteFit(blank, SETTINGS)
+    unseen = PaletteFit(images, replace(SETTINGS, voxels=replace(VOXELS, stages=[GridStage(16, 5)])))
+    unseen.settings.voxels.prune_weight = 1.0
+    with pytest.raises(FitError, match="expected some that show in the views, found none; lower prune_w"):
+        list(unseen.run())
+    broken = PaletteFit(images, replace(SETTINGS, voxels=VOXELS, rate=1e6))
+    with pytest.raises(FitError, match=r"iteration 180: .*: expected finite values"):
+        list(broken.run())

@@ -1,0 +1,226 @@
+"""StyleRF-VolVis: the free colours of a palette field follow styles; where it is stays (Tang et al. 2024)."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import cos, pi
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.progress import progress
+from texgs.edit.objective import Objective, differentiated, finite_values, view_order
+from texgs.edit.recipe import Recipe
+from texgs.edit.style_picture import StylePicture
+from texgs.edit.voxel_style import image_variation
+from texgs.fields.palette.colors import cluster_colors
+from texgs.fields.palette.model import PaletteField
+from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
+from texgs.fields.palette.rendering import RAYS, Shown, points_on, shown, view_harmonics
+from texgs.fields.voxels.rays import training_rays
+from texgs.models.vgg import Vgg
+from texgs.raster.voxels import camera_rays
+from texgs.volume.images import Images
+
+CLUSTERS = 4  # of the colours of a style, the largest of which is its dominant one
+LUMINANCE = (0.299, 0.587, 0.114)
+DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
+RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
+BETAS = (0.9, 0.99)
+LEAST_WEIGHT = 1e-3  # of points that learn
+
+
+@dataclass(frozen=True)
+class StyleRfWeights:
+    """What StyleRF-VolVis adds to the distance to the styles."""
+
+    variation: float = 1.0  # of images
+    distillation: int = 500  # steps at first, in which free colours learn those of the recoloured palette
+
+
+class Stylized(NamedTuple):
+    """What came of it."""
+
+    field: PaletteField
+    losses: dict[str, list[float]]  # weighted terms by name, a value for each iteration
+    distillation: float  # RMS difference of free and palette colours in its last step; 0 without steps
+
+
+def stylize_palette(
+    field: PaletteField,
+    images: Images,
+    styles: Sequence[StylePicture],
+    recipe: Recipe,
+    weights: StyleRfWeights,
+    vgg: Vgg | None = None,
+    title: str = "style",
+) -> Stylized:
+    """Give each palette colour of a field the style of a picture; density and light stay.
+
+    Palette colours become the dominant ones of their styles, and free colours learn these. Then they follow
+    the distance to the styles: of what has most of a palette colour, alone over the grey of its style.
+
+    Args:
+        field: fitted.
+        images: its training views.
+        styles: one for each palette colour.
+        recipe: of the distance to the styles; a view in each iteration.
+        weights: of what is added to it.
+        vgg: for NNFM, if the recipe wants it.
+        title: of progress bars.
+
+    Raises:
+        ArgumentError: if there are not as many styles as palette colours, or a model is missing.
+        FitError: if the loss is no longer finite.
+    """
+    if len(styles) != len(field.colors):
+        raise ArgumentError(
+            f"styles: expected one for each of {len(field.colors)} palette colours, got {len(styles)}"
+        )
+    dominant = [cluster_colors(style.pixels, CLUSTERS, recipe.seed)[0] for style in styles]
+    field = replace(field, parameters={**field.parameters, "palette.colors": torch.stack(dominant)})
+    run = PaletteSteps(field, torch.Generator().manual_seed(recipe.seed))
+    error = run.distil(images, weights.distillation, title)
+    losses = run.learn_styles(images, styles, recipe, weights.variation, vgg, title)
+    return Stylized(run.field, losses, error)
+
+
+class Layer(NamedTuple):
+    """What rays show of one palette colour: all that stays the same when free colours change."""
+
+    shows: Shown
+    light: Tensor  # [n, 1]
+    n_rays: int
+
+    def values(self, color: Tensor) -> Tensor:
+        """Colours and alpha [N, 4] of rays, from free colours [n, 3]."""
+        return self.shows.blend(
+            torch.cat([color + self.light, torch.ones_like(self.light)], dim=1), self.n_rays
+        )
+
+
+class PaletteSteps:
+    """A field whose free colours are on their way to styles.
+
+    Args:
+        field: recoloured; its free colours begin with the features of the palette's hash grid.
+        generator: of networks and rays.
+    """
+
+    def __init__(self, field: PaletteField, generator: torch.Generator) -> None:
+        self.levels, self.generator = field.geometry.levels, generator
+        free = new_networks(["free"], self.levels, len(field.colors), generator)
+        free["free.table"] = field.parameters["palette.table"].clone()
+        self.free = {name: x.requires_grad_() for name, x in free.items()}
+        self.recolored = field
+
+    @property
+    def field(self) -> PaletteField:
+        """The field with the free colours of now."""
+        free = {name: x.detach() for name, x in self.free.items()}
+        return replace(self.recolored, parameters={**self.recolored.parameters, **free})
+
+    def distil(self, images: Images, steps: int, title: str) -> float:
+        """Learn the colours of the recoloured palette at points of training rays; their RMS difference."""
+        rays, adam, loss = training_rays(images), self.adam(RATE), torch.zeros(())
+        for step in progress(range(steps), title=f"{title}, recoloured", unit="step"):
+            drawn, _ = rays.draw(DRAWN, RUN, self.generator)
+            with torch.no_grad():
+                points = points_on(drawn, self.recolored.geometry, self.recolored.parameters)
+                at = shown(points, LEAST_WEIGHT).points.at
+                wanted = palette_color(at, self.recolored.parameters, self.levels).color
+            loss = (free_color(at, self.free, self.levels) - wanted).square().mean()
+            loss.backward()
+            share = 0.5 * (1 + cos(pi * step / steps))
+            adam.param_groups[0]["lr"] = LAST_RATE + (RATE - LAST_RATE) * share
+            adam.step()
+            adam.zero_grad()
+        return loss.sqrt().item()
+
+    def learn_styles(
+        self,
+        images: Images,
+        styles: Sequence[StylePicture],
+        recipe: Recipe,
+        variation: float,
+        vgg: Vgg | None,
+        title: str,
+    ) -> dict[str, list[float]]:
+        """Follow the distance of whole views to the styles; its terms by name."""
+        width, height = images.size
+        side, reduce = recipe.pattern * max(width, height), recipe.reduction(width, height)
+        objectives = [Objective.of(recipe, style.scaled(side), reduce, vgg, None) for style in styles]
+        greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
+        losses: dict[str, list[float]] = defaultdict(list)
+        adam, order = self.adam(recipe.rate), view_order(len(images), recipe)
+        for iteration, index in enumerate(progress(order, title=title, unit="iteration")):
+            sums: dict[str, float] = defaultdict(float)
+            layers = self.layers(images.cameras[index])
+            for objective, grey, layer in zip(objectives, greys, layers, strict=True):
+                for name, value in self.gather(
+                    layer, grey, objective, variation, images.cameras[index], iteration
+                ).items():
+                    sums[name] += value
+            for name, value in sums.items():
+                losses[name].append(value)
+            adam.step()
+            adam.zero_grad()
+        return dict(losses)
+
+    def gather(
+        self,
+        layer: Sequence[Layer],
+        grey: float,
+        objective: Objective,
+        variation: float,
+        camera: Camera,
+        iteration: int,
+    ) -> dict[str, float]:
+        """Add the gradient of one palette colour's losses, piece by piece; the values of its terms.
+
+        The image is rendered without a graph, and each piece of it once more with one (deferred
+        back-propagation, Zhang et al. 2022). Where a colour is cut off, it learns in the way back only.
+        """
+        with torch.no_grad():
+            blended = torch.cat([part.values(self.colors(part)) for part in layer])  # [N, 4]
+        planes = blended.T.unflatten(1, (camera.height, camera.width))
+        color, alpha = planes[:3], planes[3]
+        raw = color + grey * (1 - alpha)
+        image = raw.clamp(0, 1).requires_grad_()
+        terms = objective.terms(image, alpha, iteration)
+        terms["variation"] = variation * image_variation(image)
+        values = finite_values(terms, iteration)
+        gradient = differentiated(terms, image)
+        pulled = torch.where((raw - image) * gradient < 0, 0, gradient).flatten(1).T  # [N, 3]
+        for part, given in zip(layer, pulled.split(RAYS), strict=True):
+            part.values(self.colors(part))[:, :3].backward(given)
+        return values
+
+    def colors(self, layer: Layer) -> Tensor:
+        """Free colours [n, 3] of the points of a layer."""
+        return free_color(layer.shows.points.at, self.free, self.levels)
+
+    @torch.no_grad()
+    def layers(self, camera: Camera) -> list[list[Layer]]:
+        """What a view shows of each palette colour, in pieces of rays."""
+        geometry, parameters = self.recolored.geometry, self.recolored.parameters
+        colors = len(self.recolored.colors)
+        pieces: list[list[Layer]] = [[] for _ in range(colors)]
+        for rays in camera_rays(camera).flatten(0, 1).split(RAYS):
+            points, harmonics = points_on(rays, geometry, parameters), view_harmonics(rays)
+            shares = palette_color(points.at, parameters, self.levels).shares if colors > 1 else None
+            for index, piece in enumerate(pieces):
+                own = points if shares is None else points.take(shares.argmax(1) == index)
+                shows = shown(own, LEAST_WEIGHT)
+                lit = light(shows.points.features, harmonics[shows.points.ray], parameters)
+                piece.append(Layer(shows, lit, len(rays)))
+        return pieces
+
+    def adam(self, rate: float) -> torch.optim.Adam:
+        """An optimiser of free colours at its start."""
+        return torch.optim.Adam([*self.free.values()], rate, BETAS, eps=1e-15, fused=True)

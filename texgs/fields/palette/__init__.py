@@ -1,0 +1,1 @@
+"""Fields of small networks whose colours are mixtures of a palette."""

@@ -1,0 +1,161 @@
+"""A field of small networks with palette colours, or free ones after an edit (StyleRF-VolVis).
+
+Unlike the authors' (Tang et al. 2024), it fills the box around the object instead of a fixed cube, all shares
+of the palette mix where theirs keep the largest alone, and weights are as fitted, without a running mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.core.memory import MIB
+from texgs.fields.field import Role
+from texgs.fields.palette.networks import Parameters, free_color, light, palette_color
+from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
+from texgs.raster import Render
+from texgs.raster.voxels import camera_rays
+
+OUTPUTS = ("depth",)
+LEAST_WEIGHT = 1e-4  # of points whose colours are looked at
+OCCUPIED = 128  # places along each side of the two lattices of the authors
+
+
+@dataclass(frozen=True, eq=False)
+class PaletteField:
+    """Networks on the CPU, lit as their views were: light does not change them."""
+
+    kind: ClassVar[str] = "palette"
+
+    geometry: Geometry
+    parameters: Parameters
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        """Rows of all hash grids."""
+        return sum(len(x) for name, x in self.parameters.items() if name.endswith(".table"))
+
+    @property
+    def device(self) -> torch.device:
+        """The CPU."""
+        return self.parameters["palette.colors"].device
+
+    @property
+    def colors(self) -> Tensor:
+        """The palette, [P, 3]."""
+        return self.parameters["palette.colors"]
+
+    def to(self, device: torch.device | str) -> PaletteField:
+        """The same field: on the CPU, where alone it is rendered."""
+        return self
+
+    def tensors(self, role: Role) -> dict[str, Tensor]:
+        """Raw parameters by network and layer; those of geometry with the grid's densities."""
+        placed = {name: x for name, x in self.parameters.items() if name.startswith("density.")}
+        if role == "geometry":
+            return {"grid": self.geometry.grid.rows, **placed}
+        return {name: x for name, x in self.parameters.items() if name not in placed}
+
+    def color(self, points: Points, harmonics: Tensor) -> Tensor:
+        """Colours [n, 3] of points: free ones where there are any, else those of the palette, and light.
+
+        Args:
+            points: in the unit cube, with their features.
+            harmonics: [n, 16] of the directions of their rays.
+        """
+        parameters, levels = self.parameters, self.geometry.levels
+        lit = light(points.features, harmonics, parameters)
+        if "free.table" in parameters:
+            return free_color(points.at, parameters, levels) + lit
+        return palette_color(points.at, parameters, levels).color + lit
+
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        *,
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render the field.
+
+        Args:
+            camera: from where.
+            light: changes nothing.
+            background: [3]; white by default.
+            outputs: "depth", the expected one.
+
+        Raises:
+            ArgumentError: for another output.
+        """
+        return render_fields([self], [1.0], camera, background, outputs)
+
+    def sizes(self) -> dict[str, float]:
+        """MiB.
+
+        The paper counts the hash grids and two lattices of 32 bits for what is occupied; the file has all
+        networks, and a mask for each block of voxels and a number for each voxel.
+        """
+        grid, groups = self.geometry.grid, {"density": "geometry", "free": "texture"}
+        counted = {"geometry": 2 * 4 * OCCUPIED**3, "shading": 0, "texture": 0}
+        stored = {"geometry": 8 * grid.masks.numel() + 4 * len(grid.rows), "shading": 0, "texture": 0}
+        for name, x in self.parameters.items():
+            group = groups.get(name.split(".")[0], "shading")
+            counted[group] += 4 * x.numel() if name.endswith(".table") else 0
+            stored[group] += 4 * x.numel()
+        return {**_mebibytes("", counted), **_mebibytes("stored_", stored)}
+
+
+@torch.no_grad()
+def render_fields(
+    fields: Sequence[PaletteField],
+    factors: Sequence[float],
+    camera: Camera,
+    background: Tensor | None = None,
+    outputs: Collection[str] = (),
+) -> Render:
+    """Render fields together, each with a factor on its densities.
+
+    Raises:
+        ArgumentError: for another output than depth.
+    """
+    if unknown := sorted(set(outputs) - set(OUTPUTS)):
+        raise ArgumentError(f"outputs: expected {', '.join(OUTPUTS)} of palette fields, got {unknown[0]}")
+    rays = camera_rays(camera).flatten(0, 1)
+    blended = torch.cat([_blended(fields, factors, part) for part in rays.split(RAYS)])  # [N, 5]
+    color, alpha, depth = blended.split([3, 1, 1], dim=1)
+    behind = torch.ones(3) if background is None else background
+    color = (color + (1 - alpha) * behind).clamp(0, 1)
+    size = (camera.height, camera.width)
+    depth = (depth / alpha.clamp_min(1e-12)).reshape(size) if outputs else None
+    return Render(color.reshape(*size, 3), alpha.reshape(size), depth=depth)
+
+
+def _blended(fields: Sequence[PaletteField], factors: Sequence[float], rays: Tensor) -> Tensor:
+    """Sums [N, 5] over rays [N, 6] of weight times colour, 1 and distance."""
+    several = []
+    for each, factor in zip(fields, factors, strict=True):
+        points = points_on(rays, each.geometry, each.parameters)
+        several.append(points._replace(depth=factor * points.depth))
+    points, owner = merged(several)
+    shows = shown(points, LEAST_WEIGHT)
+    owner, harmonics = owner[shows.chosen], view_harmonics(rays)
+    values = torch.ones(len(owner), 5)
+    values[:, 4] = shows.points.distance
+    for index, each in enumerate(fields):
+        own = owner == index
+        found = shows.points.take(own)
+        values[own, :3] = each.color(found, harmonics[found.ray])
+    return shows.blend(values, len(rays))
+
+
+def _mebibytes(prefix: str, groups: Mapping[str, int]) -> dict[str, float]:
+    sizes = {**groups, "total": sum(groups.values())}
+    return {f"{prefix}{group}_mib": count / MIB for group, count in sizes.items()}

@@ -1,0 +1,118 @@
+"""Rays through fields of networks: where they are dense, what of that shows, and its blended colours."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from texgs.fields.palette.networks import Parameters, density
+from texgs.raster.hash_encoding import HashLevels
+from texgs.raster.ray_points import ray_points
+from texgs.raster.reference.shading import harmonics
+from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster.voxels import March
+
+RAYS = 8192  # at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """Where a field is: the density network, looked at where a coarse grid has density.
+
+    The grid's own densities only tell where a ray may end.
+    """
+
+    grid: VoxelGrid  # of degree 0
+    march: March
+    levels: HashLevels
+
+    @property
+    def length(self) -> float:
+        """Between points on a ray, world units."""
+        return self.march.step * self.grid.spacing
+
+    def unit(self, points: Tensor) -> Tensor:
+        """World points [n, 3] in the cube around the grid's box, whose sides become 1."""
+        side = self.grid.spacing * (max(self.grid.size) - 1)
+        return (points - points.new_tensor(self.grid.lower)) / side
+
+
+class Points(NamedTuple):
+    """Points on rays, ray by ray and front to back."""
+
+    at: Tensor  # [n, 3] in the unit cube
+    ray: Tensor  # [n]
+    distance: Tensor  # [n] from the origin, in lengths of the ray's direction
+    depth: Tensor  # [n] optical: density times length
+    features: Tensor  # [n, 15] of the density network
+
+    def take(self, chosen: Tensor) -> Points:
+        """Some of them."""
+        return Points(*(x[chosen] for x in self))
+
+
+class Shown(NamedTuple):
+    """The points whose colours count."""
+
+    points: Points  # n of them
+    weights: Tensor  # [n] in the colours of their rays
+    chosen: Tensor  # bool, among all points
+
+    def blend(self, values: Tensor, n_rays: int) -> Tensor:
+        """Weighted sums [N, C] of values [n, C] for each ray."""
+        weighted = self.weights[:, None] * values
+        return values.new_zeros(n_rays, values.shape[1]).index_add_(0, self.points.ray, weighted)
+
+
+def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> Points:
+    """All points on rays [N, 6] that the grid lets through, with their densities."""
+    found, ray = ray_points(geometry.grid, rays, geometry.march)
+    origin, direction = rays[ray].split(3, dim=1)
+    distance = ((found - origin) * direction).sum(1) / direction.square().sum(1)
+    at = geometry.unit(found)
+    sigma, features = density(at, parameters, geometry.levels)
+    return Points(at, ray, distance, geometry.length * sigma, features)
+
+
+def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
+    """Weights [n] of points with optical depths [n], in the order of their rays and front to back.
+
+    The weight is the light that all points before let through, times the share that this one stops. Sums are
+    of float64: they run over all rays.
+    """
+    total = depth.double().cumsum(0)
+    before = total - depth
+    place = torch.arange(len(ray))
+    is_first = torch.ones_like(ray, dtype=torch.bool)
+    is_first[1:] = ray[1:] != ray[:-1]
+    first = torch.where(is_first, place, 0).cummax(0).values if len(ray) else place
+    passed = before - before.index_select(0, first)
+    return (torch.exp(-passed) * -torch.expm1(-depth)).float()
+
+
+def shown(points: Points, weight_min: float) -> Shown:
+    """The points with a weight above `weight_min`."""
+    weights = blending_weights(points.depth, points.ray)
+    chosen = weights > weight_min
+    return Shown(points.take(chosen), weights[chosen], chosen)
+
+
+def view_harmonics(rays: Tensor) -> Tensor:
+    """Spherical harmonics [N, 16] of the directions of rays [N, 6]."""
+    return harmonics(normalize(rays[:, 3:], dim=1))
+
+
+def merged(several: list[Points]) -> tuple[Points, Tensor]:
+    """Points of several fields in the order of their rays, and the field [n] that each is of.
+
+    Densities of fields add up: a ray meets the points of all of them, each with its own depth.
+    """
+    points = Points(*map(torch.cat, zip(*several, strict=True)))
+    field = torch.repeat_interleave(torch.arange(len(several)), torch.tensor([len(p.ray) for p in several]))
+    order = points.distance.argsort(stable=True)
+    order = order[points.ray[order].argsort(stable=True)]
+    return points.take(order), field[order]

@@ -1,0 +1,150 @@
+"""Multi-resolution hash encoding (Mueller et al. 2022): features of points, differentiable in their table.
+
+On the CPU; deterministic for any number of threads.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from ctypes import POINTER, Structure, byref, c_int32, c_int64, c_void_p
+from dataclasses import dataclass
+from functools import cache, cached_property
+from math import ceil, log2
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, DeviceError
+from texgs.raster import native
+
+FEATURES = 2  # of each level
+
+
+class NativeHash(Structure):
+    """`texgs_hash`."""
+
+    _fields_ = [("levels", c_int32), ("resolution", c_void_p), ("first", c_void_p)]
+
+
+@dataclass(frozen=True)
+class HashLevels:
+    """Lattices over the unit cube whose points have rows of one table; sides grow by a constant factor.
+
+    A level with more lattice points than `entries` has so many rows, which points share by their hash.
+
+    Raises:
+        ArgumentError: naming the value that is out of range.
+    """
+
+    levels: int = 16
+    entries: int = 1 << 19
+    coarsest: int = 16  # cells along each side
+    finest: int = 4096
+
+    def __post_init__(self) -> None:
+        if not 2 <= self.levels <= 32:
+            raise ArgumentError(f"levels: expected 2 to 32, got {self.levels}")
+        if not 8 <= self.entries <= 1 << 24 or self.entries & (self.entries - 1):
+            raise ArgumentError(f"entries: expected a power of two from 8 to 2^24, got {self.entries}")
+        if not 1 <= self.coarsest <= self.finest < 1 << 20:
+            raise ArgumentError(
+                f"coarsest, finest: expected 1 to 2^20 - 1 cells, the coarsest first, got {self.coarsest} "
+                f"and {self.finest}"
+            )
+
+    @cached_property
+    def resolutions(self) -> list[int]:
+        """Cells along each side, by level."""
+        growth = log2(self.finest / self.coarsest) / (self.levels - 1)
+        return [ceil(round(self.coarsest * 2 ** (growth * level), 6)) for level in range(self.levels)]
+
+    @cached_property
+    def first(self) -> list[int]:
+        """Row at which each level begins, and the number of all rows."""
+        firsts = [0]
+        for resolution in self.resolutions:
+            firsts.append(firsts[-1] + 8 * ceil(min((resolution + 1) ** 3, self.entries) / 8))
+        return firsts
+
+    @property
+    def rows(self) -> int:
+        """Of the table, which is [rows, 2]."""
+        return self.first[-1]
+
+    @property
+    def width(self) -> int:
+        """Features of a point."""
+        return FEATURES * self.levels
+
+    def structure(self) -> NativeHash:
+        """The levels as the library takes them."""
+        resolution, first = (
+            (c_int32 * self.levels)(*self.resolutions),
+            (c_int64 * len(self.first))(*self.first),
+        )
+        structure = NativeHash(self.levels, ctypes.addressof(resolution), ctypes.addressof(first))
+        structure.arrays = resolution, first  # for as long as the structure is there
+        return structure
+
+
+def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
+    """Features [n, 2 levels] at points [n, 3] of the unit cube, differentiable in the table.
+
+    Trilinear between the lattice points of each level; points outside of the cube have the features of its
+    faces. For a definition see `texgs.raster.reference.hash_encoding`.
+
+    Args:
+        points: any number of them.
+        table: [rows, 2] of all levels, one after the other.
+        levels: of the lattices.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    check.shape("points", points, "n 3")
+    check.shape("table", table, "rows features", rows=levels.rows, features=FEATURES)
+    check.constant(points=points)
+    for name, x in (("points", points), ("table", table)):
+        check.floating(name, x)
+        if x.device.type != "cpu":
+            raise DeviceError(
+                f"{name}: expected a tensor on cpu, got {x.device}; hash encoding runs on the CPU"
+            )
+    return _Encode.apply(points.contiguous(), table.contiguous(), levels)
+
+
+class _Encode(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
+        ctx.save_for_backward(points)
+        ctx.levels, ctx.table = levels, table.shape
+        planes = points.new_empty(levels.width, len(points))
+        _call("texgs_hash_encode", levels, points, table, planes)
+        return planes.T  # matrix products take it as it is
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, features: Tensor) -> tuple[None, Tensor, None]:
+        (points,) = ctx.saved_tensors
+        gradient = points.new_empty(ctx.table)
+        _call("texgs_hash_backward", ctx.levels, points, features.T.contiguous(), gradient)
+        return None, gradient, None
+
+
+def _call(name: str, levels: HashLevels, points: Tensor, *tensors: Tensor) -> None:
+    _describe()
+    structure = levels.structure()
+    addresses = map(native.address, tensors)
+    native.call(
+        name, byref(structure), len(points), points.data_ptr(), *addresses, device=torch.device("cpu")
+    )
+
+
+@cache
+def _describe() -> None:
+    """Tell ctypes the argument types."""
+    arguments = [POINTER(NativeHash), c_int64, c_void_p, c_void_p, c_void_p, c_void_p]
+    for name in ("texgs_hash_encode", "texgs_hash_backward"):
+        native.function(native.library("cpu"), name).argtypes = arguments
