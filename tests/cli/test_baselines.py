@@ -84,7 +84,9 @@ def test_geometry_is_kept_and_colours_are_not(edited):
 
 def test_it_is_shown_and_measured(edited):
     folder, method = edited
-    pictures = ["views.png"] if method in ("in2n", "igs2gs", "dge") else ["style.png"]
+    pictures = {"stylerf": ["style-TF01-1.png", "style-TF01-2.png"], "arf": ["style.png"]}.get(method, [])
+    if method in ("in2n", "igs2gs", "dge"):
+        pictures = ["views.png"]
     for name in (*pictures, "convergence.png", "edit.png"):
         assert np.asarray(Image.open(folder / name).convert("RGB")).std() > 5, f"{name} shows nothing"
     assert (folder / "turntable.mp4").stat().st_size > 1000

@@ -19,7 +19,16 @@ from texgs.fields.palette.rendering import points_on, shown
 from texgs.fit.palette import PaletteFit
 from texgs.raster.voxels import camera_rays
 
-RECIPE = Recipe(iterations=6, rate=0.01, features=0.0, patches=50.0, behind="white", cropped=False, reduce=2)
+RECIPE = Recipe(
+    iterations=6,
+    rate=0.01,
+    features=0.0,
+    distribution=0.0,
+    patches=50.0,
+    behind="white",
+    cropped=False,
+    reduce=2,
+)
 WEIGHTS = StyleRfWeights(variation=0.1, distillation=60)
 STYLE = StylePicture.of(picture("dots", 96))
 

@@ -45,7 +45,7 @@ def run(task: Task[StyleRfKeys]) -> EditedScene:
     def one(name: str, model: PaletteField, views: Sequence[View]) -> PaletteField:
         recipe = recipe_of(keys, len(views), task.edit.seed)
         chosen = pictures or [look.picture(name)] * len(model.colors)
-        look.pictures |= {f"{name}-{index + 1}": picture for index, picture in enumerate(pictures)}
+        look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
         edited, look.losses[name], errors[name] = stylize_palette(
             *(model, load(views, task.reduce), chosen, recipe, added, look.vgg), title=look.title(name)
         )
