@@ -9,7 +9,7 @@ import torch
 from safetensors.torch import load_file, save_file
 
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import TexgsError
 from texgs.fields.files import open_field
 from texgs.fields.palette.colors import cluster_colors
 from texgs.fields.palette.composition import PaletteScene
@@ -187,8 +187,9 @@ def test_clusters_are_of_hues_and_the_largest_comes_first():
         (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded of palette fields, got ambient"),
         (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of palette fields, got"),
         (lambda s: PaletteScene([]), "models: expected at least one"),
+        (lambda s: s.fields[0].to("cuda"), "device: expected cpu, got cuda; palette fields are rendered on"),
     ],
 )
 def test_what_palette_fields_cannot_show(render, message):
-    with pytest.raises(ArgumentError, match=message):
+    with pytest.raises(TexgsError, match=message):
         render(PaletteScene([box()]))

@@ -35,7 +35,7 @@ def cluster_colors(colors: Tensor, count: int, seed: int = 0) -> Tensor:
     distinct = len(np.unique(hues.numpy().round(6), axis=0))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of empty clusters
-        _, labels = kmeans2(hues.numpy(), min(count, distinct), minit="++", rng=random)
+        _, labels = kmeans2(hues.numpy(), min(count, distinct), minit="++", seed=random)
     members = [colors[torch.from_numpy(labels == label)] for label in range(count)]
     members.sort(key=len, reverse=True)
     return torch.stack([(each if len(each) else members[0]).mean(0) for each in members]).float()

@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.memory import MIB
 from texgs.fields.field import Role
@@ -53,7 +53,13 @@ class PaletteField:
         return self.parameters["palette.colors"]
 
     def to(self, device: torch.device | str) -> PaletteField:
-        """The same field: on the CPU, where alone it is rendered."""
+        """The same field, which is rendered on the CPU alone.
+
+        Raises:
+            DeviceError: for another device.
+        """
+        if torch.device(device).type != "cpu":
+            raise DeviceError(f"device: expected cpu, got {device}; palette fields are rendered on the CPU")
         return self
 
     def tensors(self, role: Role) -> dict[str, Tensor]:
