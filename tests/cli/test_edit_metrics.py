@@ -1,31 +1,47 @@
-"""Measures of scenes that leave some of them undefined."""
+"""Measures of scenes that leave some of them undefined, and of fields that have another one's surfaces."""
 
+import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
 from texgs.cli.stages.edit_metrics import agreement
-from texgs.config.fields import kinds
-from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.cameras import spiral as path
 
+CAMERAS = path(12, 4.0, 30.0, 32, 32)
+MISSING = {"vgg16": None, "lpips_vgg": None}
 
-def test_a_scene_that_is_nowhere_opaque_has_no_consistency(tmp_path):
+
+@pytest.fixture
+def scenes(tmp_path):
+    """Files of a ball's scene, as it is and as faint as a breath."""
     model = ball(1)
-    faint = torch.full_like(model.parameters["opacities"], -6.0)
-    scene, cameras = Scene({"ball": SceneModel(tmp_path)}), path(12, 4.0, 30.0, 32, 32)
-    missing = {"vgg16": None, "lpips_vgg": None}
-    seen, unseen = (
-        agreement(
-            Composition([Surfels({**model.parameters, **change}, model.shading)]),
-            scene,
-            cameras,
-            4,
-            missing,
-            kinds()["surfels"],
-        )
-        for change in ({}, {"opacities": faint})
-    )
-    assert 0 < seen["short_rmse"] < 0.5
-    assert unseen == {"short_rmse": None, "short_lpips": None, "long_rmse": None, "long_lpips": None}
+    faint = {**model.parameters, "opacities": torch.full_like(model.parameters["opacities"], -6.0)}
+    files = {}
+    for name, surfels in (("clear", model), ("faint", Surfels(faint, model.shading))):
+        write_model(tmp_path / f"{name}.safetensors", surfels)
+        scene = Scene({"ball": SceneModel(tmp_path / f"{name}.safetensors")})
+        files[name] = tmp_path / f"{name}.yaml"
+        write_scene(files[name], scene)
+    return files
+
+
+def measured(shown, geometry):
+    scene = read_scene(shown)
+    return agreement(scene.open(), scene, geometry, CAMERAS, 4, MISSING)
+
+
+def test_a_scene_that_is_nowhere_opaque_has_no_consistency(scenes):
+    assert 0 < measured(scenes["clear"], scenes["clear"])["short_rmse"] < 0.5
+    nothing = {"short_rmse": None, "short_lpips": None, "long_rmse": None, "long_lpips": None}
+    assert measured(scenes["faint"], scenes["faint"]) == nothing
+
+
+def test_surfaces_are_those_of_the_geometry_that_is_given(scenes):
+    """What hardly shows anything is nearly white everywhere, and consistent, on the surfaces of the ball."""
+    clear, faint = (measured(scenes[name], scenes["clear"]) for name in ("clear", "faint"))
+    assert 0 < faint["short_rmse"] < 0.2 * clear["short_rmse"]
+    assert measured(scenes["clear"], scenes["faint"])["short_rmse"] is None
