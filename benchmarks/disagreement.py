@@ -17,8 +17,10 @@ from statistics import fmean
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from texgs.config.phase import CommonRates
+from texgs.core.camera import Camera
 from texgs.core.light import HEADLIGHT
 from texgs.core.memory import keep_freed_memory
 from texgs.core.plots import words
@@ -27,6 +29,8 @@ from texgs.edit.field_views import field_views
 from texgs.edit.text import edit_by_text
 from texgs.fields.field import Field
 from texgs.fields.files import open_field
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
 from texgs.methods import dge, igs2gs, in2n
 from texgs.metrics.consistency import LONG, SHORT, SeenFrame, consistency
 from texgs.metrics.sharpness import sharpness
@@ -92,7 +96,7 @@ def measures(edited: Field, field: Field, cameras: list[Any], surfaces: list[Any
     """Consistency near and far, and sharpness against that of the guidance's own pictures of the field."""
     frames, ratios, filters = [], [], ProceduralFilters()
     for camera, surface in zip(cameras, surfaces, strict=True):
-        image = edited.render(camera).color.clamp(0, 1)
+        image = painted(edited, camera).clamp(0, 1)
         frames.append(SeenFrame(image, surface.median, surface.alpha, camera))
     for camera, frame in list(zip(cameras, frames, strict=True))[::4]:
         views = field_views(field, [camera], frame.image[None])
@@ -101,12 +105,19 @@ def measures(edited: Field, field: Field, cameras: list[Any], surfaces: list[Any
     return consistency(frames, SHORT).rmse, consistency(frames, LONG).rmse, fmean(ratios)
 
 
+def painted(field: Field, camera: Camera) -> Tensor:
+    """Colours [H, W, 3] as the guidance paints them, without light: that is what other fields learn."""
+    if isinstance(field, Surfels):
+        return Composition([field]).render(camera, look="unshaded").color
+    return field.render(camera).color
+
+
 def draw(rows: list[tuple[Any, ...]], path: Path) -> None:
     """Consistency and sharpness over seconds, a line for each method."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10, 4), dpi=120, layout="constrained")
+    figure = Figure(figsize=(10, 4.4), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     left, right = figure.subplots(1, 2)
     names = list(dict.fromkeys(row[0] for row in rows))
@@ -119,7 +130,7 @@ def draw(rows: list[tuple[Any, ...]], path: Path) -> None:
             axes.plot(*over, style, color=colors[name.removesuffix(", frozen")], label=words(name))
     left.set(xlabel="seconds", ylabel="RMSE of views seven apart", xscale="log", ylim=(0, None))
     right.set(xlabel="seconds", ylabel="sharpness against the guidance's", xscale="log", ylim=(0, None))
-    right.legend(fontsize=7)
+    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=8)
     figure.savefig(path)
 
 
