@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 from texgs.config.fields import kinds
@@ -54,6 +55,26 @@ def require_possible(edit: PartEdit, kind: str) -> None:
             raise ArgumentError(
                 f"{each.name}: expected a model that can change it, got one of {kind}; fit {able} for this"
             )
+
+
+def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> list[float]:
+    """Factors on the opacity of fields that can change nothing else: 0 for what is hidden; 1 without edits.
+
+    Args:
+        edits: one for each field.
+        count: of fields.
+        kind: of all of them.
+
+    Raises:
+        ArgumentError: if there are not as many edits as fields, or one that fields of this kind cannot show.
+    """
+    if edits is None:
+        return [1.0] * count
+    if len(edits) != count:
+        raise ArgumentError(f"edits: expected one for each of {count} models, got {len(edits)}")
+    for edit in edits:
+        require_possible(edit, kind)
+    return [edit.opacity if edit.visible else 0.0 for edit in edits]
 
 
 def color(name: str, value: object) -> tuple[float, float, float]:

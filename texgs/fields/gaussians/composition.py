@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
 from texgs.fields.gaussians.model import Gaussians
-from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, require_possible
+from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, opacity_factors
 from texgs.raster import Render
 
 
@@ -102,13 +102,7 @@ class JoinedGaussians:
 
     def _opacity(self, edits: Sequence[PartEdit]) -> Tensor:
         """Factors [N] on opacities; 0 for what is hidden, so that nothing of it is drawn."""
-        if len(edits) != len(self.counts):
-            raise ArgumentError(
-                f"edits: expected one for each of {len(self.counts)} models, got {len(edits)}"
-            )
-        for edit in edits:
-            require_possible(edit, self.whole.kind)
-        factors = [edit.opacity if edit.visible else 0.0 for edit in edits]
+        factors = opacity_factors(edits, len(self.counts), self.whole.kind)
         pairs = zip(factors, self.counts, strict=True)
         return torch.cat([torch.full((n,), factor, device=self.device) for factor, n in pairs])
 

@@ -12,7 +12,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
 from texgs.fields.palette.model import PaletteField, render_fields
-from texgs.fields.part_edit import PartEdit, require_possible
+from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.raster import Render
 
 
@@ -69,12 +69,5 @@ class PaletteScene:
         """
         if look != "shaded":
             raise ArgumentError(f"look: expected shaded of palette fields, got {look}")
-        edits = [PartEdit()] * len(self.fields) if edits is None else edits
-        if len(edits) != len(self.fields):
-            raise ArgumentError(
-                f"edits: expected one for each of {len(self.fields)} models, got {len(edits)}"
-            )
-        for edit in edits:
-            require_possible(edit, PaletteField.kind)
-        factors = [edit.opacity if edit.visible else 0.0 for edit in edits]
+        factors = opacity_factors(edits, len(self.fields), PaletteField.kind)
         return render_fields(self.fields, factors, camera, background, outputs)

@@ -13,7 +13,7 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
-from texgs.fields.part_edit import PartEdit, require_possible
+from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.fields.voxels.model import Voxels
 from texgs.raster import Render
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, unpack_rows, voxel_grid
@@ -77,14 +77,7 @@ class VoxelScene:
         """
         if look != "shaded":
             raise ArgumentError(f"look: expected shaded of voxels, got {look}")
-        edits = [PartEdit()] * len(self.fields) if edits is None else edits
-        if len(edits) != len(self.fields):
-            raise ArgumentError(
-                f"edits: expected one for each of {len(self.fields)} models, got {len(edits)}"
-            )
-        for edit in edits:
-            require_possible(edit, self.fields[0].kind)
-        factors = tuple(edit.opacity if edit.visible else 0.0 for edit in edits)
+        factors = tuple(opacity_factors(edits, len(self.fields), Voxels.kind))
         if self._merged is None or self._merged[0] != factors:
             self._merged = (factors, self._merge(factors))
         return self._merged[1].render(camera, light, background=background, outputs=outputs)
