@@ -24,6 +24,7 @@ def test_csv_keeps_all_digits_and_leaves_gaps():
 def test_markdown_says_what_was_not_measured():
     assert "| five_jets | 36.83 |" in TABLE.markdown()
     assert r"| wood \| stone | not measured |" in TABLE.markdown(), "a bar would begin a cell"
+    assert Column("primitives", 0).text(1234567) == "1,234,567"
     assert TABLE.markdown().endswith("\n\nA caption.\n")
 
 

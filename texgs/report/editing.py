@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import Any
 
 from texgs.config.fields import kinds
@@ -83,7 +83,7 @@ def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
     measured, edits = measures_of(records), edits_of("instruction", records)
     frozen = [each for each in edits if is_frozen_by_choice(each, measured)]
     kept = [each for each in edits if each in frozen or has_texture(each)] if frozen else []
-    return replace(table("", kept, measured, list(MEASURES)), caption=CAPTION)
+    return table("", kept, measured, list(MEASURES))
 
 
 def measures_of(records: Iterable[Record[Any]]) -> Measures:
@@ -102,9 +102,11 @@ def table(follows: str, edits: Sequence[Edit], measured: Measures, names: Sequen
     rows = {each.path: row_of(each, measured.get(key_of(each)), names) for each in edits}
     means = mean_rows([rows[each.path] for each in edits if not each.stand_in], keys=4)
     theirs = published(follows, names) if edits and follows else []
-    notes = clip_notes([measured[key_of(each)].result for each in edits if key_of(each) in measured])
+    notes = [CAPTION, NOT_ALIKE] if theirs else [CAPTION]
+    if set(CLIP) <= set(names):
+        notes += clip_notes([measured[key_of(each)].result for each in edits if key_of(each) in measured])
     columns = (*LABELS, *(MEASURES[name] for name in names))
-    return Table(" ".join([CAPTION, NOT_ALIKE, *notes]), columns, [*rows.values(), *means, *theirs])
+    return Table(" ".join(notes), columns, [*rows.values(), *means, *theirs])
 
 
 def key_of(record: Record[EditResult] | Record[EditMeasures]) -> Key:

@@ -15,7 +15,7 @@ from texgs.report.sections import SECTIONS, Figure, figures
 from texgs.report.table import Table
 from texgs.report.tables import specs, sweeps_of, tables_of
 
-JOB = ("stage", "dataset", "tf", "recipe", "variant", "seed", "seconds", "peak_memory_mib", "device")
+JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
 
 
@@ -48,6 +48,7 @@ def write_report(
         places={record.path: index for index, record in enumerate(records, start=1)},
         versions=versions([record.facts for record in records]),
         headings=(*JOB, *SOURCE),
+        sources_from=len(JOB),
         kinds=kinds,
     )
     return write_bytes(path, text.encode())
@@ -70,7 +71,8 @@ def sections(records: Sequence[Record[Any]], left_out: Sequence[LeftOut]) -> lis
 
 def job(metrics: Mapping[str, Any]) -> list[str]:
     """The cells of one job in the list of where things came from."""
-    cells = [metrics.get(key) for key in (*JOB, *SOURCE)]
+    facts = {"edit": metrics["numbers"].get("edit"), **metrics}
+    cells = [facts.get(key) for key in (*JOB, *SOURCE)]
     return ["" if x is None else f"{x:.1f}" if isinstance(x, float) else str(x) for x in cells]
 
 

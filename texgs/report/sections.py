@@ -27,7 +27,7 @@ SECTIONS = {
     "sizes": "Model sizes",
     "rendering": "Rendering",
     "study": "User study",
-    "more": "More figures",
+    "more": "Further tables and figures",
 }
 OF_STAGES = {  # sections by the stage that made a figure; edits have theirs by what they follow
     **dict.fromkeys(("volume", "transfer", "views", "sheet"), "data"),

@@ -29,7 +29,7 @@ class Column:
             return self.missing
         if isinstance(cell, str) or self.digits is None:
             return str(cell)
-        return f"{cell:.{self.digits}f}"
+        return f"{cell:,.{self.digits}f}"
 
 
 @dataclass(frozen=True)

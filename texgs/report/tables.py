@@ -147,7 +147,7 @@ TABLES = (
         ("pse",),
         edits,
     ),
-    TableSpec("looks", "Looks in full", "", "parts", EDITED, looks),
+    TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
     TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),
 )
 
