@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from texgs.config.fields import kinds
+from texgs.report.means import mean
 from texgs.report.metrics_files import Record, of, paper
 from texgs.report.published import (
     ALIKE,
@@ -21,7 +22,6 @@ from texgs.report.published import (
     side_by_side,
 )
 from texgs.report.results import FitResult
-from texgs.report.sweep import mean, natural
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 MEASURES = (
@@ -50,7 +50,7 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
             runs = groups.setdefault((record.title, record.recipe, record.variant), defaultdict(dict))
             runs[record.tf, record.seed][record.stage] = record
     published = paper(sweep, keys=2)
-    ordered = sorted(groups.items(), key=lambda item: natural(item[0][2]))
+    ordered = sorted(groups.items(), key=lambda item: (len(item[0][2]), item[0][2]))  # numbers, as words
     ours = [row_of(list(runs.values()), sweep, published) for _, runs in ordered]
     return Table(ALIKE, columns(sweep), side_by_side(ours, published, theirs))
 

@@ -6,10 +6,10 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from texgs.report.means import mean
 from texgs.report.metrics_files import Record, of, paper
 from texgs.report.published import beside, images, in_order
 from texgs.report.results import SheetResult, ViewsResult, VolumeResult
-from texgs.report.sweep import mean
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 COLUMNS = (

@@ -6,6 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from texgs.report.means import mean
 from texgs.report.metrics_files import Record, of, paper, phases
 from texgs.report.published import (
     ALIKE,
@@ -20,7 +21,6 @@ from texgs.report.published import (
     side_by_side,
 )
 from texgs.report.results import FitResult
-from texgs.report.sweep import mean
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
 MEASURES = (

@@ -1,12 +1,19 @@
-"""Mean rows of tables."""
+"""Means of what has several basic scenes, seeds or data sets."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from statistics import fmean
 
-from texgs.report.sweep import mean
 from texgs.report.table import Cell, Row
+
+
+def mean(values: Iterable[float | None]) -> float | None:
+    """The mean; None where a value is missing, or there is none."""
+    listed = list(values)
+    known = [value for value in listed if value is not None]
+    return fmean(known) if known and len(known) == len(listed) else None
 
 
 def mean_rows(rows: Sequence[Row], keys: int) -> list[Row]:
