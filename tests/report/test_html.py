@@ -70,11 +70,18 @@ def paths(tmp_path):
     return [
         job(folder, "gallery", GalleryResult(["before", "painted", "red"]), ["gallery.png"], recipe=None),
         job(folder, "timing", timing),
-        job(folder, "edit_text", part, ["edit.png"]),
+        job(folder, "edit_text", part, ["edit.png"], recipe="other"),
         job(folder, "edit_image", edit, ["edit.png", "style-TF01.png"]),
         job(folder, "pse", PseResult(6, [], []), ["pse.png", "relight.png"]),
         job(folder, "texture", FitResult(60.0, 9, 10, [2.0, 1.0]), tf="TF01"),
-        job(folder, "comparison", ComparisonResult(["a", "b"], ["0"]), ["comparison.png"], tf="TF01"),
+        job(
+            folder,
+            "comparison",
+            ComparisonResult(["a", "b"], ["0"]),
+            ["comparison.png"],
+            tf="TF01",
+            recipe=None,
+        ),
         job(folder, "sheet", SheetResult(9, 2, 8, 4), ["sheet.png"], tf="TF01", recipe=None),
         job(folder, "star_plot", SheetResult(9, 2, 8, 4), ["new.png"], recipe=None),
     ]
@@ -100,9 +107,9 @@ def test_every_figure_has_its_words_and_command(tmp_path, paths):
     names = ["gallery", "edit", "style-TF01", "pse", "relight", "comparison", "sheet", "new"]
     assert all(f"Words of {name}.png." in captions for name in names)
     assert set(found.of("code")) >= {
-        "texgs gallery dataset=engine 'edits=[painted,red]'",
+        "texgs gallery dataset=engine fit=quick 'fits=[quick,other]' 'edits=[painted,red]'",
         "texgs edit_image dataset=engine fit=quick edit=painted",
-        "texgs comparison dataset=engine tf=TF01 fit=quick 'fits=[a,b]'",
+        "texgs comparison dataset=engine tf=TF01 fit=a 'fits=[a,b]'",
         "texgs sheet dataset=engine tf=TF01",
     }
     assert len(found.sources) == 10, "nine pictures and the curve of the fit"

@@ -39,6 +39,7 @@ OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what the
 NARROW = ("scene.png", "transfer.png", "convergence.png")  # side by side where there is room; and styles
 QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
 UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
+Edits = Mapping[str, Record[EditResult]]  # by name
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Figure:
 
 def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
     """All pictures of jobs by section, in the order of data sets."""
-    follows = {edit.result.edit: edit.result.follows for edit in of(EditResult, records)}
+    edits = {edit.result.edit: edit for edit in of(EditResult, records)}
     found: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
         for name, words in record.facts.get("pictures", {}).items():
@@ -66,21 +67,15 @@ def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
                     label(record),
                     words,
                     data_uri(Image.open(picture)),
-                    command(record),
+                    command(record, edits),
                     is_narrow=name in NARROW or name.startswith("style"),
                 )
-                found[section_of(record, name, follows)].append(figure)
+                found[section_of(record, name, edits)].append(figure)
     return found
 
 
-def section_of(record: Record[Any], picture: str, follows: Mapping[str, str]) -> str:
-    """The section of a picture.
-
-    Args:
-        record: of the job that made it.
-        picture: name of its file.
-        follows: what edits follow, by their names.
-    """
+def section_of(record: Record[Any], picture: str, edits: Edits) -> str:
+    """The section of a picture, which a job has made; `picture` is the name of its file."""
     result = record.result
     if record.is_swept:
         return "ablations"
@@ -88,7 +83,7 @@ def section_of(record: Record[Any], picture: str, follows: Mapping[str, str]) ->
         is_part = any("/" in name for name in result.followed)
         return "parts" if is_part else OF_EDITS[result.follows]
     if isinstance(result, GalleryResult):
-        return next((OF_EDITS[follows[name]] for name in result.looks if name in follows), "more")
+        return next((OF_EDITS[edits[name].result.follows] for name in result.looks if name in edits), "more")
     if isinstance(result, FitResult):
         return "fitting"
     return OF_PICTURES.get(picture, OF_STAGES.get(record.stage, "more"))
@@ -100,16 +95,20 @@ def label(record: Record[Any]) -> str:
     return " ".join(filter(None, (record.tf, record.label, edit)))
 
 
-def command(record: Record[Any]) -> str:
+def command(record: Record[Any], edits: Edits) -> str:
     """The command that makes the pictures of a job, but for what its run overrode."""
-    result = record.result
+    result, fits = record.result, [record.recipe]
+    if isinstance(result, ComparisonResult):
+        fits = result.recipes
+    if isinstance(result, GalleryResult):
+        fits = list(dict.fromkeys(edits[name].recipe for name in result.looks if name in edits))
     words = {
         "tf": record.tf,
-        "fit": record.recipe,
+        "fit": next(iter(fits), ""),
         "edit": result.edit if isinstance(result, EditResult) else "",
         "variant": record.variant,
         "fit.seed": record.seed if record.recipe else 0,
-        "fits": listed(result.recipes) if isinstance(result, ComparisonResult) else "",
+        "fits": listed(fits) if len(fits) > 1 else "",
         "edits": listed(result.looks[1:]) if isinstance(result, GalleryResult) else "",
     }
     given = [f"{key}={value}" for key, value in words.items() if value]
