@@ -111,6 +111,12 @@ def test_a_measure_that_a_basic_scene_lacks_has_no_mean(tmp_path):
     assert (row["PSNR"], row["minutes"], row["primitives"]) == (None, 1.5, 15)
 
 
+def test_phases_of_a_field_that_is_not_here_any_more_are_shown(tmp_path):
+    metrics(tmp_path, "ball", FitResult(60.0, 9), "scan", "TF01", field="ball")
+    metrics(tmp_path, "texture", FitResult(60.0, 9), "scan", "TF01")
+    assert [row["phase"] for row in rows(fitting(records(tmp_path)))] == ["texture", "ball"]
+
+
 def test_fits_are_listed_one_by_one_but_for_those_of_sweeps(tmp_path):
     for tf in ("TF02", "TF01"):
         for phase in ("texture", "shading"):

@@ -77,9 +77,9 @@ def row_of(runs: Sequence[Run], sweep: str, published: Mapping[Key, Line]) -> Ou
 
 
 def end_of(run: Run) -> Record[FitResult] | None:
-    """The last phase of a fit; None where one is missing."""
-    names = kinds()[next(iter(run.values())).field].phases
-    return run[names[-1]] if set(names) <= set(run) else None
+    """The last phase of a fit; None where one is missing, or its kind of field is not known here."""
+    kind = kinds().get(next(iter(run.values())).field)
+    return run[kind.phases[-1]] if kind and set(kind.phases) <= set(run) else None
 
 
 def measures(run: Run, end: Record[FitResult] | None) -> list[float | None]:

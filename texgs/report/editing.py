@@ -116,7 +116,8 @@ def key_of(record: Record[EditResult] | Record[EditMeasures]) -> Key:
 
 def has_texture(edit: Edit) -> bool:
     """Whether looks change within the primitives of a field, so that its geometry may stay in any case."""
-    return "texture" in kinds()[edit.field].can
+    kind = kinds().get(edit.field)
+    return kind is not None and "texture" in kind.can
 
 
 def is_frozen_by_choice(edit: Edit, measured: Measures) -> bool:

@@ -53,10 +53,10 @@ def fitting(records: Iterable[Record[Any]]) -> Table:
 
 
 def in_phases(records: Iterable[Record[Any]]) -> list[Record[FitResult]]:
-    """The phases of fits that are of no sweep, by data set, label and their order."""
-    order = phases()
+    """The phases of fits that are of no sweep, by data set, label and their order; unknown ones last."""
+    order = {phase: place for place, phase in enumerate(phases())}
     found = [record for record in of(FitResult, records) if not record.is_swept]
-    return sorted(found, key=lambda each: (place_of(each), each.label, order.index(each.stage)))
+    return sorted(found, key=lambda each: (place_of(each), each.label, order.get(each.stage, len(order))))
 
 
 def row_of(parts: Sequence[Record[FitResult]], published: Mapping[Key, Line]) -> Ours:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,17 @@ from texgs.report.tables import specs, sweeps_of, tables_of
 
 JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
+DRAWN = {"fitting": loss_figures}  # figures that no job has made, by section
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the report."""
+
+    key: str
+    title: str
+    tables: dict[str, Table]  # by name
+    figures: dict[str, list[Figure]]  # by data set
 
 
 def write_report(
@@ -54,18 +66,19 @@ def write_report(
     return write_bytes(path, text.encode())
 
 
-def sections(records: Sequence[Record[Any]], left_out: Sequence[LeftOut]) -> list[dict[str, Any]]:
-    """The sections that have something to show: tables by name, and figures by data set."""
+def sections(records: Sequence[Record[Any]], left_out: Sequence[LeftOut]) -> list[Section]:
+    """The sections that have something to show."""
     pictures, tables = figures(records), tables_of(records, left_out)
+    places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     shown = []
     for key, title in SECTIONS.items():
-        names = [spec.name for spec in specs(sweeps_of(records)) if spec.section == key]
-        own = {name: tables[name] for name in names if tables[name].rows}
+        own = {name: table for name, table in tables.items() if table.rows and places[name] == key}
+        drawn = DRAWN[key](records) if key in DRAWN else []
         by_dataset: dict[str, list[Figure]] = {}
-        for figure in [*pictures[key], *(loss_figures(records) if key == "fitting" else [])]:
+        for figure in [*pictures[key], *drawn]:
             by_dataset.setdefault(figure.dataset, []).append(figure)
         if own or by_dataset:
-            shown.append({"key": key, "title": title, "tables": own, "figures": by_dataset})
+            shown.append(Section(key, title, own, by_dataset))
     return shown
 
 
