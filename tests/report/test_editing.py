@@ -104,4 +104,4 @@ def test_a_row_leads_to_the_edit_and_its_measures(tmp_path):
     assert table.rows[0].sources == paths
     assert (gold["pixels"], gold["CLIP similarity"]) == ("512x512", 0.3)
     assert (late["pixels"], late["mean ms"], late["minutes"]) == (None, None, 0.1)
-    assert "CLIP: B/32." in table.caption
+    assert "CLIP of the scores: B/32;" in table.caption

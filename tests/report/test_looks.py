@@ -16,7 +16,7 @@ def test_an_edit_and_its_measures_make_a_row(tmp_path):
     assert (row["minutes"], row["mean ms"], row["CLIP similarity"], row["Gram"]) == (1.5, 4.0, 0.3, 1.5)
     assert row["geometry kept"] == "bit for bit"
     assert table.rows[0].sources == paths
-    assert "CLIP: B/32." in table.caption
+    assert "CLIP of the scores: B/32;" in table.caption
 
 
 def test_what_models_follow_is_told_once_where_it_is_the_same(tmp_path):

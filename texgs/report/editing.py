@@ -157,6 +157,7 @@ def clip_notes(measured: Sequence[EditMeasures]) -> list[str]:
     """Which CLIP it was, and why it was not."""
     backbones = {each.clip for each in measured if each.clip}
     reasons = {each.clip_missing for each in measured if each.clip_missing}
-    return [f"CLIP: {name}." for name in sorted(backbones)] + [
-        f"CLIP not measured: {reason}." for reason in sorted(reasons)
+    scores = [
+        f"CLIP of the scores: {name}; that of a loss stands beside its method." for name in sorted(backbones)
     ]
+    return [*scores, *(f"CLIP not measured: {reason}." for reason in sorted(reasons))]
