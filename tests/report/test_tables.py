@@ -6,13 +6,13 @@ from texgs.config.places import PLACES
 from texgs.core.errors import ArgumentError
 from texgs.report.left_out import LeftOut
 from texgs.report.metrics_files import paper, read
-from texgs.report.results import FitResult
+from texgs.report.results import FitResult, SceneResult
 from texgs.report.sections import SECTIONS
 from texgs.report.tables import TABLES, tables_of
 
 
 def test_tables_are_in_the_papers_order_and_then_ours():
-    numbers = [int(table.number) for table in TABLES if table.number]
+    numbers = [table.number for table in TABLES if table.number]
     assert numbers == sorted(numbers)
     assert {1, 2, 3, 4, 5, 6, 7, 8} <= set(numbers)
     last = max(place for place, table in enumerate(TABLES) if table.number)
@@ -47,6 +47,11 @@ def test_each_sweep_has_a_table(tmp_path):
     assert len(tables["sweep-mine"].rows) == 1
     assert [row.cells[1] for row in tables["fits"].rows] == ["TF01"] * 3
     assert not [name for name in tables_of([]) if name.startswith("sweep")]
+
+
+def test_a_sweep_without_fits_among_the_jobs_has_none(tmp_path):
+    metrics(tmp_path, "compose", SceneResult(1, 9), sweep="mine", variant="a")
+    assert not [name for name in tables_of(records(tmp_path)) if name.startswith("sweep")]
 
 
 def test_captions_say_what_is_left_out(tmp_path):

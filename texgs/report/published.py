@@ -17,8 +17,8 @@ RECIPE = "paper"  # of conf/fit: what the paper's numbers are of
 VIEWS = 162  # training views, where the paper does not say another number
 ALIKE = (
     "Numbers of the paper stand beside ours where recipe, size of images and number of training views are "
-    f"the paper's; elsewhere there is {UNLIKE}, not like for like. Its transfer functions are not published, "
-    "so PSNR is not like for like even there."
+    f"the paper's; elsewhere there is {UNLIKE}, not like for like. Its transfer functions are not published: "
+    "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 Key = tuple[str, ...]  # of a line: its first columns, the data set first
 Line = Mapping[str, str]  # of a file of the paper's numbers

@@ -14,7 +14,8 @@ from texgs.report.fitting import fits, fitting
 from texgs.report.left_out import LeftOut, note
 from texgs.report.looks import looks
 from texgs.report.meshes import meshes
-from texgs.report.metrics_files import Record
+from texgs.report.metrics_files import Record, of
+from texgs.report.results import FitResult
 from texgs.report.scene_tables import edits, model_size, rendering
 from texgs.report.sweep import sweep
 from texgs.report.table import Table
@@ -30,7 +31,7 @@ class TableSpec:
     section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
     places: tuple[str, ...]  # of the jobs that it reads, keys of `texgs.config.places.PLACES`
     make: Callable[[Iterable[Record[Any]]], Table]
-    number: str = ""  # among the paper's tables; empty for ours
+    number: int | None = None  # among the paper's tables; none for ours
     paper: str = ""  # where the paper has it
 
     @property
@@ -55,7 +56,7 @@ TABLES = (
         "data",
         ("volume", "views", "sheet"),
         datasets,
-        "1",
+        1,
         "Table 1, and Table 3 of the appendix for the last four data sets",
     ),
     TableSpec(
@@ -65,7 +66,7 @@ TABLES = (
         "image",
         EDITED,
         image_driven,
-        "2",
+        2,
         "Table 2",
     ),
     TableSpec(
@@ -76,7 +77,7 @@ TABLES = (
         "text",
         EDITED,
         text_driven,
-        "3",
+        3,
         "Table 3",
     ),
     TableSpec(
@@ -95,7 +96,7 @@ TABLES = (
         "fitting",
         ("phase",),
         fitting,
-        "4",
+        4,
         "Table 5 of the appendix",
     ),
     TableSpec(
@@ -105,7 +106,7 @@ TABLES = (
         "ablations",
         ("phase",),
         partial(ablation, sweep="views"),
-        "5",
+        5,
         "Table 1 of the appendix",
     ),
     TableSpec(
@@ -115,7 +116,7 @@ TABLES = (
         "ablations",
         ("phase",),
         partial(ablation, sweep="resolution"),
-        "6",
+        6,
         "Table 2 of the appendix",
     ),
     TableSpec(
@@ -125,7 +126,7 @@ TABLES = (
         "sizes",
         ("phase",),
         model_size,
-        "7",
+        7,
         "Table 4 of the appendix",
     ),
     TableSpec(
@@ -135,7 +136,7 @@ TABLES = (
         "rendering",
         ("timing",),
         rendering,
-        "8",
+        8,
         "columns of Tables 1 to 3, of edited scenes on an RTX 4090; its volumes are rendered by ParaView",
     ),
     TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
@@ -163,8 +164,9 @@ def of_sweep(name: str) -> TableSpec:
 
 
 def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:
-    """The sweeps among some jobs, each once."""
-    return sorted({record.sweep for record in records if record.is_swept and record.variant})
+    """The sweeps among some jobs whose fits can be compared, each once."""
+    fits = of(FitResult, records)
+    return sorted({record.sweep for record in fits if record.is_swept and record.variant})
 
 
 def tables_of(records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = ()) -> dict[str, Table]:
