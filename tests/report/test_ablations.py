@@ -9,7 +9,7 @@ TITLES = [column.title for column in MEASURES]
 VARIANTS = {"views": "views", "resolution": "image_px"}  # columns of the paper's files, by sweep
 
 
-def write_fit(folder, line, sweep, factor=1.0, dataset=None, recipe="paper", tf="TF01", **facts):
+def write_fit(folder, line, sweep, factor=1.0, dataset=None, recipe="paper", tf="TF01", name="", **facts):
     """Metrics of a fit, whose measures are some multiple of the paper's; its phases share the minutes."""
     variant = int(line[VARIANTS[sweep]])
     pixels, views = (512, variant) if sweep == "views" else (variant, 162)
@@ -25,7 +25,7 @@ def write_fit(folder, line, sweep, factor=1.0, dataset=None, recipe="paper", tf=
             width=pixels,
             height=pixels,
         )
-        named = {"sweep": sweep, "variant": str(variant)} | facts
+        named = {"sweep": name or sweep, "variant": str(variant)} | facts
         metrics(folder, phase, result, dataset or line["dataset"], tf, recipe, **named)
 
 
@@ -65,6 +65,9 @@ def test_a_fit_with_a_missing_phase_is_not_measured(tmp_path):
     assert own["PSNR (paper)"] == UNLIKE
 
 
-def test_other_sweeps_do_not_count(tmp_path):
-    write_fit(tmp_path, lines("views")[0], "views")
+def test_other_sweeps_do_not_count_but_for_their_like(tmp_path):
+    write_fit(tmp_path, lines("views")[0], "views", dataset="scan")
+    write_fit(tmp_path, lines("views")[0], "views", dataset="other", name="views_quick")
+    write_fit(tmp_path, lines("views")[0], "views", dataset="third", name="viewshed")
+    assert [row["data set"] for row in rows(ablation(records(tmp_path), "views"))] == ["other", "scan"]
     assert ablation(records(tmp_path), "resolution").rows == []

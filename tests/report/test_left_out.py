@@ -62,3 +62,7 @@ def test_files_of_other_versions_are_left_out_as_long_as_one_is_good(tmp_path):
 
 def test_an_entry_ends_with_one_full_stop():
     assert str(LeftOut("a", "b", [])) == str(LeftOut("a", "b.", [])) == "a: b."
+
+
+def test_what_is_left_out_is_named_once():
+    assert str(LeftOut("data set wood", "data set wood: no file", [])) == "data set wood: no file."

@@ -42,11 +42,11 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
 
     Args:
         records: jobs; those of other sweeps do not count.
-        sweep: a key of `HEADINGS`.
+        sweep: a key of `HEADINGS`; the names of its like begin with it, such as `views_quick`.
     """
     groups: dict[tuple[str, str, str], dict[tuple[str | None, int], Run]] = {}
     for record in in_order(of(FitResult, records)):
-        if record.sweep == sweep and record.variant:
+        if record.variant and (record.sweep == sweep or record.sweep.startswith(f"{sweep}_")):
             runs = groups.setdefault((record.title, record.recipe, record.variant), defaultdict(dict))
             runs[record.tf, record.seed][record.stage] = record
     published = paper(sweep, keys=2)

@@ -22,7 +22,8 @@ class LeftOut:
     places: list[str]  # of the jobs that there are none of, keys of `texgs.config.places.PLACES`
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.why.rstrip('. ')}."
+        why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves
+        return f"{self.what}: {why.rstrip('. ')}."
 
 
 def read_left_out(path: str | Path | None) -> list[LeftOut]:

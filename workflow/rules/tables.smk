@@ -20,8 +20,12 @@ rule tables:
     params:
         code=PLAN.code["texgs.cli.tables"],
         folder=subpath(output[0], parent=True),
+        earlier=list(PLAN.earlier),
+        of_earlier=list(PLAN.earlier.values()),
+        left_out=PLAN.left_out,
     shell:
-        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
+        "texgs tables {input:q} {params.earlier:q} --missing {params.left_out:q} --output {params.folder:q} "
+        "2>&1 | tee --append {log:q}"
 
 
 rule report:
@@ -34,5 +38,9 @@ rule report:
     params:
         code=PLAN.code["texgs.cli.report"],
         template=digest(files("texgs.report").joinpath("report.html.j2").read_text()),
+        earlier=list(PLAN.earlier),
+        of_earlier=list(PLAN.earlier.values()),
+        left_out=PLAN.left_out,
     shell:
-        "texgs report {input:q} --output {output:q} 2>&1 | tee --append {log:q}"
+        "texgs report {input:q} {params.earlier:q} --missing {params.left_out:q} --output {output:q} "
+        "2>&1 | tee --append {log:q}"
