@@ -33,6 +33,7 @@ RESERVED = (
     "mlartifacts",
     "tables",
     "scene",
+    "study",
 )  # folders below `results`
 LONGEST = 100  # characters of a name: it becomes that of files and folders
 NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
