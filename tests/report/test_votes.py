@@ -82,8 +82,12 @@ def test_data_sets_with_other_methods_are_added_up_on_their_own():
     assert totals == ["x", "y", "z", "all", "x", "y", "all"]
 
 
-def test_without_ballots_there_are_no_rows():
-    assert user_study(Votes(STUDY, [])).rows == []
+def test_without_votes_there_are_those_of_the_paper():
+    table = user_study(None)
+    assert table.caption.startswith("No votes but the paper's.")
+    found = rows(table)
+    assert {row["edit"] for row in found} == {"the paper"}
+    assert [row["kind"] for row in found] == ["image-driven"] * 21 + ["text-driven"] * 21
 
 
 def test_the_papers_file_holds_ten_votes_in_each_row_and_column():

@@ -48,6 +48,7 @@ function show(index) {
   next.hidden = index === questions.length - 1;
   save.hidden = !next.hidden;
   status.textContent = "";
+  document.querySelector("details").open = index === 0;
   const bytes = atob(questions[index].querySelector("template").content.textContent);
   URL.revokeObjectURL(film.src);
   film.src = URL.createObjectURL(new Blob([Uint8Array.from(bytes, (x) => x.charCodeAt(0))], { type: "video/mp4" }));
@@ -69,7 +70,7 @@ function draw() {
       const { column, row } = canvas.dataset;
       canvas.getContext("2d").drawImage(film, column * size, row * size, size, size, 0, 0, size, size);
     }
-    if (!film.paused) question.querySelector(".turn").value = film.currentTime / film.duration;
+    if (!film.paused) question.querySelector(".turn").value = 360 * film.currentTime / film.duration;
   }
   question.querySelector(".play").textContent = film.paused ? "Play" : "Pause";
   requestAnimationFrame(draw);
@@ -102,7 +103,7 @@ for (const question of questions) {
   question.querySelector(".play").addEventListener("click", () => (film.paused ? film.play() : film.pause()));
   turn.addEventListener("input", () => {
     film.pause();
-    film.currentTime = Math.min(turn.value * film.duration, film.duration - 0.01);
+    film.currentTime = Math.min(turn.value / 360 * film.duration, film.duration - 0.01);
   });
   for (const input of question.querySelectorAll("fieldset input")) {
     input.checked = answers.ranks[input.name] === input.value;

@@ -27,7 +27,7 @@ class Ballot:
 
 @dataclass(frozen=True)
 class Votes:
-    """A study and its ballots."""
+    """A study and its ballots, at least one."""
 
     study: Study
     ballots: Sequence[Ballot]

@@ -9,12 +9,13 @@ from dataclasses import astuple, dataclass
 import numpy as np
 
 from texgs.report.ballots import Votes
-from texgs.report.looks import PAPER, words_of
+from texgs.report.looks import words_of
 from texgs.report.metrics_files import paper
 from texgs.report.rankings import CONFIDENCE, Rankings, firsts, friedman, together
 from texgs.report.study import KINDS, Compared
 from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
 
+METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files that name those of a kind
 PUBLISHED = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
 BEFORE = ("kind", "data set", "follows", "recipe", "edit", "method")
 AFTER = (
@@ -39,27 +40,32 @@ class Panel:
     votes: Rankings  # methods are Compared
 
 
-def user_study(votes: Votes) -> Table:
-    """The table of a study; without ballots it is empty.
+def user_study(votes: Votes | None) -> Table:
+    """The table of a study; without votes only those of the paper.
 
     Votes are added up over the data sets on which the same methods were compared.
     """
-    ours, theirs = counted(votes), published()
-    ranks = max((len(panel.votes.methods) for panels in ours.values() for panel in panels), default=0)
-    if ours:
-        ranks = max(ranks, len(PUBLISHED))
-    columns = [*map(Column, BEFORE), *(Column(f"rank {place}", 0, "-") for place in range(1, ranks + 1))]
-    rows = []
-    for follows, panels in ours.items():
-        for group in [*alike(panels), *alike(theirs[follows])]:
-            rows += rows_of(KINDS[follows], group, ranks)
-    return Table(caption(votes), [*columns, *AFTER], rows)
+    ours, theirs = counted(votes) if votes else {}, published()
+    shown = {
+        follows: [*alike(ours.get(follows, [])), *alike(theirs[follows])]
+        for follows in KINDS
+        if follows in ours or not ours
+    }
+    ranks = max(len(group[0].votes.methods) for groups in shown.values() for group in groups)
+    rows = [
+        row
+        for follows, groups in shown.items()
+        for group in groups
+        for row in rows_of(KINDS[follows], group, ranks)
+    ]
+    numbered = [Column(f"rank {rank}", 0, UNPUBLISHED) for rank in range(1, ranks + 1)]
+    return Table(caption(votes), [*map(Column, BEFORE), *numbered, *AFTER], rows)
 
 
 def counted(votes: Votes) -> dict[str, list[Panel]]:
-    """The votes of each question, by what methods follow there; none without ballots."""
+    """The votes of each question, by what methods follow there."""
     found: dict[str, list[Panel]] = defaultdict(list)
-    for place, question in enumerate(votes.study.questions if votes.ballots else ()):
+    for place, question in enumerate(votes.study.questions):
         methods = [option.compared for option in question.options]
         ranks = np.array([ballot.ranks[place] for ballot in votes.ballots])
         ranked = Rankings.of(methods, ranks).sorted(sorted(methods, key=astuple))
@@ -73,7 +79,7 @@ def published() -> dict[str, list[Panel]]:
     for (dataset, method), line in paper("user_study", keys=2).items():
         lines[dataset][method] = [int(line[rank]) for rank in PUBLISHED]
     found: dict[str, list[Panel]] = {}
-    for follows, (table, _) in PAPER.items():
+    for follows, table in METHODS.items():
         known = {method for (method,) in paper(table)}
         found[follows] = [
             Panel(
@@ -123,10 +129,13 @@ def method_rows(start: Sequence[Cell], votes: Rankings, ranks: int) -> list[Row]
     return rows
 
 
-def caption(votes: Votes) -> str:
+def caption(votes: Votes | None) -> str:
     """What the columns are, and whose votes these are."""
+    whose = (
+        f"Study {votes.study.study}, {len(votes.ballots)} ballots." if votes else "No votes but the paper's."
+    )
     return (
-        f"Study {votes.study.study}, {len(votes.ballots)} ballots. Votes for each rank; rank 1 is the best. "
+        f"{whose} Votes for each rank; rank 1 is the best. "
         f"`first` is the share of first ranks, with its exact {CONFIDENCE:.0%} interval and the two-sided "
         "binomial test against chance. Friedman's test takes each answer of each ballot as a block. "
         "The paper: ten participants; the same numbers from its counts of votes."
