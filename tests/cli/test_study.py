@@ -75,6 +75,7 @@ def test_a_study_is_made_answered_and_counted(results, capsys):
     assert sorted(path.name for path in (results / "tables").iterdir()) == [
         "user_study.csv",
         "user_study.md",
+        "user_study.png",
         "user_study.tex",
     ]
 

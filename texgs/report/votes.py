@@ -27,6 +27,7 @@ AFTER = (
     Column("chi2 (Friedman)", 2, UNPUBLISHED),
     Column("p (Friedman)", None, UNPUBLISHED),
 )
+THE_PAPER = "the paper"  # in place of an edit
 NO_BALLOTS = "only counts are published"
 TWO = "needs three methods"
 
@@ -37,7 +38,7 @@ class Panel:
 
     dataset: str
     followed: str
-    votes: Rankings  # methods are Compared
+    votes: Rankings
 
 
 def user_study(votes: Votes | None) -> Table:
@@ -45,21 +46,22 @@ def user_study(votes: Votes | None) -> Table:
 
     Votes are added up over the data sets on which the same methods were compared.
     """
-    ours, theirs = counted(votes) if votes else {}, published()
-    shown = {
-        follows: [*alike(ours.get(follows, [])), *alike(theirs[follows])]
-        for follows in KINDS
-        if follows in ours or not ours
-    }
-    ranks = max(len(group[0].votes.methods) for groups in shown.values() for group in groups)
-    rows = [
-        row
-        for follows, groups in shown.items()
-        for group in groups
-        for row in rows_of(KINDS[follows], group, ranks)
-    ]
+    groups = compared(votes)
+    ranks = max(len(panels[0].votes.methods) for _, panels in groups)
+    rows = [row for kind, panels in groups for row in rows_of(kind, panels, ranks)]
     numbered = [Column(f"rank {rank}", 0, UNPUBLISHED) for rank in range(1, ranks + 1)]
     return Table(caption(votes), [*map(Column, BEFORE), *numbered, *AFTER], rows)
+
+
+def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
+    """Kinds of questions, each with all questions that compare the same methods; the paper's follow ours."""
+    ours, theirs = counted(votes) if votes else {}, published()
+    return [
+        (KINDS[follows], panels)
+        for follows in KINDS
+        if follows in ours or not ours
+        for panels in [*alike(ours.get(follows, [])), *alike(theirs[follows])]
+    ]
 
 
 def counted(votes: Votes) -> dict[str, list[Panel]]:
@@ -85,7 +87,7 @@ def published() -> dict[str, list[Panel]]:
             Panel(
                 dataset,
                 "-",
-                Rankings([Compared("-", "the paper", name) for name in by], np.array([*by.values()])),
+                Rankings([Compared("-", THE_PAPER, name) for name in by], np.array([*by.values()])),
             )
             for dataset, by in lines.items()
             if set(by) == known
@@ -101,12 +103,17 @@ def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
     return list(groups.values())
 
 
+def total(panels: Iterable[Panel]) -> Rankings:
+    """The votes on questions that compare the same methods."""
+    return together([panel.votes for panel in panels])
+
+
 def rows_of(kind: str, panels: Sequence[Panel], ranks: int) -> list[Row]:
     """Rows of questions with the same methods: of each question, of all together, and of the test of all."""
     rows = []
     for panel in panels:
         rows += method_rows([kind, panel.dataset, panel.followed], panel.votes, ranks)
-    votes, name = together([panel.votes for panel in panels]), f"all {len(panels)}"
+    votes, name = total(panels), f"all {len(panels)}"
     shares: list[list[Cell]] = [[each.low, each.high, f"{each.p:.2g}"] for each in firsts(votes)]
     for row, share in zip(method_rows([kind, name, "-"], votes, ranks), shares, strict=True):
         rows.append(Row([*row.cells[: -len(share) - 2], *share, None, None], []))
