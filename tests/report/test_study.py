@@ -98,3 +98,18 @@ def test_a_key_is_read_as_it_was_written(tmp_path):
         read_key(path)
     with pytest.raises(ArgumentError, match=r"none\.json: no such file"):
         read_key(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("orders", "follows", "message"),
+    [
+        (["xyz", "z"], "style", "question 2: expected 2 to 26 different options .*, got 1 of 1 and style"),
+        (["xx"], "style", "question 1: expected 2 to 26 different options .*, got 1 of 2 and style"),
+        (["xy"], "music", "question 1: .* that follow style or instruction, got 2 of 2 and music"),
+        ([], "style", "expected questions, got none; texgs study writes one"),
+    ],
+)
+def test_a_key_that_was_changed_is_refused(tmp_path, orders, follows, message):
+    path = write_key(tmp_path / "key.json", study(*orders, follows=follows))
+    with pytest.raises(ArgumentError, match=rf"key\.json: {message}"):
+        read_key(path)

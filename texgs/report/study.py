@@ -183,4 +183,15 @@ def read_key(path: str | Path) -> Study:
     """
     advice = "texgs study writes one"
     with reading(path, "the key of a study", advice):
-        return typed(Study, read_json(path))
+        study = typed(Study, read_json(path))
+    for number, question in enumerate(study.questions, start=1):
+        known, count = question.follows in KINDS, len({option.compared for option in question.options})
+        if not known or not 2 <= count == len(question.letters):
+            raise ArgumentError(
+                f"{path}: question {number}: expected 2 to {len(LETTERS)} different options that follow "
+                f"{' or '.join(KINDS)}, got {count} of {len(question.options)} and {question.follows}; "
+                f"{advice}"
+            )
+    if not study.questions:
+        raise ArgumentError(f"{path}: expected questions, got none; {advice}")
+    return study
