@@ -51,7 +51,9 @@ def test_an_incomplete_ballot_is_refused(tmp_path, lines, message):
 
 
 def test_a_ballot_of_another_study_one_that_is_there_twice_and_other_files_are_refused(tmp_path):
-    with pytest.raises(ArgumentError, match=r"b\.csv: expected study 0123456789ab, got ffff; count it"):
+    with pytest.raises(
+        ArgumentError, match=r"b\.csv: expected study 0123456789ab, got ffff; count it with the key"
+    ):
         read_ballot(STUDY, ballot(tmp_path, study="ffff", file="b.csv"))
     paths = [ballot(tmp_path, file="one.csv"), ballot(tmp_path, file="two.csv")]
     with pytest.raises(

@@ -56,13 +56,14 @@ def read_ballot(study: Study, path: Path) -> Ballot:
         ArgumentError: if it is none, or not a complete one of this study.
     """
     rows = rows_of(path)
-    for column, expected in (("study", {study.study}), ("ballot", {rows[0]["ballot"]})):
+    expected = {
+        "study": (study.study, "count it with the key of its study"),
+        "ballot": (rows[0]["ballot"], ADVICE),
+    }
+    for column, (name, advice) in expected.items():
         for row in rows:
-            if row[column] not in expected:
-                (name,) = expected
-                raise ArgumentError(
-                    f"{path}: expected {column} {name}, got {row[column]}; count it elsewhere"
-                )
+            if row[column] != name:
+                raise ArgumentError(f"{path}: expected {column} {name}, got {row[column]}; {advice}")
     given: dict[str, dict[str, str]] = defaultdict(dict)
     for row in rows:
         if row["option"] in given[row["question"]]:
