@@ -49,6 +49,8 @@ INSTEAD = (
         "make --directory {root} --dry-run {words}",
         "it installs, or runs this test again",
     ),
+    (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
+    (r"texgs votes", "texgs votes --help", "it takes votes of people"),
     (r"source ", "", "activates the environment that `make install` makes"),
     (r"pip install ", "{python} -m pip {words} --help", "it would change the environment of this test"),
     (r"mlflow ui ", "{python} -m mlflow ui --help", "it starts a server"),
