@@ -141,8 +141,8 @@ def show(words: tuple[str, ...]) -> int:
     slower = probe() / PROBE_SECONDS
     hours = expected.seconds * slower / 3600
     print(
-        f"time     about {hours:.1f} hours: an estimate, from speeds measured on other scenes and how fast this "
-        f"machine rasterizes ({1 / slower:.1f} times as fast as two cores)"
+        f"time     about {hours:.1f} hours: an estimate, from speeds measured on other scenes and how "
+        f"fast this machine rasterizes ({1 / slower:.1f} times as fast as two cores)"
     )
     return 1 if stops else 0
 
