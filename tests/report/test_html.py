@@ -6,7 +6,9 @@ from html.parser import HTMLParser
 import pytest
 from PIL import Image
 
+from tests.report.studies import study
 from tests.report.written import metrics
+from texgs.report.ballots import Ballot, Votes
 from texgs.report.html import write_report
 from texgs.report.left_out import LeftOut
 from texgs.report.results import (
@@ -95,7 +97,7 @@ def test_sections_are_in_the_papers_order_and_every_link_leads_somewhere(tmp_pat
     found = page(tmp_path, paths)
     keys = [key for key in found.ids if key in SECTIONS]
     assert keys == [key for key in SECTIONS if key in keys]
-    assert set(keys) == set(SECTIONS) - {"ablations", "sizes", "study"}, "these have nothing to show"
+    assert set(keys) == set(SECTIONS) - {"ablations", "sizes"}, "these have nothing to show"
     assert len(found.ids) == len(set(found.ids))
     assert {link for link in found.links if not link.startswith("#")} == set()
     assert {link[1:] for link in found.links} <= set(found.ids)
@@ -112,7 +114,7 @@ def test_every_figure_has_its_words_and_command(tmp_path, paths):
         "texgs comparison dataset=engine tf=TF01 fit=a 'fits=[a,b]'",
         "texgs sheet dataset=engine tf=TF01",
     }
-    assert len(found.sources) == 10, "nine pictures and the curve of the fit"
+    assert len(found.sources) == 11, "nine pictures, the curve of the fit and the paper's votes"
     for source in found.sources:
         kind, data = source.split(";base64,")
         assert kind == "data:image/webp"
@@ -135,6 +137,15 @@ def test_figures_are_in_their_sections(tmp_path, paths):
     assert section("Words of style-TF01.png") == "image"
     assert section("Words of new.png") == "more", "a stage that no section names"
     assert section("edit=red") == "parts", "it follows words, but for a segment"
+
+
+def test_votes_have_their_table_and_figure(tmp_path, paths):
+    votes = Votes(study("xy"), [Ballot("a", [[1, 2]])])
+    text = write_report(tmp_path / "report.html", paths, votes=votes).read_text()
+    assert "1 ballots" in text
+    assert "<code>texgs votes</code>" in text
+    assert '<tr class="theirs">' in text
+    assert "<tr><td" in text
 
 
 def test_rows_lead_to_their_jobs(tmp_path, paths):

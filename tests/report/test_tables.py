@@ -1,20 +1,24 @@
 import pytest
 
+from tests.report.studies import study
 from tests.report.written import lines, metrics, records
 from texgs.cli.main import main
 from texgs.config.places import PLACES
 from texgs.core.errors import ArgumentError
+from texgs.report.ballots import Ballot, Votes, votes_beside
 from texgs.report.left_out import LeftOut
 from texgs.report.metrics_files import paper, read
-from texgs.report.results import FitResult, SceneResult
+from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
-from texgs.report.tables import TABLES, tables_of
+from texgs.report.study import write_key
+from texgs.report.tables import specs, tables_of
+
+TABLES = specs()
 
 
 def test_tables_are_in_the_papers_order_and_then_ours():
     numbers = [table.number for table in TABLES if table.number]
-    assert numbers == sorted(numbers)
-    assert {1, 2, 3, 4, 5, 6, 7, 8} <= set(numbers)
+    assert numbers == [1, 2, 3, 4, 5, 6, 7, 8, 9]
     last = max(place for place, table in enumerate(TABLES) if table.number)
     assert all(not table.paper for table in TABLES[last + 1 :])
     assert len({table.name for table in TABLES}) == len(TABLES)
@@ -52,6 +56,29 @@ def test_each_sweep_has_a_table(tmp_path):
 def test_a_sweep_without_fits_among_the_jobs_has_none(tmp_path):
     metrics(tmp_path, "compose", SceneResult(1, 9), sweep="mine", variant="a")
     assert not [name for name in tables_of(records(tmp_path)) if name.startswith("sweep")]
+
+
+def test_a_user_study_has_its_votes_and_without_them_the_papers_where_its_data_are_edited(tmp_path):
+    edit = EditResult("glass", "image", "how", 6.0, follows="style")
+    metrics(tmp_path, "edit_image", edit, "scan")
+    assert tables_of(records(tmp_path))["user_study"].rows == []
+    votes = Votes(study("xyz"), [Ballot("a", [[1, 2, 3]])])
+    assert "1 ballots" in tables_of(records(tmp_path), votes=votes)["user_study"].caption
+    metrics(tmp_path, "edit_image", edit, "engine")
+    table = tables_of(records(tmp_path))["user_study"]
+    assert "No votes but the paper's." in table.caption
+    assert {row.cells[4] for row in table.rows} == {"the paper"}
+
+
+def test_the_ballots_beside_a_key_are_counted(tmp_path):
+    assert votes_beside(tmp_path / "key.json") is None
+    write_key(tmp_path / "key.json", study("xy"))
+    assert votes_beside(tmp_path / "key.json") is None
+    (tmp_path / "votes").mkdir()
+    lines = ["study,ballot,question,option,rank", "0123456789ab,aa,1,A,1", "0123456789ab,aa,1,B,2"]
+    (tmp_path / "votes" / "ballot-aa.csv").write_text("\n".join(lines))
+    (ballot,) = votes_beside(tmp_path / "key.json").ballots
+    assert ballot.ranks == [[1, 2]]
 
 
 def test_captions_say_what_is_left_out(tmp_path):

@@ -22,6 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.errors import ArgumentError
     from texgs.report.ballots import read_votes
     from texgs.report.study import read_key
+    from texgs.report.table_files import write_table
     from texgs.report.votes import user_study
     from texgs.report.votes_figure import write_votes
 
@@ -31,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise ArgumentError(f"votes: no ballots in {folder}; put the files there that voters send")
     votes = read_votes(study, ballots)
     table = user_study(votes)
-    table.write(arguments.output, NAME)
+    write_table(arguments.output, NAME, table)
     write_votes(arguments.output / f"{NAME}.png", votes)
     print(table.markdown())
     return 0

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.core.reading import reading
-from texgs.report.study import Question, Study
+from texgs.report.study import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]
 LARGEST = 1 << 20  # bytes
@@ -47,6 +47,16 @@ def read_votes(study: Study, paths: Iterable[str | Path]) -> Votes:
             raise ArgumentError(f"{path}: expected another ballot than {first}, got the same one; keep one")
         found[ballot.ballot] = (path, ballot)
     return Votes(study, [found[name][1] for name in sorted(found)])
+
+
+def votes_beside(key: str | Path) -> Votes | None:
+    """The ballots in the folder `votes` beside the key of a study; None without any.
+
+    Raises:
+        ArgumentError: as `read_votes` and `read_key`.
+    """
+    ballots = sorted(Path(key).parent.glob("votes/*.csv"))
+    return read_votes(read_key(key), ballots) if ballots else None
 
 
 def read_ballot(study: Study, path: Path) -> Ballot:

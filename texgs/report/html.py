@@ -6,19 +6,24 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from PIL import Image
+
 from texgs.core.io import write_bytes
+from texgs.report.ballots import Votes
 from texgs.report.left_out import LeftOut, others
 from texgs.report.losses import loss_figures
 from texgs.report.metrics_files import Record, read_known
-from texgs.report.sections import SECTIONS, Figure, figures
-from texgs.report.table import Table
+from texgs.report.published import THEIRS
+from texgs.report.sections import SECTIONS, Figure, data_uri, figures
+from texgs.report.table import Row, Table
 from texgs.report.tables import specs, sweeps_of, tables_of
+from texgs.report.votes_figure import write_votes
 
 JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
-DRAWN = {"fitting": loss_figures}  # figures that no job has made, by section
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,10 @@ class Section:
 
 
 def write_report(
-    path: str | Path, metrics_files: Iterable[str | Path], left_out: Sequence[LeftOut] = ()
+    path: str | Path,
+    metrics_files: Iterable[str | Path],
+    left_out: Sequence[LeftOut] = (),
+    votes: Votes | None = None,
 ) -> Path:
     """Write a report that needs no other file.
 
@@ -40,6 +48,7 @@ def write_report(
         path: target, .html.
         metrics_files: of all jobs to report; their pictures lie beside them.
         left_out: what of the run is not there.
+        votes: of a user study.
 
     Returns:
         The path.
@@ -54,7 +63,7 @@ def write_report(
     template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        sections=sections(records, left_out),
+        sections=sections(records, left_out, votes),
         left_out=[*left_out, *others(old)],
         jobs=[job(record.facts) for record in records],
         places={record.path: index for index, record in enumerate(records, start=1)},
@@ -62,24 +71,36 @@ def write_report(
         headings=(*JOB, *SOURCE),
         sources_from=len(JOB),
         kinds=kinds,
+        is_theirs=is_theirs,
     )
     return write_bytes(path, text.encode())
 
 
-def sections(records: Sequence[Record[Any]], left_out: Sequence[LeftOut]) -> list[Section]:
+def sections(
+    records: Sequence[Record[Any]], left_out: Sequence[LeftOut], votes: Votes | None
+) -> list[Section]:
     """The sections that have something to show."""
-    pictures, tables = figures(records), tables_of(records, left_out)
+    pictures, tables = figures(records), tables_of(records, left_out, votes)
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
+    pictures["fitting"] += loss_figures(records)
+    if tables["user_study"].rows:
+        pictures["study"].append(votes_shown(votes))
     shown = []
     for key, title in SECTIONS.items():
         own = {name: table for name, table in tables.items() if table.rows and places[name] == key}
-        drawn = DRAWN[key](records) if key in DRAWN else []
         by_dataset: dict[str, list[Figure]] = {}
-        for figure in [*pictures[key], *drawn]:
+        for figure in pictures[key]:
             by_dataset.setdefault(figure.dataset, []).append(figure)
         if own or by_dataset:
             shown.append(Section(key, title, own, by_dataset))
     return shown
+
+
+def votes_shown(votes: Votes | None) -> Figure:
+    """The figure of a user study."""
+    with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
+        command = "texgs votes" if votes else ""
+        return Figure("votes", "", "Votes for each rank.", data_uri(picture), command, is_narrow=True)
 
 
 def job(metrics: Mapping[str, Any]) -> list[str]:
@@ -92,6 +113,11 @@ def job(metrics: Mapping[str, Any]) -> list[str]:
 def versions(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
     """What the jobs ran with, each combination once."""
     return sorted({", ".join(f"{name} {v}" for name, v in metrics["versions"].items()) for metrics in jobs})
+
+
+def is_theirs(row: Row) -> bool:
+    """Whether a row has the paper's numbers alone."""
+    return any(isinstance(cell, str) and cell.startswith(THEIRS) for cell in row.cells)
 
 
 def kinds(table: Table) -> list[str]:

@@ -13,10 +13,14 @@ FORMATS = ("csv", "md", "tex")
 DOCUMENT = "tables.tex"
 
 
+def write_table(folder: str | Path, name: str, table: Table) -> None:
+    """Write NAME.csv, NAME.md and NAME.tex."""
+    for suffix, text in zip(FORMATS, (table.csv(), table.markdown(), tabular(table)), strict=True):
+        write_bytes(Path(folder, f"{name}.{suffix}"), text.encode())
+
+
 def write_tables(folder: str | Path, tables: Mapping[str, Table]) -> None:
-    """Write NAME.csv, NAME.md and NAME.tex of each table, and tables.tex, which has them all."""
+    """Write the files of each table, and tables.tex, which has them all."""
     for name, table in tables.items():
-        texts = dict(zip(FORMATS, (table.csv(), table.markdown(), tabular(table)), strict=True))
-        for suffix, text in texts.items():
-            write_bytes(Path(folder, f"{name}.{suffix}"), text.encode())
+        write_table(folder, name, table)
     write_bytes(Path(folder, DOCUMENT), document(tables).encode())

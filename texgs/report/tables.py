@@ -8,6 +8,7 @@ from functools import partial
 from typing import Any
 
 from texgs.report.ablations import ablation
+from texgs.report.ballots import Votes
 from texgs.report.datasets import datasets
 from texgs.report.editing import image_driven, text_driven, text_driven_frozen
 from texgs.report.fitting import fits, fitting
@@ -15,10 +16,12 @@ from texgs.report.left_out import LeftOut, note
 from texgs.report.looks import looks
 from texgs.report.meshes import meshes
 from texgs.report.metrics_files import Record, of
-from texgs.report.results import FitResult
+from texgs.report.published import images, meant
+from texgs.report.results import EditResult, FitResult
 from texgs.report.scene_tables import edits, model_size, rendering
 from texgs.report.sweep import sweep
 from texgs.report.table import Table
+from texgs.report.votes import user_study
 
 
 @dataclass(frozen=True)
@@ -48,7 +51,7 @@ class TableSpec:
 
 
 EDITED = ("edit", "edit_metrics")
-TABLES = (
+PAPERS = (
     TableSpec(
         "datasets",
         "Data sets",
@@ -139,6 +142,8 @@ TABLES = (
         8,
         "columns of Tables 1 to 3, of edited scenes on an RTX 4090; its volumes are rendered by ParaView",
     ),
+)
+OURS = (
     TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
     TableSpec(
         "edits",
@@ -153,9 +158,21 @@ TABLES = (
 )
 
 
-def specs(sweeps: Iterable[str]) -> list[TableSpec]:
-    """All tables, with one for each of some sweeps."""
-    return [*TABLES, *map(of_sweep, sweeps)]
+def specs(sweeps: Iterable[str] = (), votes: Votes | None = None) -> list[TableSpec]:
+    """All tables, with one for each of some sweeps, and the votes of a user study."""
+    return [*PAPERS, of_study(votes), *OURS, *map(of_sweep, sweeps)]
+
+
+def of_study(votes: Votes | None) -> TableSpec:
+    """The table of a user study; without votes the paper's, where there are edits of its data sets."""
+
+    def make(records: Iterable[Record[Any]]) -> Table:
+        is_shown = votes or any(meant(edit) in images() for edit in of(EditResult, records))
+        table = user_study(votes)
+        return table if is_shown else replace(table, rows=[])
+
+    paper = "Table 6 of the appendix"
+    return TableSpec("user_study", "User study", "", "study", EDITED, make, 9, paper)
 
 
 def of_sweep(name: str) -> TableSpec:
@@ -169,6 +186,8 @@ def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:
     return sorted({record.sweep for record in fits if record.is_swept and record.variant})
 
 
-def tables_of(records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = ()) -> dict[str, Table]:
-    """All tables of some jobs by their names, also those without rows."""
-    return {spec.name: spec.table(records, left_out) for spec in specs(sweeps_of(records))}
+def tables_of(
+    records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), votes: Votes | None = None
+) -> dict[str, Table]:
+    """All tables of some jobs and votes by their names, also those without rows."""
+    return {spec.name: spec.table(records, left_out) for spec in specs(sweeps_of(records), votes)}

@@ -7,6 +7,7 @@ from texgs.report.tables import specs
 SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", sweep=name))
 OF_SWEEPS = {file for name in SWEEPS for file in PLAN.done("volume", "views", "phase", sweep=name)}
 TABLES = specs(SWEEPS)
+STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
 
 
 rule tables:
@@ -23,9 +24,11 @@ rule tables:
         earlier=list(PLAN.earlier),
         of_earlier=list(PLAN.earlier.values()),
         left_out=PLAN.left_out,
+        study=f"{STUDY}/key.json",
+        ballots=sorted(map(str, STUDY.glob("votes/*.csv"))),
     shell:
-        "texgs tables {input:q} {params.earlier:q} --missing {params.left_out:q} --output {params.folder:q} "
-        "2>&1 | tee --append {log:q}"
+        "texgs tables {input:q} {params.earlier:q} --missing {params.left_out:q} --study {params.study:q} "
+        "--output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule report:
@@ -41,6 +44,8 @@ rule report:
         earlier=list(PLAN.earlier),
         of_earlier=list(PLAN.earlier.values()),
         left_out=PLAN.left_out,
+        study=f"{STUDY}/key.json",
+        ballots=sorted(map(str, STUDY.glob("votes/*.csv"))),
     shell:
-        "texgs report {input:q} {params.earlier:q} --missing {params.left_out:q} --output {output:q} "
-        "2>&1 | tee --append {log:q}"
+        "texgs report {input:q} {params.earlier:q} --missing {params.left_out:q} --study {params.study:q} "
+        "--output {output:q} 2>&1 | tee --append {log:q}"
