@@ -51,11 +51,13 @@ class Plan:
 
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
-    """What Snakemake's `--config` says, in Hydra's syntax.
+    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep.
 
     Raises:
-        ConfigError: for a key that it has not, or a value that cannot be split into words.
+        ConfigError: for a key that it has not, a value that cannot be split into words, or two sweeps.
     """
+    from texgs.config.product import as_sweep
+
     if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
         expected = ", ".join(GROUPS)
         raise ConfigError(
@@ -68,9 +70,10 @@ def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
         )
     groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
     try:
-        return (*groups, *shlex.split(str(config.get("overrides", ""))))
+        words = shlex.split(str(config.get("overrides", "")))
     except ValueError as error:
         raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
+    return as_sweep((*groups, *words))
 
 
 def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
@@ -97,7 +100,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
     from texgs.config.compose import compose
     from texgs.config.methods import NO_METHOD
-    from texgs.config.places import fit_folder
+    from texgs.config.places import edit_folder, fit_folder
     from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
 
@@ -120,7 +123,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "dataset": sorted({each.dataset.name for each in configs}),
             "views": sorted({each.views.name for each in configs}),
             "fit": sorted({fit_folder(each) for each in configs}),
-            "edit": sorted({each.edit.name for each in configs if each.edit.method != NO_METHOD}),
+            "edit": sorted({edit_folder(each) for each in configs if each.edit.method != NO_METHOD}),
             "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },
         {module: code_digest(module) for module in OTHER_CODE},
@@ -132,11 +135,9 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
 def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
     """Configurations by the name of their sweep, "" for those of none.
 
-    There is one for each data set, and for each variant of a sweep or edit of it.
+    There is one for each data set, and for each variant of a sweep and edit of it.
     """
     from texgs.config.compose import compose
-    from texgs.config.edits import edits
-    from texgs.config.sweep import variants
 
     base = compose(words)
     for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
@@ -146,15 +147,29 @@ def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
     names = [(*each, f"fit={name}") for each in sets for name in base.fits] or sets
     by_sweep: dict[str, list[DictConfig]] = {}
     for each in names:
-        config = compose(each)
-        name = config.sweep.name if config.sweep.variants else ""
-        by_sweep.setdefault(name, []).extend(compose(variant) for variant in variants((*each, "edit=none")))
-        if not name:
-            by_sweep[name] += [edit for edit in map(compose, edits(each)) if is_possible(edit, base.fits)]
+        sweep, configs = variants_and_edits(each, base.fits)
+        by_sweep.setdefault(sweep, []).extend(configs)
+    own = [word for word in words if not word.startswith(("sweep.name=", "sweep.over="))]
     for name, dataset in base.sweeps.items():
-        of_sweep = (*words, f"dataset={dataset}", f"sweep={name}", "edit=none")
-        by_sweep[name] = [compose(variant) for variant in variants(of_sweep)]
+        of_sweep = (*own, f"dataset={dataset}", f"sweep={name}", "edit=none", "edits=[]")
+        by_sweep[name] = variants_and_edits(of_sweep, ())[1]
     return by_sweep
+
+
+def variants_and_edits(words: tuple[str, ...], several: Sequence[str]) -> tuple[str, list[DictConfig]]:
+    """Name of the sweep, empty for none, and the configurations of the fits and edits of each variant."""
+    from texgs.config.compose import compose
+    from texgs.config.edits import edits
+    from texgs.config.methods import NO_METHOD
+    from texgs.config.sweep import variants
+    from texgs.config.variants import changes
+
+    config, configs = compose(words), []
+    for variant in variants(words):
+        has_edit = compose(variant).edit.method != NO_METHOD
+        configs.append(compose((*variant, "edit=none") if has_edit else variant))
+        configs += [edit for edit in map(compose, edits(variant)) if is_possible(edit, several)]
+    return config.sweep.name if changes(config) else "", configs
 
 
 def is_possible(config: DictConfig, several: Sequence[str]) -> bool:

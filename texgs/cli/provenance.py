@@ -46,12 +46,13 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
     }
 
 
-def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the recipe, its field, the sweep and its variant, where the stage is of a fit."""
+def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Recipe, its field, variant, sweep and seed, where the stage is of a fit or of what comes after it."""
     fit = settings.get("fit", {})
     if "variant" not in fit:
         return {}
-    return {"recipe": fit["name"], "field": fit["field"], "variant": fit["variant"], "sweep": fit["sweep"]}
+    names = {"recipe": "name", "field": "field", "variant": "variant", "sweep": "sweep", "fit_seed": "seed"}
+    return {name: fit[key] for name, key in names.items()}
 
 
 def gpu_name() -> str:

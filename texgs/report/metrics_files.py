@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -14,7 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.report.results import Result, result_of
+from texgs.report.results import EditMeasures, EditResult, Result, result_of
 
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
@@ -27,7 +27,7 @@ class Record(Generic[R_co]):
     stage: str
     dataset: str
     tf: str | None  # None for jobs of a whole data set
-    label: str  # recipe, variant and a seed other than 0, as in tables; empty for jobs before a fit
+    label: str  # recipe, variant and seeds other than 0, as in tables; empty for jobs before a fit
     field: str  # kind of the fit
     variant: str
     sweep: str
@@ -81,7 +81,17 @@ def _record(path: Path) -> Record[Any]:
         raise ArgumentError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
-    recipe, variant, seed = (facts.get(key) or "" for key in ("recipe", "variant", "seed"))
-    label = "-".join(filter(None, (recipe, variant, f"s{seed}" if seed and recipe else "")))
-    rest = (facts.get("tf"), label, facts.get("field", ""), variant, facts.get("sweep", ""), int(seed or 0))
+    variant, seed = facts.get("variant", ""), int(facts.get("seed") or 0)
+    rest = (facts.get("tf"), label(facts), facts.get("field", ""), variant, facts.get("sweep", ""), seed)
     return Record(path, stage, dataset, *rest, result, facts)
+
+
+def label(facts: Mapping[str, Any]) -> str:
+    """Recipe, variant, seed of the fit and seed of the edit of a job, those that are not 0."""
+    recipe, seed = facts.get("recipe", ""), facts.get("seed") or 0
+    if not recipe:
+        return ""
+    is_edit = facts["result"] in (EditResult.__name__, EditMeasures.__name__)
+    by_letter = {"s": facts.get("fit_seed", 0), "e": seed} if is_edit else {"s": seed}
+    seeds = (f"{letter}{number}" for letter, number in by_letter.items() if number)
+    return "-".join(filter(None, (recipe, facts.get("variant", ""), *seeds)))
