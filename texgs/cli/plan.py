@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ class Plan:
     experiment: str  # of the store
     mapper_gpu: int  # GPUs that a job of views takes
     fit_gpu: int  # and a job of the fits and edits
-    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code and inputs of each job, by folder
+    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
@@ -213,8 +213,10 @@ def add_jobs(
                     missing.append(str(error))
                     job = Job(stage, stage.settings(each), {}, stage.output(each))
                 folders.append(job.output.as_posix())
-                if jobs.setdefault(folders[-1], job) != job:
+                known = jobs.setdefault(folders[-1], job)
+                if known != job:
                     raise ConfigError(f"{job.output}: two variants go there; give one another name")
+                jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
     return list(dict.fromkeys(folders))
 
 
@@ -237,6 +239,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "settings": settings,
         "code": job.stage.code(job.settings),
         "inputs": inputs,
+        "swept": dict(job.swept),
     }
 
 

@@ -32,6 +32,7 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
     return {
         **{key: settings[key] for key in ("stage", "dataset", "tf") if key in settings},
         **recipe(settings),
+        **edit(settings),
         "seconds": seconds,
         "peak_memory_mib": peak_memory() / MIB,
         "device": device(settings),
@@ -53,6 +54,11 @@ def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
         return {}
     names = {"recipe": "name", "field": "field", "variant": "variant", "sweep": "sweep", "fit_seed": "seed"}
     return {name: fit[key] for name, key in names.items()}
+
+
+def edit(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The edit, where the stage is of one."""
+    return {"edit": settings["edit"]["name"]} if "edit" in settings else {}
 
 
 def gpu_name() -> str:

@@ -9,10 +9,13 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from texgs.config.variants import NO_SWEEP
 from texgs.core.io import write_bytes
 from texgs.core.plots import words as plot_words
 from texgs.report.metrics_files import Record, of, read
 from texgs.report.results import EditResult, FitResult, Result
+from texgs.report.sweep import sweep
+from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import Table
 from texgs.report.tables import TABLES
 
@@ -38,13 +41,16 @@ def write_report(path: str | Path, metrics_files: Iterable[str | Path]) -> Path:
     from jinja2 import Environment
 
     records = read(metrics_files)
-    tables = {name.replace("_", " ").capitalize(): make(records) for name, make in TABLES.items()}
+    swept = [record for record in records if record.sweep not in ("", NO_SWEEP)]
+    others = [record for record in records if record not in swept]
+    tables = {name.replace("_", " ").capitalize(): make(others) for name, make in TABLES.items()}
     template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        sections=sections(records),
+        sections=sections(others),
+        sweeps=sweeps(swept),
         tables={name: table for name, table in tables.items() if table.rows},
-        curves=data_uri(curves(of(FitResult, records))),
+        curves=data_uri(curves(of(FitResult, others))),
         jobs=[job(record.facts) for record in records],
         places={record.path: index for index, record in enumerate(records, start=1)},
         versions=versions([record.facts for record in records]),
@@ -69,6 +75,13 @@ def sections(records: Sequence[Record[Any]]) -> dict[str, list[dict[str, str]]]:
                 }
                 entries.setdefault(record.dataset, []).append(entry)
     return dict(sorted(entries.items()))
+
+
+def sweeps(records: Sequence[Record[Any]]) -> dict[str, tuple[Table, str]]:
+    """The table and the figure of each sweep by its name."""
+    compared = [record for record in records if isinstance(record.result, FitResult | EditResult)]
+    names = sorted({record.sweep for record in compared if record.variant})
+    return {name: (sweep(records, name), data_uri(sweep_figure(records, name))) for name in names}
 
 
 def edit_of(result: Result) -> str:

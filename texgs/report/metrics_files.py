@@ -14,7 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.report.results import EditMeasures, EditResult, Result, result_of
+from texgs.report.results import Result, result_of
 
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
@@ -91,7 +91,6 @@ def label(facts: Mapping[str, Any]) -> str:
     recipe, seed = facts.get("recipe", ""), facts.get("seed") or 0
     if not recipe:
         return ""
-    is_edit = facts["result"] in (EditResult.__name__, EditMeasures.__name__)
-    by_letter = {"s": facts.get("fit_seed", 0), "e": seed} if is_edit else {"s": seed}
+    by_letter = {"s": facts.get("fit_seed", 0), "e": seed} if "edit" in facts else {"s": seed}
     seeds = (f"{letter}{number}" for letter, number in by_letter.items() if number)
     return "-".join(filter(None, (recipe, facts.get("variant", ""), *seeds)))

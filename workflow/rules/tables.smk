@@ -5,6 +5,7 @@ from texgs.report import tables
 
 SWEEPS = sorted(filter(None, PLAN.sweeps))
 TABLES = list(tables.TABLES) if "" in PLAN.sweeps else []
+OF_SWEEPS = ("phase", "edit", "edit_metrics")  # places that their tables read
 
 
 rule tables:
@@ -23,7 +24,7 @@ rule tables:
 
 rule sweep:
     input:
-        lambda wildcards: PLAN.done("phase", sweep=wildcards.sweep),
+        lambda wildcards: PLAN.done(*OF_SWEEPS, sweep=wildcards.sweep),
     output:
         collect("<results>/tables/sweep-{{sweep}}.{format}", format=("csv", "md", "tex")),
     log:
@@ -37,7 +38,9 @@ rule sweep:
 
 rule report:
     input:
-        PLAN.done(*PLACES),
+        sorted(
+            {*PLAN.done(*PLACES), *(file for name in SWEEPS for file in PLAN.done(*OF_SWEEPS, sweep=name))}
+        ),
     output:
         "<results>/report.html",
     log:
