@@ -59,7 +59,9 @@ def sweep(records: Iterable[Record[Any]], name: str) -> Table:
             cells += [mean(runs, title), *([deviation(runs, title)] if title in spread else [])]
         cells += [float(line[column]) if line.get(column) else None for column in beside]
         rows.append(Row(cells, [path for run in runs for path in run.sources]))
-    return Table(caption(titles), columns([KEY[place] for place in named], titles, spread, beside), rows)
+    return Table(
+        caption(titles, spread), columns([KEY[place] for place in named], titles, spread, beside), rows
+    )
 
 
 def measured(keys: Sequence[tuple[str, ...]]) -> list[str]:
@@ -107,6 +109,8 @@ def values(runs: Sequence[Run], title: str) -> list[float]:
     return known if len(known) == len(found) else []
 
 
-def caption(titles: Sequence[str]) -> str:
+def caption(titles: Sequence[str], spread: Sequence[str]) -> str:
     """What the columns are."""
-    return " ".join([SEEDS, *(words for title, words in CAPTIONS.items() if title in titles)])
+    return " ".join(
+        [*([SEEDS] if spread else []), *(words for title, words in CAPTIONS.items() if title in titles)]
+    )

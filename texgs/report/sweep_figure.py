@@ -126,6 +126,7 @@ def draw_bars(
     bars = axes.barh([*by_place], means, thick, xerr=spread if any(spread) else None, label=words(label))
     axes.bar_label(bars, [f"{value:.{DIGITS[title]}f}" for value in means], fontsize=6, padding=2)
     axes.margins(x=0.25)
+    axes.locator_params(axis="x", nbins=4)
 
 
 def looks(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
