@@ -5,9 +5,9 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
-from texgs.config.compose import compose, is_scene_file
+from texgs.config.compose import changed, compose, is_scene_file
 from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
@@ -149,11 +149,8 @@ def all_looks(config: DictConfig) -> dict[str, Path]:
 
 def with_recipe(config: DictConfig, name: str) -> DictConfig:
     """The same configuration with the name and field of another recipe: what decides where its models are."""
-    recipe, chosen = compose((f"fit={name}",)).fit, config.copy()
-    OmegaConf.set_readonly(chosen, False)
-    chosen.fit.name, chosen.fit.field = recipe.name, recipe.field
-    OmegaConf.set_readonly(chosen, True)
-    return chosen
+    recipe = compose((f"fit={name}",)).fit
+    return changed(config, fit=changed(config.fit, name=recipe.name, field=recipe.field))
 
 
 def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:

@@ -12,7 +12,7 @@ from texgs.config.variants import edit_variant, fit_variant
 class Place:
     """The folder of a job, and the files in it that other jobs and people read."""
 
-    folder: str  # of wildcards dataset, tf, views, fit, phase and edit
+    folder: str  # of wildcards dataset, tf, views, fit, phase, edit and gallery
     files: tuple[str, ...] = ()  # the first is the one that other jobs ask for; metrics.json comes with all
 
     @property
@@ -29,13 +29,13 @@ PLACES = {
     ),
     "sheet": Place("{dataset}/{tf}/sheet", ("sheet.png",)),
     "phase": Place("{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",)),
-    "comparison": Place("{dataset}/{tf}/comparison", ("comparison.png",)),
+    "comparison": Place("{dataset}/{tf}/comparison/{gallery}", ("comparison.png",)),
     "figure": Place("{dataset}/{tf}/{fit}/figure", ("figure.png",)),
     "mesh": Place("{dataset}/{tf}/{fit}/mesh", ("mesh.ply", "reference.ply", "mesh.png")),
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
     "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
     "timing": Place("{dataset}/scene/{fit}/timing"),
-    "gallery": Place("{dataset}/gallery", ("gallery.png",)),
+    "gallery": Place("{dataset}/galleries/{gallery}", ("gallery.png",)),
     "edit": Place("{dataset}/scene/{fit}/edits/{edit}", ("scene.yaml", "edit.png")),
     "edit_metrics": Place("{dataset}/scene/{fit}/edit_metrics/{edit}"),
 }
@@ -50,6 +50,7 @@ def folder_of(place: str, config: DictConfig, phase: str = "", tf: str | None = 
         fit=fit_folder(config),
         phase=phase,
         edit=edit_folder(config),
+        gallery=config.gallery,
     )
 
 

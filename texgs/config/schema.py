@@ -66,12 +66,20 @@ class Config:
 
     dataset: Dataset = key(Dataset, "the data set")
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
+    experiments: list[str] = key([], "files of conf/experiment that are one run together")
+    aimed: dict[str, list[str]] = field(
+        default_factory=dict, metadata={"help": "overrides that hold for one data set alone, by its name"}
+    )
+    missing: str = key(
+        "stop", "what a run does without data or weights that it needs", choices=("stop", "skip")
+    )
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: ViewKeys = key(ViewKeys, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")
     fits: list[str] = key([], "recipes of a whole experiment, files of conf/fit; default the one of `fit`")
     edit: Edit = key(Edit, "a new look for the scene")
     edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
+    gallery: str = key("gallery", "folder of the pictures with all fits and all edits side by side")
     metric: Metric = key(Metric, "what edits are measured with")
     mesh: MeshKeys = key(MeshKeys, "surfaces of fits beside those of their volumes")
     sweep: Sweep = key(Sweep, "variants of the experiment")

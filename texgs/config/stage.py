@@ -14,6 +14,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.code import code_digest
+from texgs.config.compose import changed
 from texgs.config.fields import kinds
 from texgs.config.methods import methods
 from texgs.config.places import PLACES, folder_of
@@ -106,8 +107,4 @@ def _yaml(settings: dict[str, Any]) -> str:
 
 def for_tf(config: DictConfig, name: str) -> DictConfig:
     """The same configuration for one basic TF."""
-    chosen: DictConfig = config.copy()
-    OmegaConf.set_readonly(chosen, False)
-    chosen.tf = name
-    OmegaConf.set_readonly(chosen, True)
-    return chosen
+    return changed(config, tf=name)

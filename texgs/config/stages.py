@@ -27,9 +27,9 @@ from texgs.config.inputs import (
     volume_inputs,
     with_recipe,
 )
-from texgs.config.locate import basic_tf
+from texgs.config.locate import basic_tf, tf_names
 from texgs.config.methods import NO_METHOD, Method, methods
-from texgs.config.stage import Stage
+from texgs.config.stage import Stage, for_tf
 from texgs.config.variants import changes
 
 
@@ -271,3 +271,18 @@ ROWS = (
     ),
 )
 STAGES = {stage.name: stage for stage in ROWS}
+
+
+def jobs(config: DictConfig) -> list[tuple[Stage, DictConfig]]:
+    """The stages that a configuration goes through, each with its own configuration of one job.
+
+    Raises:
+        MissingDataError: if basic TFs are folders of views that are not there.
+    """
+    names = tf_names(config)
+    by_tf = [for_tf(config, name) for name in names] if is_fit(config) else []
+    return [
+        (stage, each)
+        for stage in STAGES.values()
+        for each in filter(stage.applies, by_tf if stage.per_tf else [config])
+    ]

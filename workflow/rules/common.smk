@@ -145,3 +145,4 @@ wildcard_constraints:
     fit=any_of(PLAN.wildcards["fit"]),
     phase=any_of(PLAN.wildcards["phase"]),
     edit=any_of(PLAN.wildcards["edit"], "no-edit"),
+    gallery=any_of(PLAN.wildcards["gallery"]),
