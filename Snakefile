@@ -40,8 +40,12 @@ onstart:
 
 
 onsuccess:
-    made = {str(file) for each in workflow.dag.jobs for file in each.output}
+    made = finish("FINISHED")
     report = f"{RESULTS}/report.html"
     print("Done:", report if report in made else "what was asked for")
     if (PLAN.tracking or "").startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")
+
+
+onerror:
+    finish("FAILED")

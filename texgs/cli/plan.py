@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,7 +38,7 @@ class Plan:
     experiment: str  # of the store
     mapper_gpu: int  # GPUs that a job of views takes
     fit_gpu: int  # and a job of the fits and edits
-    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code and inputs of each job, by folder
+    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
@@ -53,11 +53,13 @@ class Plan:
 
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
-    """What Snakemake's `--config` says, in Hydra's syntax.
+    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep.
 
     Raises:
-        ConfigError: for a key that it has not, or a value that cannot be split into words.
+        ConfigError: for a key that it has not, a value that cannot be split into words, or two sweeps.
     """
+    from texgs.config.product import as_sweep
+
     if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
         expected = ", ".join(GROUPS)
         raise ConfigError(
@@ -70,9 +72,10 @@ def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
         )
     groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
     try:
-        return (*groups, *shlex.split(str(config.get("overrides", ""))))
+        words = shlex.split(str(config.get("overrides", "")))
     except ValueError as error:
         raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
+    return as_sweep((*groups, *words))
 
 
 def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
@@ -101,7 +104,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     from texgs.config.compose import compose
     from texgs.config.experiments import apart, selected
     from texgs.config.methods import NO_METHOD
-    from texgs.config.places import fit_folder
+    from texgs.config.places import edit_folder, fit_folder
     from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
 
@@ -124,7 +127,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "dataset": sorted({each.dataset.name for each in configs}),
             "views": sorted({each.views.name for each in configs}),
             "fit": sorted({fit_folder(each) for each in configs}),
-            "edit": sorted({each.edit.name for each in configs if each.edit.method != NO_METHOD}),
+            "edit": sorted({edit_folder(each) for each in configs if each.edit.method != NO_METHOD}),
             "gallery": sorted({each.gallery for each in configs}),
             "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },
@@ -166,8 +169,10 @@ def add_jobs(
                 missing.append(str(error))
                 job = Job(stage, stage.settings(each), {}, stage.output(each))
             folders.append(job.output.as_posix())
-            if jobs.setdefault(folders[-1], job) != job:
+            known = jobs.setdefault(folders[-1], job)
+            if known != job:
                 raise ConfigError(f"{job.output}: two variants go there; give one another name")
+            jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
     return list(dict.fromkeys(folders))
 
 
@@ -203,6 +208,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "settings": settings,
         "code": job.stage.code(job.settings),
         "inputs": inputs,
+        "swept": dict(job.swept),
     }
 
 

@@ -152,9 +152,11 @@ def check(config: DictConfig) -> None:
     check_name("gallery", config.gallery)
     if config.edit.base is not None and not is_scene_file(config.edit.base):
         check_name("edit.base", config.edit.base)
-    for key, name in (("variant", config.variant), ("sweep.name", config.sweep.name)):
-        if not re.fullmatch(r"[A-Za-z0-9_-]*", name):
-            raise ConfigError(f"{key}: expected letters, digits, _ or -, got {name!r}")
+    if not re.fullmatch(r"[A-Za-z0-9_-]*", config.sweep.name):
+        raise ConfigError(f"sweep.name: expected letters, digits, _ or -, got {config.sweep.name!r}")
+    if not re.fullmatch(rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST - 1}}})?", config.variant):
+        got = shortened(repr(config.variant))
+        raise ConfigError(f"variant: expected at most {LONGEST} letters, digits, _, - or ., got {got}")
     if re.fullmatch("sheet|comparison|views.*", config.fit.name):
         raise ConfigError(f"fit.name: {config.fit.name} is a folder of texgs; choose another name")
     if not re.fullmatch("views(-.*)?", config.views.name):

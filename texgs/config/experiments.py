@@ -13,11 +13,13 @@ from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
 from texgs.config.edits import edits
 from texgs.config.methods import method_of
+from texgs.config.places import edit_folder
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.config.slips import close
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
+from texgs.config.variants import changes
 from texgs.core.errors import ConfigError
 
 Words = tuple[str, ...]
@@ -52,7 +54,7 @@ class Selection:
         return not reasons
 
     def add(self, words: Words, several: bool) -> None:
-        """Add one data set with one recipe: its fits, or the variants of its sweep, and its edits.
+        """Add one data set with one recipe: its fits and its edits, or those of each variant of its sweep.
 
         Args:
             words: of the data set and the recipe.
@@ -61,12 +63,11 @@ class Selection:
         config = compose((*words, "edit=none"))
         if not self.takes(config, f"data set {config.dataset.name}"):
             return
-        sweep = config.sweep.name if config.sweep.variants else ""
-        edited: list[DictConfig] = []
-        if not sweep:
-            edited, left = self.edited(words, several)
-            words = (*words, f"edits=[{','.join(left)}]") if left != list(config.edits) else words
-        self.by_sweep[sweep] += [*map(compose, variants((*words, "edit=none"))), *edited]
+        listed = self.by_sweep[config.sweep.name if changes(config) else ""]
+        for each in variants(words):
+            edited, left = self.edited(each, several)
+            own = (f"edits=[{','.join(left)}]",) if left != list(compose(each).edits) else ()
+            listed += [compose((*each, *own, "edit=none")), *edited]
 
     def edited(self, words: Words, several: bool) -> tuple[list[DictConfig], list[str]]:
         """The edits of a data set that are possible and lack nothing, and what `edits` has left of them."""
@@ -74,7 +75,7 @@ class Selection:
         gone: set[str] = set()
         for config in map(compose, edits(words)):
             name, base = config.edit.name, config.edit.base
-            if base in gone or not self.takes(config, f"edit {name}"):
+            if base in gone or not self.takes(config, f"edit {edit_folder(config)}"):
                 gone.add(name)
             elif not several or method_of(config.edit).takes(config.fit.field):
                 made[name] = config
@@ -125,8 +126,9 @@ def add_part(words: Words, aimed: dict[str, Words], selection: Selection) -> set
         for each in [(*of_set, f"fit={fit}") for fit in base.fits] or [of_set]:
             selection.add(each, len(base.fits) > 1)
     of_sweeps = sweeps(words, base)
+    beside = (*without(words, "sweep.name", "sweep.over"), "edit=none", "edits=[]")
     for sweep, name in of_sweeps.items():
-        selection.add((*words, f"dataset={name}", *aimed.get(name, ()), f"sweep={sweep}"), False)
+        selection.add((*beside, f"dataset={name}", *aimed.get(name, ()), f"sweep={sweep}"), False)
     return {*names, *of_sweeps.values()}
 
 

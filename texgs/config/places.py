@@ -5,6 +5,8 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
+from texgs.config.variants import edit_variant, fit_variant
+
 
 @dataclass(frozen=True)
 class Place:
@@ -47,7 +49,7 @@ def folder_of(place: str, config: DictConfig, phase: str = "", tf: str | None = 
         views=config.views.name,
         fit=fit_folder(config),
         phase=phase,
-        edit=config.edit.name,
+        edit=edit_folder(config),
         gallery=config.gallery,
     )
 
@@ -59,5 +61,13 @@ def made(place: str, config: DictConfig, phase: str = "", tf: str | None = None)
 
 def fit_folder(config: DictConfig) -> str:
     """Name of the folder of a fit: the recipe, the variant of a sweep, and a seed other than 0."""
-    seed = f"s{config.fit.seed}" if config.fit.seed else ""
-    return "-".join(part for part in (config.fit.name, config.variant, seed) if part)
+    return _folder(config.fit.name, fit_variant(config), config.fit.seed)
+
+
+def edit_folder(config: DictConfig, name: str = "") -> str:
+    """Name of the folder of an edit in the same way; `name`: of another edit than that of `config`."""
+    return _folder(name or config.edit.name, edit_variant(config), config.edit.seed)
+
+
+def _folder(name: str, variant: str, seed: int) -> str:
+    return "-".join(filter(None, (name, variant, f"s{seed}" if seed else "")))

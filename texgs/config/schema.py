@@ -49,10 +49,15 @@ class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
     name: str = key("none", "of the table")
-    seeds: list[int] = key([0], "random numbers; each variant runs once with each")
+    seeds: list[int] = key([0], "random numbers of fits; each variant is fitted once with each")
+    edit_seeds: list[int] = key([0], "random numbers of edits; each edit is made once with each")
     variants: dict[str, list[str]] = field(
         default_factory=dict, metadata={"help": "overrides by the name of the variant"}
     )
+    over: list[str] = key(
+        [], "instead: keys with several values, such as fit.low_pass=2,6; each combination is a variant"
+    )
+    edits: list[str] = key([], "that are made of each variant; default those of the experiment")
 
 
 @dataclass

@@ -30,6 +30,7 @@ from texgs.config.inputs import (
 from texgs.config.locate import basic_tf, tf_names
 from texgs.config.methods import NO_METHOD, Method, methods
 from texgs.config.stage import Stage, for_tf
+from texgs.config.variants import changes
 
 
 def is_fit(config: DictConfig) -> bool:
@@ -54,7 +55,7 @@ def has_mesh(config: DictConfig) -> bool:
 
 def is_compared(config: DictConfig) -> bool:
     """Whether this is the first of several recipes: its configuration stands for all of them."""
-    if not is_fit(config) or config.sweep.variants or len(config.fits) < 2:
+    if not is_fit(config) or changes(config) or len(config.fits) < 2:
         return False
     return bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
@@ -66,7 +67,7 @@ def has_scene(config: DictConfig) -> bool:
 
 def has_gallery(config: DictConfig) -> bool:
     """Whether this is the first of the recipes of an experiment with several edits."""
-    if not has_scene(config) or config.sweep.variants or len(config.edits) < 2:
+    if not has_scene(config) or changes(config) or len(config.edits) < 2:
         return False
     return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -18,6 +19,7 @@ from texgs.report.losses import loss_figures
 from texgs.report.metrics_files import Record, read_known
 from texgs.report.published import THEIRS
 from texgs.report.sections import SECTIONS, Figure, data_uri, figures
+from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import Row, Table
 from texgs.report.tables import specs, sweeps_of, tables_of
 from texgs.report.votes_figure import write_votes
@@ -83,6 +85,7 @@ def sections(
     pictures, tables = figures(records), tables_of(records, left_out, votes)
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     pictures["fitting"] += loss_figures(records)
+    pictures["ablations"] += [sweep_shown(records, name) for name in sweeps_of(records)]
     if tables["user_study"].rows:
         pictures["study"].append(votes_shown(votes))
     shown = []
@@ -94,6 +97,13 @@ def sections(
         if own or by_dataset:
             shown.append(Section(key, title, own, by_dataset))
     return shown
+
+
+def sweep_shown(records: Sequence[Record[Any]], name: str) -> Figure:
+    """The figure of a sweep."""
+    with Image.open(io.BytesIO(sweep_figure(records, name))) as picture:
+        words = "Measures that differ between variants, with the standard deviation over seeds."
+        return Figure(f"sweep {name}", "", words, data_uri(picture), "")
 
 
 def votes_shown(votes: Votes | None) -> Figure:

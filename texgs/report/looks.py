@@ -29,7 +29,7 @@ CAPTION = (
 
 def looks(records: Iterable[Record[Any]]) -> Table:
     """The table of all edits among some jobs: by pictures, by words, and others; without any it is empty."""
-    records = list(records)
+    records = [record for record in records if not record.is_swept]
     measured = {key_of(each): each for each in of(EditMeasures, records)}
     edits = sorted(in_order(of(EditResult, records)), key=lambda each: ORDER.index(each.result.follows))
     rows = [row_of(each, measured.get(key_of(each))) for each in edits]

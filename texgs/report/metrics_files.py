@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.fields import kinds
+from texgs.config.variants import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.report.results import Result, result_of
@@ -27,7 +28,7 @@ class Record(Generic[R_co]):
     stage: str
     dataset: str
     tf: str | None  # None for jobs of a whole data set
-    label: str  # recipe, variant and a seed other than 0, as in tables; empty for jobs before a fit
+    label: str  # recipe, variant and seeds other than 0, as in tables; empty for jobs before a fit
     field: str  # kind of the fit
     variant: str
     sweep: str
@@ -49,7 +50,7 @@ class Record(Generic[R_co]):
     @property
     def is_swept(self) -> bool:
         """Whether this is a job of a sweep, whose numbers are in tables of their own."""
-        return self.sweep not in ("", "none")
+        return self.sweep not in ("", NO_SWEEP)
 
 
 class OtherVersionError(ArgumentError):
@@ -119,7 +120,16 @@ def _record(path: Path) -> Record[Any]:
         raise OtherVersionError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
-    recipe, variant, seed = (facts.get(key) or "" for key in ("recipe", "variant", "seed"))
-    label = "-".join(filter(None, (recipe, variant, f"s{seed}" if seed and recipe else "")))
-    fit = (label, facts.get("field", ""), variant, facts.get("sweep", ""), int(seed or 0))
-    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in", ""), result, facts)
+    fit = (label(facts), facts.get("field", ""), facts.get("variant", ""), facts.get("sweep", ""))
+    seed, stand_in = int(facts.get("seed") or 0), facts.get("stand_in", "")
+    return Record(path, stage, dataset, facts.get("tf"), *fit, seed, stand_in, result, facts)
+
+
+def label(facts: Mapping[str, Any]) -> str:
+    """Recipe, variant, seed of the fit and seed of the edit of a job, those that are not 0."""
+    recipe, seed = facts.get("recipe", ""), facts.get("seed") or 0
+    if not recipe:
+        return ""
+    by_letter = {"s": facts.get("fit_seed", 0), "e": seed} if "edit" in facts else {"s": seed}
+    seeds = (f"{letter}{number}" for letter, number in by_letter.items() if number)
+    return "-".join(filter(None, (recipe, facts.get("variant", ""), *seeds)))

@@ -177,13 +177,14 @@ def of_study(votes: Votes | None) -> TableSpec:
 
 def of_sweep(name: str) -> TableSpec:
     """The table of a sweep, with the spread over its seeds."""
-    return TableSpec(f"sweep-{name}", f"Sweep {name}", "", "ablations", ("phase",), partial(sweep, name=name))
+    places = ("phase", *EDITED)
+    return TableSpec(f"sweep-{name}", f"Sweep {name}", "", "ablations", places, partial(sweep, name=name))
 
 
 def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:
-    """The sweeps among some jobs whose fits can be compared, each once."""
-    fits = of(FitResult, records)
-    return sorted({record.sweep for record in fits if record.is_swept and record.variant})
+    """The sweeps among some jobs whose fits or edits can be compared, each once."""
+    compared = [record for record in records if isinstance(record.result, FitResult | EditResult)]
+    return sorted({record.sweep for record in compared if record.is_swept and record.variant})
 
 
 def tables_of(

@@ -4,8 +4,12 @@
 from texgs.report.table_files import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 
-SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", sweep=name))
-OF_SWEEPS = {file for name in SWEEPS for file in PLAN.done("volume", "views", "phase", sweep=name)}
+SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", "edit", sweep=name))
+OF_SWEEPS = {
+    file
+    for name in SWEEPS
+    for file in PLAN.done("volume", "views", "phase", "edit", "edit_metrics", sweep=name)
+}
 TABLES = specs(SWEEPS)
 STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
 
