@@ -97,6 +97,7 @@ def test_a_part_of_a_model_is_edited_alone(results, edit):
 def test_measures_without_weights_say_what_is_missing(results):
     found = numbers(results / "edit_metrics" / "glass")
     assert found["geometry_kept"] is True
+    assert (found["width"], found["height"]) == (48, 48)
     assert "clip-vit-base-patch32 are not on this machine" in found["clip_missing"]
     assert "similarity" not in found
     assert 0 <= found["short_rmse"] <= 0.2

@@ -30,7 +30,7 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
         seconds: that its work took.
     """
     return {
-        **{key: settings[key] for key in ("stage", "dataset", "tf") if key in settings},
+        **{key: settings[key] for key in ("stage", "dataset", "stand_in", "tf") if key in settings},
         **recipe(settings),
         **edit(settings),
         "seconds": seconds,

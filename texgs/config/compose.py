@@ -33,6 +33,7 @@ RESERVED = (
     "mlartifacts",
     "tables",
     "scene",
+    "study",
 )  # folders below `results`
 ALONE = ("fit", "edit")  # groups that depend on no other one but the experiment
 LONGEST = 100  # characters of a name: it becomes that of files and folders

@@ -48,7 +48,8 @@ class Stage:
         Raises:
             ConfigError: if the stage works on one basic TF, and `config.tf` is none of the data set's.
         """
-        selected = {"stage": self.name, "dataset": config.dataset.name, **self.select(config)}
+        of_all = {"dataset": config.dataset.name, "stand_in": config.dataset.stand_in}
+        selected = {"stage": self.name, **of_all, **self.select(config)}
         if self.per_tf:
             selected["tf"] = config.tf
         settings = OmegaConf.to_container(OmegaConf.create(selected), resolve=True)

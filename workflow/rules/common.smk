@@ -138,7 +138,6 @@ pathvars:
 
 
 wildcard_constraints:
-    sweep=any_of(filter(None, PLAN.sweeps), "no-sweep"),
     dataset=any_of(PLAN.wildcards["dataset"]),
     tf="[A-Za-z][A-Za-z0-9_-]*",
     views=any_of(PLAN.wildcards["views"]),
