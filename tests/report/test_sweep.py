@@ -1,8 +1,6 @@
-import io
 import json
 
 import pytest
-from PIL import Image
 
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
@@ -103,27 +101,22 @@ def test_fits_and_edits_of_a_sweep_have_rows_of_their_own(tmp_path):
     assert column(table, "minutes") == [3.0, 0.5]
 
 
-def size(png):
-    with Image.open(io.BytesIO(png)) as picture:
-        return picture.size
-
-
 def test_the_figure_has_a_panel_for_each_measure_that_differs(tmp_path):
     paths = run(tmp_path, "42", 0, 30.0) + run(tmp_path, "92", 0, 32.0) + run(tmp_path, "92", 1, 33.0)
-    width, _ = size(sweep_figure(read(paths), "mine"))
+    width, _ = sweep_figure(read(paths), "mine").size
     assert width == pytest.approx(2 * WIDTH * DPI, abs=1), "PSNR, and that of training views"
     named = run(tmp_path, "a", 0, 30.0, sweep="b") + run(tmp_path, "c", 0, 30.0, sweep="b")
-    width, _ = size(sweep_figure(read(named), "b"))
+    width, _ = sweep_figure(read(named), "b").size
     assert width == pytest.approx(ACROSS * WIDTH * DPI, abs=1), "all, where none differs"
 
 
 def test_the_figure_shows_the_scenes_of_edits(tmp_path):
     scene = Scene({"TF01": SceneModel(write_model(tmp_path / "model.safetensors", ball(1)))})
     paths = edit(tmp_path, "0.5") + edit(tmp_path, "1", nnfm=0.3)
-    _, without = size(sweep_figure(read(paths), "mine"))
+    _, without = sweep_figure(read(paths), "mine").size
     for path in paths[::2]:
         write_scene(path.with_name("scene.yaml"), scene)
-    _, height = size(sweep_figure(read(paths), "mine"))
+    _, height = sweep_figure(read(paths), "mine").size
     assert height > without + PICTURE * DPI
 
 

@@ -26,6 +26,7 @@ from texgs.report.votes_figure import write_votes
 
 JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
+SWEPT = "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def sections(
     pictures, tables = figures(records), tables_of(records, left_out, votes)
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     pictures["fitting"] += loss_figures(records)
-    pictures["ablations"] += [sweep_shown(records, name) for name in sweeps_of(records)]
+    pictures["ablations"] += [shown_sweep(records, name) for name in sweeps_of(records)]
     if tables["user_study"].rows:
         pictures["study"].append(votes_shown(votes))
     shown = []
@@ -99,11 +100,9 @@ def sections(
     return shown
 
 
-def sweep_shown(records: Sequence[Record[Any]], name: str) -> Figure:
+def shown_sweep(records: Sequence[Record[Any]], name: str) -> Figure:
     """The figure of a sweep."""
-    with Image.open(io.BytesIO(sweep_figure(records, name))) as picture:
-        words = "Measures that differ between variants, with the standard deviation over seeds."
-        return Figure(f"sweep {name}", "", words, data_uri(picture), "")
+    return Figure(f"sweep {name}", "", SWEPT, data_uri(sweep_figure(records, name)), "")
 
 
 def votes_shown(votes: Votes | None) -> Figure:

@@ -120,9 +120,9 @@ def _record(path: Path) -> Record[Any]:
         raise OtherVersionError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
-    fit = (label(facts), facts.get("field", ""), facts.get("variant", ""), facts.get("sweep", ""))
-    seed, stand_in = int(facts.get("seed") or 0), facts.get("stand_in", "")
-    return Record(path, stage, dataset, facts.get("tf"), *fit, seed, stand_in, result, facts)
+    variant, seed = facts.get("variant", ""), int(facts.get("seed") or 0)
+    fit = (label(facts), facts.get("field", ""), variant, facts.get("sweep", ""), seed)
+    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in", ""), result, facts)
 
 
 def label(facts: Mapping[str, Any]) -> str:

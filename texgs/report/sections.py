@@ -55,13 +55,13 @@ class Figure:
 
 
 def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
-    """All pictures of jobs by section, in the order of data sets."""
+    """All pictures of jobs by section, in the order of data sets; those of sweeps have a figure of all."""
     edits = {edit.result.edit: edit for edit in of(EditResult, records)}
     found: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
         for name, words in record.facts.get("pictures", {}).items():
             picture = record.path.with_name(name)
-            if picture.is_file() and name not in UNREPORTED:
+            if picture.is_file() and name not in UNREPORTED and not record.is_swept:
                 figure = Figure(
                     record.title,
                     label(record),
@@ -77,8 +77,6 @@ def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
 def section_of(record: Record[Any], picture: str, edits: Edits) -> str:
     """The section of a picture, which a job has made; `picture` is the name of its file."""
     result = record.result
-    if record.is_swept:
-        return "ablations"
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
         return "parts" if is_part else OF_EDITS[result.follows]

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
 from texgs.core.plots import words
 from texgs.report.metrics_files import Record
@@ -25,8 +26,8 @@ PICTURE, PIXELS = 1.8, 400  # inches and pixels of a picture
 WIDE = 30.0  # a range of values is logarithmic where the last is so many times the first
 
 
-def sweep_figure(records: Iterable[Record[Any]], name: str) -> bytes:
-    """PNG with a panel for each measure that differs between runs, and below them the edited scenes.
+def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
+    """A panel for each measure that differs between runs, and below them the edited scenes.
 
     Variants that are numbers make an axis, with the standard deviation over seeds; others have bars.
 
@@ -55,8 +56,8 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> bytes:
     if pictures:
         draw_pictures(parts[1, 0], pictures, variants)
     file = io.BytesIO()
-    figure.savefig(file, format="png", metadata={"Software": None})
-    return file.getvalue()
+    figure.savefig(file, format="png")
+    return Image.open(file)
 
 
 def different(runs: Sequence[Run]) -> list[str]:

@@ -177,8 +177,8 @@ def of_study(votes: Votes | None) -> TableSpec:
 
 def of_sweep(name: str) -> TableSpec:
     """The table of a sweep, with the spread over its seeds."""
-    places = ("phase", *EDITED)
-    return TableSpec(f"sweep-{name}", f"Sweep {name}", "", "ablations", places, partial(sweep, name=name))
+    places, make = ("phase", *EDITED), partial(sweep, name=name)
+    return TableSpec(f"sweep-{name}", f"Sweep {name}", "", "ablations", places, make)
 
 
 def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:

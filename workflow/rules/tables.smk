@@ -4,12 +4,9 @@
 from texgs.report.table_files import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 
-SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", "edit", sweep=name))
-OF_SWEEPS = {
-    file
-    for name in SWEEPS
-    for file in PLAN.done("volume", "views", "phase", "edit", "edit_metrics", sweep=name)
-}
+SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", sweep=name))
+SWEPT = ("volume", "views", "phase", "edit", "edit_metrics")  # places that tables of sweeps read
+OF_SWEEPS = {file for name in SWEEPS for file in PLAN.done(*SWEPT, sweep=name)}
 TABLES = specs(SWEEPS)
 STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
 
