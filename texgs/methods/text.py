@@ -30,8 +30,14 @@ class TextKeys(InstructionKeys):
         "Instruct-NeRF2NeRF",
         choices=("default", "paper", "iterative"),
     )
+    views: str | None = key(
+        None,
+        "that are edited: new ones along the axes, which the scene fills; the six training views nearest "
+        "to the axes, as in the paper; or all training views; default the recipe's",
+        choices=("axes", "nearest", "all"),
+    )
     textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
-    size: int = key(512, "longer side of the edited views", "pixels", least=64)
+    size: int = key(512, "longer side of the six views", "pixels", least=64)
 
 
 def run(task: Task[TextKeys]) -> EditedScene:
@@ -55,6 +61,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             guidance,
             task.settings_for(name.split("/")[0]).instruction,
             settings.recipe,
+            views=settings.views,  # type: ignore[arg-type]
             light=views[0].light,
             surfels=surfels,
             size=settings.size,
