@@ -58,9 +58,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
         result = edit_by_text(
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
-            guidance,
-            task.settings_for(name.split("/")[0]).instruction,
-            settings.recipe,
+            *(guidance, task.settings_for(name.split("/")[0]).instruction, settings.recipe),
             views=settings.views,  # type: ignore[arg-type]
             light=views[0].light,
             surfels=surfels,
@@ -90,7 +88,7 @@ METHOD = Method(
     TextKeys,
     run,
     lambda settings: settings.check(),
-    lambda settings, clip: settings.weights(),
+    lambda settings: settings.weights(),
     needs=frozenset({"texture", "relight"}),
     follows="instruction",
 )
