@@ -50,6 +50,8 @@ class Method(Generic[Settings]):
     """The `StylePicture` that it follows, which the result is compared with."""
     follows: str = ""
     """Which of its keys, "style" or "instruction", looks of a data set have an own value of."""
+    numbers: Callable[[Settings], Mapping[str, Any]] = lambda settings: {}
+    """Numbers of the recipe that its settings name, with what they change about it."""
     is_look: bool = True
     """Whether the scene looks different afterwards."""
 

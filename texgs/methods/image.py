@@ -174,4 +174,5 @@ METHOD = Method(
     files=style.files,
     style=style_of,
     follows="style",
+    numbers=lambda settings: vars(recipe_of(settings)),
 )

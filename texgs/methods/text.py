@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.keys import key
 from texgs.config.methods import Method
@@ -82,6 +82,14 @@ def run(task: Task[TextKeys]) -> EditedScene:
     )
 
 
+def numbers(settings: TextKeys) -> Mapping[str, Any]:
+    """Which views are edited, and how texels follow."""
+    from texgs.edit.text import RECIPES
+
+    recipe = RECIPES[settings.recipe]
+    return {"views": settings.views or recipe.views, **vars(recipe.policy)}
+
+
 METHOD = Method(
     "text",
     "give a scene the look that an instruction asks for",
@@ -91,4 +99,5 @@ METHOD = Method(
     lambda settings: settings.weights(),
     needs=frozenset({"texture", "relight"}),
     follows="instruction",
+    numbers=numbers,
 )
