@@ -9,6 +9,7 @@ import torch
 from PIL import Image
 
 from tests.cli.test_scene_stages import WORDS
+from tests.models.clips import write_clip
 from texgs.cli.main import main
 from texgs.core.errors import MissingDataError
 from texgs.edit.recipe import preset
@@ -229,6 +230,19 @@ def test_training_views_can_vote(results, monkeypatch):
     transforms = json.loads((results.parents[1] / "TF01" / "views" / "transforms_train.json").read_text())
     assert sum(told["notes"]["views"].values()) == len(transforms["frames"]) + 1, "and the one clicked on"
     assert told["how"] == "grabcut, centre"
+
+
+def test_the_papers_edit_by_a_picture_runs_where_clip_is_there(results, tmp_path, monkeypatch):
+    """With random weights in the real format, as the loss alone: VGG has to be the published one."""
+    monkeypatch.chdir(results.parents[3])
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path))
+    write_clip(tmp_path / "clip-vit-base-patch32")
+    words = ("edit=style_paper", "edit.image.lambda_s=0", "edit.name=clip")
+    assert main(["edit_image", *WORDS, *FEW, *words]) == 0
+    told = numbers(results / "edits" / "clip")
+    assert (told["how"], told["lambda_s"]) == ("clip-vit-base-patch32", 0)
+    before, after = (parameters(results, scene, "TF01") for scene in ("compose", "edits/clip"))
+    assert not torch.equal(before["texels"], after["texels"])
 
 
 def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
