@@ -30,7 +30,7 @@ def test_an_edit_and_its_measures_make_a_row_above_the_papers(tmp_path):
     assert (first["minutes"], first["mean ms"], first["CLIP similarity"]) == (1.5, 4.0, 0.3)
     assert first["geometry kept"] == "bit for bit"
     assert table.rows[0].sources == paths
-    assert "CLIP of the scores: B/32; that of a loss stands beside its method." in table.caption
+    assert "CLIP: B/32." in table.caption
     by_method = {row["method"]: row for row in theirs}
     assert len(theirs) == 4, "the paper's text-driven methods are beside those that follow words"
     assert by_method["TexGS-VolVis"]["minutes"] == 8.0

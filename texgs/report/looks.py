@@ -136,9 +136,6 @@ def caption(measured: Sequence[EditMeasures]) -> str:
         "The paper: means over four data sets, on an RTX 4090; it names neither its pictures nor its "
         "instructions, and those that `follows` tells stand in for them.",
     ]
-    words += [
-        f"CLIP of the scores: {name}; that of a loss stands beside its method."
-        for name in sorted(map(str, backbones))
-    ]
+    words += [f"CLIP: {name}." for name in sorted(map(str, backbones))]
     words += [f"CLIP not measured: {note}." for note in sorted(map(str, notes))]
     return " ".join(words)
