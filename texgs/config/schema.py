@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from omegaconf import II
 
-from texgs.config.clip import backbone
+from texgs.config.clip import BACKBONES
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
@@ -37,7 +37,11 @@ class Device:
 class Metric:
     """What edited scenes are measured with, besides what needs no weights."""
 
-    clip: str = backbone("CLIP's metrics, where its weights are on this machine; losses have their own")
+    clip: str = key(
+        BACKBONES[0],
+        "backbone of CLIP's metrics, where its weights are on this machine; losses have their own",
+        choices=BACKBONES,
+    )
     views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.clip import backbone
+from texgs.config.clip import BACKBONES
 from texgs.config.keys import key
 from texgs.config.methods import Method
 from texgs.methods import style
@@ -38,7 +38,11 @@ class ImageKeys(StyleKeys):
     lambda_s: float | None = key(
         None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
     )
-    clip: str = backbone("the CLIP term of the loss, where lambda_s is below 1; metrics have their own")
+    clip: str = key(
+        BACKBONES[0],
+        "backbone of the CLIP term, where lambda_s is below 1; metrics have their own",
+        choices=BACKBONES,
+    )
     pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
     start: str | None = key(
         None,
