@@ -217,7 +217,7 @@ def edit_settings(config: DictConfig) -> dict[str, Any]:
     """What jobs of edits read: what all edits have, and the keys of this one's method."""
     keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
     edit = {name: config.edit[name] for name in keys} | captions(config)
-    given = {"reduce": config.fit.reduce, "clip": config.metric.clip, "lens": lens(config)}
+    given = {"reduce": config.fit.reduce, "lens": lens(config)}
     given["followed"] = looks_of(config)
     label = fit_label(config)["fit"] | {"sweep": config.sweep.name, "variant": config.variant}
     return {"edit": edit, "fit": label, **given}

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from omegaconf import II
 
+from texgs.config.clip import BACKBONES
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
@@ -37,9 +38,9 @@ class Metric:
     """What edited scenes are measured with, besides what needs no weights."""
 
     clip: str = key(
-        "clip-vit-base-patch32",
-        "backbone of CLIP's metrics, where its weights are on this machine",
-        choices=("clip-vit-base-patch32", "clip-vit-large-patch14"),
+        BACKBONES[0],
+        "backbone of CLIP's metrics, where its weights are on this machine; losses have their own",
+        choices=BACKBONES,
     )
     views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
 

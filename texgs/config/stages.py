@@ -259,6 +259,7 @@ ROWS = (
         select=lambda config: {
             **edit_settings(config),
             "compared": config.metric.views,
+            "clip": config.metric.clip,
             "views": view_settings(config),
         },
         inputs=scenes_before_and_after,

@@ -38,6 +38,7 @@ class Settings(EditSettings):
     """What the stage reads of the configuration."""
 
     compared: int
+    clip: str
     views: ViewKeys
 
 
