@@ -119,8 +119,10 @@ def check(config: DictConfig) -> None:
     for key, name in (("variant", config.variant), ("sweep.name", config.sweep.name)):
         if not re.fullmatch(r"[A-Za-z0-9_-]*", name):
             raise ConfigError(f"{key}: expected letters, digits, _ or -, got {name!r}")
-    if re.fullmatch("sheet|comparison|views.*", config.fit.name):
-        raise ConfigError(f"fit.name: {config.fit.name} is a folder of texgs; choose another name")
+    check_name("gallery.name", config.gallery.name)
+    for key, name in (("fit.name", config.fit.name), ("gallery.name", config.gallery.name)):
+        if re.fullmatch("sheet|comparison|views.*", name):
+            raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
     if not re.fullmatch("views(-.*)?", config.views.name):
         raise ConfigError(f"views.name: expected views or views-..., got {config.views.name}")
     check_name("views.name", config.views.name)

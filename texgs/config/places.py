@@ -10,7 +10,7 @@ from omegaconf import DictConfig
 class Place:
     """The folder of a job, and the files in it that other jobs and people read."""
 
-    folder: str  # of wildcards dataset, tf, views, fit, phase and edit
+    folder: str  # of wildcards dataset, tf, views, fit, phase, edit, gallery
     files: tuple[str, ...] = ()  # the first is the one that other jobs ask for; metrics.json comes with all
 
     @property
@@ -33,7 +33,7 @@ PLACES = {
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
     "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
     "timing": Place("{dataset}/scene/{fit}/timing"),
-    "gallery": Place("{dataset}/gallery", ("gallery.png",)),
+    "gallery": Place("{dataset}/gallery/{gallery}"),
     "edit": Place("{dataset}/scene/{fit}/edits/{edit}", ("scene.yaml", "edit.png")),
     "edit_metrics": Place("{dataset}/scene/{fit}/edit_metrics/{edit}"),
 }
@@ -48,6 +48,7 @@ def folder_of(place: str, config: DictConfig, phase: str = "", tf: str | None = 
         fit=fit_folder(config),
         phase=phase,
         edit=config.edit.name,
+        gallery=config.gallery.name,
     )
 
 

@@ -11,6 +11,7 @@ from omegaconf import II
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
+from texgs.config.gallery import GalleryKeys
 from texgs.config.keys import key
 from texgs.config.mesh import MeshKeys
 from texgs.config.views import ViewKeys
@@ -69,6 +70,7 @@ class Config:
     edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
     metric: Metric = key(Metric, "what edits are measured with")
     mesh: MeshKeys = key(MeshKeys, "surfaces of fits beside those of their volumes")
+    gallery: GalleryKeys = key(GalleryKeys, "pictures of scenes side by side")
     sweep: Sweep = key(Sweep, "variants of the experiment")
     sweeps: dict[str, str] = field(
         default_factory=dict,

@@ -24,6 +24,7 @@ from texgs.volume.view_set import View
 
 MAGNIFIED = 4  # errors: a quarter of the range of colours has the full colour
 DIVERGING = "bwr"  # 0 is white
+ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)
 VISIBLE = 2 / 255  # alpha
 MARGIN = 1.06  # of what is shown around what is visible
 
@@ -89,8 +90,7 @@ def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tupl
         color = image.color.cpu().clamp(0, 1)
         visible = visible | (image.alpha.cpu() > VISIBLE)
         panels.append(Panel(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
-    scale = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)
-    panels.append(Panel(f"error × {MAGNIFIED} ({DIVERGING})", scale(signed_error(color, truth)), scale=scale))
+    panels.append(Panel(f"error × {MAGNIFIED} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
     return panels, visible
 
 

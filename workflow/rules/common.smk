@@ -129,6 +129,7 @@ wildcard_constraints:
     sweep=any_of(filter(None, PLAN.sweeps), "no-sweep"),
     dataset=any_of(PLAN.wildcards["dataset"]),
     tf="[A-Za-z][A-Za-z0-9_-]*",
+    gallery="[A-Za-z][A-Za-z0-9_-]*",
     views=any_of(PLAN.wildcards["views"]),
     fit=any_of(PLAN.wildcards["fit"]),
     phase=any_of(PLAN.wildcards["phase"]),
