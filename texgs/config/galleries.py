@@ -49,12 +49,8 @@ def gallery_inputs(config: DictConfig) -> dict[str, Path]:
     """The scenes of all places, and the volume where one is shown."""
     places = [place for _, rows in places_of(config) for row in rows for place in row if place.shot.show]
     scenes = {place.scene: place.file for place in places}
-    return {**scenes, **(prepared_volume(config) if any(map(needs_volume, places)) else {})}
-
-
-def needs_volume(place: Place) -> bool:
-    """Whether a place shows the volume, or how the scene differs from it."""
-    return place.shot.show in ("volume", "error")
+    needs_volume = any(place.shot.show != "scene" for place in places)
+    return {**scenes, **(prepared_volume(config) if needs_volume else {})}
 
 
 def picture(place: Place) -> dict[str, Any]:
@@ -85,11 +81,11 @@ def filled(config: DictConfig, grid: GridKeys) -> tuple[GridKeys, list[list[Plac
     titles = [row.title for row in grid.rows]
     if repeated := [title for title in titles if titles.count(title) > 1]:
         raise ConfigError(f"{where}: expected rows with different titles, got {repeated[0]!r} twice")
+    has_volume = config.dataset.views_folder is None
     places = [
-        [place_of(config, together(row, column), where) for column in grid.columns] for row in grid.rows
+        [place_of(config, together(row, column, has_volume), where) for column in grid.columns]
+        for row in grid.rows
     ]
-    if config.dataset.views_folder is not None:  # there is no volume
-        places = [[emptied(place) if needs_volume(place) else place for place in row] for row in places]
     rows = [index for index, row in enumerate(places) if any(place.shot.show for place in row)]
     columns = [
         index for index in range(len(grid.columns)) if any(places[row][index].shot.show for row in rows)
@@ -100,20 +96,15 @@ def filled(config: DictConfig, grid: GridKeys) -> tuple[GridKeys, list[list[Plac
     return kept, [[places[row][column] for column in columns] for row in rows]
 
 
-def together(row: ShotKeys, column: ShotKeys) -> ShotKeys:
+def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
     """What a row and a column say of the place that they share, with defaults for what neither says."""
     said = {each.name: getattr(column, each.name) or getattr(row, each.name) for each in fields(ShotKeys)}
-    if row.show and column.show and row.show != column.show:
-        said["show"] = ""
-    elif not said["show"]:
-        said["show"] = "scene"
-    said["changes"] = [*row.changes, *column.changes]
-    return ShotKeys(**{**said, "edit": said["edit"] or AS_FITTED, "view": said["view"] or FRONT})
-
-
-def emptied(place: Place) -> Place:
-    """The place without a picture."""
-    return Place(ShotKeys(**{**asdict(place.shot), "show": ""}), place.scene, place.file)
+    show = said["show"] or "scene"
+    if (row.show and column.show and row.show != column.show) or not (has_volume or show == "scene"):
+        show = ""
+    changes = [*row.changes, *column.changes]
+    edit, view = said["edit"] or AS_FITTED, said["view"] or FRONT
+    return ShotKeys(**{**said, "show": show, "edit": edit, "view": view, "changes": changes})
 
 
 def place_of(config: DictConfig, shot: ShotKeys, where: str) -> Place:
