@@ -19,7 +19,7 @@ from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.metrics.image import psnr, ssim
-from texgs.report.fit_figure import ERROR, signed_error
+from texgs.report.error_map import ERROR, signed_error
 from texgs.report.results import Comparison, PseResult
 from texgs.report.strip import write_strip
 from texgs.scene.scene import Scene

@@ -14,7 +14,7 @@ from texgs.core.camera import Camera, orbit
 from texgs.core.device import torch_device
 from texgs.core.light import Light
 from texgs.metrics.image import psnr
-from texgs.report.fit_figure import ERROR, signed_error
+from texgs.report.error_map import ERROR, signed_error
 from texgs.scene.scene_file import read_scene
 from texgs.scene.session import Session
 
