@@ -80,6 +80,20 @@ def test_numbers_name_the_method(results):
     assert json.loads((results / "edits" / "glass" / "metrics.json").read_text())["seed"] == 3
 
 
+def test_looks_are_shown_side_by_side(results, capsys, monkeypatch):
+    monkeypatch.chdir(results.parents[3])
+    assert main(["gallery", *WORDS, *FEW, "edits=[glass,gold]", "gallery.size=32"]) == 0
+    folder = results.parents[1] / "gallery" / "looks"
+    shown = [(each["row"], each["column"]) for each in numbers(folder)["shown"]]
+    columns = ["volume", "as fitted", "glass", "gold"]
+    assert shown == [(row, column) for row in ("front", "side") for column in columns]
+    assert np.asarray(Image.open(folder / "gallery.png").convert("RGB")).std() > 5
+    one = "gallery.grids=[{rows: [{edit: gold, changes: ['TF01.opacity=x']}], columns: [{}]}]"
+    assert main(["gallery", *WORDS, *FEW, "edits=[gold]", one]) == 2
+    message = "TF01.opacity=x: models.TF01.opacity: expected a factor from 0 to 1000, got 'x'"
+    assert message in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("edit", ["part", "crimson"])
 def test_a_part_of_a_model_is_edited_alone(results, edit):
     models = read_scene(results / "edits" / edit / "scene.yaml").models

@@ -49,14 +49,19 @@ def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(resu
 def test_edits_are_compared_with_the_volume(results):
     found = numbers(results, "pse")
     titles = [step["title"] for step in found["pse"]]
-    assert titles[:2] == ["as fitted", "TF02 alone"]
-    assert len(found["pse"]) == 6
-    assert len(found["relight"]) == 4
+    assert titles[:3] == ["as fitted", "+ opacity of TF01 x 0.4", "+ other colours"]
+    assert titles[3:] == ["+ k_a x 0.7, k_d x 1.2, k_s x 2", "+ light from the left"]
+    assert len(found["relight"]) == 6
     assert all(step["psnr"] > 12 for step in (*found["pse"], *found["relight"]))
     assert found["pse"][0]["psnr"] > 16
     for name in ("pse.png", "relight.png"):
         assert (results / "pse" / name).stat().st_size > 5000
-    assert not read_scene(results / "pse" / "pse-1.yaml").models["TF01"].edit.visible
+    last = read_scene(results / "pse" / "pse-4.yaml")
+    edit = last.models["TF01"].edit
+    assert (edit.opacity, edit.ambient, last.light.azimuth) == (0.4, 0.7, -150.0), (
+        "each edit keeps the others"
+    )
+    assert edit.palette is not None
 
 
 def test_frames_are_timed_beside_the_volume(results):

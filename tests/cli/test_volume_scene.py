@@ -76,7 +76,7 @@ def test_a_scene_is_compared_with_the_volume_that_has_its_edits(volume):
     comparison, shown = compared(step, Composition([ball(1), ball(2)]), fake, [CAMERA])
     assert comparison.psnr > 0
     assert comparison.ssim < 1
-    assert set(shown) == {"scene", "volume"}
+    assert set(shown) == {"scene", "volume", "error"}
     assert asked[0][1] == LIGHT
     assert asked[0][2] == edits
     torch.testing.assert_close(torch.tensor(asked[0][3][0]), ball(1).parameters["palette"])

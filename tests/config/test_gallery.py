@@ -1,27 +1,93 @@
-"""Which looks of an experiment stand side by side."""
+"""Which scenes of an experiment stand side by side, and in which places."""
+
+import re
+from pathlib import Path
 
 import pytest
 
 from texgs.config.compose import compose
+from texgs.config.project import members
 from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
 
 GALLERY = STAGES["gallery"]
+ENGINE = ("dataset=engine", "fit=quick")
+
+
+def grids(*words):
+    """Of the settings: columns, and for each row its title and what its places show."""
+    return [
+        (grid["columns"], {row["title"]: row["pictures"] for row in grid["rows"]})
+        for grid in GALLERY.settings(compose((*ENGINE, *words)))["grids"]
+    ]
+
+
+def grid(rows, columns="[{}]"):
+    return f"gallery.grids=[{{rows: {rows}, columns: {columns}}}]"
 
 
 def test_each_look_is_there_once_for_each_recipe_that_its_method_takes():
-    words = ("fits=[quick,gaussians_quick]", "edits=[glass,lobe,stylesplat]", "fit=quick")
-    inputs = GALLERY.inputs(compose(("dataset=engine", *words)))
+    words = ("fits=[quick,gaussians_quick]", "edits=[glass,lobe,stylesplat]")
+    inputs = GALLERY.inputs(compose((*ENGINE, *words)))
     scenes = "results/engine/scene"
     assert {name: path.as_posix() for name, path in inputs.items()} == {
-        "before": f"{scenes}/quick/compose/scene.yaml",
-        "glass": f"{scenes}/quick/edits/glass/scene.yaml",
-        "stylesplat": f"{scenes}/gaussians_quick/edits/stylesplat/scene.yaml",
+        "quick/none": f"{scenes}/quick/compose/scene.yaml",
+        "quick/glass": f"{scenes}/quick/edits/glass/scene.yaml",
+        "gaussians_quick/stylesplat": f"{scenes}/gaussians_quick/edits/stylesplat/scene.yaml",
+        "volume": "results/engine/volume/volume.nrrd",
     }, "a segment is no look"
-    inputs = GALLERY.inputs(
-        compose(("dataset=engine", "fits=[quick,demo]", "edits=[glass,gold]", "fit=quick"))
+    ((columns, rows),) = grids("fits=[quick,demo]", "edits=[glass,gold]")
+    assert columns == ["volume", "as fitted", "glass, quick", "glass, demo", "gold, quick", "gold, demo"]
+    assert [each["scene"] for each in rows["front"]] == [
+        "quick/none",
+        "quick/none",
+        "quick/glass",
+        "demo/glass",
+        "quick/gold",
+        "demo/gold",
+    ]
+
+
+def test_what_a_row_and_a_column_say_counts_together_and_the_column_first():
+    rows = (
+        "[{title: a, light: [1, 2], edit: gold, changes: ['TF01.opacity=0.5']}, "
+        "{title: b, show: error, fov_y: 20}]"
     )
-    assert list(inputs) == ["before", "glass, quick", "glass, demo", "gold, quick", "gold, demo"]
+    columns = (
+        "[{title: x, light: [3, 4], changes: ['TF02.visible=false']}, {title: y, edit: none, show: volume}]"
+    )
+    ((titles, found),) = grids("edits=[gold]", grid(rows, columns))
+    assert titles == ["x", "y"]
+    (ax, ay), (bx, by) = found["a"], found["b"]
+    assert (ax["scene"], ax["show"], ax["light"]) == ("quick/gold", "scene", [3, 4])
+    assert ax["changes"] == ["TF01.opacity=0.5", "TF02.visible=false"]
+    assert (ay["scene"], ay["show"], ay["light"]) == ("quick/none", "volume", [1, 2])
+    assert (bx["show"], bx["fov_y"], bx["view"]) == ("error", 20, [-90, 20])
+    assert by["show"] == "", "a row of errors has none in the column of the volume"
+
+
+def test_without_a_volume_its_rows_and_columns_are_left_out(tmp_path):
+    words = ("dataset=vortex", "tf=TF01", f"data_folder={tmp_path}", "edits=[gold]")
+    given = grid("[{title: a}, {title: b, show: error}]", "[{title: x, show: volume}, {title: y}]")
+    (tmp_path / "vortex" / "TF01").mkdir(parents=True)
+    (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
+    ((titles, found),) = grids(*words, given)
+    assert (titles, list(found)) == (["y"], ["a"])
+    with pytest.raises(ConfigError, match="expected a picture in a row and a column, got none"):
+        grids(*words, grid("[{show: volume}]"))
+
+
+def test_a_sweep_shows_its_variants_once():
+    words = ("dataset=engine", "fit=quick", "sweep=resolution")
+    given = grid("[{}]", '[{variant: "400"}, {variant: "800"}]')
+    first = compose((*words, given, "variant=400"))
+    assert GALLERY.applies(first)
+    assert not GALLERY.applies(compose((*words, given, "variant=800")))
+    assert not GALLERY.applies(compose((*words, given, "variant=400", "fit.seed=1")))
+    assert [path.as_posix() for path in GALLERY.inputs(first).values()] == [
+        "results/engine/scene/quick-400/compose/scene.yaml",
+        "results/engine/scene/quick-800/compose/scene.yaml",
+    ]
 
 
 @pytest.mark.parametrize(
@@ -30,6 +96,7 @@ def test_each_look_is_there_once_for_each_recipe_that_its_method_takes():
         (("fit=quick",), True),
         (("fit=gaussians_quick",), False),  # the first one stands for all
         (("fit=quick", "edits=[glass]"), False),
+        (("fit=quick", "edits=[glass]", grid("[{edit: glass}]")), True),
         (("fit=quick", "edit=glass"), False),
         (("fit=quick", "tf=TF01"), False),
     ],
@@ -39,6 +106,88 @@ def test_one_configuration_stands_for_all(words, applies):
     assert GALLERY.applies(compose((*given, *words))) is applies
 
 
-def test_without_edits_there_is_nothing_to_show():
-    with pytest.raises(ConfigError, match="edits: expected some to show"):
-        GALLERY.inputs(compose(("dataset=engine", "fit=quick")))
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ((), "edits: expected some to show"),
+        (
+            (grid("[{edit: glas}]"), "edits=[glass]"),
+            r"pictures\.edit: expected one of none, glass, got glas, did",
+        ),
+        ((grid("[{edit: glass}]"),), r"pictures\.edit: expected one of none, got glass"),
+        (
+            (grid("[{fit: demos}]"), "fits=[quick,demo]"),
+            r"pictures\.fit: expected one of quick, demo, got demos",
+        ),
+        (
+            (grid("[{edit: glass, fit: plenoxels}]"), "fits=[quick,plenoxels]", "edits=[glass]"),
+            r"pictures\.fit: glass does not work on plenoxels",
+        ),
+        (
+            (grid("[{edit: stylesplat}]"), "edits=[stylesplat]"),
+            r"pictures\.edit: stylesplat works on none of quick; add a recipe",
+        ),
+        ((grid("[{variant: a}]"),), r"pictures\.variant: expected none without a sweep, got a"),
+        (
+            (grid("[{}]"), "sweep=resolution", "variant=400"),
+            "variant: expected one of 400, 800, 1200, got none",
+        ),
+        ((grid("[{light: [3]}]"),), r"pictures\.light: expected azimuth and polar angle, got \[3"),
+        ((grid("[{box: [0.5, 0.5, 0.6]}]"),), r"pictures\.box: expected left, top and side, from 0 to 1"),
+        ((grid("[{fov_y: 180}]"),), r"fov_y: expected less than 180, got 180"),
+        (
+            (grid("[{show: volum}]"),),
+            "show: expected one of scene, volume, error, got volum, did you mean volume",
+        ),
+        ((grid("[{changes: ['TF03.opacity=1']}]"),), r"changes: expected PART.KEY=VALUE with one of TF01"),
+        ((grid("[{changes: [opaque]}]"),), r"changes: expected PART.KEY=VALUE with one of"),
+        ((grid("[{edit: gold, changes: ['TF02/lobe.opacity=1']}]"), "edits=[gold,lobe]"), "TF02, got TF02/"),
+        ((grid("[{title: a}, {title: a}]"),), "expected rows with different titles, got 'a' twice"),
+        ((grid("[]"),), "expected a picture in a row and a column, got none"),
+        (("gallery.grids=[{name: a/b}]",), "expected different names of files, got 'a/b'"),
+        (("gallery.grids=[{},{}]",), "expected different names of files, got 'pictures'"),
+        (("gallery.name=sheet",), "gallery.name: sheet is a folder of texgs"),
+        (("gallery.name=a/b",), "gallery.name: expected a letter and then letters"),
+    ],
+)
+def test_a_mistake_is_one_sentence(words, message):
+    with pytest.raises(ConfigError, match=message):
+        GALLERY.inputs(compose((*ENGINE, *words)))
+
+
+def test_parts_that_an_edit_adds_can_be_changed():
+    changes = "['TF02/lobe.opacity=0.5', 'background=#000000']"
+    words = ("edits=[crimson]", grid(f"[{{edit: crimson, changes: {changes}}}]"))
+    ((_, rows),) = grids(*words)
+    assert rows[""][0]["scene"] == "quick/crimson"
+
+
+def shown():
+    """Experiments with a gallery of their own, and their data sets."""
+    configs = {name: compose((f"experiment={name}",)) for name in members("experiment")}
+    named = {name: each for name, each in configs.items() if each.gallery.name != "looks"}
+    return [(name, dataset) for name, each in named.items() for dataset in each.datasets]
+
+
+@pytest.mark.parametrize(("experiment", "dataset"), shown())
+def test_every_experiment_with_a_gallery_is_named_like_it_and_shows_scenes_of_its_own(experiment, dataset):
+    words = (f"experiment={experiment}", f"dataset={dataset}")
+    config = compose(words)
+    variant = next(iter(config.sweep.variants), "")
+    config = compose((*words, f"variant={variant}", *(f"fit={name}" for name in config.fits[:1])))
+    assert config.gallery.name == experiment
+    assert GALLERY.applies(config)
+    settings = GALLERY.settings(config)
+    assert settings["command"] == f"texgs run experiment={experiment}"
+    assert all(each["caption"] for each in settings["grids"])
+    assert GALLERY.inputs(config)
+
+
+def test_the_example_of_the_page_works(tmp_path, monkeypatch):
+    page = (Path(__file__).parents[2] / "docs" / "figures.md").read_text(encoding="utf-8")
+    (example,) = re.findall("```yaml\n(.*?)```", page, flags=re.DOTALL)
+    (tmp_path / "conf" / "experiment").mkdir(parents=True)
+    (tmp_path / "conf" / "experiment" / "opacity.yaml").write_text(example)
+    monkeypatch.chdir(tmp_path)
+    settings = GALLERY.settings(compose(("experiment=opacity", "dataset=engine")))
+    assert settings["command"] == "texgs run experiment=opacity"

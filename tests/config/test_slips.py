@@ -67,6 +67,13 @@ def test_brackets_without_end_name_the_file(mine):
     )
 
 
+def test_lists_in_lists_are_no_slip(mine):
+    path = mine.parents[1] / "experiment" / "mine.yaml"
+    path.parent.mkdir()
+    path.write_text("defaults: [override /fit: quick]\ngallery: {grids: [{rows: [{title: a}]}]}\n")
+    assert "Did you mean to override fit?" in told("experiment=mine"), "it lacks # @package _global_"
+
+
 def test_a_file_that_is_not_chosen_does_no_harm(mine):
     mine.write_text("name: [\n")
     assert compose(("dataset=engine",)).dataset.name == "engine"

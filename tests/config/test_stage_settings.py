@@ -21,6 +21,7 @@ WORDS = {  # of stages that read more than the data set
         f"edit_{compose((f'edit={name}',)).edit.method}": ("dataset=turbulence", f"edit={name}")
         for name in members("edit")
     },
+    "gallery": ("dataset=turbulence", "edits=[gold]"),
     "edit_metrics": ("dataset=turbulence", "edit=gold"),
 }
 

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from texgs.core.errors import ArgumentError
-from texgs.report.strip import DPI, INCHES, content, write_strip
+from texgs.report.strip import DPI, INCHES, NOTE, content, write_strip
 
 
 def picture(rows, columns, size=(60, 80), value=0.2):
@@ -38,3 +38,16 @@ def test_all_show_the_square_around_what_any_shows():
 def test_rows_of_another_length_are_named(tmp_path):
     with pytest.raises(ArgumentError, match="scene: expected 2 pictures, got 1"):
         write_strip(tmp_path / "a.png", {"scene": [picture(0, 0)]}, ["one", "two"])
+
+
+def test_places_may_be_empty_and_pictures_have_words_below(tmp_path):
+    block = picture(slice(20, 30), slice(30, 40))
+    rows, titles = {"a": [block, None], "b": [None, block]}, ["one", "two"]
+    plain = write_strip(tmp_path / "plain.png", rows, titles)
+    noted = write_strip(tmp_path / "noted.png", rows, titles, {"a": ["", ""], "b": ["", "31.2 dB"]})
+    (width, height), (_, higher) = Image.open(plain).size, Image.open(noted).size
+    assert higher == round((2 * INCHES + 0.3 + NOTE) * DPI)
+    pixels = np.asarray(Image.open(plain).convert("L"))
+    right = pixels[40 : height // 2 - 20, width // 2 + 20 :]
+    assert right.min() == 255, "nothing is drawn in the empty place"
+    assert pixels[40 : height // 2 - 20, 20 : width // 2 - 20].min() < 100

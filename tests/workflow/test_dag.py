@@ -70,6 +70,14 @@ def test_a_comment_reruns_nothing_and_a_line_its_stages(fresh):
     assert "volume" in fresh.planned()
 
 
+def test_a_gallery_of_a_sweep_is_one_job(project):
+    words = {"config": ("tracking=none", "experiment=resolution"), "overrides": "datasets=[turbulence]"}
+    planned = project.planned(targets=("galleries",), **words)
+    assert planned.count("gallery") == 1
+    assert planned.count("compose") == 3
+    assert "timing" not in planned
+
+
 def test_views_may_be_given(project, tmp_path):
     other = Project(tmp_path)
     (tmp_path / "data").mkdir()
@@ -88,6 +96,10 @@ def test_views_may_be_given(project, tmp_path):
     ("words", "message"),
     [
         ({"overrides": "views.widht=3"}, "texgs: views.widht: no such key, did you mean views.width?"),
+        (
+            {"overrides": "edits=[gold] gallery.grids=[{rows:[{edit:gols}],columns:[{}]}]"},
+            "texgs: gallery.grids.pictures.edit: expected one of none, gold, got gols, did you mean gold?",
+        ),
         ({"overrides": "views.fov_y=wide"}, "texgs: views.fov_y: value 'wide' of type 'str'"),
         ({"config": ("dataset=engien",)}, "texgs: dataset: expected one of"),
         ({"config": ("datset=engine",)}, "texgs: --config: expected experiment, dataset"),

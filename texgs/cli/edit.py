@@ -1,6 +1,7 @@
 """Edit a scene by words such as TF01.palette=#ff8800 and write it to a new file; nothing is trained."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,17 +26,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the edited scene."""
-    from texgs.core.errors import TexgsError
     from texgs.scene.session import Session
 
     session = Session.open(arguments.scene)
-    for word in arguments.overrides:
+    apply_all(session, arguments.overrides)
+    print(session.save(arguments.output))
+    return 0
+
+
+def apply_all(session: "Session", words: Sequence[str]) -> None:
+    """Make the changes that words ask for.
+
+    Raises:
+        TexgsError: naming the word that cannot be done.
+    """
+    from texgs.core.errors import TexgsError
+
+    for word in words:
         try:
             apply(session, word)
         except TexgsError as error:
             raise type(error)(f"{word}: {error}") from error
-    print(session.save(arguments.output))
-    return 0
 
 
 def apply(session: "Session", word: str) -> None:

@@ -128,7 +128,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "views": sorted({each.views.name for each in configs}),
             "fit": sorted({fit_folder(each) for each in configs}),
             "edit": sorted({edit_folder(each) for each in configs if each.edit.method != NO_METHOD}),
-            "gallery": sorted({each.gallery for each in configs}),
+            "gallery": sorted({each.gallery.name for each in configs}),
             "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },
         {module: code_digest(module) for module in OTHER_CODE},

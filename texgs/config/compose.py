@@ -28,7 +28,7 @@ from texgs.core.errors import ConfigError
 RESERVED = (
     "volume",
     "transfer",
-    "galleries",
+    "gallery",
     "logs",
     "mlartifacts",
     "tables",
@@ -149,7 +149,6 @@ def check(config: DictConfig) -> None:
     check_name("dataset.name", config.dataset.name)
     check_name("fit.name", config.fit.name)
     check_name("edit.name", config.edit.name)
-    check_name("gallery", config.gallery)
     if config.edit.base is not None and not is_scene_file(config.edit.base):
         check_name("edit.base", config.edit.base)
     if not re.fullmatch(r"[A-Za-z0-9_-]*", config.sweep.name):
@@ -157,8 +156,10 @@ def check(config: DictConfig) -> None:
     if not re.fullmatch(rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST - 1}}})?", config.variant):
         got = shortened(repr(config.variant))
         raise ConfigError(f"variant: expected at most {LONGEST} letters, digits, _, - or ., got {got}")
-    if re.fullmatch("sheet|comparison|views.*", config.fit.name):
-        raise ConfigError(f"fit.name: {config.fit.name} is a folder of texgs; choose another name")
+    check_name("gallery.name", config.gallery.name)
+    for key, name in (("fit.name", config.fit.name), ("gallery.name", config.gallery.name)):
+        if re.fullmatch("sheet|comparison|views.*", name):
+            raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
     if not re.fullmatch("views(-.*)?", config.views.name):
         raise ConfigError(f"views.name: expected views or views-..., got {config.views.name}")
     check_name("views.name", config.views.name)

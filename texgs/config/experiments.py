@@ -23,7 +23,7 @@ from texgs.config.variants import changes
 from texgs.core.errors import ConfigError
 
 Words = tuple[str, ...]
-OF_A_UNION = ("experiments", "missing")  # the only keys that an experiment of experiments sets
+OF_A_UNION = ("experiments", "each", "missing")  # the only keys that an experiment of experiments sets
 NO_SWEEPS = ("sweeps={}", "sweeps=null", "sweep=none")  # what is written to switch them off
 AIMED = re.compile(r"dataset\.([\w-]+)\.(([\w-]+)[^=]*=.*)", re.DOTALL)  # dataset.NAME.KEY=VALUE
 
@@ -66,7 +66,9 @@ class Selection:
         listed = self.by_sweep[config.sweep.name if changes(config) else ""]
         for each in variants(words):
             edited, left = self.edited(each, several)
-            own = (f"edits=[{','.join(left)}]",) if left != list(compose(each).edits) else ()
+            own: Words = ()
+            if left != list(compose(each).edits):  # a gallery then shows what is left
+                own = f"edits=[{','.join(left)}]", "gallery.grids=[]"
             listed += [compose((*each, *own, "edit=none")), *edited]
 
     def edited(self, words: Words, several: bool) -> tuple[list[DictConfig], list[str]]:
@@ -148,11 +150,12 @@ def parts(words: Words, base: DictConfig) -> list[Words]:
         if part.experiments:
             raise ConfigError(f"experiments: expected single experiments, got {name}, which has several")
         own = list(part.datasets) or [part.dataset.name]
+        own_words = f"experiment={name}", *base.each
         if not wanted:
-            made.append((f"experiment={name}", *rest))
+            made.append((*own_words, *rest))
         elif chosen := [each for each in own if each in wanted]:
             of_set = f"datasets=[{','.join(chosen)}]"
-            made.append((f"experiment={name}", *without(rest, "dataset", "datasets"), of_set))
+            made.append((*own_words, *without(rest, "dataset", "datasets"), of_set))
     if not made:
         raise ConfigError(
             f"dataset: expected data sets of {', '.join(base.experiments)}, got {', '.join(wanted)}"

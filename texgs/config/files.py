@@ -137,6 +137,8 @@ def expected_kind(parts: list[str]) -> type[yaml.Node] | None:
         return None
     if all(names[len(parts)] == "*" for names in below):
         default = OmegaConf.select(OmegaConf.structured(Config), ".".join(parts))
+        if default is None:  # below an entry of a list, of which the schema has none
+            return None
         return yaml.SequenceNode if OmegaConf.is_list(default) else yaml.MappingNode
     return yaml.MappingNode
 

@@ -127,26 +127,6 @@ def compared_models(config: DictConfig) -> dict[str, Path]:
     }
 
 
-def all_looks(config: DictConfig) -> dict[str, Path]:
-    """The scene of the first recipe as fitted, and all scenes of the experiment with a new look, by name.
-
-    Raises:
-        ConfigError: if there are no edits.
-    """
-    if not config.edits:
-        raise ConfigError("edits: expected some to show, such as edits=[glass,gold], got none")
-    fits = [with_recipe(config, name) for name in config.fits] or [config]
-    looks = {"before": made("compose", fits[0])}
-    for name in config.edits:
-        edit = compose((f"edit={name}",)).edit
-        method = method_of(edit)
-        takes = [each for each in fits if method.is_look and method.takes(each.fit.field)]
-        for each in takes:
-            title = name if len(takes) == 1 else f"{name}, {each.fit.name}"
-            looks[title] = sibling(each, name)
-    return looks
-
-
 def with_recipe(config: DictConfig, name: str) -> DictConfig:
     """The same configuration with the name and field of another recipe: what decides where its models are."""
     recipe = compose((f"fit={name}",)).fit

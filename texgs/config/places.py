@@ -35,7 +35,7 @@ PLACES = {
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
     "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
     "timing": Place("{dataset}/scene/{fit}/timing"),
-    "gallery": Place("{dataset}/galleries/{gallery}", ("gallery.png",)),
+    "gallery": Place("{dataset}/gallery/{gallery}"),
     "edit": Place("{dataset}/scene/{fit}/edits/{edit}", ("scene.yaml", "edit.png")),
     "edit_metrics": Place("{dataset}/scene/{fit}/edit_metrics/{edit}"),
 }
@@ -50,7 +50,7 @@ def folder_of(place: str, config: DictConfig, phase: str = "", tf: str | None = 
         fit=fit_folder(config),
         phase=phase,
         edit=edit_folder(config),
-        gallery=config.gallery,
+        gallery=config.gallery.name,
     )
 
 

@@ -12,6 +12,7 @@ from texgs.config.clip import BACKBONES
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
+from texgs.config.gallery import GalleryKeys
 from texgs.config.keys import key
 from texgs.config.mesh import MeshKeys
 from texgs.config.views import ViewKeys
@@ -71,6 +72,7 @@ class Config:
     aimed: dict[str, list[str]] = field(
         default_factory=dict, metadata={"help": "overrides that hold for one data set alone, by its name"}
     )
+    each: list[str] = key([], "overrides that hold for each of `experiments`, before those of the command")
     missing: str = key(
         "stop", "what a run does without data or weights that it needs", choices=("stop", "skip")
     )
@@ -80,9 +82,9 @@ class Config:
     fits: list[str] = key([], "recipes of a whole experiment, files of conf/fit; default the one of `fit`")
     edit: Edit = key(Edit, "a new look for the scene")
     edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
-    gallery: str = key("gallery", "folder of the pictures with all fits and all edits side by side")
     metric: Metric = key(Metric, "what edits are measured with")
     mesh: MeshKeys = key(MeshKeys, "surfaces of fits beside those of their volumes")
+    gallery: GalleryKeys = key(GalleryKeys, "pictures of scenes side by side")
     sweep: Sweep = key(Sweep, "variants of the experiment")
     sweeps: dict[str, str] = field(
         default_factory=dict,

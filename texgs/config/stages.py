@@ -5,8 +5,8 @@ from collections.abc import Callable
 from omegaconf import DictConfig
 
 from texgs.config.fields import Kind, kinds
+from texgs.config.galleries import gallery_inputs, gallery_settings
 from texgs.config.inputs import (
-    all_looks,
     all_models,
     compared_models,
     edit_settings,
@@ -66,8 +66,12 @@ def has_scene(config: DictConfig) -> bool:
 
 
 def has_gallery(config: DictConfig) -> bool:
-    """Whether this is the first of the recipes of an experiment with several edits."""
-    if not has_scene(config) or changes(config) or len(config.edits) < 2:
+    """Whether this is the first of the recipes and variants of an experiment that has scenes to show."""
+    variants = list(changes(config))
+    shows_all = len(config.edits) > 1 and not variants
+    if not has_scene(config) or not (config.gallery.grids or shows_all):
+        return False
+    if variants and (config.variant, config.fit.seed) != (variants[0], config.sweep.seeds[0]):
         return False
     return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
@@ -247,10 +251,10 @@ ROWS = (
     Stage(
         "gallery",
         "texgs.cli.stages.gallery",
-        select=lambda config: {"lens": lens(config)},
-        inputs=all_looks,
+        select=gallery_settings,
+        inputs=gallery_inputs,
         place="gallery",
-        needs=("compose", *(method.stage for method in methods().values())),
+        needs=("volume", "compose", *(method.stage for method in methods().values())),
         applies=has_gallery,
     ),
     Stage(

@@ -18,12 +18,11 @@ from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
 from texgs.raster.shading import MATERIAL
+from texgs.report.error_map import DIVERGING, ERROR, MAGNIFIED, signed_error
 from texgs.report.figure_page import Panel, PanelRow, Scale, draw
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
 
-MAGNIFIED = 4  # errors: a quarter of the range of colours has the full colour
-DIVERGING = "bwr"  # 0 is white
 VISIBLE = 2 / 255  # alpha
 MARGIN = 1.06  # of what is shown around what is visible
 
@@ -89,15 +88,8 @@ def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tupl
         color = image.color.cpu().clamp(0, 1)
         visible = visible | (image.alpha.cpu() > VISIBLE)
         panels.append(Panel(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
-    scale = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)
-    panels.append(Panel(f"error × {MAGNIFIED} ({DIVERGING})", scale(signed_error(color, truth)), scale=scale))
+    panels.append(Panel(f"error × {MAGNIFIED} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
     return panels, visible
-
-
-def signed_error(image: Tensor, target: Tensor) -> Tensor:
-    """Of the channel that is farthest off, [H, W]; above 0 where the image is too bright."""
-    error = image - target
-    return error.gather(2, error.abs().argmax(dim=2, keepdim=True))[..., 0]
 
 
 def maps(model: Field, view: View, reduce: int) -> list[Panel]:

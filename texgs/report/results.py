@@ -97,10 +97,21 @@ class ComparisonResult:
 
 
 @dataclass(frozen=True)
-class GalleryResult:
-    """Looks side by side."""
+class Shown:
+    """One picture of a gallery."""
 
-    looks: list[str]
+    grid: str
+    row: str
+    column: str
+    psnr: float | None = None  # against the volume, where that is what it shows, dB
+
+
+@dataclass(frozen=True)
+class GalleryResult:
+    """Scenes side by side."""
+
+    section: str  # of the report
+    shown: list[Shown]
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import base64
 import io
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from PIL import Image
 
-from texgs.report.metrics_files import Record, of
+from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
 from texgs.report.results import ComparisonResult, EditResult, FitResult, GalleryResult
 
@@ -27,6 +27,7 @@ SECTIONS = {
     "sizes": "Model sizes",
     "rendering": "Rendering",
     "study": "User study",
+    "differences": "Where we differ from the paper",
     "more": "Further tables and figures",
 }
 OF_STAGES = {  # sections by the stage that made a figure; edits have theirs by what they follow
@@ -39,7 +40,6 @@ OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what the
 NARROW = ("scene.png", "transfer.png", "convergence.png")  # side by side where there is room; and styles
 QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
 UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
-Edits = Mapping[str, Record[EditResult]]  # by name
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,6 @@ class Figure:
 
 def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
     """All pictures of jobs by section, in the order of data sets; those of sweeps have a figure of all."""
-    edits = {edit.result.edit: edit for edit in of(EditResult, records)}
     found: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
         for name, words in record.facts.get("pictures", {}).items():
@@ -67,21 +66,21 @@ def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
                     label(record),
                     words,
                     data_uri(Image.open(picture)),
-                    command(record, edits),
+                    command(record),
                     is_narrow=name in NARROW or name.startswith("style"),
                 )
-                found[section_of(record, name, edits)].append(figure)
+                found[section_of(record, name)].append(figure)
     return found
 
 
-def section_of(record: Record[Any], picture: str, edits: Edits) -> str:
+def section_of(record: Record[Any], picture: str) -> str:
     """The section of a picture, which a job has made; `picture` is the name of its file."""
     result = record.result
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
         return "parts" if is_part else OF_EDITS[result.follows]
     if isinstance(result, GalleryResult):
-        return next((OF_EDITS[edits[name].result.follows] for name in result.looks if name in edits), "more")
+        return result.section
     if isinstance(result, FitResult):
         return "fitting"
     return OF_PICTURES.get(picture, OF_STAGES.get(record.stage, "more"))
@@ -93,29 +92,26 @@ def label(record: Record[Any]) -> str:
     return " ".join(filter(None, (record.tf, record.label, edit)))
 
 
-def command(record: Record[Any], edits: Edits) -> str:
-    """The command that makes the pictures of a job, but for what its run overrode."""
+def command(record: Record[Any]) -> str:
+    """The command that makes the pictures of a job, but for what its run overrode.
+
+    It is empty for galleries, whose words tell it.
+    """
     result, fits = record.result, [record.recipe]
+    if isinstance(result, GalleryResult):
+        return ""
     if isinstance(result, ComparisonResult):
         fits = result.recipes
-    if isinstance(result, GalleryResult):
-        fits = list(dict.fromkeys(edits[name].recipe for name in result.looks if name in edits))
     words = {
         "tf": record.tf,
         "fit": next(iter(fits), ""),
         "edit": result.edit if isinstance(result, EditResult) else "",
         "variant": record.variant,
         "fit.seed": record.seed if record.recipe else 0,
-        "fits": listed(fits) if len(fits) > 1 else "",
-        "edits": listed(result.looks[1:]) if isinstance(result, GalleryResult) else "",
+        "fits": f"[{','.join(fits)}]" if len(fits) > 1 else "",
     }
     given = [f"{key}={value}" for key, value in words.items() if value]
     return shlex.join(["texgs", record.stage, f"dataset={record.dataset}", *given])
-
-
-def listed(names: Iterable[str]) -> str:
-    """Names as a value of the configuration."""
-    return f"[{','.join(names)}]"
 
 
 def data_uri(picture: Image.Image) -> str:

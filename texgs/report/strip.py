@@ -12,12 +12,18 @@ from texgs.core.io import write_atomic
 from texgs.core.plots import words
 
 INCHES = 2.4  # of a picture
+NOTE = 0.2  # inches, of words under it
 DPI = 150
 THRESHOLD = 0.02  # of the brightest value
 MARGIN = 4  # pixels
 
 
-def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titles: Sequence[str]) -> Path:
+def write_strip(
+    path: str | Path,
+    rows: Mapping[str, Sequence[np.ndarray | None]],
+    titles: Sequence[str],
+    below: Mapping[str, Sequence[str]] | None = None,
+) -> Path:
     """Write a PNG with rows of pictures and a title over each column.
 
     All show the same part of theirs, the smallest square in which one differs from its corner.
@@ -25,7 +31,9 @@ def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titl
     Args:
         path: target file.
         rows: pictures [H, W, 3] of one size by the name of the row, in [0, 1] or uint8; as many as titles.
+            A place with None stays empty.
         titles: of the columns.
+        below: words under the pictures of each row; by default there are none.
 
     Returns:
         The path.
@@ -39,17 +47,19 @@ def write_strip(path: str | Path, rows: Mapping[str, Sequence[np.ndarray]], titl
     for name, pictures in rows.items():
         if len(pictures) != len(titles) or not titles:
             raise ArgumentError(f"{name}: expected {len(titles)} pictures, got {len(pictures)}")
-    box = content([picture for pictures in rows.values() for picture in pictures])
-    size = (INCHES * len(titles), INCHES * len(rows) + 0.3)
+    notes = below or {name: [""] * len(titles) for name in rows}
+    box = content([picture for pictures in rows.values() for picture in pictures if picture is not None])
+    size = (INCHES * len(titles), INCHES * len(rows) + 0.3 + NOTE * sum(map(any, notes.values())))
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(rows), len(titles), squeeze=False)
     for row, (name, pictures) in enumerate(rows.items()):
         for column, picture in enumerate(pictures):
             at = axes[row, column]
-            at.imshow(picture[box])
-            at.set_xticks([])
-            at.set_yticks([])
+            at.set(xticks=[], yticks=[], frame_on=picture is not None)
+            if picture is not None:
+                at.imshow(picture[box])
+            at.set_xlabel(words(notes[name][column]), fontsize=8)
             if row == 0:
                 at.set_title(words(titles[column]), fontsize=8)
             if column == 0:

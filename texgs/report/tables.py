@@ -10,6 +10,7 @@ from typing import Any
 from texgs.report.ablations import ablation
 from texgs.report.ballots import Votes
 from texgs.report.datasets import datasets
+from texgs.report.differences import differences
 from texgs.report.editing import image_driven, text_driven, text_driven_frozen
 from texgs.report.fitting import fits, fitting
 from texgs.report.left_out import LeftOut, note
@@ -143,6 +144,17 @@ PAPERS = (
         "columns of Tables 1 to 3, of edited scenes on an RTX 4090; its volumes are rendered by ParaView",
     ),
 )
+
+
+def of_recipes(records: Iterable[Record[Any]]) -> Table:
+    """Where the recipes and edits of some jobs differ from the paper; without rows where there are none."""
+    records = list(records)
+    recipes = sorted({record.recipe for record in of(FitResult, records)})
+    edits = sorted({record.result.edit for record in of(EditResult, records)})
+    table = differences(recipes, edits)
+    return table if recipes else replace(table, rows=[])
+
+
 OURS = (
     TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
     TableSpec(
@@ -155,6 +167,7 @@ OURS = (
     ),
     TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
     TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),
+    TableSpec("differences", "Where we differ", "", "differences", ("phase", "edit"), of_recipes),
 )
 
 

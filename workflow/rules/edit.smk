@@ -1,5 +1,5 @@
-# New looks for scenes and new parts of them, by any method; what can be measured of them, and all of
-# them side by side.
+# New looks for scenes and new parts of them, by any method; what can be measured of them, and scenes side by
+# side.
 
 
 rule edits:
@@ -9,7 +9,7 @@ rule edits:
 
 rule galleries:
     input:
-        PLAN.done("gallery"),
+        [file for sweep in PLAN.sweeps for file in PLAN.done("gallery", sweep=sweep)],
 
 
 rule edit:

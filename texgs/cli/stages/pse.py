@@ -19,6 +19,7 @@ from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
 from texgs.metrics.image import psnr, ssim
+from texgs.report.error_map import ERROR, signed_error
 from texgs.report.results import Comparison, PseResult
 from texgs.report.strip import write_strip
 from texgs.scene.scene import Scene
@@ -27,12 +28,15 @@ from texgs.scene.session import Session
 from texgs.volume.cameras import orbit_path
 
 PICTURES = {
-    "pse.png": "Edits of colour, opacity and light; below each the volume with the same edit.",
-    "relight.png": "A light that moves from below to above, and the volume under the same light.",
+    "pse.png": "Edits of opacity, colour and light, each on top of those before it; below each the volume "
+    "with the same edits, and the error of the worst channel, four times enlarged.",
+    "relight.png": "A light in front that moves from below to above, by its azimuth and polar angle; below "
+    "the volume under the same light, and the error.",
 }
 COMPARED = 6  # views around the object, one of which is shown
 POLAR = 20.0  # of these views, degrees
-SWEEP = (-60.0, -20.0, 20.0, 60.0)  # polar angles of the light, degrees
+LEFT = Light("directional", -150.0, 20.0)
+SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     done: dict[str, list[Comparison]] = {}
     can = kinds()[settings.fit.field].can
     groups = {
-        "pse": edits_of_the_paper(scene, composition.palettes, can),
+        "pse": chain(scene, composition.palettes, can),
         "relight": light_sweep(scene),
     }
     for group, steps in groups.items():
@@ -75,33 +79,31 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(PseResult(COMPARED, **done), PICTURES)
 
 
-def edits_of_the_paper(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:
-    """Nothing, one model alone, opacity, colour, magnitude and direction of the light; each on its own.
+def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:
+    """The edits of the paper's figure in its order: opacity, colour, magnitude and direction of the light.
 
-    What fields of a kind cannot do is left out, but for lights: without shading they change nothing.
+    Each is on top of those before it. What fields of a kind cannot do is left out, but for the direction of
+    the light: without shading it changes nothing.
     """
-    names = list(scene.models)
-    first, last = names[0], names[-1]
-    turned = {name: {"palette": (b, r, g)} for name, (r, g, b) in zip(names, fitted, strict=True)}
-    magnitude = {name: {"ambient": 0.7, "diffuse": 1.2, "specular": 2.0} for name in names}
-    alone = {name: {"visible": False} for name in names[:-1]}
-    steps = [Step("as fitted", scene)]
-    if len(names) > 1:
-        steps.append(Step(f"{last} alone", edited(scene, alone)))
-    steps.append(Step(f"opacity of {first} x 0.4", edited(scene, {first: {"opacity": 0.4}})))
+    names, steps = list(scene.models), [Step("as fitted", scene)]
+    changes: list[tuple[str, Mapping[str, Mapping[str, Any]]]] = [
+        (f"+ opacity of {names[0]} x 0.4", {names[0]: {"opacity": 0.4}})
+    ]
     if "palette" in can:
-        steps.append(Step("other colours", edited(scene, turned)))
+        turned = {name: {"palette": (b, r, g)} for name, (r, g, b) in zip(names, fitted, strict=True)}
+        changes.append(("+ other colours", turned))
     if "relight" in can:
-        steps.append(Step("k_a x 0.7, k_d x 1.2, k_s x 2", edited(scene, magnitude)))
-    steps.append(Step("light from the side", replace(scene, light=Light("directional", -30.0, 40.0))))
-    return steps
+        magnitude = {"ambient": 0.7, "diffuse": 1.2, "specular": 2.0}
+        changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
+    for title, change in changes:
+        steps.append(Step(title, edited(steps[-1].scene, change)))
+    return [*steps, Step("+ light from the left", replace(steps[-1].scene, light=LEFT))]
 
 
 def light_sweep(scene: Scene) -> list[Step]:
     """A light that moves from below the object to above it."""
-    return [
-        Step(f"light at {p:g} degrees", replace(scene, light=Light("directional", -90.0, p))) for p in SWEEP
-    ]
+    lights = {f"light at (-90°, {polar:g}°)": Light("directional", -90.0, polar) for polar in SWEEP}
+    return [Step(title, replace(scene, light=light)) for title, light in lights.items()]
 
 
 def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
@@ -116,7 +118,7 @@ def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
 def compared(
     step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
-    """PSNR and SSIM against the volume over some views, and the first of these [H, W, 3] from each."""
+    """PSNR and SSIM against the volume over some views, and of the first view all pictures [H, W, 3]."""
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
     background = torch.tensor(step.scene.background, device=composition.device)
@@ -132,6 +134,7 @@ def compared(
             )
             truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
+            shown.setdefault("error", ERROR(signed_error(image, truth)).numpy())
             scores["psnr"].append(psnr(image, truth))
             scores["ssim"].append(ssim(image, truth))
     means = {name: fmean(values) for name, values in scores.items() if values}

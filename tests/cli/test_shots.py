@@ -1,0 +1,101 @@
+"""Pictures of scenes and of their volume, as a gallery takes them."""
+
+import numpy as np
+import pytest
+
+from tests.cli.test_volume_scene import HIGH, LOW
+from tests.fields.surfels.test_composition import ball
+from texgs.cli.stages.settings import FitLabel, OfScene
+from texgs.cli.stages.shots import Shot, Studio
+from texgs.config.dataset import BasicTF
+from texgs.config.views import Shading, ViewKeys
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_json
+from texgs.core.light import Light
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
+from texgs.scene.session import Session
+from texgs.volume.generate import sphere
+from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource
+
+SIZE = 48
+VIEW = [20.0, 10.0]
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory):
+    """Two balls for the basic TFs of a sphere, and its volume."""
+    folder = tmp_path_factory.mktemp("studio")
+    models = {
+        name: SceneModel(write_model(folder / f"{name}.safetensors", ball(seed)))
+        for seed, name in enumerate(("low", "high"), start=1)
+    }
+    scene, grid = write_scene(folder / "scene.yaml", Scene(models)), sphere(32)
+    prepare(ArraySource(grid, "sphere"), folder / "volume.nrrd")
+    bounds = {"minimum": float(grid.values.min()), "maximum": float(grid.values.max())}
+    write_json(folder / "volume.json", bounds)
+    views = ViewKeys(shading=Shading(), step=0.5, mapper="cpu", width=8, height=8)
+    basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
+    fit = FitLabel("quick", "surfels", 0, "none", "", "cpu")
+    settings = OfScene("gallery", "sphere", "fraction", basic, views, fit)
+    return Studio(settings, {"quick/none": scene, "volume": folder / "volume.nrrd"}, SIZE)
+
+
+def shot(show="scene", **changed):
+    nothing = {"view": VIEW, "fov_y": None, "box": [], "pixels": None, "light": [], "changes": []}
+    return Shot(**{"scene": "quick/none", "show": show, **nothing, **changed})
+
+
+def test_a_picture_is_a_frame_of_the_changed_scene(studio):
+    session = Session.open(studio._inputs["quick/none"])
+    session.set("low", "opacity", 0.5)
+    session.set_light(Light("directional", -30.0, 40.0))
+    expected = session.frame(orbit(*VIEW, 4.0311, 20.0, SIZE, SIZE))
+    plain = studio.take(shot()).pixels
+    found = studio.take(shot(fov_y=20.0, light=[-30.0, 40.0], changes=["low.opacity=0.5"])).pixels
+    np.testing.assert_array_equal(np.round(found * 255), expected)
+    np.testing.assert_array_equal(studio.take(shot()).pixels, plain, "changes are taken back")
+    assert np.abs(found - plain).max() > 0.1
+
+
+@pytest.mark.parametrize("show", ["scene", "volume"])
+def test_a_box_is_cut_out_of_a_larger_view(studio, show):
+    box = studio.take(shot(show, box=[0.25, 0.5, 0.25])).pixels
+    assert box.shape == (SIZE, SIZE, 3)
+    studio._size *= 4
+    whole = studio.take(shot(show)).pixels
+    studio._size //= 4
+    np.testing.assert_array_equal(box, whole[2 * SIZE : 3 * SIZE, SIZE : 2 * SIZE])
+
+
+def test_pixels_of_a_view_are_enlarged(studio):
+    half = studio.take(shot(pixels=SIZE // 2)).pixels
+    small = studio.take(shot(box=[0.0, 0.5, 0.5], pixels=SIZE // 2)).pixels
+    np.testing.assert_array_equal(half, half[::2, ::2].repeat(2, 0).repeat(2, 1))
+    np.testing.assert_array_equal(small, half[SIZE // 2 :: 2, : SIZE // 2 : 2].repeat(4, 0).repeat(4, 1))
+    assert np.abs(half - studio.take(shot()).pixels).max() > 0
+
+
+def test_an_error_is_that_of_the_worst_channel_with_its_psnr(studio):
+    words = {"light": [-30.0, 40.0], "changes": ["high.palette=0.2,0.9,0.3"]}
+    scene, volume = (studio.take(shot(show, **words)).pixels.astype(float) for show in ("scene", "volume"))
+    error = studio.take(shot("error", **words))
+    assert error.psnr == pytest.approx(-10 * np.log10(((scene - volume) ** 2).mean()), abs=1e-3)
+    signed = np.take_along_axis(scene - volume, np.abs(scene - volume).argmax(2)[..., None], 2)[..., 0]
+    red, blue = error.pixels[..., 0] - error.pixels[..., 2], np.abs(signed) > 0.02
+    assert np.array_equal(np.sign(red[blue]), np.sign(signed[blue])), "red is too bright"
+    assert studio.take(shot("volume", **words)).psnr is None
+
+
+def test_a_place_may_be_empty(studio):
+    assert studio.take(shot("")).pixels is None
+
+
+def test_a_change_that_cannot_be_made_is_named_and_leaves_nothing(studio):
+    before = studio.take(shot()).pixels
+    with pytest.raises(ArgumentError, match=r"low.opacity=-1: models.low.opacity: expected a factor from 0"):
+        studio.take(shot(changes=["high.visible=false", "low.opacity=-1"]))
+    np.testing.assert_array_equal(studio.take(shot()).pixels, before)

@@ -1,0 +1,65 @@
+"""The schema of galleries: pictures of a data set's scenes in rows and columns."""
+
+from dataclasses import dataclass, field
+
+from texgs.config.keys import key
+
+SECTIONS = ("pse", "relight", "image", "text", "parts", "ablations", "more")  # of the report
+AS_FITTED = "none"  # the edit of a scene that nothing has edited
+
+
+@dataclass
+class ShotKeys:
+    """What the pictures of a row or of a column have in common; where both say something, the column counts.
+
+    Changes of both are made, those of the row first.
+    """
+
+    title: str = key("", "beside the row, or above the column")
+    edit: str | None = key(None, f"edit whose scene is shown; {AS_FITTED} or null: the scene as fitted")
+    fit: str | None = key(None, "recipe of the scene; default the first of `fits` that the edit works on")
+    variant: str | None = key(None, "of the sweep, whose fits are shown")
+    show: str | None = key(
+        None,
+        "the scene; its volume with the same changes and light; or what is wrong with the scene. A place "
+        "where row and column show different things stays empty. Default scene",
+        choices=("scene", "volume", "error"),
+    )
+    view: list[float] = key([], "azimuth and polar angle of the camera; default from the front", "degrees")
+    fov_y: float | None = key(
+        None, "vertical field of view; default that of the views", "degrees", above=0, below=180
+    )
+    box: list[float] = key(
+        [], "the part of the view that is shown, enlarged: left, top and side, as shares of the view's side"
+    )
+    pixels: int | None = key(
+        None,
+        "of each side of the whole view, whose part is enlarged pixel by pixel; default as many as make the "
+        "part as large as a picture",
+        "pixels",
+        least=16,
+    )
+    light: list[float] = key([], "azimuth and polar angle of the light; default the scene's light", "degrees")
+    changes: list[str] = key([], "of the scene, in the words of texgs edit, such as TF01.opacity=0.4")
+
+
+@dataclass
+class GridKeys:
+    """One picture file: rows and columns of pictures."""
+
+    name: str = key("pictures", "of the file")
+    caption: str = key("", "words below it in the report")
+    rows: list[ShotKeys] = field(default_factory=list, metadata={"help": "from above"})
+    columns: list[ShotKeys] = field(default_factory=list, metadata={"help": "from the left"})
+
+
+@dataclass
+class GalleryKeys:
+    """What a data set's scenes are shown in; by default all new looks of the experiment."""
+
+    name: str = key("looks", "of its folder, and that of fits side by side; as its file in conf/experiment")
+    section: str = key("more", "of the report in which it stands", choices=SECTIONS)
+    size: int = key(400, "width and height of each picture", "pixels", least=16)
+    grids: list[GridKeys] = field(
+        default_factory=list, metadata={"help": "default one with a column for each look"}
+    )
