@@ -32,8 +32,7 @@ rule all:
         rules.scenes.input,
         rules.galleries.input,
         rules.tables.output,
-        rules.report.output if TABLES else [],
-        collect("<results>/tables/sweep-{sweep}.csv", sweep=SWEEPS),
+        rules.report.output,
 
 
 onstart:
@@ -41,10 +40,12 @@ onstart:
 
 
 onsuccess:
-    made = {str(file) for each in workflow.dag.jobs for file in each.output}
-    ends = (
-        [f"{RESULTS}/report.html"] if TABLES else [f"{RESULTS}/tables/sweep-{name}.md" for name in SWEEPS]
-    )
-    print("Done:", *[file for file in ends if file in made] or ["what was asked for"])
+    made = finish("FINISHED")
+    report = f"{RESULTS}/report.html"
+    print("Done:", report if report in made else "what was asked for")
     if (PLAN.tracking or "").startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")
+
+
+onerror:
+    finish("FAILED")

@@ -36,6 +36,7 @@ DEEP = ("relu4_1", "relu4_2", "relu4_3")  # layers that no loss looks at
 STRIDE = 8  # pixels between the positions of their features
 HELD_OUT = 4  # test views that are measured; the second of them is on the sheet
 CELL = 180  # pixels of a picture on the sheet
+FITTED = "fitted"  # in place of a recipe: no edit
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +76,12 @@ def deep_gram(model: Surfels, cameras: list[Camera], lights: list[Light], style:
 
 
 def measured(
-    scene: Scene, style: StylePicture, recipe: Recipe, networks: tuple[Vgg, Vgg]
+    scene: Scene, style: StylePicture, recipe: Recipe | None, networks: tuple[Vgg, Vgg]
 ) -> tuple[dict[str, Any], Tensor]:
-    """Likeness after an edit with its CPU seconds, and a picture [3, CELL, CELL] of it."""
-    begin = time.process_time()
-    edited = stylize(scene.model, *scene.cameras(scene.train), style, recipe, vgg=networks[0]).model
+    """Likeness after an edit, or without any, with its CPU seconds, and a picture [3, CELL, CELL] of it."""
+    begin, edited = time.process_time(), scene.model
+    if recipe is not None:
+        edited = stylize(scene.model, *scene.cameras(scene.train), style, recipe, vgg=networks[0]).model
     seconds = time.process_time() - begin
     cameras, lights = scene.cameras(scene.held)
     scaled = style.scaled(max(cameras[0].width, cameras[0].height)).image
@@ -105,12 +107,18 @@ def picture(model: Surfels, camera: Camera, light: Light) -> Tensor:
     return F.interpolate(part[None], (CELL, CELL), mode="area")[0]
 
 
+def recipe_of(text: str) -> Recipe | None:
+    """A recipe from NAME[:FIELD=VALUE,...]; None for FITTED."""
+    name, _, changes = text.partition(":")
+    return None if name == FITTED else preset(name, **yaml.safe_load(f"{{{changes.replace('=', ': ')}}}"))
+
+
 def main() -> None:
     """Edit every scene with every style and recipe; a row of the CSV file and of the sheet for each."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenes", nargs="+", type=Scene.read, metavar="NAME=MODEL,VIEWS[,REDUCE]")
     parser.add_argument("--styles", nargs="+", required=True, metavar="NAME|FILE")
-    parser.add_argument("--recipes", nargs="+", required=True, metavar="NAME[:FIELD=VALUE,...]")
+    parser.add_argument("--recipes", nargs="+", required=True, metavar=f"{FITTED}|NAME[:FIELD=VALUE,...]")
     parser.add_argument("--csv", type=Path, required=True)
     parser.add_argument("--sheet", type=Path, help="PNG file: a row for each style, recipes of scenes beside")
     given = parser.parse_args()
@@ -120,9 +128,7 @@ def main() -> None:
         line = [F.interpolate(source.image[None], (CELL, CELL), mode="area")[0]]
         for scene in given.scenes:
             for text in given.recipes:
-                name, _, changes = text.partition(":")
-                recipe = preset(name, **yaml.safe_load(f"{{{changes.replace('=', ': ')}}}"))
-                numbers, shown = measured(scene, source, recipe, networks)
+                numbers, shown = measured(scene, source, recipe_of(text), networks)
                 rows.append({"views": scene.name, "style": Path(style).stem, "recipe": text, **numbers})
                 print(*rows[-1].values(), flush=True)
                 line.append(shown)

@@ -49,10 +49,15 @@ INSTEAD = (
         "make --directory {root} --dry-run {words}",
         "it installs, or runs this test again",
     ),
+    (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
+    (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
+    (r"texgs votes", "texgs votes --help", "it takes votes of people"),
     (r"source ", "", "activates the environment that `make install` makes"),
     (r"pip install ", "{python} -m pip {words} --help", "it would change the environment of this test"),
     (r"mlflow ui ", "{python} -m mlflow ui --help", "it starts a server"),
     (r"texgs weights .", "texgs weights --help", "it downloads"),
+    (r"texgs doctor --experiment paper", "texgs doctor --experiment demo", "it plans 1,000 jobs"),
+    (r"texgs run experiment=paper ", "texgs run experiment=demo --dry-run", "it plans 1,000 jobs"),
     (r"texgs run dataset=vortex ", "texgs run {words} --dry-run", "its views have to be downloaded"),
     (
         r"texgs run dataset=scan ",
@@ -203,3 +208,15 @@ def test_python_example_runs(tmp_path):
     done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "surfels.png").stat().st_size > 10_000
+
+
+def test_the_script_without_parameters_runs_the_workflow(project, monkeypatch):
+    """The files that it lists at its end are among those that the run makes."""
+    text = (ROOT / "replicate.sh").read_text(encoding="utf-8").splitlines()[-1]
+    _, install, words, listing = text.split(" && ")
+    assert install == "make install"
+    monkeypatch.chdir(project)
+    monkeypatch.setenv("TEXGS_DATA", str(project))
+    paths = listing.removeprefix("ls -l ").split()
+    code, said = run([*shlex.split(words.removeprefix(".venv/bin/")), *paths, "--dry-run"])
+    assert code == 0, said

@@ -9,10 +9,11 @@ import torch
 from PIL import Image
 
 from tests.cli.test_scene_stages import WORDS
+from tests.models.clips import write_clip
 from texgs.cli.main import main
 from texgs.core.errors import MissingDataError
 from texgs.edit.recipe import preset
-from texgs.methods.image import ImageKeys, how, weights, with_what_is_there
+from texgs.methods.image import how
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
@@ -111,6 +112,7 @@ def test_a_part_of_a_model_is_edited_alone(results, edit):
 def test_measures_without_weights_say_what_is_missing(results):
     found = numbers(results / "edit_metrics" / "glass")
     assert found["geometry_kept"] is True
+    assert (found["width"], found["height"]) == (48, 48)
     assert "clip-vit-base-patch32 are not on this machine" in found["clip_missing"]
     assert "similarity" not in found
     assert 0 <= found["short_rmse"] <= 0.2
@@ -235,6 +237,29 @@ def refused(name, entry):
     raise _missing(name, entry, [file.name for file in entry.files], entry.files[0].megabytes)
 
 
+def test_training_views_can_vote(results, monkeypatch):
+    monkeypatch.chdir(results.parents[3])
+    words = ("edit.segment.voters=training", "edit.segment.vote=centre", "edit.name=trained")
+    assert main(["edit_segment", *WORDS, *FEW, *CLICK, *words]) == 0
+    told = numbers(results / "edits" / "trained")
+    transforms = json.loads((results.parents[1] / "TF01" / "views" / "transforms_train.json").read_text())
+    assert sum(told["notes"]["views"].values()) == len(transforms["frames"]) + 1, "and the one clicked on"
+    assert told["how"] == "grabcut, centre"
+
+
+def test_the_papers_edit_by_a_picture_runs_where_clip_is_there(results, tmp_path, monkeypatch):
+    """With random weights in the real format, as the loss alone: VGG has to be the published one."""
+    monkeypatch.chdir(results.parents[3])
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path))
+    write_clip(tmp_path / "clip-vit-base-patch32")
+    words = ("edit=style_paper", "edit.image.lambda_s=0", "edit.name=clip")
+    assert main(["edit_image", *WORDS, *FEW, *words]) == 0
+    told = numbers(results / "edits" / "clip")
+    assert (told["how"], told["lambda_s"]) == ("clip-vit-base-patch32", 0)
+    before, after = (parameters(results, scene, "TF01") for scene in ("compose", "edits/clip"))
+    assert not torch.equal(before["texels"], after["texels"])
+
+
 def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(results.parents[3])
     base = f"edit.base={results / 'edits' / 'lobe' / 'scene.yaml'}"
@@ -245,11 +270,8 @@ def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
     assert "edit.base: none.yaml is not there" in capsys.readouterr().err
 
 
-def test_without_clip_lambda_s_is_one_and_says_so():
-    wanted = preset("paper")
-    recipe = with_what_is_there(wanted, "clip-vit-base-patch32", {"clip-vit-base-patch32": None})
-    assert recipe == replace(wanted, lambda_s=1.0)
-    assert how(recipe, wanted) == "VGG-16 without CLIP, its weights are missing"
-    assert with_what_is_there(wanted, "clip-vit-base-patch32", {"clip-vit-base-patch32": "0f3c"}) == wanted
-    assert weights(ImageKeys(recipe="paper"), "clip") == {"vgg16": True, "clip": False}
-    assert weights(ImageKeys(recipe="paper", lambda_s=0.9), "clip") == {"vgg16": True, "clip": True}
+def test_tables_name_the_clip_of_the_loss():
+    paper = preset("paper")
+    assert how(paper, "clip-vit-large-patch14") == "VGG-16 + clip-vit-large-patch14"
+    assert how(replace(paper, lambda_s=1.0), "clip-vit-large-patch14") == "VGG-16"
+    assert how(replace(paper, lambda_s=0.0), "clip-vit-base-patch32") == "clip-vit-base-patch32"

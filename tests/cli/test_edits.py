@@ -7,7 +7,7 @@ from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 
 
-@pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "lobe", "lambda_50"])
+@pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "lobe"])
 def test_edits_of_the_project_have_none(edit):
     check_edit(compose((f"edit={edit}",)))
 

@@ -37,6 +37,15 @@ def test_the_scene_has_all_models_and_a_picture(results):
     assert picture.min() < 200, "there is something to see"
 
 
+def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(results):
+    phases = [results.parents[1] / "TF01" / "demo" / phase for phase in ("shading", "texture")]
+    for folder in (*phases, results / "pse"):
+        assert json.loads((folder / "metrics.json").read_text())["stand_in"] == "vortex"
+    for folder in phases:
+        found = numbers(folder.parent, folder.name)
+        assert (found["train_views"], found["width"], found["height"]) == (12, 48, 48)
+
+
 def test_edits_are_compared_with_the_volume(results):
     found = numbers(results, "pse")
     titles = [step["title"] for step in found["pse"]]

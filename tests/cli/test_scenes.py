@@ -163,5 +163,5 @@ def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
     assert "not measured" in text, "the second edit was not compared"
     assert text.count('<a href="#job-1">1</a>') == 2, "rows lead to the job that they are from"
     assert text.count('<tr id="job-1">') == 1
-    assert text.count("data:image/png;base64,") == 1
+    assert text.count("data:image/webp;base64,") == 1
     assert "http" not in text.replace("http-equiv", ""), "the report needs no other file"

@@ -131,7 +131,7 @@ def test_a_preview_writes_no_scene(scene, tmp_path):
         ),
         (
             ["--point", LEFT, "--masks", "none"],
-            "masks: expected mobile_sam, grabcut or a folder with a SAM",
+            "masks: expected mobile_sam, sam_vit_h, grabcut or a folder with a SAM",
         ),
         (["--point", LEFT, "--threshold", "2"], "expected surfels that most masks"),
     ],

@@ -41,7 +41,7 @@ def volume(tmp_path_factory):
     views = ViewKeys(shading=Shading(), step=0.5, mapper="cpu")
     basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
     fit = FitLabel("quick", "surfels", 0, "none", "", "cpu")
-    return VolumeScene(OfScene("pse", "sphere", "fraction", basic, views, fit), folder / "volume.nrrd")
+    return VolumeScene(OfScene("pse", "sphere", "", "fraction", basic, views, fit), folder / "volume.nrrd")
 
 
 CAMERA, LIGHT = orbit(20, 10, 4, 30, 48, 48), Light("headlight")

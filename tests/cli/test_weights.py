@@ -47,7 +47,14 @@ def test_an_edit_changes_with_the_weights_that_it_uses_and_no_others(there):
     there[CLIP] = there["vgg16"] = "0123456789abcdef"
     assert settings("edit_image", "edit=glass")[0] == plain
     _, used = settings("edit_image", "edit=style_paper")
-    assert set(used) == {"vgg16", CLIP}, "without lambda_s CLIP is used where it is there"
+    assert used == {"vgg16": "0123456789ab", CLIP: "0123456789ab"}
+    words = ("edit=style_paper", "edit.image.clip=clip-vit-large-patch14", f"metric.clip={CLIP}")
+    assert set(settings("edit_image", *words)[1]) == {"vgg16", "clip-vit-large-patch14"}, "that of the loss"
+    assert CLIP in settings("edit_metrics", *words)[1], "that of the scores"
+    assert settings("edit_image", "metric.clip=clip-vit-large-patch14", "edit=style_paper")[1].keys() == {
+        "vgg16",
+        CLIP,
+    }
     _, used = settings("edit_segment", "edit=lobe", "edit.segment.masks=mobile_sam")
     assert used == {"mobile_sam": None}
     assert weights_of(STAGES["shading"], compose(("dataset=orbital",)), Checksums()) is None
@@ -66,8 +73,22 @@ def test_missing_weights_name_the_command_and_are_not_downloaded(there, monkeypa
     (line,) = missing(compose(("dataset=orbital", "edit=style")))
     assert line == (
         "edit style: the weights of vgg16 are not on this machine; "
-        "`texgs weights vgg16` downloads them or says how to get them"
+        "`texgs weights vgg16` downloads them or says how to get them, and edit.image.recipe=patches does "
+        "without them"
     )
+
+
+def test_the_papers_share_of_clip_is_refused_without_its_weights(there):
+    """As one that is asked for: what another share gives is not the paper's."""
+    of_clip = (
+        f"the weights of {CLIP} are not on this machine; `texgs weights {CLIP}` downloads them or says "
+        "how to get them, and edit.image.lambda_s=1 does without them"
+    )
+    for name in ("style_paper", "lambda_0", "lambda_90"):
+        lines = missing(compose(("dataset=orbital", f"edit={name}")))
+        assert f"edit {name}: {of_clip}" in lines
+    (line,) = missing(compose(("dataset=orbital", "edit=style_paper", "edit.image.lambda_s=1")))
+    assert "vgg16" in line
 
 
 def test_the_verb_lists_all_and_refuses_unknown_names(there, capsys):

@@ -1,10 +1,14 @@
 import pytest
 
 from texgs.config.compose import compose
-from texgs.config.places import fit_folder
+from texgs.config.inputs import scene_before
+from texgs.config.places import edit_folder, fit_folder
+from texgs.config.product import as_sweep
 from texgs.config.project import members
+from texgs.config.stage import for_tf
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
+from texgs.config.variants import swept
 from texgs.core.errors import ConfigError
 
 
@@ -14,17 +18,25 @@ def test_without_a_sweep_there_are_the_given_words():
     assert fit_folder(compose(words)) == "default-s3"
 
 
-def test_every_sweep_of_conf_composes():
-    for name in members("sweep"):
-        found = [compose(words) for words in variants((f"sweep={name}", "dataset=engine", "tf=TF01"))]
-        assert len({(fit_folder(each)) for each in found}) == len(found)
-        assert all(each.sweep.name == name for each in found)
+@pytest.mark.parametrize("name", [name for name in members("sweep") if name != "none"])
+def test_every_sweep_of_conf_composes(name):
+    found = [compose(words) for words in variants((f"sweep={name}", "dataset=engine", "tf=TF01"))]
+    edits = {edit_folder(each, "any") for each in found}
+    assert len(found) > 1
+    assert len({fit_folder(each) for each in found}) * len(edits) == len(found)
+    assert all(each.sweep.name == name for each in found)
 
 
 def words_of(**changes):
     """Words that make a sweep of these variants."""
     quoted = {name: ", ".join(f"'{word}'" for word in words) for name, words in changes.items()}
-    return tuple(f"+sweep.variants.{name}=[{words}]" for name, words in quoted.items())
+    return ("sweep.name=mine", *(f"+sweep.variants.{name}=[{words}]" for name, words in quoted.items()))
+
+
+def folders(words):
+    """Folders of the fits and edits of a sweep, each once, in their order."""
+    configs = [compose(each) for each in variants(words)]
+    return list(dict.fromkeys(f"{fit_folder(each)}/{edit_folder(each, 'style')}" for each in configs))
 
 
 def test_a_variant_has_its_overrides_its_seed_and_a_folder_of_its_own():
@@ -44,16 +56,137 @@ def test_views_of_a_variant_are_its_own_unless_it_names_them():
     assert [STAGES["sheet"].applies(each) for each in found] == [False, False, True]
 
 
+def test_variants_that_change_edits_alone_share_the_fits():
+    words = ("edit=style", *words_of(a=["edit.image.lambda_s=0.5"], b=[]), "sweep.edit_seeds=[0,1]")
+    assert folders(words) == [f"default/style-{each}" for each in ("a", "a-s1", "b", "b-s1")]
+    first, *_ = map(compose, variants(words))
+    assert STAGES["texture"].settings(for_tf(first, "TF01"))["fit"]["sweep"] == "none"
+    assert (
+        STAGES["edit_image"].settings(first)["fit"] | {"sweep": "mine", "variant": "a"}
+        == (STAGES["edit_image"].settings(first)["fit"])
+    )
+    assert STAGES["edit_image"].inputs(first)["scene"].parts[-3:-1] == ("default", "compose")
+
+
+def test_an_edit_starts_from_the_same_variant_of_another():
+    words = ("edit=crimson", *words_of(a=["edit.text.size=64"]), "sweep.edit_seeds=[2]")
+    (config,) = map(compose, variants(words))
+    assert scene_before(config).parts[-2] == "lobe-a-s2"
+
+
+def test_edits_of_a_sweep_of_fits_are_made_of_each_variant():
+    assert folders(("edit=style", *words_of(a=[], b=["fit.low_pass=2"]))) == [
+        "default-a/style",
+        "default-b/style",
+    ]
+
+
+def test_edits_of_a_sweep_stand_in_where_the_experiment_has_none():
+    assert compose(variants(("sweep=lambda_s",))[0]).edits == ["style"]
+    assert compose(variants(("sweep=lambda_s", "edit=glass"))[0]).edits == []
+    assert compose(variants(("sweep=lambda_s", "edits=[glass]"))[0]).edits == ["glass"]
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (("fit.seed=0,1,2",), ["default-seeds/style", "default-seeds-s1/style", "default-seeds-s2/style"]),
+        (("edit.seed=range(2)",), ["default/style-seeds", "default/style-seeds-s1"]),
+        (("fit.texture.texels=1e5,1e6",), ["default-100000/style", "default-1000000/style"]),
+        (("edit.image.lambda_s=0.5,1",), ["default/style-0.5", "default/style-1"]),
+        (
+            ("fit.low_pass=2,6", "edit.image.lambda_s=0,1"),
+            [f"default-{fit}/style-{fit}-{share}" for fit in (2, 6) for share in (0, 1)],
+        ),
+        (
+            ("fit.texture.has_offset=true,false", "fit.seed=3,4"),
+            [f"default-{name}/style" for name in ("true-s3", "true-s4", "false-s3", "false-s4")],
+        ),
+        (("edit.image.style='a b','c, d'",), ["default/style-a-b", "default/style-c-d"]),
+        (("sweep=views", "fit.seed=0,1"), ["default-42/style", "default-42-s1/style", "default-92/style"]),
+    ],
+)
+def test_keys_with_several_values_are_a_sweep(words, expected):
+    assert folders(as_sweep(("dataset=engine", "edit=style", *words)))[: len(expected)] == expected
+
+
+def test_views_are_shared_by_variants_that_differ_in_other_keys():
+    words = as_sweep(("dataset=engine", "views.width=16,32", "fit.low_pass=2,6"))
+    assert [compose(each).views.name for each in variants(words)] == ["views-16"] * 2 + ["views-32"] * 2
+
+
+def test_a_sweep_is_named_after_its_keys_and_other_words_stay():
+    words = as_sweep(("fit.low_pass=2,6", "edits=[glass,gold]", "edit.text.instruction='make it a, b'"))
+    config = compose(words)
+    assert (config.sweep.name, config.edits) == ("low_pass", ["glass", "gold"])
+    assert config.edit.text.instruction == "make it a, b"
+    assert as_sweep(("fit.low_pass=2",)) == ("fit.low_pass=2",)
+
+
+def test_swept_values_are_told_in_full():
+    words = as_sweep(("views.train.frequency=2,3", "fit.seed=0,1", "dataset=engine"))
+    found = [swept(compose(each)) for each in variants(words)]
+    assert found[1] == {"views.train.frequency": "2", "fit.seed": "1"}
+    assert swept(compose(("fit.seed=3",))) == {}
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         ((*words_of(a=[]), "sweep.seeds=[]"), "sweep.seeds: expected at least one, got none"),
-        (words_of(a=["dataset=sphere"]), "sweep.variants.a: expected overrides of views, fit or device"),
+        ((*words_of(a=[]), "sweep.edit_seeds=[1,1]"), "sweep.edit_seeds: expected different seeds, got 1"),
+        (
+            (*words_of(a=[]), "fit.seed=3"),
+            "fit.seed: expected seeds of a sweep in sweep.seeds, got fit.seed=3",
+        ),
+        (
+            words_of(a=["dataset=sphere"]),
+            "sweep.variants.a: expected overrides of views, fit, device or edit",
+        ),
+        (
+            ("results=x,y",),
+            "sweep.variants.x: expected overrides of views, fit, device or edit, got results=x",
+        ),
+        (("dataset=engine,fuel",), "got dataset=engine; the rest is the same for all variants, and several"),
+        (words_of(a=["fit.seed=1"]), "sweep.variants.a: got fit.seed=1, whose values go to sweep.seeds"),
+        (("edit=gold,glass",), "sweep.variants.gold: got edit=gold, whose values go to edits=[...]"),
         (words_of(a=["fit.low=1"]), "fit.low: no such key"),
-        (("variant=a/b",), "variant: expected letters, digits, _ or -, got 'a/b'"),
+        (("fit.low=1,2",), "fit.low: no such key"),
+        (("fit.low_pass=2,2",), "sweep.over: expected different variants, got 2 twice"),
+        (("fit.low_pass=interval(0,1)",), "fit.low_pass=interval(0,1): expected several values, such as"),
+        (("sweep.name=x", "sweep.over=[fit.low_pass]"), "fit.low_pass: expected several values, such as"),
+        (("fit.low_pass=2,6", "sweep=views"), "fit.low_pass=2,6: sweep=views has variants of its own"),
+        ((*words_of(a=[]), "sweep.over=['fit.low_pass=2,6']"), "sweep.over: expected none beside"),
+        (("sweep.name=x",), "sweep x: expected variants, keys to sweep over or several seeds, got none"),
+        (("+sweep.variants.a=[]",), "sweep.name: expected a name for the table of the variants, got none"),
+        (("edit.image.lambda_s=0,1",), "sweep lambda_s: expected an edit that its variants change, got none"),
+        (
+            ("edit.image.lambda_s=0,1", "edits=[style,gold]"),
+            "sweep lambda_s: expected to change edit gold, whose keys are edit.text, got edit.image.lambda_s",
+        ),
+        (("variant=a/b",), "variant: expected at most 100 letters, digits, _, - or ., got 'a/b'"),
     ],
 )
 def test_a_mistake_in_a_sweep_is_one_sentence(words, message):
     with pytest.raises(ConfigError) as error:
-        [compose(each) for each in variants(words)]
+        [compose(each) for each in variants(as_sweep(words))]
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "word", ["fit.seed=0,1", "fit.seed=range(3)", "dataset=engine,fuel", "fit.seed=choice(1,2)"]
+)
+def test_a_verb_of_one_stage_names_the_one_that_sweeps(word):
+    with pytest.raises(ConfigError) as error:
+        compose((word,))
+    assert f"{word}: expected one value, got several, which are a sweep: texgs run {word};" in str(
+        error.value
+    )
+
+
+def test_a_file_with_a_variant_twice_is_named(tmp_path, monkeypatch):
+    (tmp_path / "conf" / "sweep").mkdir(parents=True)
+    (tmp_path / "conf" / "sweep" / "twice.yaml").write_text("name: twice\nvariants:\n  a: []\n  a: []\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match=r"conf/sweep/twice\.yaml:4: found duplicate key a"):
+        compose(("sweep=twice",))

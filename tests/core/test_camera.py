@@ -30,6 +30,16 @@ def test_points_go_to_the_pixels_of_the_definition_and_back():
         camera.unproject(depth.T)
 
 
+@pytest.mark.parametrize(("longer", "size"), [(14, (14, 10)), (3, (3, 2)), (1, (1, 1))])
+def test_another_resolution_shows_the_same_places_at_the_same_shares(longer, size):
+    camera = orbit(30, 20, radius=3, fov_y=40, width=7, height=5)
+    other = camera.resized(longer)
+    assert (other.width, other.height) == size
+    points = torch.rand(20, 3) - 0.5
+    shares = [view.project(points)[0] / torch.tensor([view.width, view.height]) for view in (camera, other)]
+    torch.testing.assert_close(*shares)
+
+
 def test_look_at_along_minus_z_flips_y_and_z():
     viewmat = look_at(torch.tensor([0.0, 0.0, 2.0]), torch.zeros(3))
     torch.testing.assert_close(viewmat[:3, :3], torch.diag(torch.tensor([1.0, -1.0, -1.0])))

@@ -65,6 +65,12 @@ def test_a_rate_that_is_no_whole_number_and_a_size_that_no_film_has(tmp_path):
     assert not (tmp_path / "b.mp4").exists()
 
 
+def test_a_higher_rate_factor_makes_a_smaller_film(tmp_path):
+    noise = np.random.default_rng(0).integers(0, 256, (2, 64, 64, 3), dtype=np.uint8)
+    fine, coarse = (write_frames(tmp_path / f"{crf}.mp4", noise, crf=crf) for crf in (18, 35))
+    assert coarse.stat().st_size < 0.5 * fine.stat().st_size
+
+
 def test_a_shorter_film_leaves_no_pictures_of_a_longer_one(tmp_path):
     write_frames(tmp_path / "turn", frames(4))
     write_frames(tmp_path / "turn", frames(2))

@@ -11,6 +11,7 @@ from texgs.edit.exposures import expose
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
 from texgs.edit.target_views import render_views
+from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.raster.ssim import l1_dssim
@@ -111,7 +112,7 @@ def test_three_sweeps_are_as_good_as_the_papers_iterations(problem, model):
     sums = back_project(exposures, model)
     start = fill_unseen(sums, model)
     solved = solve(exposures, model, sums, start, sweeps=3, generator=torch.Generator(), title="")
-    adam = Reconstruction(bare_colors(model), 0.025, 1500)
+    adam = Reconstruction(bare_colors(model), Rate(0.025, 0.1), 1500)
     adam.run(problem, model, 1500, torch.Generator().manual_seed(0), "")
     assert error(problem[1], model, start) > 1.1 * error(problem[1], model, solved)
     assert error(problem[1], model, solved) < 1.023 * error(problem[1], model, adam.colors)  # 0.1 dB
@@ -133,7 +134,7 @@ def solved_in(rows, model):
 
 
 def test_adam_lowers_its_loss_and_follows_the_opacities(problem, model):
-    adam = Reconstruction(bare_colors(model), 0.025, 90)
+    adam = Reconstruction(bare_colors(model), Rate(0.025, 0.1), 90)
     first = loss(problem[-1], model, adam.colors)
     adam.run(problem, model, 60, torch.Generator().manual_seed(0), "")
     middle = adam.colors.clone()

@@ -253,6 +253,7 @@ def test_bad_arguments(model):
         {"sweeps": 0},
         {"iterations": -1},
         {"rate": 0.0},
+        {"final": 0.0},
         {"opacities": ()},
         {"opacities": (1.0, 0.0)},
     ],

@@ -1,15 +1,20 @@
 """Text-driven editing from end to end, offline."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
 from tests.edit.guidances import Tint, Watching
 from tests.edit.textured import around, shell
 from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
+from texgs.edit.target_update import Policy
 from texgs.edit.target_views import render_views
 from texgs.edit.text import RECIPES, edit_by_text
 from texgs.fields.surfels.texels import bare_colors, untextured
 from texgs.models.filters.guidance import ProceduralFilters
+from texgs.volume.cameras import icosphere
 
 
 @pytest.fixture(scope="module")
@@ -29,20 +34,34 @@ def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
     assert (filled > 0.8).all()
 
 
-def test_iterative_edits_the_views_given(model, monkeypatch):
-    from texgs.edit.target_update import Policy
+def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model):
+    guidance = Watching((0.1, 0.2, 0.3))
+    cameras = icosphere(4, *Lens(3.0, 30.0, 64, 64))
+    edit_by_text(model, cameras, guidance, "x", views="nearest", size=32)
+    (views,) = guidance.seen
+    assert views.images.shape == (6, 32, 32, 3)
+    given = {tuple(camera.position.tolist()): camera for camera in cameras}
+    for camera in views.cameras:
+        original = given[tuple(camera.position.tolist())]
+        shown, expected = model.render(camera).color, model.render(original).color
+        mean = expected.unflatten(0, (32, 2)).unflatten(2, (32, 2)).mean((1, 3))
+        assert (shown - mean).abs().mean() < 0.01
 
-    monkeypatch.setitem(RECIPES, "iterative", Policy(rounds=2, opacities=(1.0,), iterations=5))
+
+def test_iterative_edits_the_views_given(model, monkeypatch):
+    quick = replace(RECIPES["iterative"], policy=Policy(rounds=2, opacities=(1.0,), iterations=5))
+    monkeypatch.setitem(RECIPES, "iterative", quick)
     guidance = Watching((0.1, 0.2, 0.3))
     edit_by_text(model, around(7), guidance, "x", "iterative")
     assert [views.images.shape for views in guidance.seen] == [(7, 48, 48, 3)] * 2
 
 
 def test_recipes_are_those_of_the_paper_and_its_rivals():
-    assert RECIPES["paper"].iterations == 1500
-    assert RECIPES["paper"].opacities[0] == 2.0
-    assert RECIPES["paper"].opacities[-1] == 0.5
-    assert RECIPES["iterative"].rounds * RECIPES["iterative"].iterations == 7500
+    paper, iterative = RECIPES["paper"].policy, RECIPES["iterative"].policy
+    assert (paper.rounds, paper.iterations, paper.rate, paper.final) == (1, 1500, 0.025, 1.0)
+    assert (paper.opacities[0], paper.opacities[-1]) == (2.0, 0.5)
+    assert RECIPES["paper"].views == "nearest"
+    assert iterative.rounds * iterative.iterations == 7500
 
 
 def test_refinement_keeps_some_of_the_first_style(model):
@@ -76,6 +95,10 @@ def test_bad_arguments(model):
         edit_by_text(model, around(2), Tint((0, 0, 0)), "x", "fast")
     with pytest.raises(ArgumentError, match="cameras: expected those of the training views, got none"):
         edit_by_text(model, [], Tint((0, 0, 0)), "x")
+    with pytest.raises(ArgumentError, match="views: expected one of axes, nearest, all, got 'some'"):
+        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", views="some")
+    with pytest.raises(ArgumentError, match=r"cameras: expected 6 at least .*, got 2; .*views=axes"):
+        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", "paper")
     with pytest.raises(ArgumentError, match="size: expected at least 1 pixel"):
         edit_by_text(model, around(2), Tint((0, 0, 0)), "x", size=0)
     with pytest.raises(ArgumentError, match="expected one of stipple drawing"):

@@ -141,7 +141,15 @@ def test_a_model_of_another_stage_is_refused(ball, images):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("sweeps", -1), ("iterations", -1), ("ridge", -0.1), ("sparsity", math.nan)]
+    ("name", "value"),
+    [
+        ("sweeps", -1),
+        ("iterations", -1),
+        ("ridge", -0.1),
+        ("sparsity", math.nan),
+        ("palette_rate", -1),
+        ("final", -0.5),
+    ],
 )
 def test_numbers_out_of_range_are_named(ball, images, name, value):
     with pytest.raises(ArgumentError, match=f"{name}: expected 0 or more, got {value}"):

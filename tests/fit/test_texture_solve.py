@@ -6,16 +6,13 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.fit.scenes import HEADLIGHT, ball_images, ball_planes, ball_seeds, cameras, images_of, new_fit, run
+from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras, images_of, new_fit, run
 from texgs.config.phase import Densify
-from texgs.core.errors import FitError
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.texels import textured
-from texgs.fit.texture_adam import refine, without_texture
 from texgs.fit.texture_layout import look, sizes_for_budget
 from texgs.fit.texture_solve import curvature, sampled_error, solve
-from texgs.volume.images import Images
 
 
 def striped():
@@ -146,38 +143,3 @@ def test_views_of_nothing_leave_the_texels_alone(start):
     blank = images_of([planes], [type(behind[0])(away, behind[0].K, 16, 16)])
     solved = solve(start, blank, look(start, blank, ""), sweeps=2, ridge=0.2, seed=0, title="")
     assert torch.equal(solved.parameters["texels"], start.parameters["texels"])
-
-
-def test_adam_finds_detail(start, images):
-    refined = refine(start, images, iterations=120, rate=0.0025, sparsity=0.0, seed=0, title="")
-    assert squared(refined, images) < 0.95 * squared(start, images)
-
-
-def test_sparsity_makes_rendered_texels_small(start, images):
-    sizes = []
-    for sparsity in (0.0, 3.0):
-        refined = refine(start, images, iterations=60, rate=0.0025, sparsity=sparsity, seed=0, title="")
-        sizes.append(float((shown(refined, images) - shown(without_texture(refined), images)).abs().mean()))
-    assert sizes[1] < 0.3 * sizes[0]
-
-
-def test_without_texture_is_the_model_with_texels_of_zero(start, images):
-    texels = start.parameters["texels"]
-    zero = Surfels({**start.parameters, "texels": torch.zeros_like(texels)}, start.shading)
-    some = Surfels({**start.parameters, "texels": texels + 0.25}, start.shading)
-    assert without_texture(some).stage == "shading"
-    assert_close(shown(without_texture(some), images), shown(zero, images), atol=1e-6, rtol=0)
-
-
-def shown(model, images):
-    """The first view."""
-    target = images.target(0)
-    return model.render(target.camera, target.light).color.detach()
-
-
-def test_numbers_that_are_not_finite_are_reported(start):
-    one = ball_images(1)
-    broken = Images(one.planes, one.cameras, one.lights)
-    model = Surfels({**start.parameters, "colors": start.parameters["colors"] * torch.nan}, start.shading)
-    with pytest.raises(FitError, match="texels are not finite after Adam"):
-        refine(model, broken, iterations=2, rate=0.0025, sparsity=0.0, seed=0, title="")

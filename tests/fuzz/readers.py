@@ -16,6 +16,7 @@ from PIL import Image
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
+from tests.report.studies import study
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
 from texgs.core.io import read_json, write_json
@@ -31,6 +32,8 @@ from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texture_file import with_texture, write_texture
 from texgs.fit.checkpoint import latest
 from texgs.models.tensors import read_tensors
+from texgs.report.ballots import read_ballot
+from texgs.report.study import read_key, write_key
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
@@ -39,6 +42,7 @@ from texgs.volume.sources import open_source
 from texgs.volume.tf_files import read_tf
 from texgs.volume.view_set import View, read_views, write_transforms
 
+STUDY = study("xyz", "zyx")
 Pack = Callable[[bytes], bytes]
 
 
@@ -216,6 +220,13 @@ def metrics(folder: Path) -> Path:
     )
 
 
+def ballot(folder: Path) -> Path:
+    header, ids = "study,ballot,question,option,rank", "0123456789ab,aa"
+    ranked = [f"{ids},{number},{letter},{rank}" for number in (1, 2) for rank, letter in enumerate("ABC", 1)]
+    (folder / "ballot.csv").write_text("\n".join([header, *ranked]))
+    return folder / "ballot.csv"
+
+
 def read_segment_file(path: Path) -> None:
     read_segment(path, sample())
 
@@ -262,6 +273,8 @@ READERS: dict[str, Reader] = {
     "style.tif": Reader(picture("s.tif", compression="tiff_lzw"), read_style),
     "checkpoint": Reader(checkpoint, latest, "checkpoint.safetensors"),
     "json": Reader(metrics, read_json),
+    "ballot": Reader(ballot, lambda path: read_ballot(STUDY, path)),
+    "study key": Reader(lambda folder: write_key(folder / "key.json", STUDY), read_key),
     "packed.vti": Reader(volume("packed.vti"), read_volume),
     "plain.vti": Reader(volume("plain.vti"), read_volume),
     "text.vtk": Reader(volume("text.vtk"), read_volume),

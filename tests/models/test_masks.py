@@ -1,13 +1,16 @@
 """Mask models on pictures whose objects are known, and weights in the formats that they come in."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.models.catalogue import CATALOGUE
 from texgs.models.grabcut import GrabCut
 from texgs.models.masks import Remembered
-from texgs.models.sam import Sam, mobile_sam, sam_folder
+from texgs.models.sam import PUBLISHED, Sam, published_sam, sam_folder
 
 SIZE = 96
 
@@ -212,16 +215,48 @@ def test_folders_that_hold_no_sam(tiny_sam, tmp_path):
 
 def test_mobile_sam_without_its_weights(tmp_path):
     with pytest.raises(ArgumentError, match=r"none\.pt: no such file"):
-        mobile_sam(tmp_path / "none.pt")
+        published_sam("mobile_sam", tmp_path / "none.pt")
     torch.save({"weight": torch.zeros(2)}, tmp_path / "other.pt")
     with pytest.raises(ArgumentError, match=r"other\.pt: expected the weights of MobileSAM, got others"):
-        mobile_sam(tmp_path / "other.pt")
+        published_sam("mobile_sam", tmp_path / "other.pt")
+
+
+def test_the_largest_sam_has_as_many_weights_as_its_file():
+    from kornia.models.sam import Sam as Network
+    from kornia.models.sam import SamConfig
+
+    (file,) = CATALOGUE["sam_vit_h"].files
+    with torch.device("meta"):
+        weights = Network.from_config(SamConfig(PUBLISHED["sam_vit_h"][1])).state_dict().values()
+    megabytes = sum(4 * x.numel() for x in weights) / 1e6
+    assert file.megabytes == pytest.approx(megabytes, rel=1e-4), "and a header for each tensor"
+
+
+def test_a_published_sam_of_another_size_gives_the_masks_of_kornia(tmp_path, monkeypatch):
+    """With random weights, in the format of the published file, by an encoder of two layers."""
+    from kornia.contrib.visual_prompter import VisualPrompter
+    from kornia.models import sam as kornia
+
+    torch.manual_seed(0)
+    small = kornia.SamConfig(
+        encoder_embed_dim=16, encoder_depth=2, encoder_num_heads=2, encoder_global_attn_indexes=(1,)
+    )
+    torch.save(kornia.Sam.from_config(small).state_dict(), tmp_path / "random.pth")
+    monkeypatch.setattr(kornia, "SamConfig", lambda kind: small)
+    ours = published_sam("sam_vit_h", tmp_path / "random.pth", dtype=torch.float32)
+    assert (ours.name, ours.size) == ("SAM ViT-H", 1024)
+    prompter = VisualPrompter(replace(small, checkpoint=str(tmp_path / "random.pth")))
+    image, _ = picture((30, 30, 16, YELLOW), (60, 40, 12, BLUE))
+    prompter.set_image(image.permute(2, 0, 1))
+    theirs = prompter.predict(torch.tensor([[(30.0, 30.0)]]) - 0.5, torch.ones(1, 1))
+    expected = theirs.binary_masks[0, theirs.scores[0].argmax()]
+    assert overlap(ours(image, *click((30.0, 30.0))), expected) > 0.99
 
 
 def test_mobile_sam_finds_the_disc_clicked_on():
     path = real_data("weights/mobile_sam.pt")
     image, masks = picture((30, 30, 16, YELLOW), (70, 40, 14, BLUE), (45, 74, 14, RED))
-    sam = mobile_sam(path)
+    sam = published_sam("mobile_sam", path)
     for (x, y), mask in zip(((30, 30), (70, 40), (45, 74)), masks, strict=True):
         assert overlap(sam(image, *click((x, y))), mask) > 0.9
 
@@ -236,7 +271,7 @@ def test_mobile_sam_gives_the_masks_of_kornia():
     image = image[:, :72].contiguous()
     prompter = VisualPrompter(SamConfig("mobile_sam", checkpoint=str(path)))
     prompter.set_image(image.permute(2, 0, 1))
-    ours = mobile_sam(path, dtype=torch.float32)
+    ours = published_sam("mobile_sam", path, dtype=torch.float32)
     for at in ((30.0, 30.0), (60.0, 40.0), (45.0, 74.0)):
         theirs = prompter.predict(torch.tensor([[at]]) - 0.5, torch.ones(1, 1))
         expected = theirs.binary_masks[0, theirs.scores[0].argmax()]

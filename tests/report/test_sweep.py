@@ -2,10 +2,16 @@ import json
 
 import pytest
 
+from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
+from texgs.fields.surfels.model_file import write_model
 from texgs.report.metrics_files import read
+from texgs.report.strip import DPI
 from texgs.report.sweep import sweep
+from texgs.report.sweep_figure import ACROSS, PICTURE, WIDTH, sweep_figure
 from texgs.report.table import Table
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
 
 
 def run(
@@ -34,6 +40,25 @@ def run(
     return paths
 
 
+def edit(folder, variant, seed=0, nnfm=0.5):
+    """Metrics files of one edit and of what was measured of it, in the folders that they have in results."""
+    paths = []
+    told = {"similarity": 0.25, "style_nnfm": nnfm, "frame_mean_ms": 4.0, "frame_max_ms": 5.0}
+    measures = {"primitives": 9, "megabytes": 1.0, "geometry_kept": True, **told}
+    kinds = {
+        "edits": ("EditResult", {"how": "patches", "edit_seconds": 30.0}),
+        "edit_metrics": ("EditMeasures", measures),
+    }
+    for place, (kind, numbers) in kinds.items():
+        path = folder / place / f"style-{variant}-s{seed}" / "metrics.json"
+        path.parent.mkdir(parents=True)
+        facts = {"stage": place, "dataset": "engine", "recipe": "quick", "variant": variant, "sweep": "mine"}
+        facts |= {"seed": seed, "fit_seed": 0, "edit": "style", "result": kind}
+        path.write_text(json.dumps({**facts, "numbers": {"edit": "style", "method": "image", **numbers}}))
+        paths.append(path)
+    return paths
+
+
 def column(table: Table, title):
     return [row.cells[[c.title for c in table.columns].index(title)] for row in table.rows]
 
@@ -48,19 +73,51 @@ def test_means_and_spread_over_seeds(tmp_path):
     assert column(table, "± PSNR") == [pytest.approx(2**0.5), None]
     assert column(table, "minutes") == [3.0, 3.0]
     assert column(table, "memory GiB") == [1.0, 1.0]
+    assert column(table, "± minutes") == [0.0, None]
     assert "PSNR (paper)" not in [c.title for c in table.columns]
 
 
-def test_numbers_of_the_paper_stand_beside_the_variants_of_its_data_set_in_their_order(tmp_path):
-    options = {"dataset": "ionization", "sweep": "views"}
-    paths = [path for name in ("162", "42", "92") for path in run(tmp_path, name, **options)]
-    table = sweep(read(paths), "views")
-    assert column(table, "variant") == ["42", "92", "162"]
-    assert column(table, "PSNR (paper)") == [29.33, 30.95, 31.64]
-    assert column(table, "primitives (paper)")[0] == 60172
-    options = {"dataset": "supernova", "sweep": "resolution"}
-    table = sweep(read(run(tmp_path, "400", **options) + run(tmp_path, "77", **options)), "resolution")
-    assert column(table, "PSNR, training (paper)") == [None, 27.91], "77 is not the paper's"
+def test_a_sweep_of_edits_has_their_measures(tmp_path):
+    paths = edit(tmp_path, "0.5", 0, 0.4) + edit(tmp_path, "0.5", 1, 0.6) + edit(tmp_path, "0", 0, 0.7)
+    table = sweep(read(paths), "mine")
+    assert [each.title for each in table.columns][:5] == ["data set", "recipe", "edit", "variant", "seeds"]
+    assert column(table, "variant") == ["0", "0.5"], "in the order of their values"
+    assert column(table, "seeds") == [1, 2]
+    assert column(table, "NNFM") == [0.7, pytest.approx(0.5)]
+    assert column(table, "± NNFM") == [None, pytest.approx(0.02**0.5)]
+    assert column(table, "minutes") == [0.5, 0.5]
+    assert column(table, "Gram") == [None, None]
+    assert table.rows[0].sources == edit_sources(tmp_path, "0")
+
+
+def edit_sources(folder, variant):
+    return [folder / place / f"style-{variant}-s0" / "metrics.json" for place in ("edits", "edit_metrics")]
+
+
+def test_fits_and_edits_of_a_sweep_have_rows_of_their_own(tmp_path):
+    table = sweep(read(run(tmp_path, "a") + edit(tmp_path, "a")), "mine")
+    assert column(table, "edit") == ["-", "style"]
+    assert column(table, "PSNR") == [30.0, None]
+    assert column(table, "minutes") == [3.0, 0.5]
+
+
+def test_the_figure_has_a_panel_for_each_measure_that_differs(tmp_path):
+    paths = run(tmp_path, "42", 0, 30.0) + run(tmp_path, "92", 0, 32.0) + run(tmp_path, "92", 1, 33.0)
+    width, _ = sweep_figure(read(paths), "mine").size
+    assert width == pytest.approx(2 * WIDTH * DPI, abs=1), "PSNR, and that of training views"
+    named = run(tmp_path, "a", 0, 30.0, sweep="b") + run(tmp_path, "c", 0, 30.0, sweep="b")
+    width, _ = sweep_figure(read(named), "b").size
+    assert width == pytest.approx(ACROSS * WIDTH * DPI, abs=1), "all, where none differs"
+
+
+def test_the_figure_shows_the_scenes_of_edits(tmp_path):
+    scene = Scene({"TF01": SceneModel(write_model(tmp_path / "model.safetensors", ball(1)))})
+    paths = edit(tmp_path, "0.5") + edit(tmp_path, "1", nnfm=0.3)
+    _, without = sweep_figure(read(paths), "mine").size
+    for path in paths[::2]:
+        write_scene(path.with_name("scene.yaml"), scene)
+    _, height = sweep_figure(read(paths), "mine").size
+    assert height > without + PICTURE * DPI
 
 
 def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):
@@ -71,11 +128,13 @@ def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):
 def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
     table = sweep(read(run(tmp_path, "a", phases=("shading",))), "mine")
     assert column(table, "seeds") == [0]
-    assert set(table.rows[0].cells[5:]) == {None}
+    assert set(table.rows[0].cells[5:]) == {None}, "but for the name and the number of seeds"
 
 
 def test_fits_of_another_sweep_do_not_count_and_other_files_are_named(tmp_path):
-    with pytest.raises(ArgumentError, match="sweep mine: no fit of it among the metrics files; run it first"):
+    with pytest.raises(
+        ArgumentError, match="sweep mine: no fit or edit of it among the metrics files; run it first"
+    ):
         sweep(read(run(tmp_path, "a", sweep="other")), "mine")
     (tmp_path / "x.json").write_text("[]")
     with pytest.raises(ArgumentError, match=r"x\.json: expected the metrics of a job"):

@@ -30,6 +30,6 @@ METHOD = Method(
     FadeKeys,
     run,
     check=lambda settings: None,
-    weights=lambda settings, clip: {},
+    weights=lambda settings: {},
     needs=frozenset({"opacity"}),
 )

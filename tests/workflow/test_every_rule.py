@@ -30,7 +30,7 @@ OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "f
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
 AFTER_FITS = {"figure", "comparison", "mesh", "compose", "pse", "timing", "edit", "edit_metrics", "gallery"}
-TABLES = {"tables", "sweep", "report"}
+TABLES = {"tables", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
 GROUPS = {
     "all",
@@ -109,7 +109,8 @@ def test_every_result_is_there_and_recorded(project):
     side_by_side = 2  # comparison and gallery
     assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep + side_by_side
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
-        assert (results / "tables" / f"{name}.csv").stat().st_size > 0
+        assert len((results / "tables" / f"{name}.csv").read_text().splitlines()) > 1
+        assert f"fitted{{{name}.tex}}" in (results / "tables" / "tables.tex").read_text()
     assert "red" in (results / "tables" / "looks.md").read_text()
     assert (results / "report.html").stat().st_size > 10_000
     shading = json.loads((results / "sphere" / "TF01" / "demo" / "shading" / "metrics.json").read_text())
@@ -135,7 +136,9 @@ def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project)
     report = (results / "report.html").read_text()
     assert "<b>ball fade</b>" in report
     assert "<b>TF01 ball</b>" in report
-    compared = json.loads((results / "sphere" / "TF01" / "comparison" / "metrics.json").read_text())
+    compared = json.loads(
+        (results / "sphere" / "TF01" / "comparison" / "gallery" / "metrics.json").read_text()
+    )
     assert compared["numbers"]["recipes"] == ["demo", "ball"]
     assert compared["pictures"]["comparison.png"] in report
     words = ("edit_fade", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")

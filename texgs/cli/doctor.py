@@ -1,4 +1,7 @@
-"""Show what texgs found on this machine, one line per thing, and what to do where something is missing."""
+"""Show what texgs found on this machine, one line per thing, and what to do where something is missing.
+
+With --experiment, show what a run of the workflow would find, what it would do, and about how long it takes.
+"""
 
 import argparse
 import sys
@@ -8,11 +11,18 @@ from texgs.cli.probes import PROBES, Finding
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The doctor takes no arguments."""
+    """The run to look at, if any."""
+    parser.add_argument("--experiment", metavar="NAME", help="file of conf/experiment, such as paper")
+    parser.add_argument("words", nargs="*", metavar="KEY=VALUE", help="of that run, as for `texgs run`")
 
 
-def run(_arguments: argparse.Namespace) -> int:
+def run(arguments: argparse.Namespace) -> int:
     """Print every finding as soon as it is known; 1 if something texgs cannot work without is missing."""
+    if arguments.experiment or arguments.words:
+        from texgs.cli import forecast
+
+        chosen = (f"experiment={arguments.experiment}",) if arguments.experiment else ()
+        return forecast.show((*chosen, *arguments.words))
     return show(examine(probe) for probe in PROBES)
 
 

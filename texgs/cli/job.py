@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,13 +13,15 @@ from omegaconf import DictConfig
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs import track
-from texgs.cli import result
-from texgs.cli.provenance import git_revision, record, user
+from texgs.cli import result, tracked
+from texgs.cli.provenance import record
 from texgs.cli.stages.outcome import Outcome
+from texgs.cli.tracked import Tracking
 from texgs.cli.weights import require_same, weights_of
 from texgs.config.slips import sentence
 from texgs.config.stage import Stage, settings_digest
 from texgs.config.typed import typed
+from texgs.config.variants import swept
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
@@ -37,6 +39,7 @@ class Job:
     inputs: Mapping[str, Path]
     output: Path
     checksums: Checksums = field(default_factory=Checksums, compare=False)  # what is known of files
+    swept: Mapping[str, str] = field(default_factory=dict, compare=False)  # see `texgs.config.variants.swept`
 
     @classmethod
     def of(cls, stage: Stage, config: DictConfig, checksums: Checksums) -> Job:
@@ -48,7 +51,8 @@ class Job:
         """
         settings, weights = stage.settings(config), weights_of(stage, config, checksums)
         named = {} if weights is None else {"weights": weights}
-        return cls(stage, {**settings, **named}, stage.inputs(config), stage.output(config), checksums)
+        files = stage.inputs(config), stage.output(config)
+        return cls(stage, {**settings, **named}, *files, checksums, swept(config))
 
     def identity(self) -> dict[str, Any]:
         """What the job's result depends on: settings, code and the contents of input files."""
@@ -69,15 +73,14 @@ class Job:
         )
 
 
-def execute(job: Job, tracking: str | None, experiment: str, *, force: bool = False) -> bool:
+def execute(job: Job, tracking: Tracking, *, force: bool = False) -> bool:
     """Run a job, unless its result is there; an interrupted run of the same job goes on.
 
     The result before it stays until this one is complete.
 
     Args:
         job: what to run.
-        tracking: URI of the tracking store, or None.
-        experiment: of the tracking store.
+        tracking: where its run is recorded.
         force: whether to begin from nothing in any case.
 
     Returns:
@@ -92,11 +95,11 @@ def execute(job: Job, tracking: str | None, experiment: str, *, force: bool = Fa
             result.discard_work(job.output)
         elif job.is_done():
             return False
-        _execute(job, tracking, experiment)
+        _execute(job, tracking)
     return True
 
 
-def _execute(job: Job, tracking: str | None, experiment: str) -> None:
+def _execute(job: Job, tracking: Tracking) -> None:
     for name, path in job.inputs.items():
         if not path.exists():
             raise ArgumentError(
@@ -108,28 +111,26 @@ def _execute(job: Job, tracking: str | None, experiment: str) -> None:
     settings = _typed(module.Settings, job)
     identity = job.identity()
     work = result.claim(job.output, identity)
-    name = " ".join(str(job.settings[key]) for key in ("dataset", "tf", "stage") if key in job.settings)
     with track.run(
-        tracking, experiment=experiment, name=name, tags=_tags(job, identity), params=job.settings
+        tracking.uri,
+        experiment=tracking.experiment,
+        name=tracked.name(job),
+        tags=tracked.tags(job, identity, tracking.parent),
+        params={**job.swept, **job.settings},
     ) as run:
         start = time.perf_counter()
         outcome: Outcome = module.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
-        numbers = plain(outcome.result)
         metrics = {
             **record(job.settings, identity, seconds),
             "run": run.id,
             "result": type(outcome.result).__name__,
-            "numbers": numbers,
+            "numbers": plain(outcome.result),
             "pictures": dict(outcome.pictures),
         }
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
-        run.log({"seconds": seconds, "peak_memory_mib": metrics["peak_memory_mib"], **scalars(numbers)})
-        for step, values in enumerate(series(numbers)):
-            run.log(values, step)
-        for name in (*outcome.pictures, result.METRICS):
-            run.artifact(job.output / name)
+        tracked.tell(run, job, metrics)
 
 
 def _typed(kind: type[T], job: Job) -> T:
@@ -138,34 +139,3 @@ def _typed(kind: type[T], job: Job) -> T:
         return typed(kind, job.settings)
     except OmegaConfBaseException as error:
         raise ArgumentError(f"settings of a {job.stage.name} job: {sentence(error)}") from error
-
-
-def _tags(job: Job, identity: Mapping[str, Any]) -> dict[str, str]:
-    return {
-        "mlflow.user": user(),
-        "snakemake.rule": job.stage.name,
-        **{f"wildcards.{key}": job.settings[key] for key in ("dataset", "tf") if key in job.settings},
-        "config.sha": identity["settings"],
-        "code.sha": identity["code"],
-        "git.sha": git_revision(),
-        "output": job.output.as_posix(),
-        **track.process_tags(job.output / result.METRICS),
-    }
-
-
-def series(numbers: Mapping[str, Any]) -> Iterator[dict[str, float]]:
-    """The entries that are lists of numbers of one kind, step by step."""
-    lists = {key: value for key, value in numbers.items() if isinstance(value, list) and key.endswith("_ms")}
-    for step in range(max(map(len, lists.values()), default=0)):
-        yield {key: float(value[step]) for key, value in lists.items() if step < len(value)}
-
-
-def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
-    """The entries that are single numbers, also those of tables in them, but for notes."""
-    single: dict[str, float] = {}
-    for key, value in numbers.items():
-        if isinstance(value, int | float):
-            single[key] = float(value)
-        elif isinstance(value, dict) and key != "notes":
-            single |= scalars(value)
-    return single

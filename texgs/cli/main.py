@@ -46,6 +46,8 @@ VERBS = {
     "export": "export a scene or a model as Gaussians, points, a mesh or a compact file",
     "tables": "write the tables that metrics files hold",
     "report": "write one HTML file with the pictures, tables and provenance of all jobs",
+    "study": "make a user study of edited scenes: a page for voters, and its key",
+    "votes": "count the ballots of a user study",
     "download": "download a file and compare it with its checksum",
     "weights": "list pretrained weights, and download those that are named",
     "doctor": "show what is installed, what is missing and what to do about it",

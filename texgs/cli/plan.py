@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -38,11 +38,13 @@ class Plan:
     experiment: str  # of the store
     mapper_gpu: int  # GPUs that a job of views takes
     fit_gpu: int  # and a job of the fits and edits
-    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code and inputs of each job, by folder
+    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
-    code: dict[str, str] = field(default_factory=dict)  # digests of modules that are no stages
+    code: dict[str, str]  # digests of modules that are no stages
+    left_out: str  # file that tells what the run goes on without
+    earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
 
     def done(self, *places: str, sweep: str = "") -> list[str]:
         """The metrics files of all jobs that have one of some places, of a sweep or of none."""
@@ -51,11 +53,13 @@ class Plan:
 
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
-    """What Snakemake's `--config` says, in Hydra's syntax.
+    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep.
 
     Raises:
-        ConfigError: for a key that it has not, or a value that cannot be split into words.
+        ConfigError: for a key that it has not, a value that cannot be split into words, or two sweeps.
     """
+    from texgs.config.product import as_sweep
+
     if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
         expected = ", ".join(GROUPS)
         raise ConfigError(
@@ -68,9 +72,10 @@ def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
         )
     groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
     try:
-        return (*groups, *shlex.split(str(config.get("overrides", ""))))
+        words = shlex.split(str(config.get("overrides", "")))
     except ValueError as error:
         raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
+    return as_sweep((*groups, *words))
 
 
 def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
@@ -95,18 +100,20 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
 
 def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
+    from texgs.cli.absent import lacking, left_out, missing_weights
     from texgs.config.compose import compose
+    from texgs.config.experiments import apart, selected
     from texgs.config.methods import NO_METHOD
-    from texgs.config.places import fit_folder
+    from texgs.config.places import edit_folder, fit_folder
     from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
 
-    config, checksums = compose(words), Checksums.load()
-    by_sweep = experiments(words)
-    configs = [each for some in by_sweep.values() for each in some]
+    checksums, selection = Checksums.load(), selected(words, lacking)
+    configs = [each for some in selection.by_sweep.values() for each in some]
+    config = compose(apart(words)[0])
     jobs: dict[str, Job] = {}
     missing: list[str] = []
-    sweeps = {sweep: add_jobs(some, checksums, jobs, missing) for sweep, some in by_sweep.items()}
+    sweeps = {sweep: add_jobs(some, checksums, jobs, missing) for sweep, some in selection.by_sweep.items()}
     plan = Plan(
         config.results,
         config.tracking.uri,
@@ -120,48 +127,16 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "dataset": sorted({each.dataset.name for each in configs}),
             "views": sorted({each.views.name for each in configs}),
             "fit": sorted({fit_folder(each) for each in configs}),
-            "edit": sorted({each.edit.name for each in configs if each.edit.method != NO_METHOD}),
+            "edit": sorted({edit_folder(each) for each in configs if each.edit.method != NO_METHOD}),
+            "gallery": sorted({each.gallery.name for each in configs}),
             "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },
         {module: code_digest(module) for module in OTHER_CODE},
+        left_out(selection.left_out, config.results),
+        earlier(config.results, jobs, checksums),
     )
     checksums.save()
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
-
-
-def experiments(words: tuple[str, ...]) -> dict[str, list[DictConfig]]:
-    """Configurations by the name of their sweep, "" for those of none.
-
-    There is one for each data set, and for each variant of a sweep or edit of it.
-    """
-    from texgs.config.compose import compose
-    from texgs.config.edits import edits
-    from texgs.config.sweep import variants
-
-    base = compose(words)
-    for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
-        if repeated := [name for name in listed if listed.count(name) > 1]:
-            raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
-    sets = [(*words, f"dataset={name}") for name in base.datasets] or [words]
-    names = [(*each, f"fit={name}") for each in sets for name in base.fits] or sets
-    by_sweep: dict[str, list[DictConfig]] = {}
-    for each in names:
-        config = compose(each)
-        name = config.sweep.name if config.sweep.variants else ""
-        by_sweep.setdefault(name, []).extend(compose(variant) for variant in variants((*each, "edit=none")))
-        if not name:
-            by_sweep[name] += [edit for edit in map(compose, edits(each)) if is_possible(edit, base.fits)]
-    for name, dataset in base.sweeps.items():
-        of_sweep = (*words, f"dataset={dataset}", f"sweep={name}", "edit=none")
-        by_sweep[name] = [compose(variant) for variant in variants(of_sweep)]
-    return by_sweep
-
-
-def is_possible(config: DictConfig, several: Sequence[str]) -> bool:
-    """Whether the field of a fit can be edited so; of a single fit that is told as a mistake later."""
-    from texgs.config.methods import method_of
-
-    return len(several) < 2 or method_of(config.edit).takes(config.fit.field)
 
 
 def add_jobs(
@@ -176,31 +151,42 @@ def add_jobs(
     from texgs.cli.fits import check_fit
     from texgs.cli.job import Job
     from texgs.cli.stages.tf import check_basic_tfs
-    from texgs.config.locate import tf_names
-    from texgs.config.stage import for_tf
-    from texgs.config.stages import STAGES, is_fit
+    from texgs.config import stages
 
     folders = []
     for config in configs:
         check_basic_tfs(config.dataset)
         check_fit(config)
         try:
-            names = tf_names(config)
+            all_jobs = stages.jobs(config)
         except MissingDataError as error:
             missing.append(str(error))
             continue
-        by_tf = [for_tf(config, name) for name in names] if is_fit(config) else []
-        for stage in STAGES.values():
-            for each in filter(stage.applies, by_tf if stage.per_tf else [config]):
-                try:
-                    job = Job.of(stage, each, checksums)
-                except MissingDataError as error:
-                    missing.append(str(error))
-                    job = Job(stage, stage.settings(each), {}, stage.output(each))
-                folders.append(job.output.as_posix())
-                if jobs.setdefault(folders[-1], job) != job:
-                    raise ConfigError(f"{job.output}: two variants go there; give one another name")
+        for stage, each in all_jobs:
+            try:
+                job = Job.of(stage, each, checksums)
+            except MissingDataError as error:
+                missing.append(str(error))
+                job = Job(stage, stage.settings(each), {}, stage.output(each))
+            folders.append(job.output.as_posix())
+            known = jobs.setdefault(folders[-1], job)
+            if known != job:
+                raise ConfigError(f"{job.output}: two variants go there; give one another name")
+            jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
     return list(dict.fromkeys(folders))
+
+
+def earlier(results: str, jobs: Iterable[str], checksums: Checksums) -> dict[str, str]:
+    """The metrics files of whole results that no job of the plan makes, with digests of their contents."""
+    from texgs.cli.result import METRICS, is_complete
+    from texgs.report.metrics_files import below
+
+    others = {path.parent.as_posix() for path in below(results)} - set(jobs)
+    return {
+        f"{folder}/{METRICS}": checksums.of(Path(folder, METRICS))
+        for folder in sorted(others)
+        if is_complete(Path(folder), checksums)
+    }
 
 
 def plain(job: Job, results: str) -> dict[str, Any]:
@@ -222,6 +208,7 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "settings": settings,
         "code": job.stage.code(job.settings),
         "inputs": inputs,
+        "swept": dict(job.swept),
     }
 
 
@@ -232,18 +219,3 @@ def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:
     volumes = [(config.data_folder, config.dataset.volume) for config in configs]
     absent = [each for folder, each in volumes if each.url and not Path(folder, each.file).exists()]
     return {cached_volume(each).as_posix(): (each.url, each.sha256) for each in absent}
-
-
-def missing_weights(configs: Iterable[DictConfig]) -> list[str]:
-    """What edits need and this machine has not; mistakes in edits are told first."""
-    from texgs.config.methods import NO_METHOD
-
-    edited = [config for config in configs if config.edit.method != NO_METHOD]
-    if not edited:
-        return []
-    from texgs.cli.edits import check_edit  # not at the top: most runs have no edits
-    from texgs.cli.weights import missing
-
-    for config in edited:
-        check_edit(config)
-    return list(dict.fromkeys(line for config in edited for line in missing(config)))

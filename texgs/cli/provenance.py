@@ -30,8 +30,9 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
         seconds: that its work took.
     """
     return {
-        **{key: settings[key] for key in ("stage", "dataset", "tf") if key in settings},
+        **{key: settings[key] for key in ("stage", "dataset", "stand_in", "tf") if key in settings},
         **recipe(settings),
+        **edit(settings),
         "seconds": seconds,
         "peak_memory_mib": peak_memory() / MIB,
         "device": device(settings),
@@ -46,12 +47,18 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
     }
 
 
-def recipe(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the recipe, its field, the sweep and its variant, where the stage is of a fit."""
+def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Recipe, its field, variant, sweep and seed, where the stage is of a fit or of what comes after it."""
     fit = settings.get("fit", {})
     if "variant" not in fit:
         return {}
-    return {"recipe": fit["name"], "field": fit["field"], "variant": fit["variant"], "sweep": fit["sweep"]}
+    names = {"recipe": "name", "field": "field", "variant": "variant", "sweep": "sweep", "fit_seed": "seed"}
+    return {name: fit[key] for name, key in names.items()}
+
+
+def edit(settings: Mapping[str, Any]) -> dict[str, str]:
+    """The edit, where the stage is of one."""
+    return {"edit": settings["edit"]["name"]} if "edit" in settings else {}
 
 
 def gpu_name() -> str:

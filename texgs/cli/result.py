@@ -139,6 +139,11 @@ def stamped(folder: Path) -> Any:
     return _content(folder / STAMP)
 
 
+def recorded(folder: Path) -> dict[str, str]:
+    """Checksums of the files of a complete result, by their names."""
+    return dict(_content(folder / FILES) or {})
+
+
 def _content(path: Path) -> Any:
     """What a JSON file holds; None where it is missing or damaged: then its folder is of no job."""
     try:

@@ -26,7 +26,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--masks",
         default="mobile_sam",
-        help="mobile_sam, a folder with a SAM of transformers, or grabcut, which needs no weights "
+        help="mobile_sam, sam_vit_h, a folder with a SAM of transformers, or grabcut, which needs no weights "
         "(%(default)s)",
     )
     parser.add_argument(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -147,6 +146,7 @@ def fetch_volume(config: DictConfig) -> None:
 def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
     from texgs.cli.job import Job, execute
+    from texgs.cli.tracked import Tracking
     from texgs.config.locate import tf_names
     from texgs.config.stage import for_tf
     from texgs.config.stages import STAGES
@@ -168,7 +168,7 @@ def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     if stage.place == "edit" and (force or not job.is_done()):
         fetch_weights(config)
         job = Job.of(stage, config, checksums)  # with what was downloaded
-    has_run = execute(job, config.tracking.uri, config.tracking.experiment, force=force)
+    has_run = execute(job, Tracking(config.tracking.uri, config.tracking.experiment), force=force)
     checksums.save()
     print(f"{job.output}: {'done' if has_run else 'up to date'}")
 
@@ -179,6 +179,7 @@ def run_settings(arguments: argparse.Namespace) -> int:
     from yaml import YAMLError
 
     from texgs.cli.job import Job, execute
+    from texgs.cli.tracked import of_workflow
     from texgs.config.stages import STAGES
 
     if arguments.overrides or arguments.output is None:
@@ -192,6 +193,7 @@ def run_settings(arguments: argparse.Namespace) -> int:
             f"{arguments.settings}: expected the settings of a {arguments.verb} job, got others"
         )
     inputs = {name: Path(path) for name, _, path in (word.partition("=") for word in arguments.input)}
-    job = Job(STAGES[arguments.verb], dict(settings), inputs, arguments.output)  # type: ignore[arg-type]
-    execute(job, os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs"))
+    tracking, swept = of_workflow(arguments.output)
+    stage, plain = STAGES[arguments.verb], {str(key): value for key, value in settings.items()}
+    execute(Job(stage, plain, inputs, arguments.output, swept=swept), tracking)
     return 0

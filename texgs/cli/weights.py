@@ -41,17 +41,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def used(config: DictConfig) -> Mapping[str, bool]:
-    """Names of the weights that the edit of a configuration works with, and whether it must have them."""
+def needed(config: DictConfig) -> Mapping[str, str]:
+    """Names of the weights that the edit of a configuration needs, each with the word that does without."""
     if config.edit.method == NO_METHOD:
         return {}
     method = method_of(config.edit)
-    return method.weights(method.of(config.edit), config.metric.clip)
-
-
-def needed(config: DictConfig) -> list[str]:
-    """Names of the weights that the edit of a configuration cannot do without."""
-    return [name for name, must in used(config).items() if must]
+    words = method.weights(method.of(config.edit))
+    return {name: word and f"edit.{method.name}.{word}" for name, word in words.items()}
 
 
 def weights_of(stage: Stage, config: DictConfig, checksums: Checksums) -> dict[str, str | None] | None:
@@ -70,7 +66,7 @@ def weights_of(stage: Stage, config: DictConfig, checksums: Checksums) -> dict[s
     if stage.name == "edit_metrics":
         names = ["vgg16", "lpips_vgg", config.metric.clip]
     elif stage.place == "edit":
-        names = list(used(config))
+        names = list(needed(config))
     else:
         return None
     return {name: _short(name, checksums) for name in names}
@@ -105,6 +101,7 @@ def missing(config: DictConfig) -> list[str]:
     return [
         f"edit {config.edit.name}: the weights of {name} are not on this machine; "
         f"`texgs weights {name}` downloads them or says how to get them"
-        for name in needed(config)
+        + (f", and {word} does without them" if word else "")
+        for name, word in needed(config).items()
         if not available(name)
     ]

@@ -33,7 +33,9 @@ RESERVED = (
     "mlartifacts",
     "tables",
     "scene",
+    "study",
 )  # folders below `results`
+ALONE = ("fit", "edit")  # groups that depend on no other one but the experiment
 LONGEST = 100  # characters of a name: it becomes that of files and folders
 NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
 
@@ -65,6 +67,9 @@ class OwnFolders(SearchPathPlugin):
 def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> DictConfig:
     """The configuration, interpolations resolved; read only. Cached, because composing takes 0.1 s.
 
+    A run has many data sets, recipes and edits, and needs all combinations of them. The groups ALONE are
+    therefore composed once for all data sets, and put into what the other words make.
+
     Args:
         overrides: words such as ``dataset=engine`` or ``views.width=400``, in Hydra's syntax.
         first: a folder to look for files in before those of the project.
@@ -73,7 +78,37 @@ def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> DictC
         ConfigError: for an unknown key, group member or value, or one of the wrong type or out of range;
             or a file that cannot be read.
     """
-    return _compose(overrides, (first, *folders()) if first else folders())
+    return _assembled(overrides, (first, *folders()) if first else folders())
+
+
+@lru_cache(maxsize=1024)
+def _assembled(overrides: tuple[str, ...], places: tuple[Path, ...]) -> DictConfig:
+    own = {group: _words(overrides, group) for group in ALONE}
+    rest = tuple(word for word in overrides if not any(word in words for words in own.values()))
+    config = _compose(rest, places)
+    if rest == overrides:
+        return config
+    chosen = _words(overrides, "experiment")
+    nodes = {group: _compose((*chosen, *words), places)[group] for group, words in own.items() if words}
+    return changed(config, **nodes)
+
+
+def changed(config: DictConfig, **values: Any) -> DictConfig:
+    """The same configuration, or node of one, with other values of some keys; read only.
+
+    What is below other keys is shared, not copied: a plan has hundreds of configurations.
+    """
+    made = DictConfig({}, flags={"no_deepcopy_set_nodes": True})
+    for name in config:
+        made[name] = values.get(str(name), config[name])
+    OmegaConf.set_struct(made, True)
+    OmegaConf.set_readonly(made, True)
+    return made
+
+
+def _words(overrides: tuple[str, ...], group: str) -> tuple[str, ...]:
+    """The words that choose the file of a group, or set a key of it."""
+    return tuple(word for word in overrides if re.match(rf"[+~]*{group}(=|\.|$)", word))
 
 
 @lru_cache(maxsize=256)
@@ -116,9 +151,11 @@ def check(config: DictConfig) -> None:
     check_name("edit.name", config.edit.name)
     if config.edit.base is not None and not is_scene_file(config.edit.base):
         check_name("edit.base", config.edit.base)
-    for key, name in (("variant", config.variant), ("sweep.name", config.sweep.name)):
-        if not re.fullmatch(r"[A-Za-z0-9_-]*", name):
-            raise ConfigError(f"{key}: expected letters, digits, _ or -, got {name!r}")
+    if not re.fullmatch(r"[A-Za-z0-9_-]*", config.sweep.name):
+        raise ConfigError(f"sweep.name: expected letters, digits, _ or -, got {config.sweep.name!r}")
+    if not re.fullmatch(rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST - 1}}})?", config.variant):
+        got = shortened(repr(config.variant))
+        raise ConfigError(f"variant: expected at most {LONGEST} letters, digits, _, - or ., got {got}")
     check_name("gallery.name", config.gallery.name)
     for key, name in (("fit.name", config.fit.name), ("gallery.name", config.gallery.name)):
         if re.fullmatch("sheet|comparison|views.*", name):

@@ -42,7 +42,8 @@ def gallery_settings(config: DictConfig) -> dict[str, Any]:
         ]
         titles = [column.title for column in grid.columns]
         shown.append({"name": grid.name, "caption": grid.caption, "columns": titles, "rows": rows})
-    return {**scene_settings(config), "size": size, "command": command, "grids": shown}
+    given = {"section": config.gallery.section, "size": size, "command": command, "grids": shown}
+    return {**scene_settings(config), **given}
 
 
 def gallery_inputs(config: DictConfig) -> dict[str, Path]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from texgs.config.keys import key
 
+SECTIONS = ("pse", "relight", "image", "text", "parts", "ablations", "more")  # of the report
 AS_FITTED = "none"  # the edit of a scene that nothing has edited
 
 
@@ -56,7 +57,8 @@ class GridKeys:
 class GalleryKeys:
     """What a data set's scenes are shown in; by default all new looks of the experiment."""
 
-    name: str = key("looks", "of its folder; that of its file in conf/experiment")
+    name: str = key("looks", "of its folder, and that of fits side by side; as its file in conf/experiment")
+    section: str = key("more", "of the report in which it stands", choices=SECTIONS)
     size: int = key(400, "width and height of each picture", "pixels", least=16)
     grids: list[GridKeys] = field(
         default_factory=list, metadata={"help": "default one with a column for each look"}

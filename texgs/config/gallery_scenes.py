@@ -1,14 +1,15 @@
 """The scene that a place of a gallery shows: which recipe, edit and variant, and the parts that it has."""
 
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
-from texgs.config.compose import compose, is_scene_file
+from texgs.config.compose import changed, compose, is_scene_file
 from texgs.config.gallery import AS_FITTED, ShotKeys
 from texgs.config.inputs import with_recipe
 from texgs.config.locate import tf_names
 from texgs.config.methods import method_of
 from texgs.config.project import members
 from texgs.config.slips import close
+from texgs.config.variants import changes as swept
 from texgs.core.errors import ConfigError
 
 ANYWHERE = ("background", "light")  # changes of the whole scene
@@ -21,15 +22,13 @@ def fit_of(config: DictConfig, shot: ShotKeys, where: str) -> DictConfig:
         ConfigError: for a recipe, a variant or an edit that the experiment has not.
     """
     of_fit = with_fit(config, recipe_of(config, shot, where))
-    variants = list(config.sweep.variants)
+    variants = list(swept(config))
     if (shot.variant or "") not in (variants or [""]):
         expected = f"one of {', '.join(variants)}" if variants else "none without a sweep"
         hint = close(shot.variant or "", variants)
         raise ConfigError(f"{where}.variant: expected {expected}, got {shot.variant or 'none'}{hint}")
     if shot.variant:
-        of_fit = of_fit.copy()
-        OmegaConf.set_readonly(of_fit, False)
-        of_fit.variant = shot.variant
+        of_fit = changed(of_fit, variant=shot.variant)
     return of_fit
 
 

@@ -5,15 +5,16 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 
-from texgs.config.compose import compose, is_scene_file
+from texgs.config.compose import changed, compose, is_scene_file
 from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.config.looks import captions, looks_of
 from texgs.config.methods import method_of
-from texgs.config.places import folder_of, made
+from texgs.config.places import edit_folder, folder_of, made
+from texgs.config.variants import NO_SWEEP, fit_variant
 from texgs.core.errors import ConfigError, MissingDataError
 
 
@@ -89,14 +90,15 @@ def lens(config: DictConfig) -> dict[str, float]:
 
 
 def fit_label(config: DictConfig) -> dict[str, Any]:
-    """Which fit this is, and what it runs on."""
+    """Which fit this is, and what it runs on. One that variants of a sweep share is of none of them."""
+    variant = fit_variant(config)
     return {
         "fit": {
             "name": config.fit.name,
             "field": config.fit.field,
             "seed": config.fit.seed,
-            "sweep": config.sweep.name,
-            "variant": config.variant,
+            "sweep": config.sweep.name if variant else NO_SWEEP,
+            "variant": variant,
             "device": config.device.name,
         }
     }
@@ -127,11 +129,8 @@ def compared_models(config: DictConfig) -> dict[str, Path]:
 
 def with_recipe(config: DictConfig, name: str) -> DictConfig:
     """The same configuration with the name and field of another recipe: what decides where its models are."""
-    recipe, chosen = compose((f"fit={name}",)).fit, config.copy()
-    OmegaConf.set_readonly(chosen, False)
-    chosen.fit.name, chosen.fit.field = recipe.name, recipe.field
-    OmegaConf.set_readonly(chosen, True)
-    return chosen
+    recipe = compose((f"fit={name}",)).fit
+    return changed(config, fit=changed(config.fit, name=recipe.name, field=recipe.field))
 
 
 def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
@@ -173,10 +172,15 @@ def scene_before(config: DictConfig) -> Path:
     if base is None:
         return made("compose", config)
     if not is_scene_file(base):
-        return folder_of("edit", config).with_name(base) / made("edit", config).name
+        return sibling(config, base)
     if not Path(base).is_file():
         raise MissingDataError(f"edit.base: {base} is not there; name the file of a scene, or another edit")
     return Path(base)
+
+
+def sibling(config: DictConfig, name: str) -> Path:
+    """The scene.yaml that another edit of the same fit writes."""
+    return folder_of("edit", config).with_name(edit_folder(config, name)) / made("edit", config).name
 
 
 def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:
@@ -193,6 +197,7 @@ def edit_settings(config: DictConfig) -> dict[str, Any]:
     """What jobs of edits read: what all edits have, and the keys of this one's method."""
     keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
     edit = {name: config.edit[name] for name in keys} | captions(config)
-    given = {"reduce": config.fit.reduce, "clip": config.metric.clip, "lens": lens(config)}
+    given = {"reduce": config.fit.reduce, "lens": lens(config)}
     given["followed"] = looks_of(config)
-    return {"edit": edit, **fit_label(config), **given}
+    label = fit_label(config)["fit"] | {"sweep": config.sweep.name, "variant": config.variant}
+    return {"edit": edit, "fit": label, **given}

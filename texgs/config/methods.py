@@ -34,8 +34,8 @@ class Method(Generic[Settings]):
     """Edits a scene: from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`."""
     check: Callable[[Settings], None]
     """Raises an ArgumentError for what is wrong with its settings, without scene and weights."""
-    weights: Callable[[Settings, str], Mapping[str, bool]]
-    """Names of the weights that it may use, and whether it must; from its settings and the CLIP to use."""
+    weights: Callable[[Settings], Mapping[str, str]]
+    """Names of the weights that it needs, each with the word of its settings that does without; or ""."""
     needs: frozenset[str] = frozenset()
     """What fields have to be capable of, of `texgs.config.fields.Capability`."""
     fields: frozenset[str] = frozenset()
@@ -50,6 +50,8 @@ class Method(Generic[Settings]):
     """The `StylePicture` that it follows, which the result is compared with."""
     follows: str = ""
     """Which of its keys, "style" or "instruction", looks of a data set have an own value of."""
+    numbers: Callable[[Settings], Mapping[str, Any]] = lambda settings: {}
+    """Numbers of the recipe that its settings name, with what they change about it."""
     is_look: bool = True
     """Whether the scene looks different afterwards."""
 

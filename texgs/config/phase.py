@@ -99,7 +99,13 @@ class TextureKeys:
     texels: int | None = key(None, "in all; default where they are seen, about one per pixel")
     sweeps: int = key(3, "of the least-squares solver over all views", least=0)
     iterations: int = key(0, "of Adam on L1 + D-SSIM afterwards", least=0)
-    rate: float = key(0.0025, "of Adam at the start; it falls to a tenth", least=0)
+    rate: float = key(0.0025, "of Adam at the start, of texels", least=0)
+    palette_rate: float = key(
+        0.0, "the same of the palette, which starts at the mean colour of the views; 0: it stays", least=0
+    )
+    final: float = key(0.1, "both rates at the end, relative to the start", least=0)
     ridge: float = key(0.2, "of the solver: how strongly texels stay at 0, relative", least=0)
-    sparsity: float = key(0.0, "weight of the L1 norm of what texels add to an image", least=0)
+    sparsity: float = key(
+        0.0, "weight of the L1 norm of the image of texels alone, without palette and light", least=0
+    )
     has_offset: bool = key(True, "surfels keep their colours as offsets; the paper has none")

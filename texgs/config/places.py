@@ -5,12 +5,14 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
+from texgs.config.variants import edit_variant, fit_variant
+
 
 @dataclass(frozen=True)
 class Place:
     """The folder of a job, and the files in it that other jobs and people read."""
 
-    folder: str  # of wildcards dataset, tf, views, fit, phase, edit, gallery
+    folder: str  # of wildcards dataset, tf, views, fit, phase, edit and gallery
     files: tuple[str, ...] = ()  # the first is the one that other jobs ask for; metrics.json comes with all
 
     @property
@@ -27,7 +29,7 @@ PLACES = {
     ),
     "sheet": Place("{dataset}/{tf}/sheet", ("sheet.png",)),
     "phase": Place("{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",)),
-    "comparison": Place("{dataset}/{tf}/comparison", ("comparison.png",)),
+    "comparison": Place("{dataset}/{tf}/comparison/{gallery}", ("comparison.png",)),
     "figure": Place("{dataset}/{tf}/{fit}/figure", ("figure.png",)),
     "mesh": Place("{dataset}/{tf}/{fit}/mesh", ("mesh.ply", "reference.ply", "mesh.png")),
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
@@ -47,7 +49,7 @@ def folder_of(place: str, config: DictConfig, phase: str = "", tf: str | None = 
         views=config.views.name,
         fit=fit_folder(config),
         phase=phase,
-        edit=config.edit.name,
+        edit=edit_folder(config),
         gallery=config.gallery.name,
     )
 
@@ -59,5 +61,13 @@ def made(place: str, config: DictConfig, phase: str = "", tf: str | None = None)
 
 def fit_folder(config: DictConfig) -> str:
     """Name of the folder of a fit: the recipe, the variant of a sweep, and a seed other than 0."""
-    seed = f"s{config.fit.seed}" if config.fit.seed else ""
-    return "-".join(part for part in (config.fit.name, config.variant, seed) if part)
+    return _folder(config.fit.name, fit_variant(config), config.fit.seed)
+
+
+def edit_folder(config: DictConfig, name: str = "") -> str:
+    """Name of the folder of an edit in the same way; `name`: of another edit than that of `config`."""
+    return _folder(name or config.edit.name, edit_variant(config), config.edit.seed)
+
+
+def _folder(name: str, variant: str, seed: int) -> str:
+    return "-".join(filter(None, (name, variant, f"s{seed}" if seed else "")))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 from omegaconf import II
 
+from texgs.config.clip import BACKBONES
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
@@ -38,9 +39,9 @@ class Metric:
     """What edited scenes are measured with, besides what needs no weights."""
 
     clip: str = key(
-        "clip-vit-base-patch32",
-        "backbone of CLIP's metrics, where its weights are on this machine",
-        choices=("clip-vit-base-patch32", "clip-vit-large-patch14"),
+        BACKBONES[0],
+        "backbone of CLIP's metrics, where its weights are on this machine; losses have their own",
+        choices=BACKBONES,
     )
     views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
 
@@ -50,10 +51,15 @@ class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
     name: str = key("none", "of the table")
-    seeds: list[int] = key([0], "random numbers; each variant runs once with each")
+    seeds: list[int] = key([0], "random numbers of fits; each variant is fitted once with each")
+    edit_seeds: list[int] = key([0], "random numbers of edits; each edit is made once with each")
     variants: dict[str, list[str]] = field(
         default_factory=dict, metadata={"help": "overrides by the name of the variant"}
     )
+    over: list[str] = key(
+        [], "instead: keys with several values, such as fit.low_pass=2,6; each combination is a variant"
+    )
+    edits: list[str] = key([], "that are made of each variant; default those of the experiment")
 
 
 @dataclass
@@ -62,6 +68,14 @@ class Config:
 
     dataset: Dataset = key(Dataset, "the data set")
     datasets: list[str] = key([], "data sets of a whole experiment; default the one of `dataset`")
+    experiments: list[str] = key([], "files of conf/experiment that are one run together")
+    aimed: dict[str, list[str]] = field(
+        default_factory=dict, metadata={"help": "overrides that hold for one data set alone, by its name"}
+    )
+    each: list[str] = key([], "overrides that hold for each of `experiments`, before those of the command")
+    missing: str = key(
+        "stop", "what a run does without data or weights that it needs", choices=("stop", "skip")
+    )
     tf: str | None = key(None, "basic TF to work on; default each of the data set")
     views: ViewKeys = key(ViewKeys, "training and test views")
     fit: Fit = key(Fit, "recipe of the fit")

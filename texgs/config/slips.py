@@ -25,6 +25,10 @@ def sentence(error: Exception) -> str:
             f"{shortened(error.override)}: expected key=value, with quotes around a value that has commas, "
             "spaces or ="
         )
+    if several := re.search(
+        r"(?:argument|parameters) '([^']+=.*)'(?: requires --multirun)?$", lines(error)[0]
+    ):
+        return several_values(several[1])
     if isinstance(error, TypeError) or "group override" in str(error):
         return "a group: expected the name of a file of conf/, such as dataset=engine, got something else"
     file = file_of(error)
@@ -46,6 +50,14 @@ def told(error: Exception) -> str:
     if missing := re.match(r"Could not override '([^']+)'", str(error)):
         return no_such_key(missing[1])
     return shortened(f"{name}: {text[0].lower()}{text[1:]}" if name else text)
+
+
+def several_values(word: str) -> str:
+    """What to say about a key with several values."""
+    return (
+        f"{word}: expected one value, got several, which are a sweep: texgs run {word}; "
+        "a list stands in brackets, a text with a comma in quotes"
+    )
 
 
 def full_key(error: Exception) -> str:

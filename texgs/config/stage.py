@@ -14,6 +14,7 @@ from typing import Any
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.code import code_digest
+from texgs.config.compose import changed
 from texgs.config.fields import kinds
 from texgs.config.methods import methods
 from texgs.config.places import PLACES, folder_of
@@ -47,7 +48,8 @@ class Stage:
         Raises:
             ConfigError: if the stage works on one basic TF, and `config.tf` is none of the data set's.
         """
-        selected = {"stage": self.name, "dataset": config.dataset.name, **self.select(config)}
+        of_all = {"dataset": config.dataset.name, "stand_in": config.dataset.stand_in}
+        selected = {"stage": self.name, **of_all, **self.select(config)}
         if self.per_tf:
             selected["tf"] = config.tf
         settings = OmegaConf.to_container(OmegaConf.create(selected), resolve=True)
@@ -106,8 +108,4 @@ def _yaml(settings: dict[str, Any]) -> str:
 
 def for_tf(config: DictConfig, name: str) -> DictConfig:
     """The same configuration for one basic TF."""
-    chosen: DictConfig = config.copy()
-    OmegaConf.set_readonly(chosen, False)
-    chosen.tf = name
-    OmegaConf.set_readonly(chosen, True)
-    return chosen
+    return changed(config, tf=name)

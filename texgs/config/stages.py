@@ -27,9 +27,10 @@ from texgs.config.inputs import (
     volume_inputs,
     with_recipe,
 )
-from texgs.config.locate import basic_tf
+from texgs.config.locate import basic_tf, tf_names
 from texgs.config.methods import NO_METHOD, Method, methods
-from texgs.config.stage import Stage
+from texgs.config.stage import Stage, for_tf
+from texgs.config.variants import changes
 
 
 def is_fit(config: DictConfig) -> bool:
@@ -54,7 +55,7 @@ def has_mesh(config: DictConfig) -> bool:
 
 def is_compared(config: DictConfig) -> bool:
     """Whether this is the first of several recipes: its configuration stands for all of them."""
-    if not is_fit(config) or config.sweep.variants or len(config.fits) < 2:
+    if not is_fit(config) or changes(config) or len(config.fits) < 2:
         return False
     return bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
@@ -66,10 +67,11 @@ def has_scene(config: DictConfig) -> bool:
 
 def has_gallery(config: DictConfig) -> bool:
     """Whether this is the first of the recipes and variants of an experiment that has scenes to show."""
-    sweep, shows_all = config.sweep, len(config.edits) > 1 and not config.sweep.variants
+    variants = list(changes(config))
+    shows_all = len(config.edits) > 1 and not variants
     if not has_scene(config) or not (config.gallery.grids or shows_all):
         return False
-    if sweep.variants and (config.variant, config.fit.seed) != (next(iter(sweep.variants)), sweep.seeds[0]):
+    if variants and (config.variant, config.fit.seed) != (variants[0], config.sweep.seeds[0]):
         return False
     return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
@@ -261,6 +263,7 @@ ROWS = (
         select=lambda config: {
             **edit_settings(config),
             "compared": config.metric.views,
+            "clip": config.metric.clip,
             "views": view_settings(config),
         },
         inputs=scenes_before_and_after,
@@ -273,3 +276,18 @@ ROWS = (
     ),
 )
 STAGES = {stage.name: stage for stage in ROWS}
+
+
+def jobs(config: DictConfig) -> list[tuple[Stage, DictConfig]]:
+    """The stages that a configuration goes through, each with its own configuration of one job.
+
+    Raises:
+        MissingDataError: if basic TFs are folders of views that are not there.
+    """
+    names = tf_names(config)
+    by_tf = [for_tf(config, name) for name in names] if is_fit(config) else []
+    return [
+        (stage, each)
+        for stage in STAGES.values()
+        for each in filter(stage.applies, by_tf if stage.per_tf else [config])
+    ]

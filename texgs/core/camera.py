@@ -72,6 +72,15 @@ class Camera:
         K[1, 2] -= top
         return replace(self, K=K, width=right - left, height=bottom - top)
 
+    def resized(self, longer: int) -> Camera:
+        """The camera of the same view at another resolution, the longer side having so many pixels."""
+        scale = longer / max(self.width, self.height)
+        width, height = (max(1, round(side * scale)) for side in (self.width, self.height))
+        K = self.K.clone()
+        K[0] *= width / self.width
+        K[1] *= height / self.height
+        return replace(self, K=K, width=width, height=height)
+
 
 def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
     """World-to-camera matrix of a camera at `position` that looks at `target`.

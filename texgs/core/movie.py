@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import IO, Any
@@ -17,9 +18,10 @@ from texgs.core.memory import require_memory
 
 KINDS = (".png", ".gif", ".mp4")
 MOST_FPS = 240.0
+FINE = 18  # constant rate factor of H.264 that looks like the frames
 
 
-def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0) -> Path:
+def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0, crf: int = FINE) -> Path:
     """Write frames as they come; the file appears when it is complete.
 
     Args:
@@ -27,6 +29,7 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
             receives one PNG a frame.
         frames: [H, W, 3] uint8, of one size.
         fps: frames per second.
+        crf: constant rate factor of H.264 in MP4, 0 to 51: the higher, the smaller and the coarser.
 
     Returns:
         The path.
@@ -57,7 +60,7 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
             raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")
         _write_png(path, first)
     else:
-        write = _write_gif if path.suffix == ".gif" else _write_mp4
+        write = _write_gif if path.suffix == ".gif" else partial(_write_mp4, crf=crf)
         write_atomic(path, lambda file: write(file, chain([first], left), fps))
     return path
 
@@ -78,7 +81,7 @@ def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> Non
     )
 
 
-def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
+def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float, crf: int) -> None:
     """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even.
 
     Raises:
@@ -88,7 +91,7 @@ def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> Non
 
     first = next(frames)
     try:
-        _encode(av, file, chain([first], frames), fps)
+        _encode(av, file, chain([first], frames), fps, crf)
     except av.error.FFmpegError as error:
         height, width = first.shape[:2]
         raise ArgumentError(
@@ -96,7 +99,7 @@ def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> Non
         ) from error
 
 
-def _encode(av: Any, file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
+def _encode(av: Any, file: IO[bytes], frames: Iterator[np.ndarray], fps: float, crf: int) -> None:
     with av.open(file, "w", format="mp4") as container:
         stream: Any = None
         for frame in frames:
@@ -105,6 +108,6 @@ def _encode(av: Any, file: IO[bytes], frames: Iterator[np.ndarray], fps: float) 
             if stream is None:
                 stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
                 stream.height, stream.width = even.shape[:2]
-                stream.pix_fmt, stream.options = "yuv420p", {"crf": "18"}
+                stream.pix_fmt, stream.options = "yuv420p", {"crf": str(crf)}
             container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
         container.mux(stream.encode())

@@ -12,6 +12,7 @@ from texgs.edit.back_projection import back_project, fill_unseen
 from texgs.edit.exposures import Exposure
 from texgs.edit.target_adam import Reconstruction
 from texgs.edit.target_solve import solve
+from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors
 
@@ -52,7 +53,7 @@ class AdamFollower:
     """Texels on their way, from round to round."""
 
     def __init__(
-        self, model: Surfels, iterations: int, rounds: int, rate: float, generator: torch.Generator
+        self, model: Surfels, iterations: int, rounds: int, rate: Rate, generator: torch.Generator
     ) -> None:
         self.model, self.count, self.generator = model, iterations, generator
         start = bare_colors(model).clamp(0, 1)

@@ -9,11 +9,11 @@ from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.edit.exposures import Exposure
+from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
 from texgs.raster.ssim import l1_dssim
 
 DSSIM = 0.2
-FINAL = 0.1  # rate at the end, relative to the start
 
 
 class Reconstruction:
@@ -21,11 +21,11 @@ class Reconstruction:
 
     Args:
         start: [T, 3] bare colours.
-        rate: of Adam at the start; it falls to a tenth over all steps.
+        rate: of Adam, over all steps.
         steps: of all calls of `run` together.
     """
 
-    def __init__(self, start: Tensor, rate: float, steps: int) -> None:
+    def __init__(self, start: Tensor, rate: Rate, steps: int) -> None:
         self.texels = start.clone().requires_grad_()
         self.rate, self.steps, self.done = rate, steps, 0
         self.adam = torch.optim.Adam([self.texels], eps=1e-15, fused=True)
@@ -59,7 +59,7 @@ class Reconstruction:
             beyond = (1 - exposure.cover)[..., None]  # white, in image and target alike
             wanted = (exposure.wanted + beyond).permute(2, 0, 1).contiguous().permute(1, 2, 0)
             image = exposure.image(self.texels, sizes, offsets) + beyond
-            self.adam.param_groups[0]["lr"] = self.rate * FINAL ** (self.done / self.steps)
+            self.adam.param_groups[0]["lr"] = self.rate.at(self.done / self.steps)
             self.adam.zero_grad(set_to_none=True)
             l1_dssim(image, wanted, DSSIM).backward()
             self.adam.step()

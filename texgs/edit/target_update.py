@@ -16,6 +16,7 @@ from texgs.edit.back_projection import seen_texels
 from texgs.edit.exposures import Exposure, expose
 from texgs.edit.followers import AdamFollower, Follower, SolveFollower
 from texgs.edit.target_views import render_views, require_texture
+from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
 from texgs.models.guidance import EditViews, Guidance, require_edited
@@ -36,15 +37,17 @@ class Policy:
     sweeps: int = 3  # of the solver in a round, where there are no iterations
     iterations: int = 0  # of Adam in a round, over which opacities follow each other; 0: solve
     rate: float = 0.025  # of Adam at the start
+    final: float = 0.1  # at the end, relative to that
 
     def __post_init__(self) -> None:
         for name in ("rounds", "group", "sweeps"):
             value = getattr(self, name)
             if value is not None and value < 1:
                 raise ArgumentError(f"{name}: expected at least 1, got {value}")
-        if self.iterations < 0 or not self.rate > 0:
+        if self.iterations < 0 or not (self.rate > 0 and self.final > 0):
             raise ArgumentError(
-                f"iterations, rate: expected 0 or more and above 0, got {self.iterations} and {self.rate}"
+                "iterations, rate, final: expected 0 or more and above 0, got "
+                f"{self.iterations}, {self.rate} and {self.final}"
             )
         if not self.opacities or not all(0 < factor < float("inf") for factor in self.opacities):
             raise ArgumentError(f"opacities: expected factors above 0, at least one, got {self.opacities}")
@@ -172,7 +175,8 @@ def changing_texels(model: Surfels, surfels: Tensor) -> Tensor:
 def _follower(model: Surfels, policy: Policy, generator: torch.Generator) -> Follower:
     """What makes texels follow."""
     if policy.iterations:
-        return AdamFollower(model, policy.iterations, policy.rounds, policy.rate, generator)
+        rate = Rate(policy.rate, policy.final)
+        return AdamFollower(model, policy.iterations, policy.rounds, rate, generator)
     return SolveFollower(model, policy.sweeps, generator)
 
 

@@ -34,9 +34,7 @@ class Task(Generic[Settings]):
     output: Path  # folder for textures, segments and pictures
     device: torch.device
     reduce: int  # factor by which the views were made smaller for the fit
-    clip: str  # backbone
     lens: Lens  # of the views, but for the size of images
-    weights: Mapping[str, str | None]  # checksums; None for those that are not on this machine
     title: str  # of progress bars
     followed: Mapping[str, str] = field(default_factory=dict)  # by model, where not as settings say
 

@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
 
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.edit.axis_views import axis_cameras
+from texgs.edit.axis_views import axis_cameras, nearest_to_axes
 from texgs.edit.target_update import Edited, Policy, update
 from texgs.edit.target_views import require_texture
 from texgs.fields.surfels.model import Surfels
 from texgs.models.guidance import Guidance
 
 SIZE = 512  # pixels along the longer side of the views: what InstructPix2Pix was trained on
+Views = Literal["axes", "nearest", "all"]
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Which views are edited, and how texels follow."""
+
+    views: Views
+    """Six new ones along the axes, filled by the scene; six training views nearest to the axes; or all."""
+    policy: Policy
+
 
 RECIPES = {
     # One edit of six views; texels are the solution of a linear problem.
-    "default": Policy(),
-    # The same edit; texels by 1,500 iterations while the opacity falls, as the paper finds them.
-    "paper": Policy(opacities=(2.0, 1.5, 1.0, 0.75, 0.5), iterations=1500),
+    "default": Recipe("axes", Policy()),
+    # One edit of six training views; texels by 1,500 iterations while the opacity falls, as in the paper.
+    "paper": Recipe("nearest", Policy(opacities=(2.0, 1.5, 1.0, 0.75, 0.5), iterations=1500, final=1.0)),
     # All views given, again and again, as IN2N and InstructGS2GS do: what the paper compares with.
-    "iterative": Policy(rounds=3, opacities=(1.0,), iterations=2500),
+    "iterative": Recipe("all", Policy(rounds=3, opacities=(1.0,), iterations=2500)),
 }
 
 
@@ -34,6 +47,7 @@ def edit_by_text(
     instruction: str,
     recipe: str = "default",
     *,
+    views: Views | None = None,
     light: Light = HEADLIGHT,
     lit: bool | None = None,
     surfels: Tensor | None = None,
@@ -44,20 +58,20 @@ def edit_by_text(
 
     Args:
         model: textured, possibly edited before: the guidance sees it as it is.
-        cameras: of the training views. Recipes of one round edit six new views along the axes, from as far
-            as the first of these and filled by the scene; the others edit these as they are.
+        cameras: of the training views; new views are made from as far as the first of them.
         guidance: edits views.
         instruction: such as "as a stipple drawing".
         recipe: of `RECIPES`.
+        views: which are edited, see `Recipe`; those of the recipe by default.
         light: that shines on the scene while it is edited.
         lit: whether the guidance sees light; as it wants, by default. See `update`.
         surfels: [N] bool, which may change; all by default.
-        size: pixels along the longer side of the six views; they have the aspect of the first camera.
+        size: pixels along the longer side of the six views; all training views are edited as they are.
         seed: of all random numbers.
 
     Raises:
-        ArgumentError: if there is no camera, the recipe is unknown, or an argument is not as `update` and
-            `axis_cameras` expect it.
+        ArgumentError: if there is no camera, the recipe or the views are unknown, or an argument is not as
+            `update`, `axis_cameras` and `nearest_to_axes` expect it.
     """
     if recipe not in RECIPES:
         raise ArgumentError(f"recipe: expected one of {', '.join(RECIPES)}, got {recipe!r}")
@@ -66,21 +80,30 @@ def edit_by_text(
     if size < 1:
         raise ArgumentError(f"size: expected at least 1 pixel, got {size}")
     require_texture(model)
-    policy = RECIPES[recipe]
-    if policy.rounds == 1:
-        first = cameras[0]
-        scale = size / max(first.width, first.height)
-        pixels = [max(1, round(side * scale)) for side in (first.width, first.height)]
-        cameras = list(axis_cameras(first, model.parameters["means"], *pixels).values())
     return update(
         model,
-        cameras,
+        chosen(views or RECIPES[recipe].views, cameras, model.parameters["means"], size),
         guidance,
         instruction,
-        policy,
+        RECIPES[recipe].policy,
         light=light,
         lit=lit,
         surfels=surfels,
         seed=seed,
         title=f"text, {recipe}",
     )
+
+
+def chosen(views: Views, cameras: Sequence[Camera], means: Tensor, size: int) -> list[Camera]:
+    """The cameras of the views to edit, from those of the training views; see `edit_by_text`.
+
+    Raises:
+        ArgumentError: if the views are unknown, or there are too few to choose from.
+    """
+    if views not in get_args(Views):
+        raise ArgumentError(f"views: expected one of {', '.join(get_args(Views))}, got {views!r}")
+    if views == "all":
+        return list(cameras)
+    if views == "nearest":
+        return [camera.resized(size) for camera in nearest_to_axes(cameras, means).values()]
+    return list(axis_cameras(cameras[0].resized(size), means).values())

@@ -21,6 +21,8 @@ def texturize(
     sweeps: int = 3,
     iterations: int = 0,
     rate: float = 0.0025,
+    palette_rate: float = 0.0,
+    final: float = 0.1,
     ridge: float = 0.2,
     sparsity: float = 0.0,
     has_offset: bool = True,
@@ -36,9 +38,11 @@ def texturize(
             seen.
         sweeps: of `solve` over all views.
         iterations: of `refine` afterwards.
-        rate: of `refine` at the start.
+        rate: of `refine` at the start, of texels.
+        palette_rate: the same of the palette, which starts at the mean colour of the images; at 0 it stays.
+        final: both at the end, relative to the start.
         ridge: of `solve`, relative: how strongly texels that are hardly seen stay where they are.
-        sparsity: of `refine`, weight of the mean absolute value of what texels add to an image.
+        sparsity: of `refine`, weight of the mean absolute value of the image of texels alone.
         has_offset: whether surfels keep their colours, as offsets from the palette, and texels start at 0;
             else texels take them over, as the paper has it.
         seed: of the order of views; with the same one, machine and versions, results are the same.
@@ -51,8 +55,8 @@ def texturize(
         ArgumentError: if the model is of another stage, or a number is out of range.
         FitError: if texels are no longer finite.
     """
-    numbers = {"sweeps": sweeps, "iterations": iterations, "rate": rate, "ridge": ridge, "sparsity": sparsity}
-    for name, value in numbers.items():
+    rates = {"rate": rate, "palette_rate": palette_rate, "final": final, "sparsity": sparsity}
+    for name, value in {"sweeps": sweeps, "iterations": iterations, "ridge": ridge, **rates}.items():
         if not value >= 0:
             raise ArgumentError(f"{name}: expected 0 or more, got {value}")
     if model.stage != "shading":
@@ -68,9 +72,7 @@ def texturize(
     if sweeps:
         result = solve(result, images, sight, sweeps=sweeps, ridge=ridge, seed=seed, title=title)
     if iterations:
-        result = refine(
-            result, images, iterations=iterations, rate=rate, sparsity=sparsity, seed=seed, title=title
-        )
+        result = refine(result, images, iterations=iterations, **rates, seed=seed, title=title)
     return result
 
 

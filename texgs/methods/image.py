@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from texgs.config.clip import BACKBONES
 from texgs.config.keys import key
 from texgs.config.methods import Method
 from texgs.methods import style
@@ -38,6 +38,11 @@ class ImageKeys(StyleKeys):
     lambda_s: float | None = key(
         None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
     )
+    clip: str = key(
+        BACKBONES[0],
+        "backbone of the CLIP term, where lambda_s is below 1; metrics have their own",
+        choices=BACKBONES,
+    )
     pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
     start: str | None = key(
         None,
@@ -53,8 +58,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     from texgs.edit.task import EditedScene
     from texgs.report.convergence import write_convergence
 
-    wanted = recipe_of(task.settings, task.edit.seed)
-    recipe = with_what_is_there(wanted, task.clip, task.weights)
+    recipe = recipe_of(task.settings, task.edit.seed)
     pictures: dict[str, StylePicture] = {}
     curves: dict[str, dict[str, list[float]]] = {}
     seconds: dict[str, dict[str, float]] = {}
@@ -62,7 +66,7 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     write_convergence(task.output / "convergence.png", curves)
     return EditedScene(
         scene,
-        how(recipe, wanted),
+        how(recipe, task.settings.clip),
         sum(each["all"] for each in seconds.values()),
         style.CONVERGENCE | style.write_styles(task.output, pictures),
         recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
@@ -85,7 +89,7 @@ def stylist(
     from texgs.volume.reduced import smaller
 
     vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
-    network = Clip.load(task.clip, task.device) if recipe.needs_clip else None
+    network = Clip.load(task.settings.clip, task.device) if recipe.needs_clip else None
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
         start = time.monotonic()
@@ -133,24 +137,15 @@ def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
     )
 
 
-def with_what_is_there(recipe: Recipe, clip: str, weights: Mapping[str, str | None]) -> Recipe:
-    """The recipe with lambda_s 1 where the weights of the CLIP that it would use are missing."""
-    if not recipe.needs_clip or weights[clip] is not None:
-        return recipe
-    sys.stderr.write(f"the weights of {clip} are not on this machine: lambda_s is 1\n")
-    return replace(recipe, lambda_s=1.0)
-
-
-def how(recipe: Recipe, wanted: Recipe) -> str:
-    """What the edit works with, for tables; and that CLIP is missing, where a recipe wants it."""
+def how(recipe: Recipe, clip: str) -> str:
+    """What the edit works with, for tables; `clip` is the backbone of a CLIP term."""
     names = {
         "VGG-16": recipe.needs_vgg,
-        "CLIP": recipe.needs_clip,
+        clip: recipe.needs_clip,
         "patches": recipe.patches > 0 and recipe.iterations > 0,
     }
     used = [name for name, is_used in names.items() if is_used] or ["projection"]
     words = " + ".join(used) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")
-    words += " without CLIP, its weights are missing" if wanted.needs_clip and not recipe.needs_clip else ""
     return words if recipe.is_textured else f"{words}, without texture"
 
 
@@ -164,15 +159,12 @@ def check(settings: ImageKeys) -> None:
     style.check(settings, KEYS)
 
 
-def weights(settings: ImageKeys, clip: str) -> Mapping[str, bool]:
-    """Those of the recipe; CLIP is left out where it is missing and nobody has asked for a share of it."""
+def weights(settings: ImageKeys) -> Mapping[str, str]:
+    """Those of the recipe, and what finds an object in the picture."""
     recipe = recipe_of(settings)
-    vgg = {"vgg16": True} if recipe.needs_vgg else {}
-    return {
-        **vgg,
-        **style.weights(settings),
-        **({clip: settings.lambda_s is not None} if recipe.needs_clip else {}),
-    }
+    vgg = {"vgg16": "recipe=patches"} if recipe.needs_vgg else {}
+    clip = {settings.clip: "lambda_s=1"} if recipe.needs_clip else {}
+    return {**vgg, **style.weights(settings), **clip}
 
 
 METHOD = Method(
@@ -186,4 +178,5 @@ METHOD = Method(
     files=style.files,
     style=style_of,
     follows="style",
+    numbers=lambda settings: vars(recipe_of(settings)),
 )

@@ -75,6 +75,6 @@ class InstructionKeys:
         if self.guidance == "filters":
             understand(instruction)
 
-    def weights(self) -> dict[str, bool]:
+    def weights(self) -> dict[str, str]:
         """The diffusion model, where it edits the views."""
-        return {"instruct-pix2pix": True} if self.guidance == "instruct_pix2pix" else {}
+        return {"instruct-pix2pix": "guidance=filters"} if self.guidance == "instruct_pix2pix" else {}

@@ -12,7 +12,7 @@ from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.lens import Lens
 from texgs.core.names import require_name
-from texgs.methods.shares import shares
+from texgs.methods.shares import MASKS, mask_weights, shares
 
 if TYPE_CHECKING:
     import torch
@@ -38,18 +38,19 @@ class SegmentKeys:
     # OmegaConf takes no integers for list[list[float]].
     points: list[Any] = key([], "clicks on the part: right and down, as shares of the view's sides")
     others: list[Any] = key([], "clicks on what does not belong to it")
-    masks: str = key(
-        "mobile_sam",
-        "what finds the part in a view; grabcut needs no weights",
-        choices=("mobile_sam", "grabcut"),
-    )
+    masks: str = key("mobile_sam", "what finds the part in a view; grabcut needs no weights", choices=MASKS)
     vote: str = key(
         "contribution",
         "how masks become surfels; centre: as in the paper",
         choices=("contribution", "centre"),
     )
     connected: bool = key(False, "only the connected pieces that hold a click are kept")
-    views: int = key(42, "that vote, 10 f^2 + 2", least=12)
+    voters: str = key(
+        "icosphere",
+        "views that vote: some around the object, or those of training, as in the paper",
+        choices=("icosphere", "training"),
+    )
+    views: int = key(42, "of the icosphere, 10 f^2 + 2", least=12)
     size: int = key(512, "of these views", "pixels", least=32)
 
 
@@ -59,14 +60,13 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
     from texgs.edit.new_segment import model_name, new_segment
     from texgs.edit.task import EditedScene
     from texgs.models.by_name import mask_model
-    from texgs.volume.cameras import icosphere_of
 
     settings, device, start = task.settings, task.device, time.monotonic()
     name = model_name(task.scene, settings.model, "edit.segment.model")
-    clicks, lens = clicks_of(settings, task.lens, device), task.lens.square(settings.size)
+    clicks = clicks_of(settings, task.lens, device)
     made = new_segment(
         *(task.scene, f"{name}/{settings.name}", clicks),
-        [camera.to(device) for camera in icosphere_of(settings.views, lens)],
+        voters(task, name),
         mask_model(settings.masks, device),
         task.output / part_file("edit.segment.name", name, settings.name),
         asdict(settings),
@@ -86,6 +86,18 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
             "views": {"used": made.lifted.used, "left out": made.lifted.left_out},
         },
     )
+
+
+def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
+    """Cameras of the views that vote on a model."""
+    from texgs.volume.cameras import icosphere_of
+    from texgs.volume.reduced import smaller
+
+    if task.settings.voters == "training":
+        cameras = [smaller(view.camera, task.reduce) for view in task.training_views(model)]
+    else:
+        cameras = icosphere_of(task.settings.views, task.lens.square(task.settings.size))
+    return [camera.to(task.device) for camera in cameras]
 
 
 def places_of(settings: SegmentKeys) -> list[list[float]]:
@@ -158,9 +170,9 @@ def check(settings: SegmentKeys) -> None:
     frequency_of(settings.views, "edit.segment.views")
 
 
-def weights(settings: SegmentKeys, clip: str) -> Mapping[str, bool]:
+def weights(settings: SegmentKeys) -> Mapping[str, str]:
     """The mask model's, where it has some."""
-    return {"mobile_sam": True} if settings.masks == "mobile_sam" else {}
+    return mask_weights(settings.masks)
 
 
 def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:

@@ -1,4 +1,4 @@
-"""Clicks in the configuration: places in a picture, as shares of its sides."""
+"""Clicks in the configuration: shares of the sides of a picture, and what finds the object there."""
 
 from __future__ import annotations
 
@@ -6,6 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from texgs.core.errors import ArgumentError
+
+MASKS = ("mobile_sam", "sam_vit_h", "grabcut")  # the second is the paper's
+
+
+def mask_weights(masks: str) -> dict[str, str]:
+    """Weights of what finds the object, for `Method.weights`."""
+    return {} if masks == "grabcut" else {masks: "masks=grabcut"}
 
 
 def shares(name: str, points: Sequence[Any]) -> list[list[float]]:

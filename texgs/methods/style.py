@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from texgs.config.keys import key
 from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
-from texgs.methods.shares import shares
+from texgs.methods.shares import MASKS, mask_weights, shares
 
 CONVERGENCE = {"convergence.png": "Terms of the loss in each iteration."}
 
@@ -28,9 +28,7 @@ class StyleKeys:
 
     style: str = key("strokes", "picture that texgs paints (strokes, glass, marble, ...), or a picture file")
     region: list[Any] = key([], "clicks on the object of the picture that counts, as shares; default all")
-    masks: str = key(
-        "mobile_sam", "what finds that object; grabcut needs no weights", choices=("mobile_sam", "grabcut")
-    )
+    masks: str = key("mobile_sam", "what finds that object; grabcut needs no weights", choices=MASKS)
 
 
 @dataclass
@@ -63,9 +61,10 @@ class FeatureKeys(StyleKeys):
             seed=seed,
         )
 
-    def weights(self) -> dict[str, bool]:
+    def weights(self) -> dict[str, str]:
         """VGG where features are compared, and what finds the object."""
-        return {**({"vgg16": True} if self.nnfm > 0 else {}), **weights(self)}
+        without = "nnfm=0" if self.patches else ""
+        return {**({"vgg16": without} if self.nnfm > 0 else {}), **weights(self)}
 
     @property
     def how(self) -> str:
@@ -150,7 +149,7 @@ def look_method(
         settings,
         run,
         checked,
-        lambda values, clip: values.weights(),
+        lambda values: values.weights(),
         fields=frozenset({field}),
         files=files,
         style=lambda values: style_of(values, where),
@@ -164,9 +163,9 @@ def files(settings: StyleKeys) -> dict[str, Path]:
     return {"style": path} if path.is_file() else {}
 
 
-def weights(settings: StyleKeys) -> dict[str, bool]:
+def weights(settings: StyleKeys) -> dict[str, str]:
     """What finds the object, where that needs weights."""
-    return {"mobile_sam": True} if settings.region and settings.masks == "mobile_sam" else {}
+    return mask_weights(settings.masks) if settings.region else {}
 
 
 def picture_of(name: str, key: str) -> StylePicture:

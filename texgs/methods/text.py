@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.keys import key
 from texgs.config.methods import Method
@@ -30,8 +30,14 @@ class TextKeys(InstructionKeys):
         "Instruct-NeRF2NeRF",
         choices=("default", "paper", "iterative"),
     )
+    views: str | None = key(
+        None,
+        "that are edited: new ones along the axes, which the scene fills; the six training views nearest "
+        "to the axes, as in the paper; or all training views; default the recipe's",
+        choices=("axes", "nearest", "all"),
+    )
     textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
-    size: int = key(512, "longer side of the edited views", "pixels", least=64)
+    size: int = key(512, "longer side of the six views", "pixels", least=64)
 
 
 def run(task: Task[TextKeys]) -> EditedScene:
@@ -52,9 +58,8 @@ def run(task: Task[TextKeys]) -> EditedScene:
         result = edit_by_text(
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
-            guidance,
-            task.settings_for(name.split("/")[0]).instruction,
-            settings.recipe,
+            *(guidance, task.settings_for(name.split("/")[0]).instruction, settings.recipe),
+            views=settings.views,  # type: ignore[arg-type]
             light=views[0].light,
             surfels=surfels,
             size=settings.size,
@@ -77,13 +82,22 @@ def run(task: Task[TextKeys]) -> EditedScene:
     )
 
 
+def numbers(settings: TextKeys) -> Mapping[str, Any]:
+    """Which views are edited, and how texels follow."""
+    from texgs.edit.text import RECIPES
+
+    recipe = RECIPES[settings.recipe]
+    return {"views": settings.views or recipe.views, **vars(recipe.policy)}
+
+
 METHOD = Method(
     "text",
     "give a scene the look that an instruction asks for",
     TextKeys,
     run,
     lambda settings: settings.check(),
-    lambda settings, clip: settings.weights(),
+    lambda settings: settings.weights(),
     needs=frozenset({"texture", "relight"}),
     follows="instruction",
+    numbers=numbers,
 )

@@ -46,9 +46,9 @@ class UpdateKeys(InstructionKeys):
         network = Lpips.load(device=device, dtype=fast_dtype(device)) if self.lpips else None
         return Closeness(self.l1, self.dssim, self.lpips, network)
 
-    def weights(self) -> dict[str, bool]:
+    def weights(self) -> dict[str, str]:
         """Those of the guidance, and of LPIPS where it counts."""
-        return super().weights() | (dict.fromkeys(("vgg16", "lpips_vgg"), True) if self.lpips else {})
+        return super().weights() | (dict.fromkeys(("vgg16", "lpips_vgg"), "lpips=0") if self.lpips else {})
 
 
 Keys = TypeVar("Keys", bound=UpdateKeys)
@@ -83,7 +83,7 @@ def update_method(
 
     return Method(
         *(name, summary, settings, run, checked),
-        lambda values, clip: values.weights(),
+        lambda values: values.weights(),
         fields=frozenset({field}),
         follows="instruction",
     )

@@ -17,12 +17,14 @@ def mask_model(name: str, device: torch.device) -> MaskModel:
     Raises:
         ArgumentError, MissingDataError: if there is neither, or its weights are missing or damaged.
     """
-    from texgs.models.sam import mobile_sam, sam_folder
+    from texgs.models.sam import PUBLISHED, published_sam, sam_folder
 
     if name == "grabcut":
         return GrabCut()
-    if name == "mobile_sam":
-        return mobile_sam(device=device)
+    if name in PUBLISHED:
+        return published_sam(name, device=device)
     if not Path(name).is_dir():
-        raise ArgumentError(f"masks: expected mobile_sam, grabcut or a folder with a SAM, got {name}")
+        raise ArgumentError(
+            f"masks: expected {', '.join(PUBLISHED)}, grabcut or a folder with a SAM, got {name}"
+        )
     return sam_folder(name, device)

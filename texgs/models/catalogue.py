@@ -86,6 +86,17 @@ CATALOGUE: dict[str, Single | Snapshot] = {
         ),
         "https://github.com/ChaoningZhang/MobileSAM, weights/mobile_sam.pt",
     ),
+    "sam_vit_h": Single(
+        (
+            File(
+                "sam_vit_h_4b8939.pth",
+                2564.6,
+                "a7bf3b02f3ebf1267aba913ff637d9a2d5c33d3173bb679e46d9f338c26f262e",
+                "https://dl.fbaipublicfiles.com/segment_anything/sam_vit_h_4b8939.pth",
+            ),
+        ),
+        "https://github.com/facebookresearch/segment-anything, the default model",
+    ),
     "clip-vit-base-patch32": Snapshot(
         "openai/clip-vit-base-patch32",
         "3d74acf9a28c67741b2f4f2ea7635f0aaf6f0268",

@@ -1,4 +1,4 @@
-"""Masks from clicks by Segment Anything (Kirillov et al. 2023): MobileSAM, or a folder of transformers."""
+"""Masks from clicks by Segment Anything (Kirillov et al. 2023): its files, or a folder of transformers."""
 
 from __future__ import annotations
 
@@ -19,6 +19,10 @@ from texgs.models.weights import locate
 
 MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # that images are normalised with, per channel
 DEVIATION = (58.395 / 255, 57.12 / 255, 57.375 / 255)
+PUBLISHED = {  # title, and name of the architecture in kornia, by name in the catalogue
+    "mobile_sam": ("MobileSAM", "mobile_sam"),  # Zhang et al. 2023
+    "sam_vit_h": ("SAM ViT-H", "vit_h"),  # the paper's
+}
 
 Encode = Callable[[Tensor], Tensor]  # [1, 3, S, S] to features of the image
 Decode = Callable[[Tensor, Tensor, Tensor, bool], tuple[Tensor, Tensor]]
@@ -81,15 +85,17 @@ class Sam:
         return (F.interpolate(square, shape, mode="bilinear")[0, 0] > 0).to(image.device)
 
 
-def mobile_sam(
+def published_sam(
+    name: str,
     path: str | Path | None = None,
     device: torch.device | str = "cpu",
     dtype: torch.dtype | None = None,
 ) -> Sam:
-    """MobileSAM (Zhang et al. 2023) from its official file.
+    """A SAM from the file that its authors publish.
 
     Args:
-        path: mobile_sam.pt; by default where it is found.
+        name: of `PUBLISHED`.
+        path: the file; by default where it is found.
         device: that computes.
         dtype: of the encoder, which takes nearly all of the time; by default `fast_dtype`.
 
@@ -99,16 +105,17 @@ def mobile_sam(
     from kornia.models.sam import Sam as Network
     from kornia.models.sam import SamConfig
 
-    path = locate("mobile_sam") if path is None else path
+    title, kind = PUBLISHED[name]
+    path = locate(name) if path is None else path
     dtype = fast_dtype(device) if dtype is None else dtype
-    network = Network.from_config(SamConfig("mobile_sam")).eval().requires_grad_(False)
+    network = Network.from_config(SamConfig(kind)).eval().requires_grad_(False)
     try:
         network.load_state_dict(read_tensors(path))
     except RuntimeError as error:
-        raise ArgumentError(f"{path}: expected the weights of MobileSAM, got others") from error
+        raise ArgumentError(f"{path}: expected the weights of {title}, got others") from error
     network.to(device)
     network.image_encoder.to(dtype)
-    return Sam("MobileSAM", *_kornia(network, dtype), network.image_encoder.img_size, device)
+    return Sam(title, *_kornia(network, dtype), network.image_encoder.img_size, device)
 
 
 def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:

@@ -1,108 +1,120 @@
-"""One HTML file with all that a run has to show: pictures, tables, curves, and where each came from."""
+"""One HTML file with all that a run has to show: tables, pictures, curves, and where each came from."""
 
 from __future__ import annotations
 
-import base64
-import io
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+from PIL import Image
+
 from texgs.core.io import write_bytes
-from texgs.core.plots import words as plot_words
-from texgs.report.metrics_files import Record, of, read
-from texgs.report.results import EditResult, FitResult, Result
-from texgs.report.table import Table
-from texgs.report.tables import TABLES
+from texgs.report.ballots import Votes
+from texgs.report.left_out import LeftOut, others
+from texgs.report.losses import loss_figures
+from texgs.report.metrics_files import Record, read_known
+from texgs.report.published import THEIRS
+from texgs.report.sections import SECTIONS, Figure, data_uri, figures
+from texgs.report.sweep_figure import sweep_figure
+from texgs.report.table import Row, Table
+from texgs.report.tables import specs, sweeps_of, tables_of
+from texgs.report.votes_figure import write_votes
 
-NARROW = ("scene.png", "transfer.png", "style.png", "convergence.png")  # at any width; others scroll there
-UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
-JOB = ("stage", "dataset", "tf", "recipe", "variant", "seed", "seconds", "peak_memory_mib", "device")
+JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
+SWEPT = "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
 
 
-def write_report(path: str | Path, metrics_files: Iterable[str | Path]) -> Path:
+@dataclass(frozen=True)
+class Section:
+    """A part of the report."""
+
+    key: str
+    title: str
+    tables: dict[str, Table]  # by name
+    figures: dict[str, list[Figure]]  # by data set
+
+
+def write_report(
+    path: str | Path,
+    metrics_files: Iterable[str | Path],
+    left_out: Sequence[LeftOut] = (),
+    votes: Votes | None = None,
+) -> Path:
     """Write a report that needs no other file.
 
     Args:
         path: target, .html.
         metrics_files: of all jobs to report; their pictures lie beside them.
+        left_out: what of the run is not there.
+        votes: of a user study.
 
     Returns:
         The path.
 
     Raises:
-        ArgumentError: if a file is no metrics file, or the target cannot be written.
+        ArgumentError: if a file is no metrics file, all are of other versions of texgs, or the target cannot
+            be written.
     """
     from jinja2 import Environment
 
-    records = read(metrics_files)
-    tables = {name.replace("_", " ").capitalize(): make(records) for name, make in TABLES.items()}
+    records, old = read_known(metrics_files)
     template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        sections=sections(records),
-        tables={name: table for name, table in tables.items() if table.rows},
-        curves=data_uri(curves(of(FitResult, records))),
+        sections=sections(records, left_out, votes),
+        left_out=[*left_out, *others(old)],
         jobs=[job(record.facts) for record in records],
         places={record.path: index for index, record in enumerate(records, start=1)},
         versions=versions([record.facts for record in records]),
         headings=(*JOB, *SOURCE),
+        sources_from=len(JOB),
         kinds=kinds,
+        is_theirs=is_theirs,
     )
     return write_bytes(path, text.encode())
 
 
-def sections(records: Sequence[Record[Any]]) -> dict[str, list[dict[str, str]]]:
-    """Pictures by data set, scenes first; each with what it shows and of which basic TF."""
-    entries: dict[str, list[dict[str, str]]] = {}
-    for record in sorted(records, key=lambda each: (each.tf is not None, each.path)):
-        for name, words in record.facts.get("pictures", {}).items():
-            picture = record.path.with_name(name)
-            if picture.is_file() and name not in UNREPORTED:
-                entry = {
-                    "kind": "" if name in NARROW else "wide",
-                    "uri": data_uri(picture.read_bytes()),
-                    "label": " ".join(filter(None, (record.tf, record.label, edit_of(record.result)))),
-                    "words": words,
-                }
-                entries.setdefault(record.dataset, []).append(entry)
-    return dict(sorted(entries.items()))
+def sections(
+    records: Sequence[Record[Any]], left_out: Sequence[LeftOut], votes: Votes | None
+) -> list[Section]:
+    """The sections that have something to show."""
+    pictures, tables = figures(records), tables_of(records, left_out, votes)
+    places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
+    pictures["fitting"] += loss_figures(records)
+    pictures["ablations"] += [shown_sweep(records, name) for name in sweeps_of(records)]
+    if tables["user_study"].rows:
+        pictures["study"].append(votes_shown(votes))
+    shown = []
+    for key, title in SECTIONS.items():
+        own = {name: table for name, table in tables.items() if table.rows and places[name] == key}
+        by_dataset: dict[str, list[Figure]] = {}
+        for figure in pictures[key]:
+            by_dataset.setdefault(figure.dataset, []).append(figure)
+        if own or by_dataset:
+            shown.append(Section(key, title, own, by_dataset))
+    return shown
 
 
-def edit_of(result: Result) -> str:
-    """The name of an edit; empty for other jobs."""
-    return result.edit if isinstance(result, EditResult) else ""
+def shown_sweep(records: Sequence[Record[Any]], name: str) -> Figure:
+    """The figure of a sweep."""
+    return Figure(f"sweep {name}", "", SWEPT, data_uri(sweep_figure(records, name)), "")
 
 
-def curves(records: Sequence[Record[FitResult]]) -> bytes:
-    """PNG of the losses that the phases have looked at, over iterations; empty if there are none."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    shown = [record for record in records if len(record.result.losses) > 1]
-    if not shown:
-        return b""
-    figure = Figure(figsize=(8, 3.2), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots()
-    for record in shown:
-        losses, total = record.result.losses, record.result.iterations
-        steps = [total * (i + 1) / len(losses) for i in range(len(losses))]
-        name = f"{record.dataset}/{record.tf} {record.label} {record.stage}"
-        axes.semilogy(steps, losses, label=plot_words(name))
-    axes.set_xlabel("iterations")
-    axes.set_ylabel("loss of one view")
-    axes.legend(fontsize=7)
-    file = io.BytesIO()
-    figure.savefig(file, format="png", metadata={"Software": None})
-    return file.getvalue()
+def votes_shown(votes: Votes | None) -> Figure:
+    """The figure of a user study."""
+    with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
+        command = "texgs votes" if votes else ""
+        return Figure("votes", "", "Votes for each rank.", data_uri(picture), command, is_narrow=True)
 
 
 def job(metrics: Mapping[str, Any]) -> list[str]:
     """The cells of one job in the list of where things came from."""
-    cells = [metrics.get(key) for key in (*JOB, *SOURCE)]
+    facts = {"edit": metrics["numbers"].get("edit"), **metrics}
+    cells = [facts.get(key) for key in (*JOB, *SOURCE)]
     return ["" if x is None else f"{x:.1f}" if isinstance(x, float) else str(x) for x in cells]
 
 
@@ -111,11 +123,11 @@ def versions(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
     return sorted({", ".join(f"{name} {v}" for name, v in metrics["versions"].items()) for metrics in jobs})
 
 
+def is_theirs(row: Row) -> bool:
+    """Whether a row has the paper's numbers alone."""
+    return any(isinstance(cell, str) and cell.startswith(THEIRS) for cell in row.cells)
+
+
 def kinds(table: Table) -> list[str]:
     """Class of each column: numbers stand to the right."""
     return ["text" if column.digits is None else "number" for column in table.columns]
-
-
-def data_uri(png: bytes) -> str:
-    """A picture as text for the attribute of a tag; empty for none."""
-    return f"data:image/png;base64,{base64.b64encode(png).decode()}" if png else ""

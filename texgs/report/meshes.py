@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from texgs.report.metrics_files import Record, of
+from texgs.report.published import in_order
 from texgs.report.results import MeshResult
 from texgs.report.table import Column, Row, Table
 
@@ -31,9 +32,9 @@ CAPTION = (
 def meshes(records: Iterable[Record[Any]]) -> Table:
     """The table of all meshes among some jobs."""
     rows = []
-    for record in of(MeshResult, records):
+    for record in in_order(of(MeshResult, records)):
         r = record.result
         measured = [r.chamfer, r.accuracy, r.completeness, r.f_score, r.tolerance, r.normal_angle]
-        cells = [record.dataset, record.tf, record.label, *measured, r.triangles, r.mesh_seconds]
+        cells = [record.title, record.tf, record.label, *measured, r.triangles, r.mesh_seconds]
         rows.append(Row(cells, [record.path]))
     return Table(CAPTION, COLUMNS, rows)

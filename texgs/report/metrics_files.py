@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any, Generic, TypeVar
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.fields import kinds
+from texgs.config.variants import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.report.results import Result, result_of
@@ -27,13 +28,33 @@ class Record(Generic[R_co]):
     stage: str
     dataset: str
     tf: str | None  # None for jobs of a whole data set
-    label: str  # recipe, variant and a seed other than 0, as in tables; empty for jobs before a fit
+    label: str  # recipe, variant and seeds other than 0, as in tables; empty for jobs before a fit
     field: str  # kind of the fit
     variant: str
     sweep: str
     seed: int
+    stand_in: str  # what the data set stands in for; empty for those that are what they are called
     result: R_co
     facts: dict[str, Any]  # the file, for its times, versions and digests
+
+    @property
+    def recipe(self) -> str:
+        """Name of the recipe of the fit; empty for jobs before a fit."""
+        return str(self.facts.get("recipe") or "")
+
+    @property
+    def title(self) -> str:
+        """The data set as tables name it."""
+        return f"{self.dataset}, stand-in for {self.stand_in}" if self.stand_in else self.dataset
+
+    @property
+    def is_swept(self) -> bool:
+        """Whether this is a job of a sweep, whose numbers are in tables of their own."""
+        return self.sweep not in ("", NO_SWEEP)
+
+
+class OtherVersionError(ArgumentError):
+    """A metrics file is of another version of texgs."""
 
 
 def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
@@ -43,6 +64,24 @@ def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
         ArgumentError: if a file is no metrics file, or of another version of texgs.
     """
     return [_record(path) for path in sorted(map(Path, paths))]
+
+
+def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Path]]:
+    """The metrics of this version of texgs, as `read`, and the files of other versions.
+
+    Raises:
+        ArgumentError: if a file is no metrics file, or all are of other versions.
+    """
+    records: list[Record[Any]] = []
+    others: dict[Path, OtherVersionError] = {}
+    for path in sorted(map(Path, paths)):
+        try:
+            records.append(_record(path))
+        except OtherVersionError as error:
+            others[path] = error
+    if others and not records:
+        raise next(iter(others.values()))
+    return records, list(others)
 
 
 def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
@@ -78,10 +117,19 @@ def _record(path: Path) -> Record[Any]:
         result = result_of(facts["result"], facts["numbers"])
         stage, dataset = str(facts["stage"]), str(facts["dataset"])
     except (KeyError, OmegaConfBaseException) as error:
-        raise ArgumentError(
+        raise OtherVersionError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
-    recipe, variant, seed = (facts.get(key) or "" for key in ("recipe", "variant", "seed"))
-    label = "-".join(filter(None, (recipe, variant, f"s{seed}" if seed and recipe else "")))
-    rest = (facts.get("tf"), label, facts.get("field", ""), variant, facts.get("sweep", ""), int(seed or 0))
-    return Record(path, stage, dataset, *rest, result, facts)
+    variant, seed = facts.get("variant", ""), int(facts.get("seed") or 0)
+    fit = (label(facts), facts.get("field", ""), variant, facts.get("sweep", ""), seed)
+    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in", ""), result, facts)
+
+
+def label(facts: Mapping[str, Any]) -> str:
+    """Recipe, variant, seed of the fit and seed of the edit of a job, those that are not 0."""
+    recipe, seed = facts.get("recipe", ""), facts.get("seed") or 0
+    if not recipe:
+        return ""
+    by_letter = {"s": facts.get("fit_seed", 0), "e": seed} if "edit" in facts else {"s": seed}
+    seeds = (f"{letter}{number}" for letter, number in by_letter.items() if number)
+    return "-".join(filter(None, (recipe, facts.get("variant", ""), *seeds)))

@@ -71,6 +71,9 @@ class FitResult:
     ssim: float | None = None
     train_psnr: float | None = None
     train_ssim: float | None = None
+    train_views: int | None = None
+    width: int | None = None  # of all these views as they were compared, pixels
+    height: int | None = None
     peak_gpu_memory_mib: float | None = None
     sizes: dict[str, float] = field(default_factory=dict)  # of the last phase, see `Field.sizes`
     material: dict[str, float] = field(default_factory=dict)  # medians of its factors, by name
@@ -107,6 +110,7 @@ class Shown:
 class GalleryResult:
     """Scenes side by side."""
 
+    section: str  # of the report
     shown: list[Shown]
 
 
@@ -192,6 +196,8 @@ class EditMeasures:
     primitives: int
     megabytes: float  # of all models, as the paper counts
     geometry_kept: bool
+    width: int | None = None  # of the frames, pixels
+    height: int | None = None
     short_rmse: float | None = None  # between consecutive views, and views farther apart
     short_lpips: float | None = None
     long_rmse: float | None = None

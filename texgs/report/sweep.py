@@ -1,106 +1,95 @@
-"""The table of a sweep: means of each variant over all seeds, beside the paper's numbers."""
+"""The table of a sweep: means of each variant over all seeds."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 from statistics import fmean, stdev
 from typing import Any
 
-from texgs.config.fields import kinds
-from texgs.core.errors import ArgumentError
-from texgs.report.metrics_files import Record, of, paper
-from texgs.report.results import FitResult
-from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
+from texgs.report.metrics_files import Record
+from texgs.report.sweep_runs import DIGITS, MATERIAL, OF_EDITS, OF_FITS, Run, runs_of
+from texgs.report.table import Cell, Column, Row, Table
 
-MATERIAL = ("ambient", "diffuse", "specular", "shininess")
-PUBLISHED = {  # columns of the paper's numbers, by their headings in its files
-    "train_psnr": Column("PSNR, training (paper)", 2, UNPUBLISHED),
-    "test_psnr": Column("PSNR (paper)", 2, UNPUBLISHED),
-    "test_ssim": Column("SSIM (paper)", 4, UNPUBLISHED),
-    "fitting_min": Column("minutes (paper)", 2, UNPUBLISHED),
-    "primitives": Column("primitives (paper)", 0, UNPUBLISHED),
+KEY = (
+    "data set",
+    "TF",
+    "recipe",
+    "edit",
+    "variant",
+)  # of a row; columns that all rows leave empty are left out
+SEEDS = "Means over seeds, ± their standard deviation."
+CAPTIONS = {  # by the measures that they are about
+    "PSNR": "Fits: test views after the last phase; minutes of all phases; medians of the material.",
+    "NNFM": "Edits: minutes of the edit alone; distances to the style in views that it was not learned from.",
 }
-COLUMNS = (
-    Column("data set"),
-    Column("TF"),
-    Column("recipe"),
-    Column("variant"),
-    Column("seeds", 0),
-    Column("PSNR, training", 2),
-    Column("PSNR", 2),
-    Column("± PSNR", 2),
-    Column("SSIM", 4),
-    Column("minutes", 2),
-    Column("memory GiB", 2),
-    Column("primitives", 0),
-    *(Column(title, 2) for title in ("k_a", "k_d", "k_s", "beta")),
-)
-Run = dict[str, Record[FitResult]]  # by phase
-CAPTION = (
-    "Test views after the last phase; means over seeds, ± their standard deviation; "
-    "minutes of all phases; medians of the material."
-)
 
 
 def sweep(records: Iterable[Record[Any]], name: str) -> Table:
-    """The table of the variants among some jobs.
+    """The table of the variants among some jobs: a row for the fits of each, and one for each of its edits.
 
     Args:
-        records: jobs; those of other fits do not count.
-        name: of the sweep; the paper's numbers stand beside those of its data set, where it has them.
+        records: jobs; those of other fits and edits do not count.
+        name: of the sweep.
 
     Raises:
         ArgumentError: if none is of the sweep.
     """
-    groups: dict[tuple[str, ...], dict[int, Run]] = defaultdict(lambda: defaultdict(dict))
-    sources: dict[tuple[str, ...], list[Path]] = defaultdict(list)
-    for record in of(FitResult, records):
-        if record.variant and record.sweep == name:
-            key: tuple[str, ...] = (record.dataset, str(record.tf), record.facts["recipe"], record.variant)
-            sources[key].append(record.path)
-            groups[key][record.seed][record.stage] = record
-    if not groups:
-        raise ArgumentError(f"sweep {name}: no fit of it among the metrics files; run it first")
-    published = paper(name, keys=2)
-    lines = [
-        published[dataset, variant] for dataset, _, _, variant in groups if (dataset, variant) in published
+    groups: dict[tuple[str, ...], list[Run]] = defaultdict(list)
+    for run in runs_of(records, name):
+        groups[*run.series, run.variant].append(run)
+    titles = measured(list(groups))
+    spread = [
+        title for title in titles if any(deviation(runs, title) is not None for runs in groups.values())
     ]
-    beside = [PUBLISHED[key] for key in PUBLISHED if any(key in line for line in lines)]
+    named = [place for place in range(len(KEY)) if any(key[place] for key in groups)]
     rows = []
-    for key, by_seed in sorted(groups.items(), key=lambda item: (*item[0][:3], natural(item[0][3]))):
-        line = published.get((key[0], key[3]), {})
-        theirs = [float(line[k]) if line.get(k) else None for k, c in PUBLISHED.items() if c in beside]
-        rows.append(Row([*key, *cells(list(by_seed.values())), *theirs], sources[key]))
-    return Table(CAPTION, (*COLUMNS, *beside), rows)
+    for key, runs in groups.items():
+        cells: list[Cell] = [*(key[place] or "-" for place in named), sum(bool(run.measures) for run in runs)]
+        for title in titles:
+            cells += [mean(runs, title), *([deviation(runs, title)] if title in spread else [])]
+        rows.append(Row(cells, [path for run in runs for path in run.sources]))
+    return Table(caption(titles, spread), columns([KEY[place] for place in named], titles, spread), rows)
 
 
-def cells(runs: Sequence[Run]) -> list[Cell]:
-    """The cells of one variant from its runs; None where a phase is missing."""
-    whole = (kind.phases for kind in kinds().values() if any(set(kind.phases) <= set(run) for run in runs))
-    phases = next(whole, None)
-    if phases is None:
-        return [0, *[None] * (len(COLUMNS) - 5)]
-    complete = [run for run in runs if set(phases) <= set(run)]
-    last = [run[phases[-1]].result for run in complete]
-    psnr = [result.psnr for result in last if result.psnr is not None]
-    spread = stdev(psnr) if 1 < len(psnr) == len(last) else None
-    minutes = [sum(phase.result.fit_seconds for phase in run.values()) / 60 for run in complete]
-    memory = [max(phase.facts["peak_memory_mib"] for phase in run.values()) / 1024 for run in complete]
-    quality = [mean([x.train_psnr for x in last]), mean([x.psnr for x in last]), spread]
-    costs = [fmean(minutes), max(memory), mean([x.primitives for x in last])]
-    materials = [run["shading"].result.material for run in complete if "shading" in run]
-    factors = [mean([material.get(name) for material in materials]) for name in MATERIAL]
-    return [len(complete), *quality, mean([x.ssim for x in last]), *costs, *factors]
+def measured(keys: Sequence[tuple[str, ...]]) -> list[str]:
+    """What is measured of fits, where there are some, and of edits."""
+    of_fits = [*OF_FITS, *MATERIAL] if any(not key[3] for key in keys) else []
+    of_edits = ["minutes", *OF_EDITS] if any(key[3] for key in keys) else []
+    return list(dict.fromkeys([*of_fits, *of_edits]))
 
 
-def mean(values: Sequence[float | None]) -> float | None:
-    """The mean; None where a value is missing, or there is none."""
-    known = [value for value in values if value is not None]
-    return fmean(known) if known and len(known) == len(values) else None
+def columns(named: Sequence[str], titles: Sequence[str], spread: Sequence[str]) -> list[Column]:
+    """What the cells of a row are."""
+    found = [*map(Column, named), Column("seeds", 0)]
+    for title in titles:
+        found.append(Column(title, DIGITS[title]))
+        if title in spread:
+            found.append(Column(f"± {title}", DIGITS[title] + (DIGITS[title] == 0)))
+    return found
 
 
-def natural(name: str) -> tuple[float, str]:
-    """Numbers in their order before words."""
-    return (float(name), "") if name.isdigit() else (float("inf"), name)
+def mean(runs: Sequence[Run], title: str) -> float | None:
+    """The mean over the seeds that are done; None where a value is missing, or there is none."""
+    known = values(runs, title)
+    return fmean(known) if known else None
+
+
+def deviation(runs: Sequence[Run], title: str) -> float | None:
+    """The standard deviation over seeds; None where there are not several."""
+    known = values(runs, title)
+    return stdev(known) if len(known) > 1 else None
+
+
+def values(runs: Sequence[Run], title: str) -> list[float]:
+    """A measure of all runs that are done; none where one of them has not measured it."""
+    found = [run.measures.get(title) for run in runs if run.measures]
+    known = [value for value in found if value is not None]
+    return known if len(known) == len(found) else []
+
+
+def caption(titles: Sequence[str], spread: Sequence[str]) -> str:
+    """What the columns are."""
+    return " ".join(
+        [*([SEEDS] if spread else []), *(words for title, words in CAPTIONS.items() if title in titles)]
+    )

@@ -1,4 +1,4 @@
-"""One table in three formats: CSV, Markdown and LaTeX; each row knows the jobs that its numbers are from."""
+"""One table as CSV and Markdown; each row knows the jobs that its numbers are from."""
 
 from __future__ import annotations
 
@@ -8,12 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from texgs.core.io import write_bytes
-
 Cell = str | float | int | None
 MISSING = "not measured"
 SOURCES = "metrics files"  # heading in CSV
-UNPUBLISHED = "-"  # in columns of the paper's numbers
+UNPUBLISHED = "-"  # in columns of the paper's numbers: it has none
+UNLIKE = "≠"  # there: it has one, of something else
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class Column:
             return self.missing
         if isinstance(cell, str) or self.digits is None:
             return str(cell)
-        return f"{cell:.{self.digits}f}"
+        return f"{cell:,.{self.digits}f}"
 
 
 @dataclass(frozen=True)
@@ -48,6 +47,7 @@ class Table:
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Row]
+    heading: str = ""
 
     def texts(self) -> list[list[str]]:
         """All cells as people read them."""
@@ -57,35 +57,25 @@ class Table:
         ]
 
     def csv(self) -> str:
-        """Comma separated, numbers in full, sources last; an empty cell is not measured."""
+        """Comma separated, numbers in full, sources last; an empty cell has no number of its own."""
         file = io.StringIO()
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*(column.title for column in self.columns), SOURCES])
         for row in self.rows:
             sources = " ".join(path.as_posix() for path in row.sources)
-            writer.writerow(["" if cell is None else cell for cell in (*row.cells, sources)])
+            writer.writerow(["" if cell in (None, UNLIKE) else cell for cell in (*row.cells, sources)])
         return file.getvalue()
 
     def markdown(self) -> str:
         """A Markdown table, numbers to the right."""
         rule = ["---" if column.digits is None else "---:" for column in self.columns]
         lines = [[column.title for column in self.columns], rule, *self.texts()]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines) + f"\n\n{self.caption}\n"
-
-    def latex(self) -> str:
-        """A LaTeX tabular between rules of booktabs."""
-        kinds = "".join("l" if column.digits is None else "r" for column in self.columns)
-        lines = [[column.title for column in self.columns], *self.texts()]
-        head, *body = (" & ".join(map(escape, line)) + r" \\" for line in lines)
-        rows = [rf"\begin{{tabular}}{{{kinds}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
-        return "\n".join([f"% {self.caption}", *rows, r"\end{tabular}"]) + "\n"
-
-    def write(self, folder: str | Path, name: str) -> list[Path]:
-        """Write NAME.csv, NAME.md and NAME.tex; returns their paths."""
-        texts = {"csv": self.csv(), "md": self.markdown(), "tex": self.latex()}
-        return [write_bytes(Path(folder, f"{name}.{kind}"), text.encode()) for kind, text in texts.items()]
+        rows = [" | ".join(one_line(text).replace("|", r"\|") for text in line) for line in lines]
+        parts = [f"## {self.heading}"] if self.heading else []
+        parts += ["\n".join(f"| {row} |" for row in rows), one_line(self.caption)]
+        return "\n\n".join(parts) + "\n"
 
 
-def escape(text: str) -> str:
-    """Text as LaTeX prints it."""
-    return "".join(f"\\{letter}" if letter in "&%$#_{}" else letter for letter in text)
+def one_line(text: str) -> str:
+    """Text without line breaks, which end a row of a table."""
+    return " ".join(text.split())

@@ -1,21 +1,207 @@
-"""The tables of an experiment, by their names."""
+"""The tables of a report in their order: first the paper's, then ours."""
 
-from collections.abc import Callable, Iterable
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
-from texgs.report.fitting import fitting
+from texgs.report.ablations import ablation
+from texgs.report.ballots import Votes
+from texgs.report.datasets import datasets
+from texgs.report.differences import differences
+from texgs.report.editing import image_driven, text_driven, text_driven_frozen
+from texgs.report.fitting import fits, fitting
+from texgs.report.left_out import LeftOut, note
 from texgs.report.looks import looks
 from texgs.report.meshes import meshes
-from texgs.report.metrics_files import Record
-from texgs.report.scene_tables import datasets, edits, model_size, rendering
+from texgs.report.metrics_files import Record, of
+from texgs.report.published import images, meant
+from texgs.report.results import EditResult, FitResult
+from texgs.report.scene_tables import edits, model_size, rendering
+from texgs.report.sweep import sweep
 from texgs.report.table import Table
+from texgs.report.votes import user_study
 
-TABLES: dict[str, Callable[[Iterable[Record[Any]]], Table]] = {
-    "fitting": fitting,
-    "datasets": datasets,
-    "rendering": rendering,
-    "model_size": model_size,
-    "edits": edits,
-    "looks": looks,
-    "meshes": meshes,
-}
+
+@dataclass(frozen=True)
+class TableSpec:
+    """A table of the report: what it is called, and how it is made of records."""
+
+    name: str  # of its files
+    title: str
+    caption: str
+    section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
+    places: tuple[str, ...]  # of the jobs that it reads, keys of `texgs.config.places.PLACES`
+    make: Callable[[Iterable[Record[Any]]], Table]
+    number: int | None = None  # among the paper's tables; none for ours
+    paper: str = ""  # where the paper has it
+
+    @property
+    def heading(self) -> str:
+        """Number and title."""
+        return f"Table {self.number}. {self.title}" if self.number else self.title
+
+    def table(self, records: Iterable[Record[Any]], left_out: Sequence[LeftOut] = ()) -> Table:
+        """The table of some jobs, whose caption says what it shows and what is left out."""
+        made = self.make(records)
+        where = f"In the paper: {self.paper}." if self.paper else ""
+        parts = (self.caption, where, made.caption, note(left_out, self.places))
+        return replace(made, heading=self.heading, caption=" ".join(filter(None, parts)))
+
+
+EDITED = ("edit", "edit_metrics")
+PAPERS = (
+    TableSpec(
+        "datasets",
+        "Data sets",
+        "Data sets with their settings, and the time of a frame of the volume renderer.",
+        "data",
+        ("volume", "views", "sheet"),
+        datasets,
+        1,
+        "Table 1, and Table 3 of the appendix for the last four data sets",
+    ),
+    TableSpec(
+        "image_driven",
+        "Image-driven editing",
+        "Minutes of editing, size of the model, mean and largest time of a frame, and primitives.",
+        "image",
+        EDITED,
+        image_driven,
+        2,
+        "Table 2",
+    ),
+    TableSpec(
+        "text_driven",
+        "Text-driven editing",
+        "CLIP similarity and directional similarity, minutes of editing, mean and largest time of a frame, "
+        "size of the model, and primitives.",
+        "text",
+        EDITED,
+        text_driven,
+        3,
+        "Table 3",
+    ),
+    TableSpec(
+        "text_driven_frozen",
+        "Text-driven editing, geometry frozen",
+        "As Table 3, for methods whose geometry stays as it was fitted.",
+        "text",
+        EDITED,
+        text_driven_frozen,
+        paper="a figure of the appendix, without numbers",
+    ),
+    TableSpec(
+        "fitting",
+        "Fitting, phase by phase",
+        "Test views after each phase, means over the basic scenes; minutes of the phase itself.",
+        "fitting",
+        ("phase",),
+        fitting,
+        4,
+        "Table 5 of the appendix",
+    ),
+    TableSpec(
+        "views",
+        "Numbers of training views",
+        "Training and test views after the last phase, means over basic scenes; minutes of all phases.",
+        "ablations",
+        ("phase",),
+        partial(ablation, sweep="views"),
+        5,
+        "Table 1 of the appendix",
+    ),
+    TableSpec(
+        "resolution",
+        "Sizes of training images",
+        "Training and test views after the last phase, means over basic scenes; minutes of all phases.",
+        "ablations",
+        ("phase",),
+        partial(ablation, sweep="resolution"),
+        6,
+        "Table 2 of the appendix",
+    ),
+    TableSpec(
+        "model_size",
+        "Model size",
+        "Sums over the basic scenes of a data set, 32 bits a value; 16 for harmonics of voxels.",
+        "sizes",
+        ("phase",),
+        model_size,
+        7,
+        "Table 4 of the appendix",
+    ),
+    TableSpec(
+        "rendering",
+        "Rendering",
+        "Frames of scenes as fitted along the test path, beside those of the volume in the same job.",
+        "rendering",
+        ("timing",),
+        rendering,
+        8,
+        "columns of Tables 1 to 3, of edited scenes on an RTX 4090; its volumes are rendered by ParaView",
+    ),
+)
+
+
+def of_recipes(records: Iterable[Record[Any]]) -> Table:
+    """Where the recipes and edits of some jobs differ from the paper; without rows where there are none."""
+    records = list(records)
+    recipes = sorted({record.recipe for record in of(FitResult, records)})
+    edits = sorted({record.result.edit for record in of(EditResult, records)})
+    table = differences(recipes, edits)
+    return table if recipes else replace(table, rows=[])
+
+
+OURS = (
+    TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
+    TableSpec(
+        "edits",
+        "Edits by numbers against the volume",
+        "Views around the object; nothing is trained for an edit.",
+        "pse",
+        ("pse",),
+        edits,
+    ),
+    TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
+    TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),
+    TableSpec("differences", "Where we differ", "", "differences", ("phase", "edit"), of_recipes),
+)
+
+
+def specs(sweeps: Iterable[str] = (), votes: Votes | None = None) -> list[TableSpec]:
+    """All tables, with one for each of some sweeps, and the votes of a user study."""
+    return [*PAPERS, of_study(votes), *OURS, *map(of_sweep, sweeps)]
+
+
+def of_study(votes: Votes | None) -> TableSpec:
+    """The table of a user study; without votes the paper's, where there are edits of its data sets."""
+
+    def make(records: Iterable[Record[Any]]) -> Table:
+        is_shown = votes or any(meant(edit) in images() for edit in of(EditResult, records))
+        table = user_study(votes)
+        return table if is_shown else replace(table, rows=[])
+
+    paper = "Table 6 of the appendix"
+    return TableSpec("user_study", "User study", "", "study", EDITED, make, 9, paper)
+
+
+def of_sweep(name: str) -> TableSpec:
+    """The table of a sweep, with the spread over its seeds."""
+    places, make = ("phase", *EDITED), partial(sweep, name=name)
+    return TableSpec(f"sweep-{name}", f"Sweep {name}", "", "ablations", places, make)
+
+
+def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:
+    """The sweeps among some jobs whose fits or edits can be compared, each once."""
+    compared = [record for record in records if isinstance(record.result, FitResult | EditResult)]
+    return sorted({record.sweep for record in compared if record.is_swept and record.variant})
+
+
+def tables_of(
+    records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), votes: Votes | None = None
+) -> dict[str, Table]:
+    """All tables of some jobs and votes by their names, also those without rows."""
+    return {spec.name: spec.table(records, left_out) for spec in specs(sweeps_of(records), votes)}

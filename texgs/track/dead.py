@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 HOST, PROCESS, METRICS = "texgs.host", "texgs.process", "texgs.metrics"  # tags
 
 
-def process_tags(metrics: Path) -> dict[str, str]:
-    """Tags that say which process a run is of, and where the metrics of its job will be."""
-    started = psutil.Process().create_time()
-    return {HOST: platform.node(), PROCESS: f"{os.getpid()} {started}", METRICS: str(metrics.absolute())}
+def process_tags(metrics: Path | None = None) -> dict[str, str]:
+    """Tags that say which process a run is of, and where the metrics of its job will be, if it is one."""
+    own = {HOST: platform.node(), PROCESS: f"{os.getpid()} {psutil.Process().create_time()}"}
+    return own if metrics is None else {**own, METRICS: str(metrics.absolute())}
 
 
 def close_dead(client: "MlflowClient", experiment_id: str) -> None:

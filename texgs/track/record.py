@@ -16,7 +16,7 @@ from texgs.track.store import SECONDS_TO_CONNECT, calm, connect
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
-    from mlflow.entities import Metric
+    from mlflow.entities import Metric, RunTag
 
 SECONDS_BETWEEN_BATCHES = 10.0
 MOST_METRICS_KEPT = 100_000  # about 50 MB, where the store is gone for the rest of a long job
@@ -44,6 +44,12 @@ class Run:
         Raises:
             ArgumentError: if there is no such file.
         """
+
+    def tag(self, tags: Mapping[str, str]) -> None:
+        """Record tags that were not known when the run began."""
+
+    def end(self, status: str, error: Exception | None = None) -> None:
+        """End the run: FINISHED, FAILED with the error, or KILLED. `run` does this by itself."""
 
 
 @contextmanager
@@ -104,18 +110,38 @@ def close_dead_runs(uri: str | None, experiment: str) -> None:
 
 def _start(
     uri: str, experiment: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]
-) -> "_Recorded":
+) -> Run:
     with calm(MLFLOW_HTTP_REQUEST_TIMEOUT=str(SECONDS_TO_CONNECT)), translated(uri):
         client, experiment_id = connect(uri, experiment)
     with calm(), translated(uri):
-        from mlflow.entities import Param
-
         close_dead(client, experiment_id)
-        texts = {allowed_name(key): cut(str(value), LONGEST_TAG) for key, value in tags.items()}
-        created = client.create_run(experiment_id, tags=texts, run_name=title)
-        entries = [Param(key, value) for key, value in flatten(params).items()]
-        client.log_batch(created.info.run_id, params=entries)
-    return _Recorded(client, created.info.run_id, public(uri))
+        return recorded(client, create(client, experiment_id, title, tags, params), uri)
+
+
+def recorded(client: "MlflowClient", id: str, uri: str) -> Run:
+    """A run that is in a store."""
+    return _Recorded(client, id, public(uri))
+
+
+def create(
+    client: "MlflowClient",
+    experiment_id: str,
+    title: str,
+    tags: Mapping[str, str],
+    params: Mapping[str, object],
+) -> str:
+    """Make a run with all that is known of it at the start; its identifier."""
+    from mlflow.entities import Param
+
+    created = client.create_run(experiment_id, tags=texts(tags), run_name=title)
+    entries = [Param(key, value) for key, value in flatten(params).items()]
+    client.log_batch(created.info.run_id, params=entries)
+    return str(created.info.run_id)
+
+
+def texts(tags: Mapping[str, str]) -> dict[str, str]:
+    """Tags as MLflow takes them."""
+    return {allowed_name(key): cut(str(value), LONGEST_TAG) for key, value in tags.items()}
 
 
 class _Recorded(Run):
@@ -128,6 +154,7 @@ class _Recorded(Run):
         self._client = client
         self._store = store
         self._metrics: list[Metric] = []
+        self._tags: list[RunTag] = []
         self._files: list[tuple[Path, str | None]] = []
         self._due = time.monotonic() + SECONDS_BETWEEN_BATCHES
         self._trouble: str | None = None
@@ -153,6 +180,11 @@ class _Recorded(Run):
         self._files.append((path, folder))
         if self._trouble is None or time.monotonic() >= self._due:
             self._attempt(self._deliver)
+
+    def tag(self, tags: Mapping[str, str]) -> None:
+        from mlflow.entities import RunTag
+
+        self._tags += [RunTag(key, value) for key, value in texts(tags).items()]
 
     def end(self, status: str, error: Exception | None = None) -> None:
         """Send what is left and close the run; where that fails, say so in one warning."""
@@ -181,8 +213,9 @@ class _Recorded(Run):
 
     def _deliver(self) -> None:
         """Send what waits. A batch that arrived only in part may be sent again: MLflow keeps one of each."""
-        self._client.log_batch(self.id, metrics=self._metrics)
+        self._client.log_batch(self.id, metrics=self._metrics, tags=self._tags)
         self._metrics.clear()
+        self._tags.clear()
         while self._files:
             path, folder = self._files[0]
             self._client.log_artifact(self.id, str(path), folder)

@@ -6,7 +6,7 @@ import sys
 from importlib.resources import files
 from pathlib import Path
 
-from texgs.cli import fork_client
+from texgs.cli import fork_client, parents
 from texgs.cli.plan import planned, words_of
 from texgs.config.sources import digest
 from texgs.config.places import PLACES
@@ -18,7 +18,8 @@ collect_rarely()
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
-    PLAN, MISSING = planned(words_of(config), is_job=not workflow.is_main_process)
+    WORDS = words_of(config)
+    PLAN, MISSING = planned(WORDS, is_job=not workflow.is_main_process)
 except TexgsError as error:
     print(f"texgs: {error}", file=sys.stderr)
     sys.exit(2)
@@ -30,6 +31,7 @@ if MISSING:
     if not any(re.fullmatch(NOTHING_IS_MADE, word) for word in sys.argv):
         sys.exit(2)
 
+PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
 MAPPER_GPU, FIT_GPU = PLAN.mapper_gpu, PLAN.fit_gpu
 
@@ -83,28 +85,38 @@ def any_of(names, otherwise="none"):
 
 
 def begin():
-    """Hold the results, close the tracked runs of killed processes, and start what forks the jobs."""
-    global RUN_LOCK, FORK_SERVER
+    """Hold the results, begin the tracked runs that hold those of jobs, and start what forks the jobs."""
+    global RUN_LOCK, FORK_SERVER, PARENTS
     from texgs.cli import fork_server
     from texgs.cli.result import run_alone
-    from texgs.track import close_dead_runs
 
     try:
         RUN_LOCK = run_alone(RESULTS)  # it goes with the process, however that ends
         jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in PLACES]
         if workflow.local_exec and len(jobs) > 1:
             FORK_SERVER = fork_server.start(ENVIRONMENT)
-        close_dead_runs(PLAN.tracking, PLAN.experiment)
+        PARENTS = parents.begin(PLAN, WORDS)
     except TexgsError as error:
         print(f"texgs: {error}", file=sys.stderr)
         sys.exit(2)
+
+
+def finish(status):
+    """End the tracked runs that hold those of jobs; returns all files that the workflow makes."""
+    made = {str(file) for each in workflow.dag.jobs for file in each.output}
+    parents.end(PARENTS, status, PLAN, made)
+    return made
 
 
 # In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
 # result. Threads that spin while they wait take the cores that other jobs and the other threads need.
 ENVIRONMENT = {"OMP_WAIT_POLICY": os.environ.get("OMP_WAIT_POLICY", "passive")}
 if PLAN.tracking is not None:
-    ENVIRONMENT |= {"TEXGS_TRACKING": PLAN.tracking, "TEXGS_EXPERIMENT": PLAN.experiment}
+    ENVIRONMENT |= {
+        "TEXGS_TRACKING": PLAN.tracking,
+        "TEXGS_EXPERIMENT": PLAN.experiment,
+        "TEXGS_RUNS": parents.runs_file(RESULTS),
+    }
 CLIENT = fork_client.__file__
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())
 shell.prefix(
@@ -126,11 +138,10 @@ pathvars:
 
 
 wildcard_constraints:
-    sweep=any_of(filter(None, PLAN.sweeps), "no-sweep"),
     dataset=any_of(PLAN.wildcards["dataset"]),
     tf="[A-Za-z][A-Za-z0-9_-]*",
-    gallery="[A-Za-z][A-Za-z0-9_-]*",
     views=any_of(PLAN.wildcards["views"]),
     fit=any_of(PLAN.wildcards["fit"]),
     phase=any_of(PLAN.wildcards["phase"]),
     edit=any_of(PLAN.wildcards["edit"], "no-edit"),
+    gallery=any_of(PLAN.wildcards["gallery"]),

@@ -1,43 +1,40 @@
 # Tables and the report, from the metrics files of jobs.
 
 
-from texgs.report import tables
+from texgs.report.table_files import DOCUMENT, FORMATS
+from texgs.report.tables import specs
 
-SWEEPS = sorted(filter(None, PLAN.sweeps))
-TABLES = list(tables.TABLES) if "" in PLAN.sweeps else []
+SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", sweep=name))
+SWEPT = ("volume", "views", "phase", "edit", "edit_metrics")  # places that tables of sweeps read
+OF_SWEEPS = {file for name in SWEEPS for file in PLAN.done(*SWEPT, sweep=name)}
+TABLES = specs(SWEEPS)
+STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
 
 
 rule tables:
     input:
-        PLAN.done("volume", "views", "phase", "mesh", "pse", "timing", "edit", "edit_metrics"),
+        sorted({*PLAN.done(*{place for table in TABLES for place in table.places}), *OF_SWEEPS}),
     output:
-        collect("<results>/tables/{name}.{format}", name=TABLES, format=("csv", "md", "tex")),
+        f"<results>/tables/{DOCUMENT}",
+        collect("<results>/tables/{table}.{format}", table=[table.name for table in TABLES], format=FORMATS),
     log:
         "<logs>/tables.log",
     params:
         code=PLAN.code["texgs.cli.tables"],
         folder=subpath(output[0], parent=True),
+        earlier=list(PLAN.earlier),
+        of_earlier=list(PLAN.earlier.values()),
+        left_out=PLAN.left_out,
+        study=f"{STUDY}/key.json",
+        ballots=sorted(map(str, STUDY.glob("votes/*.csv"))),
     shell:
-        "texgs tables {input:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
-
-
-rule sweep:
-    input:
-        lambda wildcards: PLAN.done("phase", sweep=wildcards.sweep),
-    output:
-        collect("<results>/tables/sweep-{{sweep}}.{format}", format=("csv", "md", "tex")),
-    log:
-        "<logs>/tables-{sweep}.log",
-    params:
-        code=PLAN.code["texgs.cli.tables"],
-        folder=subpath(output[0], parent=True),
-    shell:
-        "texgs tables {input:q} --sweep {wildcards.sweep:q} --output {params.folder:q} 2>&1 | tee --append {log:q}"
+        "texgs tables {input:q} {params.earlier:q} --missing {params.left_out:q} --study {params.study:q} "
+        "--output {params.folder:q} 2>&1 | tee --append {log:q}"
 
 
 rule report:
     input:
-        PLAN.done(*PLACES),
+        sorted({*PLAN.done(*PLACES), *OF_SWEEPS}),
     output:
         "<results>/report.html",
     log:
@@ -45,5 +42,11 @@ rule report:
     params:
         code=PLAN.code["texgs.cli.report"],
         template=digest(files("texgs.report").joinpath("report.html.j2").read_text()),
+        earlier=list(PLAN.earlier),
+        of_earlier=list(PLAN.earlier.values()),
+        left_out=PLAN.left_out,
+        study=f"{STUDY}/key.json",
+        ballots=sorted(map(str, STUDY.glob("votes/*.csv"))),
     shell:
-        "texgs report {input:q} --output {output:q} 2>&1 | tee --append {log:q}"
+        "texgs report {input:q} {params.earlier:q} --missing {params.left_out:q} --study {params.study:q} "
+        "--output {output:q} 2>&1 | tee --append {log:q}"

@@ -26,7 +26,6 @@ class Settings(OfDataset):
     edit: Edit
     fit: FitLabel
     reduce: int
-    clip: str
     lens: Distance
     weights: dict[str, str | None]
     followed: dict[str, str]  # by model: what it follows, where that is not what the edit says
@@ -50,9 +49,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         output,
         device,
         settings.reduce,
-        settings.clip,
         settings.lens.lens,
-        settings.weights,
         title,
         settings.followed,
     )

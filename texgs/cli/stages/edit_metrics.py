@@ -38,6 +38,7 @@ class Settings(EditSettings):
     """What the stage reads of the configuration."""
 
     compared: int
+    clip: str
     views: ViewKeys
 
 
@@ -65,6 +66,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         len(scenes[0]),
         megabytes=sum(size_of(after)) * MIB / 1e6,
         geometry_kept=is_geometry_kept(*scenes, some, "normals" in kind.can),
+        width=views.width,
+        height=views.height,
         **agreement(scenes[0], after, inputs["geometry"], cameras, settings.compared, weights),
         **style_distance(settings, after, some, device, title),
         **clip_numbers(settings, (after, before), scenes, cameras, title),

@@ -39,6 +39,7 @@ class Grid:
 class Settings(OfScene):
     """What the stage reads of the configuration."""
 
+    section: str
     size: int
     command: str
     grids: list[Grid]
@@ -65,7 +66,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         errors = ERRORS if any(map(any, below.values())) else ""
         made_by = f"Made by: {settings.command}" if settings.command else ""
         captions[f"{grid.name}.png"] = " ".join(filter(None, (grid.caption, errors, made_by)))
-    return Outcome(GalleryResult(shown), captions)
+    return Outcome(GalleryResult(settings.section, shown), captions)
 
 
 def pictures(grid: Grid, studio: Studio, title: str) -> dict[str, list[Taken]]:

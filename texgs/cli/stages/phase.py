@@ -17,6 +17,7 @@ from texgs.fit.loop import Fit
 from texgs.fit.resumable import run_to_end
 from texgs.metrics.quality import evaluate, mean
 from texgs.volume.images import Images
+from texgs.volume.reduced import smaller
 from texgs.volume.view_set import ViewSet
 
 
@@ -46,8 +47,10 @@ def run_phase(
 
 
 def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
-    """PSNR and SSIM on the test views; none where there are none."""
-    return mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {}
+    """Which views a model is of, and PSNR and SSIM on the test views, where there are some."""
+    camera = smaller(views.train[0].camera, reduce)
+    seen = {"train_views": len(views.train), "width": camera.width, "height": camera.height}
+    return seen | (mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {})
 
 
 def training_quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:

@@ -17,6 +17,7 @@ class OfDataset:
 
     stage: str
     dataset: str
+    stand_in: str  # what the data stand in for
 
 
 @dataclass

@@ -1,0 +1,67 @@
+"""What a run would find and do, before it is started."""
+
+import re
+
+import pytest
+
+from texgs.cli import forecast
+from texgs.cli.main import main
+from texgs.config.experiments import selected
+from texgs.config.stages import STAGES
+
+
+@pytest.fixture(autouse=True)
+def empty(tmp_path, monkeypatch):
+    """A folder without data, results and weights."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("TEXGS_DATA", "nowhere")
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path))
+
+
+def test_each_stage_has_a_speed_and_no_other():
+    assert set(forecast.speeds()) == set(STAGES)
+
+
+def test_seconds_follow_pixels_and_iterations():
+    speed = forecast.Speed(2.0, 10.0, 0.5)
+    assert speed.seconds(0.16, 100) == pytest.approx(2 + 0.16 * 10 + 0.16 * 100 * 0.5)
+
+
+def test_iterations_are_found_wherever_settings_name_them():
+    settings = {"phase": {"iterations": 7, "losses": {"iterations": 2}}, "iterations": 100, "name": "a"}
+    assert forecast.iterations(settings) == 109
+
+
+def test_the_jobs_of_a_run_are_counted_each_once():
+    words = ("dataset=orbital", "fit=demo", "edits=[gold]")
+    expected = forecast.forecast(words)
+    orbital = {"volume": 1, "transfer": 1, "views": 2, "surfels": 2, "texture": 2, "edit_text": 1}
+    assert {name: expected.to_do[name] for name in orbital} == orbital
+    assert expected.done == 0
+    by_hand = sum(
+        forecast.speeds()[job.stage.name].seconds(
+            config.views.width * config.views.height / 1e6, forecast.iterations(job.settings)
+        )
+        for job, config in forecast.planned_jobs(selected(words, lambda config: ()))
+    )
+    assert expected.seconds == pytest.approx(by_hand)
+
+
+def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, tmp_path):
+    words = ["datasets=[engine,wood,orbital]", "views=small", "fit=quick", "missing=skip", "edits=[style]"]
+    assert main(["doctor", *words]) == 0
+    told = capsys.readouterr().out
+    assert re.search(r"ok +data set engine +to be downloaded from https://", told)
+    assert re.search(r"ok +data set orbital +generated: orbital", told)
+    assert re.search(r"left out data set wood: .*woodbranch\S* is not there", told)
+    assert re.search(r"left out edit style: .*weights of vgg16 are not on this machine", told)
+    assert re.search(r"jobs +\d+ to do \(.*4 views.*\), 0 done", told)
+    assert re.search(r"time +about \d+\.\d hours: an estimate", told)
+    assert not list(tmp_path.iterdir())  # nothing is written
+
+
+def test_a_run_that_would_not_start_is_told(capsys):
+    assert main(["doctor", "dataset=wood", "fit=quick"]) == 1
+    assert re.search(r"missing +data set wood: .* is not there", capsys.readouterr().out)
+    assert main(["doctor", "--experiment", "papr"]) == 2
+    assert "paper" in capsys.readouterr().err

@@ -1,0 +1,160 @@
+"""A user study from the command line: made of tiny scenes, answered, counted."""
+
+import base64
+import json
+import re
+from itertools import permutations
+
+import av
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.fields.voxels.test_voxels import ball
+from tests.report.studies import WORDS, edit, fit
+from texgs.cli.main import main
+from texgs.fields.voxels.file import write_voxels
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
+
+EDITS = ("arf_quick", "stylesplat_quick", "texgs_style")
+SMALL = ("--size", "64", "--frames", "2")
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch):
+    """Results with three edits by a picture and two by an instruction, below the current folder."""
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "results"
+    model = write_voxels(tmp_path / "model.safetensors", ball(side=16, spacing=0.04))
+    jobs = [
+        fit(folder, "plenoxels_quick"),
+        *(edit(folder, name, "plenoxels_quick", method="arf") for name in EDITS),
+    ]
+    jobs += [
+        edit(folder, name, "plenoxels_quick", "engine", WORDS, "in2n") for name in ("in2n_quick", "dge_quick")
+    ]
+    for job in jobs:
+        write_scene(job.with_name("scene.yaml"), Scene({"TF01": SceneModel(model)}))
+        Image.fromarray(np.zeros((8, 8, 3), dtype=np.uint8)).save(job.with_name("style.png"))
+    return folder
+
+
+def key(folder):
+    return json.loads((folder / "key.json").read_text())
+
+
+def vote(folder, ballot, ranks):
+    """The ballot that gives methods these ranks, by the name of the edit."""
+    known = key(folder)
+    lines = [
+        f"{known['study']},{ballot},{number},{'ABC'[place]},{ranks[option['edit']]}"
+        for number, question in enumerate(known["questions"], start=1)
+        for place, option in enumerate(question["options"])
+    ]
+    (folder / "votes").mkdir(exist_ok=True)
+    path = folder / "votes" / f"ballot-{ballot}.csv"
+    path.write_text("\n".join(["study,ballot,question,option,rank", *lines]))
+    return path
+
+
+def test_a_study_is_made_answered_and_counted(results, capsys):
+    assert main(["study", *SMALL]) == 0
+    out = capsys.readouterr().out
+    assert "1. engine, image-driven: arf_quick, stylesplat_quick, texgs_style" in out
+    assert "2. engine, text-driven: dge_quick, in2n_quick" in out
+    for number, order in enumerate(permutations((2, 3))):
+        ranks = {"stylesplat_quick": 1, "arf_quick": order[0], "texgs_style": order[1]}
+        vote(results / "study", f"{number}", {**ranks, "in2n_quick": 2, "dge_quick": 1})
+    assert main(["votes"]) == 0
+    table = (results / "tables" / "user_study.md").read_text()
+    assert capsys.readouterr().out.strip() == table.strip()
+    line = r"\| image-driven \| all 1 \| - \| plenoxels_quick \| stylesplat_quick \| arf \| 2 \| 0 \| 0 \|"
+    assert re.search(line, table)
+    assert "| image-driven | wood | - | - | the paper | TexGS-VolVis | 8 | 2 | 0 | 0 |" in table
+    assert sorted(path.name for path in (results / "tables").iterdir()) == [
+        "user_study.csv",
+        "user_study.md",
+        "user_study.png",
+        "user_study.tex",
+    ]
+
+
+def test_what_voters_get_names_no_method(results, tmp_path):
+    assert main(["study", *SMALL, "--output", "out"]) == 0
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert names == {"ballot.html", "key.json"}
+    page = (tmp_path / "out" / "ballot.html").read_text()
+    films = re.findall(r"<template>(.*?)</template>", page)
+    assert len(films) == 2
+    for film in films:
+        page = page.replace(film, "")
+        (tmp_path / "film.mp4").write_bytes(base64.b64decode(film))
+        with av.open(str(tmp_path / "film.mp4")) as opened:
+            told = str([opened.metadata, *(stream.metadata for stream in opened.streams)])
+        assert not named(told), "in the film"
+    page = re.sub(r"base64,[\w+/=]+", "", page)
+    assert not named(page)
+    assert {
+        option["edit"] for question in key(tmp_path / "out")["questions"] for option in question["options"]
+    } == {
+        *EDITS,
+        "in2n_quick",
+        "dge_quick",
+    }
+
+
+def named(text):
+    """Names of methods, recipes and texgs in a text, in any case; `style` is a word of HTML too."""
+    names = (
+        r"arf|style[_-]?splat|style[_-]?rf|in2n|igs2gs|ig2g|dge|texgs|plenoxels|voxel|surfel|gaussian|_quick"
+    )
+    return re.findall(rf"\b\w*(?:{names})\w*", text, flags=re.IGNORECASE)
+
+
+def test_the_seed_decides_the_order_and_the_id_is_that_of_the_clips(results, tmp_path):
+    for name, words in {"a": [], "b": [], "c": ["--seed", "1"]}.items():
+        assert main(["study", *SMALL, "--edits", *EDITS, *words, "--output", name]) == 0
+    a, b, c = (key(tmp_path / name) for name in "abc")
+    assert a == b
+    assert (tmp_path / "a" / "ballot.html").read_bytes() == (tmp_path / "b" / "ballot.html").read_bytes()
+    assert len(a["questions"]) == 1
+    assert a["questions"][0]["options"] != c["questions"][0]["options"]
+    assert a["study"] in (tmp_path / "a" / "ballot.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["none"], "study: no scenes with a new look among the results; run something first"),
+        (["--edits", "gold"], "--edits: expected some of arf_quick, dge_quick, .*, got gold"),
+        (["--edits", "arf_quick"], r"got only one of each \(engine arf_quick\); run edits of other methods"),
+        (["--size", "8"], "--size: expected 64 to 1024 pixels, got 8"),
+        (["--size", "64", "--frames", "0"], "count: expected at least 1 camera, got 0"),
+    ],
+)
+def test_a_study_that_cannot_be_made_leaves_nothing(results, tmp_path, capsys, words, message):
+    assert main(["study", *words, "--output", "out"]) == 2
+    assert re.search(message, capsys.readouterr().err)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_study_is_not_overwritten(results, capsys):
+    assert main(["study", *SMALL, "--edits", *EDITS]) == 0
+    before = (results / "study" / "ballot.html").read_bytes()
+    assert main(["study", *SMALL]) == 2
+    said = "results/study/key.json: there is a study already, whose ballots need it; choose another --output"
+    assert said in capsys.readouterr().err
+    assert (results / "study" / "ballot.html").read_bytes() == before
+
+
+def test_votes_that_cannot_be_counted_leave_no_table(results, capsys):
+    assert main(["votes"]) == 2
+    assert "results/study/key.json: no such file" in capsys.readouterr().err
+    assert main(["study", *SMALL, "--edits", *EDITS]) == 0
+    assert main(["votes"]) == 2
+    assert "votes: no ballots in results/study/votes; put the files there" in capsys.readouterr().err
+    vote(results / "study", "aa", dict.fromkeys(EDITS, 1))
+    assert main(["votes"]) == 2
+    assert re.search("question 1: expected each rank from 1 to 3 once, got A 1, B 1", capsys.readouterr().err)
+    assert not (results / "tables").exists()

@@ -1,0 +1,58 @@
+"""Jobs of sweeps: which ones there are, what they share, and what tells them apart."""
+
+from collections import Counter
+
+import pytest
+
+from texgs.cli.parents import WHOLE, of_sweep, owner
+from texgs.cli.plan import make, words_of
+from texgs.core.errors import ConfigError
+
+FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
+
+
+@pytest.fixture
+def planned(tmp_path, monkeypatch):
+    """Makes a plan in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    return lambda overrides, **words: make(words_of({**FITS, **words, "overrides": overrides}))[0]
+
+
+def stages(plan):
+    return Counter(job["stage"] for job in plan.jobs.values())
+
+
+def test_a_sweep_of_edits_has_the_jobs_of_one_fit(planned):
+    single = stages(planned("edit.text.size=64", edit="gold"))
+    swept = stages(planned("edit.text.size=64,128,256 edit.seed=0,1", edit="gold"))
+    assert single["edit_text"] == single["edit_metrics"] == 1
+    assert swept == {**single, "edit_text": 6, "edit_metrics": 6}
+
+
+def test_variants_with_the_same_fit_share_it(planned):
+    swept = stages(planned("edit.text.size=64,128 fit.low_pass=2,6", edit="gold"))
+    assert (swept["texture"], swept["edit_text"]) == (2, 4)
+
+
+def test_jobs_know_the_values_that_are_theirs_alone(planned):
+    plan = planned("views.train.frequency=1,2 fit.seed=0,1")
+    told = {folder.removeprefix("results/sphere/"): job["swept"] for folder, job in plan.jobs.items()}
+    frequency = "views.train.frequency"
+    assert told["volume"] == {}
+    assert told["TF01/views-1"] == {frequency: "1"}
+    assert told["TF01/demo-2-s1/texture"] == {frequency: "2", "fit.seed": "1"}
+    assert of_sweep(plan, "frequency").params == {"keys": f"fit.seed, {frequency}"}
+
+
+def test_jobs_of_one_sweep_are_in_its_run_and_others_in_that_of_all(planned):
+    plan = planned("+sweeps.views=sphere")
+    assert owner(plan, "results/sphere/TF01/demo-42/texture") == "views"
+    assert owner(plan, "results/sphere/TF01/demo/texture") == WHOLE
+    assert owner(plan, "results/sphere/volume") == WHOLE, "both have it"
+
+
+def test_two_variants_of_one_folder_are_refused(planned):
+    given = {"a": ["views.name=views-b", "views.width=16"], "b": ["views.width=32"]}
+    words = " ".join(f'"+sweep.variants.{name}={listed}"' for name, listed in given.items())
+    with pytest.raises(ConfigError, match="two variants go there; give one another name"):
+        planned(f"sweep.name=x {words}")

@@ -1,0 +1,78 @@
+"""What the tracking store is told of a job."""
+
+import json
+
+import pytest
+
+from texgs.cli.job import Job
+from texgs.cli.tracked import RUNS, Tracking, curves, name, of_workflow, scalars, tags
+from texgs.config.compose import compose
+from texgs.config.product import as_sweep
+from texgs.config.stage import for_tf
+from texgs.config.stages import STAGES
+from texgs.config.sweep import variants
+from texgs.core.checksum import Checksums
+from texgs.report.results import Comparison, FitResult, PseResult, plain
+from texgs.track import PARENT
+
+GOLD = ("edit=gold", "edit.text.size=64,128")
+IDENTITY = {"settings": "0123", "code": "4567"}
+
+
+def job(stage, words, tf=None):
+    """The job of the last variant of some words."""
+    config = compose(variants(as_sweep(("dataset=sphere", "fit=demo", *words)))[-1])
+    return Job.of(STAGES[stage], for_tf(config, tf) if tf else config, Checksums())
+
+
+@pytest.mark.parametrize(
+    ("stage", "words", "tf", "expected"),
+    [
+        ("volume", (), None, "sphere volume"),
+        ("texture", ("fit.seed=3",), "TF01", "sphere TF01 demo-s3 texture"),
+        ("texture", ("fit.low_pass=2,6",), "TF01", "sphere TF01 demo-6 texture"),
+        ("edit_text", (*GOLD, "edit.seed=0,1"), None, "sphere demo-128-e1 gold edit_text"),
+        ("views", ("views.train.frequency=1,2",), "TF01", "sphere TF01 views views.train.frequency=2"),
+    ],
+)
+def test_names_tell_variant_seed_and_edit(stage, words, tf, expected):
+    assert name(job(stage, words, tf)) == expected
+
+
+def test_tags_are_of_what_a_job_is_and_leave_out_what_it_is_not():
+    found = tags(job("edit_text", (*GOLD, "edit.seed=0,1")), IDENTITY, "abc")
+    expected = {"stage": "edit_text", "dataset": "sphere", "recipe": "demo", "field": "surfels"}
+    expected |= {"variant": "128", "sweep": "size", "seed": "1", "fit_seed": "0", "edit": "gold"}
+    assert found.items() >= {**expected, "device": "cpu", PARENT: "abc"}.items()
+    assert not tags(job("volume", ()), IDENTITY, None).keys() & {"tf", "variant", "sweep", "edit", PARENT}
+
+
+def test_losses_are_a_curve_over_iterations_and_times_one_over_frames():
+    fit = FitResult(1.0, 10, iterations=30, losses=[0.3, 0.2, 0.1])
+    assert list(curves(plain(fit))) == [(10, {"loss": 0.3}), (20, {"loss": 0.2}), (30, {"loss": 0.1})]
+    assert list(curves({"frames_ms": [4, 5]})) == [(0, {"frames_ms": 4.0}), (1, {"frames_ms": 5.0})]
+
+
+def test_edits_by_numbers_have_a_metric_each_and_their_mean():
+    compared = [Comparison("as fitted", 30.0, 0.9), Comparison("other colours", 20.0, 0.8)]
+    found = scalars(plain(PseResult(2, compared, [Comparison("light")])))
+    assert found == {
+        "views": 2.0,
+        "pse_psnr": 25.0,
+        "pse_psnr/as fitted": 30.0,
+        "pse_psnr/other colours": 20.0,
+        "pse_ssim": pytest.approx(0.85),
+        "pse_ssim/as fitted": 0.9,
+        "pse_ssim/other colours": 0.8,
+    }
+
+
+def test_the_workflow_says_which_run_a_job_is_inside_of(tmp_path, monkeypatch):
+    output = tmp_path / "a"
+    assert of_workflow(output) == (Tracking(None, "texgs"), {})
+    monkeypatch.setenv("TEXGS_TRACKING", "sqlite:///x.db")
+    monkeypatch.setenv(RUNS, str(tmp_path / "runs.json"))
+    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs"), {})
+    told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}}}
+    (tmp_path / "runs.json").write_text(json.dumps(told))
+    assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"})

@@ -1,0 +1,74 @@
+"""Ballots as the page saves them, and what is wrong with others."""
+
+import pytest
+
+from tests.report.studies import study
+from texgs.core.errors import ArgumentError
+from texgs.report.ballots import read_ballot, read_votes
+
+STUDY = study("xyz", "zy")
+LINES = ["1,A,2", "1,B,3", "1,C,1", "2,A,1", "2,B,2"]
+
+
+def ballot(folder, lines=LINES, name="aa", study=STUDY.study, file=None):
+    path = folder / (file or f"ballot-{name}.csv")
+    rows = "".join(f"{study},{name},{line}\n" for line in lines)
+    path.write_text(f"study,ballot,question,option,rank\n{rows}")
+    return path
+
+
+def test_ballots_are_read_in_the_order_of_their_ids(tmp_path):
+    paths = [ballot(tmp_path, name="bb", file="1.csv"), ballot(tmp_path, LINES[::-1], "aa", file="2.csv")]
+    votes = read_votes(STUDY, paths)
+    assert [each.ballot for each in votes.ballots] == ["aa", "bb"]
+    assert votes.ballots[0].ranks == votes.ballots[1].ranks == [[2, 3, 1], [1, 2]]
+
+
+def test_a_spreadsheet_may_have_saved_it(tmp_path):
+    path = ballot(tmp_path)
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes().replace(b"\n", b"\r\n"))
+    assert read_ballot(STUDY, path).ranks == [[2, 3, 1], [1, 2]]
+
+
+@pytest.mark.parametrize(
+    ("lines", "message"),
+    [
+        (LINES[:2] + LINES[3:], "question 1: expected each rank from 1 to 3 once, got A 2, B 3, C none; ask"),
+        (["1,A,2", "1,B,2", "1,C,1", *LINES[3:]], "question 1: expected each rank .* got A 2, B 2, C 1; ask"),
+        (["1,A,2", "1,B,3", "1,C,0", *LINES[3:]], "question 1: expected each rank .* got A 2, B 3, C 0"),
+        (["1,A,2", "1,B,3", "1,C,best", *LINES[3:]], "question 1: expected each rank .* C best"),
+        (LINES[:3], "question 2: expected each rank from 1 to 2 once, got A none, B none"),
+        ([*LINES, "2,C,3"], "question 2: expected options A to B, got C; ask the voter"),
+        ([*LINES, "3,A,1"], "expected questions 1 to 2, got question 3; ask the voter"),
+        ([*LINES, "2,B,2"], "question 2: expected one rank of B, got two; ask the voter"),
+        ([], "expected a ballot with the columns study, ballot, question, option, rank; ask the voter"),
+        (["1;A;1"], "expected a ballot with the columns"),
+    ],
+)
+def test_an_incomplete_ballot_is_refused(tmp_path, lines, message):
+    with pytest.raises(ArgumentError, match=rf"ballot-aa\.csv: {message}"):
+        read_ballot(STUDY, ballot(tmp_path, lines))
+
+
+def test_a_ballot_of_another_study_one_that_is_there_twice_and_other_files_are_refused(tmp_path):
+    with pytest.raises(
+        ArgumentError, match=r"b\.csv: expected study 0123456789ab, got ffff; count it with the key"
+    ):
+        read_ballot(STUDY, ballot(tmp_path, study="ffff", file="b.csv"))
+    paths = [ballot(tmp_path, file="one.csv"), ballot(tmp_path, file="two.csv")]
+    with pytest.raises(
+        ArgumentError, match=r"two\.csv: expected another ballot than .*one\.csv, got the same"
+    ):
+        read_votes(STUDY, paths)
+    both = paths[0].read_text() + ballot(tmp_path, name="bb").read_text().partition("\n")[2]
+    (tmp_path / "both.csv").write_text(both)
+    with pytest.raises(ArgumentError, match=r"both\.csv: expected ballot aa, got bb"):
+        read_ballot(STUDY, tmp_path / "both.csv")
+    (tmp_path / "picture.csv").write_bytes(b"\x89PNG\r\n\xff\xfe")
+    with pytest.raises(ArgumentError, match=r"picture\.csv: expected a ballot, got"):
+        read_ballot(STUDY, tmp_path / "picture.csv")
+    (tmp_path / "long.csv").write_text("study\n" * 300_000)
+    with pytest.raises(ArgumentError, match=r"long\.csv: expected a ballot of at most 1048576 bytes"):
+        read_ballot(STUDY, tmp_path / "long.csv")
+    with pytest.raises(ArgumentError, match=r"none\.csv: no such file"):
+        read_ballot(STUDY, tmp_path / "none.csv")

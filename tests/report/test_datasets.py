@@ -1,0 +1,46 @@
+from tests.report.written import lines, metrics, records, rows
+from texgs.report.datasets import datasets
+from texgs.report.results import SheetResult, ViewsResult, VolumeResult
+from texgs.report.table import UNLIKE
+
+LATTICE = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
+
+
+def test_data_sets_by_size_of_their_views(tmp_path):
+    metrics(tmp_path, "volume", VolumeResult([4, 5, 6], "uint8", **LATTICE, volume_mib=2.5))
+    for tf, size, ms in (("TF01", 64, 10.0), ("TF02", 64, 30.0), ("TF01", 512, 500.0)):
+        metrics(tmp_path, "views", ViewsResult(9, 2, size, size, frame_ms=ms), tf=tf)
+    table = datasets(records(tmp_path))
+    by_size = {row["image, pixels"]: row for row in rows(table)}
+    small, large = by_size["64x64"], by_size["512x512"]
+    assert (small["basic scenes"], small["ms / frame"]) == (2, 20.0)
+    assert (large["basic scenes"], large["ms / frame"]) == (1, 500.0)
+    assert (small["volume, samples"], small["volume MiB"]) == ("4x5x6", 2.5)
+    assert (small["samples (paper)"], small["MiB (paper)"]) == ("256x256x128", 32.0)
+    assert (small["ms / frame (paper)"], large["ms / frame (paper)"]) == (UNLIKE, 16.14)
+    sources = [[path.stem for path in row.sources] for row in table.rows]
+    assert sorted(sources) == [["0000", "0001", "0002"], ["0000", "0003"]]
+
+
+def test_data_sets_are_in_the_papers_order_and_stand_ins_below(tmp_path):
+    names = [line["dataset"] for line in lines("datasets")]
+    views = ViewsResult(9, 2, 800, 800, frame_ms=1.0)
+    for name in [*sorted(names), "another"]:
+        metrics(tmp_path, "views", views, name, "TF01")
+    metrics(tmp_path, "views", views, "jets", "TF01", stand_in="five jets")
+    found = rows(datasets(records(tmp_path)))
+    assert [row["data set"] for row in found] == [
+        names[0],
+        "jets, stand-in for five jets",
+        *names[1:],
+        "another",
+    ]
+    assert [found[1][c] for c in ("samples (paper)", "MiB (paper)", "ms / frame (paper)")] == [None] * 3
+
+
+def test_published_views_have_a_row_without_a_volume(tmp_path):
+    for tf in ("TF01", "TF04"):
+        metrics(tmp_path, "sheet", SheetResult(92, 181, 800, 800), "vortex", tf)
+    (row,) = rows(datasets(records(tmp_path)))
+    assert (row["image, pixels"], row["basic scenes"], row["volume, samples"]) == ("800x800", 2, None)
+    assert row["basic scenes (paper)"] == 1

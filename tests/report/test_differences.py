@@ -1,0 +1,100 @@
+"""Where recipes are not as in the paper: its values are ones that their keys can have, and make no rows."""
+
+import pytest
+from omegaconf import OmegaConf
+
+from texgs.config.compose import compose
+from texgs.config.describe import keys
+from texgs.config.methods import methods
+from texgs.core.errors import ConfigError
+from texgs.report.differences import ALL, compared, differences, published, text
+
+
+def told(*arguments, **options):
+    """Rows of keys: what, the paper, here, in."""
+    return [tuple(row.cells[:4]) for row in differences(*arguments, **options).rows if row.cells[3] != ALL]
+
+
+def override(claim):
+    return f"{claim.key}={text(claim.paper)}"
+
+
+@pytest.mark.parametrize("claim", published().keys, ids=lambda claim: claim.key)
+def test_keys_are_there_and_can_have_the_papers_values(claim):
+    group, method, *rest = claim.key.split(".")
+    if group == "edit" and rest[0] == "recipe":
+        numbers = methods()[method].numbers(methods()[method].settings(recipe="paper"))
+        assert rest[1] in numbers
+    else:
+        assert claim.key in {key.name for key in keys()}
+        assert text(OmegaConf.select(compose((override(claim),)), claim.key)) == text(claim.paper)
+    assert claim.where
+    assert claim.of is None or claim.of in {other.key for other in published().keys}
+
+
+def test_the_papers_recipes_differ_in_what_is_known():
+    """c_ind starts from the zeroth harmonic and keeps the rate that it has in 2DGS, as in the release."""
+    assert told(["paper"]) == [("fit.shading.rates.colors", "0.01", "0.0007", "paper")]
+    assert told([], ["style_paper", "text_paper", "lobe_paper"], ["paper"]) == []
+
+
+def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
+    config = compose(("fit=quick", *(override(c) for c in published().keys if c.key.startswith("fit."))))
+    folder = tmp_path / "conf" / "fit"
+    folder.mkdir(parents=True)
+    OmegaConf.save(OmegaConf.merge(config.fit, {"name": "mine"}), folder / "mine.yaml")
+    OmegaConf.save(
+        OmegaConf.merge(config.fit, {"name": "other", "texture": {"rate": 0.5}}), folder / "other.yaml"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert told(["mine"]) == []
+    assert told(["mine", "other"]) == [("fit.texture.rate", "0.025", "0.5", "other")]
+
+
+def test_recipes_with_the_same_difference_share_a_row():
+    rows = told(["quick", "default"])
+    assert ("fit.materials", "surfel", "shared", "quick, default") in rows
+    assert ("fit.shading.iterations", "20000", "2000", "quick") in rows
+    assert ("fit.shading.iterations", "20000", "8000", "default") in rows
+    assert not {"fit.surfels.rates.sh", "fit.texture.rate"} & {row[0] for row in rows}, "of what is not run"
+
+
+def test_numbers_of_an_edits_recipe_are_those_it_runs_with():
+    rows = told([], ["style", "text_quick", "lambda_50"])
+    assert ("edit.image.recipe.iterations", "3000", "100", "style, lambda_50") in rows
+    assert ("edit.image.recipe.lambda_s", "0.9", "0.5", "lambda_50") in rows
+    assert ("edit.text.recipe.views", "nearest", "axes", "text_quick") in rows
+    assert ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick") in rows
+
+
+def test_what_has_nothing_to_compare_is_left_out():
+    assert told(["gaussians", "quick-variant"], ["none", "arf", "of-the-user"], ["nowhere"]) == []
+    assert list(compared("fit", "gaussians")) == []
+
+
+def test_what_no_key_expresses_is_always_told():
+    rows = [row.cells for row in differences([]).rows]
+    assert len(rows) == len(published().others) > 10
+    assert all(all(cells) for cells in rows)
+    assert {"transfer functions", "style pictures", "text prompts"} <= {cells[0] for cells in rows}
+
+
+def test_a_file_that_cannot_be_composed_is_named(tmp_path, monkeypatch):
+    folder = tmp_path / "conf" / "fit"
+    folder.mkdir(parents=True)
+    (folder / "mine.yaml").write_text("name: mine\ntextur: {}\n")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(ConfigError, match="textur"):
+        differences(["mine"])
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [(None, "null"), (True, "true"), (1.6e-4, "0.00016"), ((2.0, 0.5), "[2, 0.5]"), ("", '""'), ("a", "a")],
+)
+def test_values_are_written_as_in_files(value, expected):
+    assert text(value) == expected
+
+
+def test_cells_do_not_break_tables():
+    assert "|" not in "".join(cell for row in differences(["quick"], ["style"]).rows for cell in row.cells)

@@ -1,0 +1,107 @@
+import pytest
+
+from tests.report.written import lines, metrics, records, rows
+from texgs.report.editing import image_driven, text_driven, text_driven_frozen
+from texgs.report.results import EditMeasures, EditResult
+
+OWN = {  # columns by the headings of the paper's files
+    "editing_min": "minutes",
+    "model_mb": "MB",
+    "render_mean_ms": "mean ms",
+    "render_max_ms": "max ms",
+    "primitives": "primitives",
+    "clip_similarity": "CLIP similarity",
+    "clip_directional_similarity": "CLIP direction",
+}
+TABLES = {  # table, file of the paper, what edits follow, size of images
+    "image": (image_driven, "image_npse", "style", 800),
+    "text": (text_driven, "text_npse", "instruction", 512),
+}
+
+
+def edit(
+    folder, name, values, *, follows, dataset="engine", field="surfels", method="text", kept=True, **facts
+):
+    """Metrics of an edit and of its measures, by the headings of the paper's files; returns their paths."""
+    result = EditResult(name, method, "how", 60 * values.get("editing_min", 1.0), follows=follows)
+    measured = EditMeasures(
+        name,
+        method,
+        values.get("render_mean_ms", 4.0),
+        values.get("render_max_ms", 5.0),
+        round(values.get("primitives") or 9),
+        values.get("model_mb", 1.0),
+        kept,
+        width=facts.pop("pixels", 512),
+        height=512,
+        similarity=values.get("clip_similarity"),
+        direction=values.get("clip_directional_similarity"),
+        clip="B/32",
+    )
+    facts |= {"field": field}
+    paths = [metrics(folder, f"edit_{method}", result, dataset, **facts)]
+    return [*paths, metrics(folder, "edit_metrics", measured, dataset, **facts)]
+
+
+@pytest.mark.parametrize("driven", list(TABLES))
+def test_means_over_four_data_sets_are_the_papers_rows(tmp_path, driven):
+    """Values around the paper's means give these; a stand-in far from them changes nothing."""
+    make, name, follows, _ = TABLES[driven]
+    published = lines(name)
+    for line in published:
+        numbers = {key: value for key, value in line.items() if isinstance(value, float)}
+        for dataset, factor in zip("abcd", (0.6, 0.8, 1.2, 1.4), strict=True):
+            values = {key: value * factor for key, value in numbers.items()}
+            edit(tmp_path, line["method"], values, follows=follows, dataset=dataset)
+        far = {key: 100 * value for key, value in numbers.items()}
+        edit(tmp_path, line["method"], far, follows=follows, dataset="e", stand_in="a")
+    found = rows(make(records(tmp_path)))
+    theirs = {row["method"]: row for row in found if row["recipe"] == "the paper"}
+    means = {row["edit"]: row for row in found if row["data set"] == "mean of 4" and row["recipe"] == "quick"}
+    assert len(found) == len(published) * 7
+    for line in published:
+        for key, title in OWN.items():
+            if isinstance(line.get(key), float):
+                assert means[line["method"]][title] == pytest.approx(line[key], rel=2e-5)
+                assert theirs[line["method"]][title] == line[key]
+            elif key in line:
+                assert theirs[line["method"]][title] == "-", "the paper counts no voxels"
+        assert means[line["method"]]["geometry kept"] == "bit for bit"
+
+
+def test_each_kind_of_edit_has_its_own_table(tmp_path):
+    edit(tmp_path, "painted", {}, follows="style", method="image")
+    edit(tmp_path, "gold", {}, follows="instruction")
+    edit(tmp_path, "lambda", {}, follows="style", method="image", sweep="lambda_s", variant="0")
+    metrics(tmp_path, "edit_segment", EditResult("pick", "segment", "grabcut", 6.0))
+    of_images, of_texts = (rows(make(records(tmp_path)))[0:1] for make in (image_driven, text_driven))
+    assert [row["edit"] for row in of_images] == ["painted"]
+    assert [row["edit"] for row in of_texts] == ["gold"]
+    assert "CLIP similarity" not in of_images[0], "the paper measures it of texts"
+    assert text_driven_frozen(records(tmp_path)).rows == []
+
+
+def test_other_methods_with_frozen_geometry_are_compared_by_themselves(tmp_path):
+    options = {"follows": "instruction", "field": "gaussians", "method": "dge"}
+    edit(tmp_path, "dge", {}, **options, kept=False)
+    edit(tmp_path, "dge_frozen", {}, **options, kept=True)
+    edit(tmp_path, "text", {}, follows="instruction")
+    free, frozen = (rows(make(records(tmp_path))) for make in (text_driven, text_driven_frozen))
+    assert [row["edit"] for row in free if row["recipe"] != "the paper"] == ["dge", "text"]
+    assert [row["edit"] for row in frozen] == ["dge_frozen", "text"]
+
+
+def test_pictures_that_keep_geometry_are_not_frozen(tmp_path):
+    edit(tmp_path, "arf", {}, follows="style", field="voxels", method="arf", kept=True)
+    assert rows(image_driven(records(tmp_path)))[0]["edit"] == "arf"
+
+
+def test_a_row_leads_to_the_edit_and_its_measures(tmp_path):
+    paths = edit(tmp_path, "gold", {"clip_similarity": 0.3}, follows="instruction")
+    metrics(tmp_path, "edit_text", EditResult("late", "text", "how", 6.0, follows="instruction"))
+    table = text_driven(records(tmp_path))
+    gold, late = rows(table)[:2]
+    assert table.rows[0].sources == paths
+    assert (gold["pixels"], gold["CLIP similarity"]) == ("512x512", 0.3)
+    assert (late["pixels"], late["mean ms"], late["minutes"]) == (None, None, 0.1)
+    assert "CLIP of the scores: B/32;" in table.caption

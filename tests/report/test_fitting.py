@@ -1,0 +1,133 @@
+from dataclasses import replace
+
+import pytest
+
+from tests.report.written import lines, metrics, records, rows
+from texgs.report.fitting import fits, fitting
+from texgs.report.results import FitResult
+from texgs.report.table import UNLIKE
+
+MEASURES = {
+    "PSNR": "psnr",
+    "SSIM": "ssim",
+    "minutes": "minutes",
+    "CPU GiB": "cpu_gb",
+    "GPU GiB": "gpu_gb",
+    "primitives": "primitives",
+}
+SIZES = {line["dataset"]: line for line in lines("datasets")}
+
+
+def phase_of(line, factor, **more):
+    """A phase whose measures are some multiple of the paper's."""
+    pixels = int(SIZES[line["dataset"]]["image_px"])
+    return FitResult(
+        60 * line["minutes"] * factor,
+        round(line["primitives"] * factor),
+        psnr=line["psnr"] * factor,
+        ssim=line["ssim"] * factor,
+        peak_gpu_memory_mib=1024 * line["gpu_gb"] * factor,
+        **{"train_views": 162, "width": pixels, "height": pixels} | more,
+    )
+
+
+def write_paper(folder):
+    """Metrics whose means are the paper's numbers: 10 % above and below where a data set has two scenes."""
+    for line in lines("fitting"):
+        scenes = int(SIZES[line["dataset"]]["basic_scenes"])
+        for index, factor in enumerate([1.0] if scenes == 1 else [0.9, 1.1]):
+            metrics(
+                folder,
+                line["phase"],
+                phase_of(line, factor),
+                line["dataset"],
+                f"TF{index}",
+                recipe="paper",
+                peak_memory_mib=1024 * line["cpu_gb"] * factor,
+            )
+
+
+def test_means_of_the_papers_basic_scenes_are_the_papers_rows(tmp_path):
+    write_paper(tmp_path)
+    found, expected = rows(fitting(records(tmp_path))), lines("fitting")
+    assert [(row["data set"], row["phase"]) for row in found] == [
+        (line["dataset"], line["phase"]) for line in expected
+    ]
+    for row, line in zip(found, expected, strict=True):
+        assert row["recipe"] == "paper"
+        assert row["basic scenes"] == SIZES[line["dataset"]]["basic_scenes"]
+        for title, key in MEASURES.items():
+            assert row[title] == pytest.approx(line[key], rel=2e-5), "primitives are whole numbers"
+            assert row[f"{title} (paper)"] == line[key]
+
+
+def test_other_recipes_and_sizes_have_a_sign_and_the_paper_rows_of_its_own(tmp_path):
+    line = next(line for line in lines("fitting") if line["dataset"] == "engine")
+    result = phase_of(line, 1.0)
+    for recipe, changed in (
+        ("quick", result),
+        ("paper", replace(result, width=400)),
+        ("paper", replace(result, train_views=92)),
+        ("paper", replace(result, width=None, height=None)),
+    ):
+        path = metrics(tmp_path, "surfels", changed, tf="TF01", recipe=recipe)
+        table = fitting(records(tmp_path))
+        own = [row for row in rows(table) if row["recipe"] != "the paper"]
+        assert [row["PSNR (paper)"] for row in own] == [UNLIKE]
+        assert own[0]["PSNR"] == line["psnr"]
+        theirs = [row for row in rows(table) if row["recipe"] == "the paper"]
+        assert len(theirs) == 24
+        assert [row["PSNR"] for row in theirs if row["data set"] == "engine"] == [30.15, 33.25, 33.29]
+        assert "not like for like" in table.caption
+        path.unlink()
+
+
+def test_a_variant_of_the_recipe_is_not_the_recipe(tmp_path):
+    line = next(line for line in lines("fitting") if line["dataset"] == "engine")
+    metrics(tmp_path, "surfels", phase_of(line, 1.0), tf="TF01", recipe="paper", variant="hand")
+    own = [row for row in rows(fitting(records(tmp_path))) if row["recipe"] == "paper-hand"]
+    assert [row["PSNR (paper)"] for row in own] == [UNLIKE]
+
+
+def test_data_that_the_paper_does_not_have_stand_alone(tmp_path):
+    metrics(tmp_path, "surfels", FitResult(60.0, 9, psnr=30.0), "scan", "TF01")
+    (row,) = rows(fitting(records(tmp_path)))
+    assert (row["data set"], row["PSNR"], row["PSNR (paper)"]) == ("scan", 30.0, None)
+
+
+def test_a_stand_in_has_a_row_of_its_own_without_the_papers_numbers(tmp_path):
+    line = next(line for line in lines("fitting") if line["dataset"] == "five_jets")
+    metrics(tmp_path, "surfels", phase_of(line, 1.0), "jets", "TF01", recipe="paper", stand_in="five jets")
+    found = rows(fitting(records(tmp_path)))
+    assert [row["data set"] for row in found[:4]] == ["five_jets"] * 3 + ["jets, stand-in for five jets"]
+    assert [row["recipe"] for row in found[:4]] == ["the paper"] * 3 + ["paper"]
+    assert [found[3][f"{title} (paper)"] for title in MEASURES] == [None] * 6
+
+
+def test_a_measure_that_a_basic_scene_lacks_has_no_mean(tmp_path):
+    metrics(tmp_path, "shading", FitResult(60.0, 10, psnr=30.0), "scan", "TF01")
+    metrics(tmp_path, "shading", FitResult(120.0, 20), "scan", "TF02")
+    (row,) = rows(fitting(records(tmp_path)))
+    assert (row["PSNR"], row["minutes"], row["primitives"]) == (None, 1.5, 15)
+
+
+def test_phases_of_a_field_that_is_not_here_any_more_are_shown(tmp_path):
+    metrics(tmp_path, "ball", FitResult(60.0, 9), "scan", "TF01", field="ball")
+    metrics(tmp_path, "texture", FitResult(60.0, 9), "scan", "TF01")
+    assert [row["phase"] for row in rows(fitting(records(tmp_path)))] == ["texture", "ball"]
+
+
+def test_fits_are_listed_one_by_one_but_for_those_of_sweeps(tmp_path):
+    for tf in ("TF02", "TF01"):
+        for phase in ("texture", "shading"):
+            metrics(tmp_path, phase, FitResult(90.0, 7), tf=tf)
+    metrics(tmp_path, "texture", FitResult(90.0, 7), tf="TF01", sweep="views", variant="42")
+    found = rows(fits(records(tmp_path)))
+    assert [(row["TF"], row["phase"]) for row in found] == [
+        ("TF01", "shading"),
+        ("TF01", "texture"),
+        ("TF02", "shading"),
+        ("TF02", "texture"),
+    ]
+    assert {row["minutes"] for row in found} == {1.5}
+    assert all("42" not in row["recipe"] for row in rows(fitting(records(tmp_path))))

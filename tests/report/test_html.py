@@ -1,0 +1,166 @@
+import base64
+import io
+import re
+from html.parser import HTMLParser
+
+import pytest
+from PIL import Image
+
+from tests.report.studies import study
+from tests.report.written import metrics
+from texgs.report.ballots import Ballot, Votes
+from texgs.report.html import write_report
+from texgs.report.left_out import LeftOut
+from texgs.report.results import (
+    ComparisonResult,
+    EditResult,
+    FitResult,
+    GalleryResult,
+    PseResult,
+    SheetResult,
+    TimingResult,
+)
+from texgs.report.sections import SECTIONS
+
+VOID = {"meta", "img", "br"}
+
+
+class Page(HTMLParser):
+    """What a browser would find: headings in order, anchors and links, and captions of figures."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.ids, self.links, self.sources, self.open, self.texts = [], [], [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        values = dict(attributes)
+        self.ids += [values["id"]] if "id" in values else []
+        self.links += [values["href"]] if "href" in values else []
+        self.sources += [values["src"]] if "src" in values else []
+        self.open += [] if tag in VOID else [tag]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if data.strip() and self.open:
+            self.texts.append((self.open[-1], data.strip()))
+
+    def of(self, tag):
+        return [text for name, text in self.texts if name == tag]
+
+
+def job(folder, stage, result, pictures=(), **facts):
+    """Metrics of a job in a folder of its own, with pictures."""
+    place = folder / f"{len(list(folder.iterdir()))}-{stage}"
+    place.mkdir()
+    for name in pictures:
+        Image.new("RGB", (8, 4), "red").save(place / name)
+    words = {name: f"Words of {name}." for name in pictures}
+    return metrics(place, stage, result, pictures=words, **facts)
+
+
+@pytest.fixture
+def paths(tmp_path):
+    folder = tmp_path / "jobs"
+    folder.mkdir()
+    edit = EditResult("painted", "image", "how", 6.0, follows="style", followed={"TF01": "strokes"})
+    part = EditResult("red", "text", "how", 6.0, follows="instruction", followed={"TF01/lobe": "red"})
+    timing = TimingResult(4.0, 5.0, 4.0, primitives=9, width=8, height=6, threads=2)
+    return [
+        job(folder, "gallery", GalleryResult(["before", "painted", "red"]), ["gallery.png"], recipe=None),
+        job(folder, "timing", timing),
+        job(folder, "edit_text", part, ["edit.png"], recipe="other"),
+        job(folder, "edit_image", edit, ["edit.png", "style-TF01.png"]),
+        job(folder, "pse", PseResult(6, [], []), ["pse.png", "relight.png"]),
+        job(folder, "texture", FitResult(60.0, 9, 10, [2.0, 1.0]), tf="TF01"),
+        job(
+            folder,
+            "comparison",
+            ComparisonResult(["a", "b"], ["0"]),
+            ["comparison.png"],
+            tf="TF01",
+            recipe=None,
+        ),
+        job(folder, "sheet", SheetResult(9, 2, 8, 4), ["sheet.png"], tf="TF01", recipe=None),
+        job(folder, "star_plot", SheetResult(9, 2, 8, 4), ["new.png"], recipe=None),
+    ]
+
+
+def page(tmp_path, paths, left_out=()):
+    return Page(write_report(tmp_path / "report.html", paths, left_out).read_text())
+
+
+def test_sections_are_in_the_papers_order_and_every_link_leads_somewhere(tmp_path, paths):
+    found = page(tmp_path, paths)
+    keys = [key for key in found.ids if key in SECTIONS]
+    assert keys == [key for key in SECTIONS if key in keys]
+    assert set(keys) == set(SECTIONS) - {"ablations", "sizes"}, "these have nothing to show"
+    assert len(found.ids) == len(set(found.ids))
+    assert {link for link in found.links if not link.startswith("#")} == set()
+    assert {link[1:] for link in found.links} <= set(found.ids)
+
+
+def test_every_figure_has_its_words_and_command(tmp_path, paths):
+    found = page(tmp_path, paths)
+    captions = " ".join(found.of("figcaption"))
+    names = ["gallery", "edit", "style-TF01", "pse", "relight", "comparison", "sheet", "new"]
+    assert all(f"Words of {name}.png." in captions for name in names)
+    assert set(found.of("code")) >= {
+        "texgs gallery dataset=engine fit=quick 'fits=[quick,other]' 'edits=[painted,red]'",
+        "texgs edit_image dataset=engine fit=quick edit=painted",
+        "texgs comparison dataset=engine tf=TF01 fit=a 'fits=[a,b]'",
+        "texgs sheet dataset=engine tf=TF01",
+    }
+    assert len(found.sources) == 11, "nine pictures, the curve of the fit and the paper's votes"
+    for source in found.sources:
+        kind, data = source.split(";base64,")
+        assert kind == "data:image/webp"
+        assert Image.open(io.BytesIO(base64.b64decode(data))).format == "WEBP"
+
+
+def test_figures_are_in_their_sections(tmp_path, paths):
+    text = write_report(tmp_path / "report.html", paths).read_text()
+    places = {match[1]: match.start() for match in re.finditer(r'<h2 id="([a-z-]+)"', text)}
+    bounds = sorted(places.values())
+
+    def section(words):
+        start = max(place for place in bounds if place < text.index(words))
+        return next(key for key, place in places.items() if place == start)
+
+    assert section("Words of sheet.png") == "data"
+    assert section("Words of comparison.png") == "fitting"
+    assert section("Words of relight.png") == "relight"
+    assert section("Words of gallery.png") == "image", "its first look follows a picture"
+    assert section("Words of style-TF01.png") == "image"
+    assert section("Words of new.png") == "more", "a stage that no section names"
+    assert section("edit=red") == "parts", "it follows words, but for a segment"
+
+
+def test_votes_have_their_table_and_figure(tmp_path, paths):
+    votes = Votes(study("xy"), [Ballot("a", [[1, 2]])])
+    text = write_report(tmp_path / "report.html", paths, votes=votes).read_text()
+    assert "1 ballots" in text
+    assert "<code>texgs votes</code>" in text
+    assert '<tr class="theirs">' in text
+    assert "<tr><td" in text
+
+
+def test_rows_lead_to_their_jobs(tmp_path, paths):
+    found = page(tmp_path, paths)
+    timing = sorted(paths).index(paths[1]) + 1
+    assert found.links.count(f"#job-{timing}") == 1
+    assert [key for key in found.ids if key.startswith("job-")] == [f"job-{n}" for n in range(1, 10)]
+
+
+def test_what_was_left_out_stands_on_top(tmp_path, paths):
+    old = tmp_path / "old.json"
+    old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
+    found = page(tmp_path, [*paths, old], [LeftOut("data set wood", "no <file>", ["phase"])])
+    assert found.ids[0] == "left-out"
+    first, second = found.of("li")[:2]
+    assert first == "data set wood: no <file>."
+    assert second.startswith("1 metrics file: of another version of texgs")
+    assert "left-out" not in page(tmp_path, paths).ids

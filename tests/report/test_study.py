@@ -1,0 +1,115 @@
+"""What is compared in which question, and the key."""
+
+import pytest
+
+from tests.report.studies import WORDS, edit, fit, job, study
+from texgs.core.errors import ArgumentError
+from texgs.report.metrics_files import below, read
+from texgs.report.results import EditResult
+from texgs.report.study import questions_of, rank_name, read_key, write_key
+
+
+def questions(results, edits=(), seed=0):
+    return questions_of(read(below(results)), edits, seed)
+
+
+def names(question):
+    return sorted(option.edit for option in question.options)
+
+
+def test_scenes_that_follow_the_same_are_one_question_pictures_first(tmp_path):
+    for dataset in ("wood", "engine"):
+        fit(tmp_path, dataset=dataset)
+        for name in ("arf", "style"):
+            edit(tmp_path, name, dataset=dataset)
+        for name in ("dge", "text"):
+            edit(tmp_path, name, dataset=dataset, followed=WORDS, method="text")
+    edit(tmp_path, "copper", dataset="wood", followed={"TF01": "make it copper"}, method="text")
+    found = questions(tmp_path)
+    assert [(each.follows, each.dataset, names(each)) for each in found] == [
+        ("style", "engine", ["arf", "style"]),
+        ("style", "wood", ["arf", "style"]),
+        ("instruction", "engine", ["dge", "text"]),
+        ("instruction", "wood", ["dge", "text"]),
+    ], "copper is alone with its instruction"
+    assert [len(each.pictures) for each in found] == [1, 1, 0, 0]
+    assert found[0].pictures[0].endswith("style.png")
+    assert found[0].options[0].scene.endswith(f"{found[0].options[0].edit}/scene.yaml")
+
+
+def test_the_order_is_random_and_that_of_the_seed(tmp_path):
+    fit(tmp_path)
+    for name in "abcde":
+        edit(tmp_path, name)
+    orders = [[option.edit for option in questions(tmp_path, seed=seed)[0].options] for seed in range(60)]
+    assert orders[7] == [option.edit for option in questions(tmp_path, seed=7)[0].options]
+    firsts = {name: sum(order[0] == name for order in orders) for name in "abcde"}
+    assert min(firsts.values()) >= 3, "12 are expected of each; fewer than 3 in one of 1,000 sets of seeds"
+
+
+def test_edits_are_chosen_and_the_scene_before_is_of_the_best_fit(tmp_path):
+    for recipe, psnr in (("quick", 30.0), ("plenoxels", 33.0), ("other", 40.0)):
+        fit(tmp_path, recipe, psnr=psnr)
+    edit(tmp_path, "style")
+    edit(tmp_path, "arf", recipe="plenoxels", method="arf")
+    edit(tmp_path, "untextured")
+    (question,) = questions(tmp_path, ["style", "arf"])
+    assert names(question) == ["arf", "style"]
+    assert question.original.endswith("scene/plenoxels/compose/scene.yaml"), "no clip is of `other`"
+
+
+def test_what_cannot_be_asked_is_told(tmp_path):
+    with pytest.raises(ArgumentError, match="no scenes with a new look among the results; run something"):
+        questions(tmp_path)
+    job(tmp_path / "core", "edit_segment", EditResult("core", "segment", "grabcut", 1.0))
+    with pytest.raises(ArgumentError, match="no scenes with a new look"):
+        questions(tmp_path)
+    edit(tmp_path, "style")
+    edit(tmp_path, "text", followed=WORDS)
+    with pytest.raises(ArgumentError, match=r"got only one of each \(engine style, engine text\); run edits"):
+        questions(tmp_path)
+    with pytest.raises(ArgumentError, match="--edits: expected some of style, text, got arf"):
+        questions(tmp_path, ["arf"])
+    edit(tmp_path, "arf")
+    with pytest.raises(ArgumentError, match=r"no scene of engine by quick before its edits .* texgs compose"):
+        questions(tmp_path)
+    fit(tmp_path)
+    for number in range(25):
+        edit(tmp_path, f"style{number}")
+    with pytest.raises(ArgumentError, match="at most 26 scenes in a question, got 27 of engine; choose some"):
+        questions(tmp_path)
+
+
+def test_ranks_have_the_papers_names():
+    assert [rank_name(rank, 4) for rank in (1, 2, 3, 4)] == ["best", "second-best", "second-worst", "worst"]
+    assert [rank_name(rank, 2) for rank in (1, 2)] == ["best", "worst"]
+    assert [rank_name(rank, 3) for rank in (1, 2, 3)] == ["best", "second-best", "worst"]
+    six = [rank_name(rank, 6) for rank in range(1, 7)]
+    assert six == ["best", "second-best", "rank 3", "rank 4", "second-worst", "worst"]
+
+
+def test_a_key_is_read_as_it_was_written(tmp_path):
+    path = write_key(tmp_path / "key.json", study("xyz", "zy"))
+    assert read_key(path) == study("xyz", "zy")
+    path.write_text('{"study": 3}')
+    with pytest.raises(
+        ArgumentError, match=r"key\.json: expected the key of a study, .* texgs study writes one"
+    ):
+        read_key(path)
+    with pytest.raises(ArgumentError, match=r"none\.json: no such file"):
+        read_key(tmp_path / "none.json")
+
+
+@pytest.mark.parametrize(
+    ("orders", "follows", "message"),
+    [
+        (["xyz", "z"], "style", "question 2: expected 2 to 26 different options .*, got 1 of 1 and style"),
+        (["xx"], "style", "question 1: expected 2 to 26 different options .*, got 1 of 2 and style"),
+        (["xy"], "music", "question 1: .* that follow style or instruction, got 2 of 2 and music"),
+        ([], "style", "expected questions, got none; texgs study writes one"),
+    ],
+)
+def test_a_key_that_was_changed_is_refused(tmp_path, orders, follows, message):
+    path = write_key(tmp_path / "key.json", study(*orders, follows=follows))
+    with pytest.raises(ArgumentError, match=rf"key\.json: {message}"):
+        read_key(path)

@@ -1,0 +1,112 @@
+import pytest
+
+from tests.report.studies import study
+from tests.report.written import lines, metrics, records
+from texgs.cli.main import main
+from texgs.config.places import PLACES
+from texgs.core.errors import ArgumentError
+from texgs.report.ballots import Ballot, Votes, votes_beside
+from texgs.report.left_out import LeftOut
+from texgs.report.metrics_files import paper, read
+from texgs.report.results import EditResult, FitResult, SceneResult
+from texgs.report.sections import SECTIONS
+from texgs.report.study import write_key
+from texgs.report.tables import specs, tables_of
+
+TABLES = specs()
+
+
+def test_tables_are_in_the_papers_order_and_then_ours():
+    numbers = [table.number for table in TABLES if table.number]
+    assert numbers == [1, 2, 3, 4, 5, 6, 7, 8, 9]
+    last = max(place for place, table in enumerate(TABLES) if table.number)
+    assert all(not table.paper for table in TABLES[last + 1 :])
+    assert len({table.name for table in TABLES}) == len(TABLES)
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
+def test_a_table_names_places_and_a_section_that_there_are(table):
+    assert set(table.places) <= set(PLACES)
+    assert table.section in SECTIONS
+
+
+@pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
+def test_a_table_of_nothing_has_no_rows(table):
+    assert table.table([]).rows == []
+
+
+def test_the_papers_numbers_are_all_there():
+    assert len(paper("fitting", keys=2)) == 8 * 3
+    assert paper("fitting", keys=2)["supernova", "shading"]["psnr"] == "29.34"
+    assert [len(lines(name)) for name in ("datasets", "views", "resolution", "model_size")] == [12, 4, 3, 4]
+
+
+def test_each_sweep_has_a_table(tmp_path):
+    numbers = FitResult(60.0, 9, psnr=30.0)
+    for phase in ("surfels", "shading", "texture"):
+        metrics(tmp_path, phase, numbers, tf="TF01", sweep="mine", variant="a")
+        metrics(tmp_path, phase, numbers, tf="TF01")
+    tables = tables_of(records(tmp_path))
+    assert list(tables)[-1] == "sweep-mine"
+    assert len(tables["sweep-mine"].rows) == 1
+    assert [row.cells[1] for row in tables["fits"].rows] == ["TF01"] * 3
+    assert not [name for name in tables_of([]) if name.startswith("sweep")]
+
+
+def test_a_sweep_without_fits_among_the_jobs_has_none(tmp_path):
+    metrics(tmp_path, "compose", SceneResult(1, 9), sweep="mine", variant="a")
+    assert not [name for name in tables_of(records(tmp_path)) if name.startswith("sweep")]
+
+
+def test_a_user_study_has_its_votes_and_without_them_the_papers_where_its_data_are_edited(tmp_path):
+    edit = EditResult("glass", "image", "how", 6.0, follows="style")
+    metrics(tmp_path, "edit_image", edit, "scan")
+    assert tables_of(records(tmp_path))["user_study"].rows == []
+    votes = Votes(study("xyz"), [Ballot("a", [[1, 2, 3]])])
+    assert "1 ballots" in tables_of(records(tmp_path), votes=votes)["user_study"].caption
+    metrics(tmp_path, "edit_image", edit, "engine")
+    table = tables_of(records(tmp_path))["user_study"]
+    assert "No votes but the paper's." in table.caption
+    assert {row.cells[4] for row in table.rows} == {"the paper"}
+
+
+def test_the_ballots_beside_a_key_are_counted(tmp_path):
+    assert votes_beside(tmp_path / "key.json") is None
+    write_key(tmp_path / "key.json", study("xy"))
+    assert votes_beside(tmp_path / "key.json") is None
+    (tmp_path / "votes").mkdir()
+    lines = ["study,ballot,question,option,rank", "0123456789ab,aa,1,A,1", "0123456789ab,aa,1,B,2"]
+    (tmp_path / "votes" / "ballot-aa.csv").write_text("\n".join(lines))
+    (ballot,) = votes_beside(tmp_path / "key.json").ballots
+    assert ballot.ranks == [[1, 2]]
+
+
+def test_captions_say_what_is_left_out(tmp_path):
+    tables = tables_of([], [LeftOut("data set wood", "no file", ["phase"])])
+    said = {
+        name for name, table in tables.items() if table.caption.endswith("Left out: data set wood: no file.")
+    }
+    assert said == {"fitting", "views", "resolution", "model_size", "fits"}
+
+
+def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
+    path = metrics(tmp_path, "shading", FitResult(60.0, 9, psnr=40.0), "scan", "TF01")
+    old = tmp_path / "old.json"
+    old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
+    missing = tmp_path / "missing.json"
+    missing.write_text('[{"what": "data set wood", "why": "no file", "places": ["phase"]}]')
+    words = ["tables", str(path), str(old), "--missing", str(missing), "--output", str(tmp_path / "tables")]
+    assert main(words) == 0
+    expected = {f"{table.name}.{kind}" for table in TABLES for kind in ("csv", "md", "tex")}
+    assert {file.name for file in (tmp_path / "tables").iterdir()} == expected | {"tables.tex"}
+    said = capsys.readouterr()
+    assert "| scan | quick | shading | 1 | 40.00 |" in said.out
+    assert "Left out: data set wood: no file." in said.out
+    assert "Left out: 1 metrics file: of another version of texgs" in said.err
+    assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
+
+
+def test_a_file_that_is_no_metrics_is_named(tmp_path):
+    (tmp_path / "a.json").write_text("[]")
+    with pytest.raises(ArgumentError, match=r"a\.json: expected the metrics of a job"):
+        read([tmp_path / "a.json"])

@@ -1,0 +1,101 @@
+"""The table of a study beside the paper's votes."""
+
+from dataclasses import replace
+from math import comb
+
+import pytest
+
+from tests.report.studies import study
+from texgs.report.ballots import Ballot, Votes
+from texgs.report.metrics_files import paper
+from texgs.report.votes import user_study
+
+STUDY = study("xyz", "zyx")
+BALLOTS = [  # ranks by letter: x is the best, y is mostly second
+    Ballot("aa", [[1, 2, 3], [3, 2, 1]]),
+    Ballot("bb", [[1, 3, 2], [3, 2, 1]]),
+]
+
+
+def rows(table):
+    titles = [column.title for column in table.columns]
+    return [dict(zip(titles, row.cells, strict=True)) for row in table.rows]
+
+
+def test_votes_go_to_methods_whatever_their_letter():
+    table = user_study(Votes(STUDY, BALLOTS))
+    ours = [row for row in rows(table) if row["edit"] != "the paper"]
+    assert [
+        (row["data set"], row["method"], row["rank 1"], row["rank 2"], row["rank 3"]) for row in ours
+    ] == [
+        ("data1", "x", 2, 0, 0),
+        ("data1", "y", 0, 1, 1),
+        ("data1", "z", 0, 1, 1),
+        ("data2", "x", 2, 0, 0),
+        ("data2", "y", 0, 2, 0),
+        ("data2", "z", 0, 0, 2),
+        ("all 2", "x", 4, 0, 0),
+        ("all 2", "y", 0, 3, 1),
+        ("all 2", "z", 0, 1, 3),
+        ("all 2", "all", None, None, None),
+    ]
+    best, test = ours[6], ours[-1]
+    assert (best["kind"], best["recipe"], best["edit"]) == ("image-driven", "quick", "edit_x")
+    assert (best["mean rank"], best["first"], best["to"]) == (1.0, 1.0, 1.0)
+    assert best["p (binomial)"] == "0.012", "1 in 81"
+    assert test["chi2 (Friedman)"] == pytest.approx(12 / (4 * 3 * 4) * (4**2 + 9**2 + 11**2) - 3 * 4 * 4)
+    assert best["rank 4"] is None
+    assert best["p (Friedman)"] is None
+    assert "Study 0123456789ab, 2 ballots." in table.caption
+
+
+def test_the_papers_votes_stand_beside_with_what_its_counts_tell():
+    theirs = [row for row in rows(user_study(Votes(STUDY, BALLOTS))) if row["edit"] == "the paper"]
+    assert {row["kind"] for row in theirs} == {"image-driven"}
+    total = {row["method"]: row for row in theirs if row["data set"] == "all 4"}
+    best = total["TexGS-VolVis"]
+    assert [best[f"rank {rank}"] for rank in (1, 2, 3, 4)] == [27, 8, 3, 2]
+    assert best["first"] == 27 / 40
+    assert best["mean rank"] == pytest.approx((27 + 16 + 9 + 8) / 40)
+    assert best["from"] < 27 / 40 < best["to"]
+    above = sum(comb(40, k) * 0.25**k * 0.75 ** (40 - k) for k in range(27, 41))
+    assert best["p (binomial)"] == f"{above:.2g}", "no lower number is as rare"
+    assert total["all"]["p (Friedman)"] == "only counts are published"
+
+
+def test_each_kind_has_its_own_votes_and_the_papers_for_it():
+    both = replace(STUDY, questions=[*STUDY.questions, *study("vw", follows="instruction").questions])
+    ballots = [replace(each, ranks=[*each.ranks, [1, 2]]) for each in BALLOTS]
+    found = rows(user_study(Votes(both, ballots)))
+    text = [row for row in found if row["kind"] == "text-driven"]
+    assert [row["p (Friedman)"] for row in text if row["method"] == "all"] == [
+        "needs three methods",
+        "only counts are published",
+    ]
+    assert {row["method"] for row in text} == {"v", "w", "all", "IN2N", "IG2G", "DGE", "TexGS-VolVis"}
+    assert next(row for row in text if row["edit"] != "the paper")["follows"] == "make it gold"
+
+
+def test_data_sets_with_other_methods_are_added_up_on_their_own():
+    found = rows(user_study(Votes(study("xyz", "xy"), [Ballot("aa", [[1, 2, 3], [1, 2]])])))
+    totals = [row["method"] for row in found if row["data set"] == "all 1"]
+    assert totals == ["x", "y", "z", "all", "x", "y", "all"]
+
+
+def test_without_votes_there_are_those_of_the_paper():
+    table = user_study(None)
+    assert table.caption.startswith("No votes but the paper's.")
+    found = rows(table)
+    assert {row["edit"] for row in found} == {"the paper"}
+    assert [row["kind"] for row in found] == ["image-driven"] * 21 + ["text-driven"] * 21
+
+
+def test_the_papers_file_holds_ten_votes_in_each_row_and_column():
+    by_dataset = {}
+    for (dataset, _), line in paper("user_study", keys=2).items():
+        by_dataset.setdefault(dataset, []).append([int(votes) for votes in list(line.values())[2:]])
+    assert len(by_dataset) == 8
+    for counts in by_dataset.values():
+        assert (
+            [sum(row) for row in counts] == [sum(column) for column in zip(*counts, strict=True)] == [10] * 4
+        )

@@ -1,0 +1,158 @@
+"""What a run would find on this machine, what it would do, and about how long that takes."""
+
+from __future__ import annotations
+
+import csv
+import statistics
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.errors import MissingDataError
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.cli.job import Job
+    from texgs.config.experiments import Selection
+
+PROBE_SECONDS = 0.0109  # of one probe, see `probe`, on the two cores that speeds.csv was measured on
+REPEATS = 15  # of the probe; the median counts
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """A run before it is started."""
+
+    selection: Selection
+    to_do: Mapping[str, int]  # jobs by stage
+    done: int  # jobs whose results are there
+    seconds: float  # of what is to be done, on the machine of speeds.csv
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Seconds of the jobs of a stage, measured on quick recipes at 400x400 pixels."""
+
+    constant: float
+    per_megapixel: float  # of one view
+    per_iteration: float  # and megapixel
+
+    def seconds(self, megapixels: float, iterations: int) -> float:
+        """Of one job."""
+        return self.constant + megapixels * (self.per_megapixel + iterations * self.per_iteration)
+
+
+def forecast(words: tuple[str, ...]) -> Forecast:
+    """What a run with these words would do. Nothing is written.
+
+    Raises:
+        ConfigError, ArgumentError: for a mistake in the words.
+    """
+    from texgs.cli.absent import lacking
+    from texgs.config.experiments import selected
+
+    selection = selected(words, lacking)
+    table, seconds, done = speeds(), 0.0, 0
+    to_do: Counter[str] = Counter()
+    for job, config in planned_jobs(selection):
+        if job.is_done():
+            done += 1
+            continue
+        pixels = config.views.width * config.views.height / config.fit.reduce**2
+        to_do[job.stage.name] += 1
+        seconds += table[job.stage.name].seconds(pixels / 1e6, iterations(job.settings))
+    return Forecast(selection, to_do, done, seconds)
+
+
+def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
+    """All jobs of a selection, each once, with their configurations; not those whose files are not there."""
+    from texgs.cli.job import Job
+    from texgs.config.stages import jobs
+    from texgs.core.checksum import Checksums
+
+    checksums, seen = Checksums.load(), set()
+    for config in (each for some in selection.by_sweep.values() for each in some):
+        try:
+            for stage, each in jobs(config):
+                if (folder := stage.output(each)) not in seen:
+                    seen.add(folder)
+                    yield Job.of(stage, each, checksums), each
+        except MissingDataError:  # told where the selection is shown
+            continue
+
+
+def iterations(settings: Mapping[str, Any]) -> int:
+    """All iterations that the settings of a job name."""
+    own = settings.get("iterations", 0)
+    below = (iterations(value) for value in settings.values() if isinstance(value, Mapping))
+    return (own if isinstance(own, int) else 0) + sum(below)
+
+
+def speeds() -> dict[str, Speed]:
+    """The measured speeds by stage."""
+    text = files("texgs.cli").joinpath("speeds.csv").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
+
+
+def probe() -> float:
+    """Seconds of one view of 20,000 surfels with its gradients at 400x400 pixels, on all threads."""
+    import torch
+
+    from texgs.raster import rasterize
+
+    generator = torch.Generator().manual_seed(0)
+    means = torch.rand(20000, 3, generator=generator) - 0.5
+    colors = torch.rand(20000, 3, generator=generator).requires_grad_()
+    quats = torch.randn(20000, 4, generator=generator)
+    scales, opacities = torch.full((20000, 2), 0.01), torch.full((20000,), 0.5)
+    viewmat, K = torch.eye(4), torch.tensor([[750.0, 0, 200], [0, 750, 200], [0, 0, 1]])
+    viewmat[2, 3] = 2.0
+    times = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        shown = rasterize(means, quats, scales, opacities, viewmat, K, 400, 400, features=colors)
+        shown.color.sum().backward()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def show(words: tuple[str, ...]) -> int:
+    """Print a forecast, a line for each thing; 1 if the run would not start."""
+    expected = forecast(words)
+    selection = expected.selection
+    configs = [each for some in selection.by_sweep.values() for each in some]
+    stops: dict[str, None] = {}
+    for config in {config.dataset.name: config for config in configs}.values():
+        print(f"ok       data set {config.dataset.name:16} {source(config)}")
+    for entry in selection.left_out:
+        print(f"left out {entry.what}: {entry.why}")
+    if not selection.skips:
+        stops = dict.fromkeys(line for config in configs for line in selection.lacking(config))
+    for line in stops:
+        print(f"missing  {line}")
+    kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
+    print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
+    slower = probe() / PROBE_SECONDS
+    hours = expected.seconds * slower / 3600
+    print(
+        f"time     about {hours:.1f} hours: an estimate, from speeds measured on other scenes and how "
+        f"fast this machine rasterizes ({1 / slower:.1f} times as fast as two cores)"
+    )
+    return 1 if stops else 0
+
+
+def source(config: DictConfig) -> str:
+    """Where the data of a data set come from."""
+    volume = config.dataset.volume
+    if config.dataset.views_folder is not None:
+        return str(Path(config.data_folder, config.dataset.views_folder))
+    if volume.generator is not None:
+        return f"generated: {volume.generator}"
+    path = Path(config.data_folder, volume.file)
+    return str(path) if path.exists() else f"to be downloaded from {volume.url}"

@@ -1,0 +1,78 @@
+"""Make a user study of edited scenes: one HTML page for voters, and the key that tells what they saw."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import torch
+
+    from texgs.report.study import Question
+
+LEAST, MOST = 64, 1024  # pixels of a clip
+KEY, PAGE = "key.json", "ballot.html"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to compare, how to show it, and where to."""
+    parser.add_argument("results", nargs="?", type=Path, default=Path("results"), help="folder (%(default)s)")
+    parser.add_argument(
+        "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
+    )
+    parser.add_argument("--output", type=Path, default=Path("results/study"), help="folder (%(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the order of clips (%(default)s)")
+    parser.add_argument("--size", type=int, default=384, help="of a clip, pixels (%(default)s)")
+    parser.add_argument("--frames", type=int, default=150, help="of a turn, 25 a second (%(default)s)")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Write ballot.html, then key.json; print the questions."""
+    from hashlib import sha256
+
+    from texgs.core.device import torch_device
+    from texgs.core.errors import ArgumentError
+    from texgs.core.io import write_bytes
+    from texgs.report.ballot_page import ballot_page
+    from texgs.report.metrics_files import below, read
+    from texgs.report.study import KINDS, Study, questions_of, write_key
+
+    key, page = arguments.output / KEY, arguments.output / PAGE
+    if key.exists():
+        raise ArgumentError(
+            f"{key}: there is a study already, whose ballots need it; choose another --output, or remove it"
+        )
+    if not LEAST <= arguments.size <= MOST:
+        raise ArgumentError(f"--size: expected {LEAST} to {MOST} pixels, got {arguments.size}")
+    questions = questions_of(read(below(arguments.results)), arguments.edits, arguments.seed)
+    films = films_of(questions, arguments.size, arguments.frames, torch_device(arguments.device))
+    shown = ballot_page("", questions, films, arguments.size)
+    study = Study(sha256(shown.encode()).hexdigest()[:12], arguments.seed, questions)
+    text = ballot_page(study.study, questions, films, arguments.size)
+    write_bytes(page, text.encode())
+    write_key(key, study)
+    for number, question in enumerate(questions, start=1):
+        compared = ", ".join(sorted(option.edit for option in question.options))
+        print(f"{number}. {question.dataset}, {KINDS[question.follows]}: {compared}")
+    print(f"{page}: {len(text) / 1e6:.1f} MB, for voters")
+    print(f"{key}: what the clips are, not for voters")
+    return 0
+
+
+def films_of(questions: "list[Question]", size: int, frames: int, device: "torch.device") -> list[bytes]:
+    """The film of each question, MP4."""
+    from tempfile import TemporaryDirectory
+
+    from texgs.report.study_film import write_film
+    from texgs.scene.scene_file import read_scene
+
+    films = []
+    with TemporaryDirectory() as folder:
+        for number, question in enumerate(questions, start=1):
+            files = [question.original, *(option.scene for option in question.options)]
+            path = write_film(
+                *(Path(folder, "film.mp4"), [read_scene(file) for file in files], size, frames, device),
+                title=f"question {number} of {len(questions)}",
+            )
+            films.append(path.read_bytes())
+    return films

@@ -1,0 +1,86 @@
+"""The page that voters get: one HTML file with all clips, which works offline and names no method."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import io
+from collections.abc import Sequence
+from importlib.resources import files
+from typing import Any
+
+from texgs.core.image import open_picture
+from texgs.report.study import Question, rank_name
+from texgs.report.study_film import cell
+
+PICTURE = 320  # pixels, the longest side of a style picture
+TASKS = {  # what was asked for, by what methods follow
+    "style": ("The new looks follow this picture.", "The new looks follow these pictures, each in a part."),
+    "instruction": ("The new looks follow this instruction:", "Instructions for parts of the scene:"),
+}
+
+
+def ballot_page(study: str, questions: Sequence[Question], films: Sequence[bytes], size: int) -> str:
+    """The page as HTML.
+
+    Args:
+        study: its digest, which ballots carry.
+        questions: at least one.
+        films: MP4 of each question: the scene before the edits and the options, in cells.
+        size: of a cell, pixels.
+    """
+    from jinja2 import Environment
+
+    style, script = (text_of(f"ballot.{kind}") for kind in ("css", "js"))
+    environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    return environment.from_string(text_of("ballot.html.j2")).render(
+        study=study,
+        size=size,
+        questions=[
+            entry(number, question, film)
+            for number, (question, film) in enumerate(zip(questions, films, strict=True), start=1)
+        ],
+        style=style,
+        script=script,
+        hashes={"style": policy_hash(style), "script": policy_hash(script)},
+    )
+
+
+def entry(number: int, question: Question, film: bytes) -> dict[str, Any]:
+    """What the template reads of a question."""
+    count = len(question.options)
+    words = list(dict.fromkeys(question.followed.values())) if question.follows == "instruction" else []
+    places = [dict(zip(("column", "row"), cell(index, count + 1), strict=True)) for index in range(count + 1)]
+    return {
+        "number": number,
+        "dataset": question.dataset.replace("_", " "),
+        "task": TASKS[question.follows][max(len(words), len(question.pictures)) > 1],
+        "words": words,
+        "pictures": [picture_uri(path) for path in question.pictures],
+        "original": places[0],
+        "options": [
+            {"letter": letter, **place} for letter, place in zip(question.letters, places[1:], strict=True)
+        ],
+        "ranks": [rank_name(rank, count) for rank in range(1, count + 1)],
+        "film": base64.b64encode(film).decode(),
+    }
+
+
+def picture_uri(path: str) -> str:
+    """A picture, made small, for the attribute of a tag; nothing but its pixels."""
+    file = io.BytesIO()
+    with open_picture(path) as picture:
+        small = picture.convert("RGB")
+    small.thumbnail((PICTURE, PICTURE))
+    small.save(file, format="JPEG", quality=90)
+    return f"data:image/jpeg;base64,{base64.b64encode(file.getvalue()).decode()}"
+
+
+def policy_hash(text: str) -> str:
+    """How a Content-Security-Policy names a style or a script that it allows."""
+    return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
+
+
+def text_of(name: str) -> str:
+    """A file beside this one."""
+    return files("texgs.report").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,129 @@
+"""Ballots that voters send, read and checked: CSV files that the page of a study saves."""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from texgs.core.errors import ArgumentError
+from texgs.core.reading import reading
+from texgs.report.study import Question, Study, read_key
+
+COLUMNS = ["study", "ballot", "question", "option", "rank"]
+LARGEST = 1 << 20  # bytes
+WHAT, ADVICE = "a ballot", "ask the voter for the file that the page saves"
+
+
+@dataclass(frozen=True)
+class Ballot:
+    """What one voter has ranked."""
+
+    ballot: str  # random id
+    ranks: Sequence[Sequence[int]]  # by question, by option; 1 is the best
+
+
+@dataclass(frozen=True)
+class Votes:
+    """A study and its ballots, at least one."""
+
+    study: Study
+    ballots: Sequence[Ballot]
+
+
+def read_votes(study: Study, paths: Iterable[str | Path]) -> Votes:
+    """Read the ballots of a study, in the order of their ids.
+
+    Raises:
+        ArgumentError: naming the file that is no complete ballot of this study, or that is there twice.
+    """
+    found: dict[str, tuple[Path, Ballot]] = {}
+    for path in sorted(map(Path, paths)):
+        ballot = read_ballot(study, path)
+        if ballot.ballot in found:
+            first, _ = found[ballot.ballot]
+            raise ArgumentError(f"{path}: expected another ballot than {first}, got the same one; keep one")
+        found[ballot.ballot] = (path, ballot)
+    return Votes(study, [found[name][1] for name in sorted(found)])
+
+
+def votes_beside(key: str | Path) -> Votes | None:
+    """The ballots in the folder `votes` beside the key of a study; None without any.
+
+    Raises:
+        ArgumentError: as `read_votes` and `read_key`.
+    """
+    ballots = sorted(Path(key).parent.glob("votes/*.csv"))
+    return read_votes(read_key(key), ballots) if ballots else None
+
+
+def read_ballot(study: Study, path: Path) -> Ballot:
+    """Read one ballot.
+
+    Raises:
+        ArgumentError: if it is none, or not a complete one of this study.
+    """
+    rows = rows_of(path)
+    expected = {
+        "study": (study.study, "count it with the key of its study"),
+        "ballot": (rows[0]["ballot"], ADVICE),
+    }
+    for column, (name, advice) in expected.items():
+        for row in rows:
+            if row[column] != name:
+                raise ArgumentError(f"{path}: expected {column} {name}, got {row[column]}; {advice}")
+    given: dict[str, dict[str, str]] = defaultdict(dict)
+    for row in rows:
+        if row["option"] in given[row["question"]]:
+            raise ArgumentError(
+                f"{path}: question {row['question']}: expected one rank of {row['option']}, got two; {ADVICE}"
+            )
+        given[row["question"]][row["option"]] = row["rank"]
+    numbers = [str(number) for number in range(1, len(study.questions) + 1)]
+    for number in given:
+        if number not in numbers:
+            raise ArgumentError(
+                f"{path}: expected questions 1 to {len(numbers)}, got question {number}; {ADVICE}"
+            )
+    ranks = [
+        ranks_of(f"{path}: question {number}", question, given[number])
+        for number, question in zip(numbers, study.questions, strict=True)
+    ]
+    return Ballot(rows[0]["ballot"], ranks)
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    """The lines of a ballot by column, at least one.
+
+    Raises:
+        ArgumentError: if the file has other columns.
+    """
+    with reading(path, WHAT, ADVICE):
+        if path.stat().st_size > LARGEST:
+            raise ArgumentError(f"{path}: expected {WHAT} of at most {LARGEST} bytes; is it another file?")
+        lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+    header, *rows = lines or [[]]
+    if header != COLUMNS or any(len(row) != len(COLUMNS) for row in rows) or not rows:
+        raise ArgumentError(f"{path}: expected {WHAT} with the columns {', '.join(COLUMNS)}; {ADVICE}")
+    return [dict(zip(COLUMNS, row, strict=True)) for row in rows]
+
+
+def ranks_of(where: str, question: Question, given: Mapping[str, str]) -> list[int]:
+    """The rank of each option of a question.
+
+    Raises:
+        ArgumentError: if an option is unknown, or each rank is not given once.
+    """
+    for letter in given:
+        if letter not in tuple(question.letters):
+            raise ArgumentError(
+                f"{where}: expected options {question.letters[0]} to {question.letters[-1]}, got {letter}; "
+                f"{ADVICE}"
+            )
+    count = len(question.letters)
+    if sorted(given.values()) != sorted(str(rank) for rank in range(1, count + 1)):
+        got = ", ".join(f"{letter} {given.get(letter, 'none')}" for letter in question.letters)
+        raise ArgumentError(f"{where}: expected each rank from 1 to {count} once, got {got}; {ADVICE}")
+    return [int(given[letter]) for letter in question.letters]

@@ -1,0 +1,134 @@
+"""Table `differences`: where recipes and edits are not as in the paper, by their values."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from texgs.config.compose import compose
+from texgs.config.methods import NO_METHOD, method_of
+from texgs.config.project import members
+from texgs.config.typed import typed
+from texgs.core.plain_yaml import parse_yaml
+from texgs.report.table import Column, Row, Table
+
+COLUMNS = (
+    Column("what"),
+    Column("the paper"),
+    Column("here"),
+    Column("in"),
+    Column("where the paper says it"),
+)
+ALL = "all"  # of what no key expresses
+CAPTION = (
+    "Keys whose values in conf/ are not those of the paper, for the recipes and edits of this report, and "
+    "what no key expresses. What a run overrides is not told here."
+)
+
+
+@dataclass(frozen=True)
+class Claim:
+    """What the paper does, by the key that stands for it."""
+
+    key: str  # such as fit.texture.rate; edit.METHOD.recipe.NAME is a number of an edit's recipe
+    paper: Any  # its value
+    where: str  # the paper's section
+    of: str | None = None  # key that is 0 where this has no meaning
+
+
+@dataclass(frozen=True)
+class Other:
+    """What the paper does otherwise and no key expresses, in words."""
+
+    what: str
+    paper: str
+    here: str
+    where: str
+
+
+@dataclass(frozen=True)
+class Published:
+    """The paper's method: what a configuration can be compared with, and the rest."""
+
+    keys: list[Claim]
+    others: list[Other]
+
+
+@cache
+def published() -> Published:
+    """What the paper says, from recipe.yaml."""
+    file = files("texgs.report").joinpath("paper", "recipe.yaml")
+    return typed(Published, parse_yaml(file.read_text(encoding="utf-8")))
+
+
+def differences(recipes: Sequence[str], edits: Sequence[str] = (), views: Sequence[str] = ()) -> Table:
+    """The table of what differs from the paper.
+
+    A difference that several files share is one row. Names without a file in conf/, such as variants of a
+    sweep, are left out, and so is what has nothing to compare: fits of other fields than surfels, and edits
+    by methods that are not the paper's.
+
+    Args:
+        recipes: of fits, files of conf/fit.
+        edits: files of conf/edit.
+        views: files of conf/views.
+
+    Raises:
+        ConfigError: if a file cannot be composed.
+    """
+    names: dict[tuple[str, str], list[str]] = defaultdict(list)  # by key and value here
+    for group, given in (("views", views), ("fit", recipes), ("edit", edits)):
+        for name in [name for name in given if name in members(group)]:
+            for claim, here in compared(group, name):
+                if plain(here) != plain(claim.paper):
+                    names[claim.key, text(here)].append(name)
+    claims = {claim.key: claim for claim in published().keys}
+    order = list(claims)
+    rows = [
+        Row([key, text(claims[key].paper), here, ", ".join(some), claims[key].where], [])
+        for (key, here), some in sorted(names.items(), key=lambda item: order.index(item[0][0]))
+    ]
+    rows += [Row([each.what, each.paper, each.here, ALL, each.where], []) for each in published().others]
+    return Table(CAPTION, COLUMNS, rows)
+
+
+def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
+    """Claims of the paper that a file of conf/ can be compared with, each with the value there."""
+    config, prefix, numbers = compose((f"{group}={name}",)), f"{group}.", dict[str, Any]()
+    if group == "fit" and config.fit.field != "surfels":
+        return
+    if group == "edit":
+        if config.edit.method == NO_METHOD:
+            return
+        method = method_of(config.edit)
+        prefix, numbers = f"edit.{method.name}.", dict(method.numbers(method.of(config.edit)))
+
+    def value(key: str) -> Any:
+        _, is_number, number = key.partition(".recipe.")
+        return numbers[number] if is_number else OmegaConf.select(config, key)
+
+    for claim in published().keys:
+        if claim.key.startswith(prefix) and (claim.of is None or value(claim.of)):
+            yield claim, value(claim.key)
+
+
+def plain(value: Any) -> Any:
+    """A value to compare: sequences of any kind as lists."""
+    return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
+
+
+def text(value: Any) -> str:
+    """A value as files of conf/ have it."""
+    if value is None or isinstance(value, bool):
+        return {None: "null", True: "true", False: "false"}[value]
+    if isinstance(value, float):
+        return f"{value:g}"
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(text, value))}]"
+    return str(value) or '""'

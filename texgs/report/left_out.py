@@ -1,0 +1,58 @@
+"""What a run has left out, and why: tables and the report say it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from omegaconf.errors import OmegaConfBaseException
+
+from texgs.config.typed import typed
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that is not there."""
+
+    what: str  # such as "data set wood"
+    why: str  # one sentence
+    places: list[str]  # of the jobs that there are none of, keys of `texgs.config.places.PLACES`
+
+    def __str__(self) -> str:
+        why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves
+        return f"{self.what}: {why.rstrip('. ')}."
+
+
+def read_left_out(path: str | Path | None) -> list[LeftOut]:
+    """What a file says was left out; nothing without a file.
+
+    Raises:
+        ArgumentError: if the file is no list of entries with `what`, `why` and `places`.
+    """
+    if path is None or not Path(path).exists():
+        return []
+    entries = read_json(path)
+    if not isinstance(entries, list):
+        raise ArgumentError(f"{path}: expected a list of what was left out, got {type(entries).__name__}")
+    try:
+        return [typed(LeftOut, entry) for entry in entries]
+    except (OmegaConfBaseException, TypeError, ValueError) as error:
+        raise ArgumentError(f"{path}: expected entries with what, why and places, got others") from error
+
+
+def others(paths: Sequence[Path]) -> list[LeftOut]:
+    """The entry for metrics files of other versions of texgs; none where there are none."""
+    if not paths:
+        return []
+    what = f"{len(paths)} metrics files" if len(paths) > 1 else "1 metrics file"
+    why = f"of another version of texgs, {paths[0]} first; run its job again to have it back"
+    return [LeftOut(what, why, [])]
+
+
+def note(left_out: Iterable[LeftOut], places: Collection[str]) -> str:
+    """What of a table is left out, in words; empty where all is there."""
+    entries = [str(entry) for entry in left_out if set(entry.places) & set(places)]
+    return " ".join(["Left out:", *entries]) if entries else ""

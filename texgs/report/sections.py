@@ -1,0 +1,121 @@
+"""The sections of the report in the paper's order, and the figures of each."""
+
+from __future__ import annotations
+
+import base64
+import io
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from PIL import Image
+
+from texgs.report.metrics_files import Record
+from texgs.report.published import in_order
+from texgs.report.results import ComparisonResult, EditResult, FitResult, GalleryResult
+
+SECTIONS = {
+    "data": "Data sets and views",
+    "fitting": "Fitting",
+    "pse": "Editing of colour, opacity and light",
+    "relight": "Relighting",
+    "image": "Image-driven editing",
+    "text": "Text-driven editing",
+    "parts": "Partial editing and other edits",
+    "ablations": "Ablations",
+    "sizes": "Model sizes",
+    "rendering": "Rendering",
+    "study": "User study",
+    "differences": "Where we differ from the paper",
+    "more": "Further tables and figures",
+}
+OF_STAGES = {  # sections by the stage that made a figure; edits have theirs by what they follow
+    **dict.fromkeys(("volume", "transfer", "views", "sheet"), "data"),
+    **dict.fromkeys(("figure", "comparison", "mesh"), "fitting"),
+    **dict.fromkeys(("compose", "pse"), "pse"),
+}
+OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
+OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
+NARROW = ("scene.png", "transfer.png", "convergence.png")  # side by side where there is room; and styles
+QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
+UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A picture with what it shows."""
+
+    dataset: str
+    label: str  # basic TF, fit and edit
+    words: str
+    uri: str
+    command: str  # that makes it
+    is_narrow: bool = False
+
+
+def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
+    """All pictures of jobs by section, in the order of data sets; those of sweeps have a figure of all."""
+    found: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
+    for record in in_order(records):
+        for name, words in record.facts.get("pictures", {}).items():
+            picture = record.path.with_name(name)
+            if picture.is_file() and name not in UNREPORTED and not record.is_swept:
+                figure = Figure(
+                    record.title,
+                    label(record),
+                    words,
+                    data_uri(Image.open(picture)),
+                    command(record),
+                    is_narrow=name in NARROW or name.startswith("style"),
+                )
+                found[section_of(record, name)].append(figure)
+    return found
+
+
+def section_of(record: Record[Any], picture: str) -> str:
+    """The section of a picture, which a job has made; `picture` is the name of its file."""
+    result = record.result
+    if isinstance(result, EditResult):
+        is_part = any("/" in name for name in result.followed)
+        return "parts" if is_part else OF_EDITS[result.follows]
+    if isinstance(result, GalleryResult):
+        return result.section
+    if isinstance(result, FitResult):
+        return "fitting"
+    return OF_PICTURES.get(picture, OF_STAGES.get(record.stage, "more"))
+
+
+def label(record: Record[Any]) -> str:
+    """Basic TF, fit and edit of a job, as far as it is of one."""
+    edit = record.result.edit if isinstance(record.result, EditResult) else ""
+    return " ".join(filter(None, (record.tf, record.label, edit)))
+
+
+def command(record: Record[Any]) -> str:
+    """The command that makes the pictures of a job, but for what its run overrode.
+
+    It is empty for galleries, whose words tell it.
+    """
+    result, fits = record.result, [record.recipe]
+    if isinstance(result, GalleryResult):
+        return ""
+    if isinstance(result, ComparisonResult):
+        fits = result.recipes
+    words = {
+        "tf": record.tf,
+        "fit": next(iter(fits), ""),
+        "edit": result.edit if isinstance(result, EditResult) else "",
+        "variant": record.variant,
+        "fit.seed": record.seed if record.recipe else 0,
+        "fits": f"[{','.join(fits)}]" if len(fits) > 1 else "",
+    }
+    given = [f"{key}={value}" for key, value in words.items() if value]
+    return shlex.join(["texgs", record.stage, f"dataset={record.dataset}", *given])
+
+
+def data_uri(picture: Image.Image) -> str:
+    """A picture as text for the attribute of a tag, compressed to about an eighth of its PNG."""
+    file = io.BytesIO()
+    picture.convert("RGBA").save(file, format="WEBP", quality=QUALITY, method=EFFORT)
+    return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"

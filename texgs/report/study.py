@@ -1,0 +1,197 @@
+"""User study: which edited scenes are compared in which question, and the key that tells what was shown.
+
+A question shows the scenes of one data set that follow the same pictures or the same instructions, side by
+side in random order and without names, as in the paper (section User Study).
+"""
+
+from __future__ import annotations
+
+import random
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from string import ascii_uppercase as LETTERS
+from typing import Any
+
+from texgs.config.typed import typed
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_json
+from texgs.core.reading import reading
+from texgs.report.metrics_files import Record, of
+from texgs.report.results import EditResult, FitResult, SceneResult
+
+KINDS = {"style": "image-driven", "instruction": "text-driven"}  # of questions, by what methods follow
+
+
+@dataclass(frozen=True)
+class Compared:
+    """What gets votes: an edit of the fits of a recipe."""
+
+    recipe: str
+    edit: str
+    method: str
+
+
+@dataclass(frozen=True)
+class Option:
+    """One clip of a question."""
+
+    recipe: str
+    edit: str
+    method: str
+    scene: str  # file
+
+    @property
+    def compared(self) -> Compared:
+        """What its votes are for."""
+        return Compared(self.recipe, self.edit, self.method)
+
+
+@dataclass(frozen=True)
+class Question:
+    """Clips that are ranked among themselves; the letter of an option is that of its place."""
+
+    dataset: str
+    follows: str  # a key of KINDS
+    followed: dict[str, str]  # the picture or the words, by model
+    original: str  # file of the scene before the edits
+    pictures: list[str]  # files of the pictures that methods follow
+    options: list[Option]
+
+    @property
+    def letters(self) -> str:
+        """Names of the options."""
+        return LETTERS[: len(self.options)]
+
+
+@dataclass(frozen=True)
+class Study:
+    """All questions, in their order."""
+
+    study: str  # digest of what voters see
+    seed: int
+    questions: list[Question]
+
+
+def questions_of(records: Iterable[Record[Any]], edits: Sequence[str], seed: int) -> list[Question]:
+    """All questions that edited scenes give, those by pictures first, with options in random order.
+
+    Args:
+        records: of all jobs.
+        edits: names of the edits to compare; none: all.
+        seed: of the order of options.
+
+    Raises:
+        ArgumentError: if there is no edited scene, an edit has none, or nothing can be compared.
+    """
+    records = list(records)
+    looks = [record for record in of(EditResult, records) if record.result.follows]
+    if not looks:
+        raise ArgumentError(
+            "study: no scenes with a new look among the results; run something first, such as "
+            "texgs run experiment=paper_text_quick"
+        )
+    known = sorted({record.result.edit for record in looks})
+    for name in edits:
+        if name not in known:
+            raise ArgumentError(f"--edits: expected some of {', '.join(known)}, got {name}")
+    groups: dict[tuple[int, str, str], list[Record[EditResult]]] = defaultdict(list)
+    for record in looks:
+        if not edits or record.result.edit in edits:
+            place = list(KINDS).index(record.result.follows)
+            groups[place, record.dataset, str(sorted(record.result.followed.items()))].append(record)
+    order = random.Random(seed)
+    found = [question_of(groups[key], records, order) for key in sorted(groups) if len(groups[key]) > 1]
+    if not found:
+        alone = ", ".join(f"{group[0].dataset} {group[0].result.edit}" for group in groups.values())
+        raise ArgumentError(
+            "study: expected two scenes or more of a data set that follow the same picture or instruction, "
+            f"got only one of each ({alone}); run edits of other methods"
+        )
+    return found
+
+
+def question_of(
+    looks: Sequence[Record[EditResult]], records: Sequence[Record[Any]], order: random.Random
+) -> Question:
+    """The question that compares some scenes."""
+    first = looks[0]
+    if len(looks) > len(LETTERS):
+        raise ArgumentError(
+            f"study: expected at most {len(LETTERS)} scenes in a question, got {len(looks)} of "
+            f"{first.dataset}; choose some with --edits"
+        )
+    options = [
+        Option(each.label, each.result.edit, each.result.method, each.path.with_name("scene.yaml").as_posix())
+        for each in looks
+    ]
+    order.shuffle(options)
+    original = original_of(first.dataset, {record.label for record in looks}, records)
+    pictures = [
+        first.path.with_name(name).as_posix()
+        for name in first.facts.get("pictures", {})
+        if name.startswith("style")
+    ]
+    followed = dict(first.result.followed)
+    return Question(first.dataset, first.result.follows, followed, original.as_posix(), pictures, options)
+
+
+def original_of(dataset: str, recipes: set[str], records: Sequence[Record[Any]]) -> Path:
+    """The scene before the edits: of the recipe whose fits are closest to their test views.
+
+    Raises:
+        ArgumentError: if none of the recipes has a scene.
+    """
+    scenes = {
+        record.label: record.path.with_name("scene.yaml")
+        for record in of(SceneResult, records)
+        if record.dataset == dataset and record.label in recipes
+    }
+    if not scenes:
+        raise ArgumentError(
+            f"study: no scene of {dataset} by {', '.join(sorted(recipes))} before its edits among the "
+            "results; texgs compose makes it"
+        )
+    psnr: dict[str, dict[str | None, float]] = defaultdict(dict)  # by recipe and TF, of the best phase
+    for record in of(FitResult, records):
+        if record.dataset == dataset and record.label in scenes and record.result.psnr is not None:
+            best = psnr[record.label]
+            best[record.tf] = max(record.result.psnr, best.get(record.tf, record.result.psnr))
+    return scenes[max(sorted(scenes), key=lambda recipe: sum(psnr[recipe].values()))]
+
+
+def rank_name(rank: int, count: int) -> str:
+    """What voters read: with four options best, second-best, second-worst and worst, as in the paper."""
+    if rank in (1, count):
+        return "best" if rank == 1 else "worst"
+    if rank == 2:
+        return "second-best"
+    return "second-worst" if rank == count - 1 else f"rank {rank}"
+
+
+def write_key(path: str | Path, study: Study) -> Path:
+    """Write which scene each option is: JSON that voters do not get."""
+    return write_json(path, asdict(study))
+
+
+def read_key(path: str | Path) -> Study:
+    """Read the key of a study.
+
+    Raises:
+        ArgumentError: if the file is missing or no key.
+    """
+    advice = "texgs study writes one"
+    with reading(path, "the key of a study", advice):
+        study = typed(Study, read_json(path))
+    for number, question in enumerate(study.questions, start=1):
+        known, count = question.follows in KINDS, len({option.compared for option in question.options})
+        if not known or not 2 <= count == len(question.letters):
+            raise ArgumentError(
+                f"{path}: question {number}: expected 2 to {len(LETTERS)} different options that follow "
+                f"{' or '.join(KINDS)}, got {count} of {len(question.options)} and {question.follows}; "
+                f"{advice}"
+            )
+    if not study.questions:
+        raise ArgumentError(f"{path}: expected questions, got none; {advice}")
+    return study

@@ -1,0 +1,84 @@
+"""Film of several scenes that turn in step, each in its cell of one picture; one film cannot fall apart."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import atan, ceil, degrees, radians, sqrt, tan
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from texgs.core.camera import Camera
+from texgs.core.lens import Lens
+from texgs.core.movie import write_frames
+from texgs.core.progress import progress
+from texgs.scene.frame import frame
+from texgs.scene.scene import WHITE, Scene
+from texgs.volume.cameras import orbit_path
+
+POLAR = 20.0  # degrees above the horizon
+LOOKS, COARSE = 12, 128  # views that tell how large a scene is, and their pixels
+SEEN = 250  # of 255: whatever is darker is not background
+MARGIN = 1.1
+CRF = 23  # of H.264: half the bytes of a film that is looked at alone, so that the page can be mailed
+
+
+def cell(index: int, count: int) -> tuple[int, int]:
+    """Column and row of a scene among so many, in a picture about as wide as high."""
+    columns = ceil(sqrt(count))
+    return index % columns, index // columns
+
+
+def write_film(
+    path: str | Path, scenes: Sequence[Scene], size: int, frames: int, device: torch.device, title: str
+) -> Path:
+    """Write one turn around scenes as MP4: the same cameras, background and size for all.
+
+    Args:
+        path: target, .mp4.
+        scenes: at least one; the first one fills its cell.
+        size: of a cell, pixels.
+        frames: of the turn.
+        device: that renders.
+        title: of the progress bar.
+
+    Returns:
+        The path.
+    """
+    compositions = [scene.open(device) for scene in scenes]
+
+    def draw(camera: Camera, count: int) -> list[np.ndarray]:
+        return [
+            frame(composition, camera, scene.light, scene.edits, background=WHITE)
+            for composition, scene in zip(compositions[:count], scenes, strict=False)
+        ]
+
+    coarse = orbit_path(LOOKS, POLAR, *Lens().square(COARSE))
+    lens = filled(Lens(), max(extent(*draw(camera, 1)) for camera in coarse)).square(size)
+    turn = progress(orbit_path(frames, POLAR, *lens), title=title, unit="frame")
+    return write_frames(path, (mosaic(draw(camera, len(scenes))) for camera in turn), crf=CRF)
+
+
+def extent(picture: np.ndarray) -> float:
+    """How far from its centre a square picture [H, W, 3] shows something, as a share of what it could."""
+    size = len(picture)
+    places = np.argwhere(picture.min(axis=2) < SEEN) + 0.5
+    return float(np.abs(2 * places / size - 1).max(initial=0)) + 1 / size
+
+
+def filled(lens: Lens, share: float) -> Lens:
+    """The lens whose picture shows only that share of its width and height, with a margin."""
+    slope = tan(radians(lens.fov_y / 2)) * min(1.0, MARGIN * share)
+    return lens._replace(fov_y=2 * degrees(atan(slope)))
+
+
+def mosaic(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    """Pictures [H, W, 3] of one size in their cells; cells without one are white."""
+    height, width = pictures[0].shape[:2]
+    places = [cell(index, len(pictures)) for index in range(len(pictures))]
+    columns, rows = (1 + max(place) for place in zip(*places, strict=True))
+    whole = np.full((rows * height, columns * width, 3), 255, dtype=np.uint8)
+    for (column, row), picture in zip(places, pictures, strict=True):
+        whole[row * height : (row + 1) * height, column * width : (column + 1) * width] = picture
+    return whole

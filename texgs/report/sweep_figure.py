@@ -1,0 +1,171 @@
+"""The figure of a sweep: what was measured over the swept value, and a picture of each edited scene."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from PIL import Image
+
+from texgs.core.plots import words
+from texgs.report.metrics_files import Record
+from texgs.report.strip import DPI, content
+from texgs.report.sweep import deviation, mean, measured, values
+from texgs.report.sweep_runs import DIGITS, Run, natural, number, runs_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import SubFigure
+
+ACROSS, WIDTH = 4, 2.6  # panels in a row, and inches of each
+HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
+PICTURE, PIXELS = 1.8, 400  # inches and pixels of a picture
+WIDE = 30.0  # a range of values is logarithmic where the last is so many times the first
+
+
+def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
+    """A panel for each measure that differs between runs, and below them the edited scenes.
+
+    Variants that are numbers make an axis, with the standard deviation over seeds; others have bars.
+
+    Args:
+        records: jobs; the scenes of edits lie beside their metrics.
+        name: of the sweep.
+
+    Raises:
+        ArgumentError: if none is of the sweep.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    runs = runs_of(records, name)
+    titles, series, pictures = different(runs), grouped(runs), looks(runs)
+    variants = sorted({run.variant for run in runs}, key=natural)
+    is_axis = all(number(variant) is not None for variant in variants)
+    tall = HEIGHT if is_axis else 0.6 + BAR * len(variants) * len(series)
+    heights = [tall * -(-len(titles) // ACROSS) + 0.25, (PICTURE + 0.1) * len(pictures) + 0.3]
+    width = max(WIDTH * min(ACROSS, len(titles)), PICTURE * len(variants) if pictures else 0)
+    heights = heights if pictures else heights[:1]
+    figure = Figure(figsize=(width, sum(heights)), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)
+    draw_panels(parts[0, 0], titles, series, name, [] if is_axis else variants)
+    if pictures:
+        draw_pictures(parts[1, 0], pictures, variants)
+    file = io.BytesIO()
+    figure.savefig(file, format="png")
+    return Image.open(file)
+
+
+def different(runs: Sequence[Run]) -> list[str]:
+    """The measures that differ between runs; all that there are, where none does."""
+    titles = measured([(*run.series, run.variant) for run in runs])
+    known = [title for title in titles if values(runs, title) or any(run.measures.get(title) for run in runs)]
+    differ = [title for title in known if len({run.measures.get(title) for run in runs} - {None}) > 1]
+    return differ or known or titles[:1]
+
+
+def grouped(runs: Sequence[Run]) -> dict[str, dict[str, list[Run]]]:
+    """The runs by what they are of and by variant."""
+    found: dict[str, dict[str, list[Run]]] = {}
+    for run in runs:
+        label = " ".join(filter(None, run.series))
+        found.setdefault(label, {}).setdefault(run.variant, []).append(run)
+    return found
+
+
+def draw_panels(
+    figure: SubFigure,
+    titles: Sequence[str],
+    series: Mapping[str, Mapping[str, Sequence[Run]]],
+    name: str,
+    bars: Sequence[str],
+) -> None:
+    """A panel for each measure, with a line or a bar for each of `bars` for each of the series."""
+    rows, thick = -(-len(titles) // ACROSS), 0.8 / len(series)
+    panels = figure.subplots(rows, min(ACROSS, len(titles)), squeeze=False).ravel()
+    for axes, title in zip(panels, titles, strict=False):
+        axes.set_title(words(title), fontsize=9)
+        axes.tick_params(labelsize=7)
+        for index, (label, by_variant) in enumerate(series.items()):
+            known = {each: runs for each, runs in by_variant.items() if mean(runs, title) is not None}
+            if bars:
+                places = [bars.index(each) + thick * (index - 0.5 * (len(series) - 1)) for each in known]
+                draw_bars(axes, dict(zip(places, known.values(), strict=True)), title, label, thick)
+            else:
+                draw_line(axes, known, title, label)
+        if bars:
+            axes.set_yticks(range(len(bars)), [words(variant) for variant in bars], fontsize=7)
+            axes.invert_yaxis()
+    for axes in panels[len(titles) :]:
+        axes.set_axis_off()
+    figure.supxlabel("" if bars else words(name), fontsize=9)
+    if len(series) > 1:
+        named = panels[0].get_legend_handles_labels()
+        figure.legend(*named, loc="outside upper left", ncols=len(series), fontsize=7, frameon=False)
+
+
+def draw_line(axes: Axes, by_variant: Mapping[str, Sequence[Run]], title: str, label: str) -> None:
+    """Means over the swept value, with their standard deviation where there are several seeds."""
+    at = [float(variant) for variant in by_variant]
+    means = [mean(runs, title) or 0.0 for runs in by_variant.values()]
+    spread = [deviation(runs, title) or 0.0 for runs in by_variant.values()]
+    axes.errorbar(at, means, spread, label=words(label), marker="o", markersize=3, linewidth=1, capsize=2)
+    if at and min(at) > 0 and max(at) / min(at) > WIDE:
+        axes.set_xscale("log")
+
+
+def draw_bars(
+    axes: Axes, by_place: Mapping[float, Sequence[Run]], title: str, label: str, thick: float
+) -> None:
+    """A bar with its number for each variant, at its place."""
+    means = [mean(runs, title) or 0.0 for runs in by_place.values()]
+    spread = [deviation(runs, title) or 0.0 for runs in by_place.values()]
+    bars = axes.barh([*by_place], means, thick, xerr=spread if any(spread) else None, label=words(label))
+    axes.bar_label(bars, [f"{value:.{DIGITS[title]}f}" for value in means], fontsize=6, padding=2)
+    axes.margins(x=0.25)
+    axes.locator_params(axis="x", nbins=4)
+
+
+def looks(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
+    """Pictures [H, W, 3] of the edited scenes by what they are of and by variant, of the first seed each."""
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for run in runs:
+        by_variant = found.setdefault(" ".join(filter(None, run.series)), {}) if run.edit else {}
+        scene = run.sources[0].with_name("scene.yaml")
+        if run.edit and run.variant not in by_variant and scene.is_file():
+            by_variant[run.variant] = picture(scene)
+    return {label: by_variant for label, by_variant in found.items() if by_variant}
+
+
+def picture(path: Path) -> np.ndarray:
+    """A scene as its first look from the front shows it."""
+    import torch
+
+    from texgs.core.lens import Lens
+    from texgs.report.before_after import POLAR, pictures
+    from texgs.scene.scene_file import read_scene
+    from texgs.volume.cameras import orbit_path
+
+    scene = read_scene(path)
+    cameras = orbit_path(1, POLAR, *Lens().square(PIXELS))
+    return pictures(scene, cameras, [scene.light], torch.device("cpu"))[0]
+
+
+def draw_pictures(
+    figure: SubFigure, pictures: Mapping[str, Mapping[str, np.ndarray]], variants: Sequence[str]
+) -> None:
+    """A row of pictures for each edit, a column for each variant."""
+    panels = figure.subplots(len(pictures), len(variants), squeeze=False)
+    for row, (label, by_variant) in zip(panels, pictures.items(), strict=True):
+        box = content(list(by_variant.values()))
+        row[0].set_ylabel(words(label), fontsize=7)
+        for axes, variant in zip(row, variants, strict=True):
+            axes.set(xticks=[], yticks=[])
+            if variant in by_variant:
+                axes.imshow(by_variant[variant][box])
+    for axes, variant in zip(panels[0], variants, strict=True):
+        axes.set_title(words(variant), fontsize=8)

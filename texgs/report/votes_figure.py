@@ -1,0 +1,66 @@
+"""Figure of a user study, as the paper's: how often each method got each rank, over all data sets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from texgs.core.io import write_atomic
+from texgs.core.plots import words
+from texgs.report.ballots import Votes
+from texgs.report.study import Compared, rank_name
+from texgs.report.votes import THE_PAPER, Panel, compared, total
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+WIDTH, DPI = 5.0, 150  # inches of a chart
+BAR, AROUND = 0.35, 1.0  # inches of a bar, and of what is above and below all of a chart
+
+
+def write_votes(path: str | Path, votes: Votes | None) -> Path:
+    """Write a PNG with a chart for each kind of question, ours and the paper's below each other.
+
+    Returns:
+        The path.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    charts = compared(votes)
+    heights = [AROUND + BAR * len(panels[0].votes.methods) for _, panels in charts]
+    figure = Figure(figsize=(WIDTH, sum(heights)), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    places = figure.subplots(len(charts), squeeze=False, height_ratios=heights)[:, 0]
+    for axes, (kind, panels) in zip(places, charts, strict=True):
+        draw(axes, kind, panels)
+    return write_atomic(path, lambda file: figure.savefig(file, format="png", metadata={"Software": None}))
+
+
+def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
+    """A bar for each method, of its votes from the best rank to the worst."""
+    from matplotlib import colormaps  # slow to import
+
+    votes = total(panels)
+    names, count = [words(name_of(method)) for method in votes.methods], len(votes.methods)
+    starts = np.zeros(count)
+    for rank, column in enumerate(votes.counts.T, start=1):
+        color = colormaps["viridis"](1 - (rank - 0.5) / count)
+        axes.barh(names, column, left=starts, height=0.7, color=color, label=rank_name(rank, count))
+        starts += column
+    axes.invert_yaxis()
+    axes.set_xlim(0, votes.number)
+    axes.set_xlabel("votes", fontsize=8)
+    axes.tick_params(labelsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+    source = f", {THE_PAPER}" if votes.methods[0].edit == THE_PAPER else ""
+    axes.set_title(f"{kind}{source}: {votes.number} rankings of {len(panels)} questions", fontsize=9)
+    axes.legend(fontsize=7, ncols=count, loc="upper center", bbox_to_anchor=(0.5, -0.25), frameon=False)
+
+
+def name_of(method: Compared) -> str:
+    """What a bar is called."""
+    return method.method if method.edit == THE_PAPER else f"{method.edit}\n{method.recipe}"
