@@ -40,7 +40,7 @@ def studio(tmp_path_factory):
     views = ViewKeys(shading=Shading(), step=0.5, mapper="cpu", width=8, height=8)
     basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
     fit = FitLabel("quick", "surfels", 0, "none", "", "cpu")
-    settings = OfScene("gallery", "sphere", "fraction", basic, views, fit)
+    settings = OfScene("gallery", "sphere", "", "fraction", basic, views, fit)
     return Studio(settings, {"quick/none": scene, "volume": folder / "volume.nrrd"}, SIZE)
 
 
