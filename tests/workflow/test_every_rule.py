@@ -137,7 +137,7 @@ def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project)
     assert "<b>ball fade</b>" in report
     assert "<b>TF01 ball</b>" in report
     compared = json.loads(
-        (results / "sphere" / "TF01" / "comparison" / "gallery" / "metrics.json").read_text()
+        (results / "sphere" / "TF01" / "comparison" / "looks" / "metrics.json").read_text()
     )
     assert compared["numbers"]["recipes"] == ["demo", "ball"]
     assert compared["pictures"]["comparison.png"] in report
