@@ -56,3 +56,12 @@ def test_two_variants_of_one_folder_are_refused(planned):
     words = " ".join(f'"+sweep.variants.{name}={listed}"' for name, listed in given.items())
     with pytest.raises(ConfigError, match="two variants go there; give one another name"):
         planned(f"sweep.name=x {words}")
+
+
+def test_a_gallery_of_a_sweep_of_edits_shows_the_edits_of_its_variants(planned):
+    columns = "[{title: small, variant: '64'}, {title: large, variant: '128'}]"
+    grid = f"{{name: sizes, rows: [{{edit: gold}}], columns: {columns}}}"
+    words = "edit.text.size=64,128 edit.seed=5,6 edits=[gold]"
+    plan = planned(f'{words} "gallery.grids=[{grid}]"')
+    (gallery,) = (job for job in plan.jobs.values() if job["stage"] == "gallery")
+    assert {path.split("/")[-2] for path in gallery["inputs"].values()} == {"gold-64-s5", "gold-128-s5"}

@@ -84,8 +84,8 @@ def test_the_papers_share_of_clip_is_refused_without_its_weights(there):
         f"the weights of {CLIP} are not on this machine; `texgs weights {CLIP}` downloads them or says "
         "how to get them, and edit.image.lambda_s=1 does without them"
     )
-    for name in ("style_paper", "lambda_0", "lambda_90"):
-        lines = missing(compose(("dataset=orbital", f"edit={name}")))
+    for name, *words in (("style_paper",), *(("style", f"edit.image.lambda_s={x}") for x in (0, 0.9))):
+        lines = missing(compose(("dataset=orbital", f"edit={name}", *words)))
         assert f"edit {name}: {of_clip}" in lines
     (line,) = missing(compose(("dataset=orbital", "edit=style_paper", "edit.image.lambda_s=1")))
     assert "vgg16" in line

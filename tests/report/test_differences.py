@@ -60,9 +60,9 @@ def test_recipes_with_the_same_difference_share_a_row():
 
 
 def test_numbers_of_an_edits_recipe_are_those_it_runs_with():
-    rows = told([], ["style", "text_quick", "lambda_50"])
-    assert ("edit.image.recipe.iterations", "3000", "100", "style, lambda_50") in rows
-    assert ("edit.image.recipe.lambda_s", "0.9", "0.5", "lambda_50") in rows
+    rows = told([], ["style", "text_quick", "style_untextured"])
+    assert ("edit.image.recipe.iterations", "3000", "100", "style, style_untextured") in rows
+    assert ("edit.image.recipe.lambda_s", "0.9", "1", "style, style_untextured") in rows
     assert ("edit.text.recipe.views", "nearest", "axes", "text_quick") in rows
     assert ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick") in rows
 

@@ -11,9 +11,9 @@ from omegaconf import DictConfig, OmegaConf
 from texgs.config.compose import compose
 from texgs.config.gallery import AS_FITTED, GalleryKeys, GridKeys, ShotKeys
 from texgs.config.gallery_scenes import check_changes, fit_of, takers
-from texgs.config.inputs import prepared_volume, scene_settings
+from texgs.config.inputs import prepared_volume, scene_settings, sibling
 from texgs.config.methods import method_of
-from texgs.config.places import fit_folder, folder_of, made
+from texgs.config.places import edit_folder, fit_folder, made
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 
@@ -121,10 +121,10 @@ def place_of(config: DictConfig, shot: ShotKeys, where: str) -> Place:
             raise ConfigError(f"{where}.{name}: expected {expected}, got {given}")
     of_fit = fit_of(config, shot, where)
     check_changes(config, shot, where)
-    file = made("compose", of_fit)
-    if shot.edit != AS_FITTED:
-        file = folder_of("edit", of_fit).with_name(str(shot.edit)) / made("edit", of_fit).name
-    return Place(shot, f"{fit_folder(of_fit)}/{shot.edit}", file)
+    if shot.edit == AS_FITTED:
+        return Place(shot, f"{fit_folder(of_fit)}/{AS_FITTED}", made("compose", of_fit))
+    edit = str(shot.edit)
+    return Place(shot, f"{fit_folder(of_fit)}/{edit_folder(of_fit, edit)}", sibling(of_fit, edit))
 
 
 def is_inside(box: Sequence[float]) -> bool:

@@ -71,7 +71,8 @@ def has_gallery(config: DictConfig) -> bool:
     shows_all = len(config.edits) > 1 and not variants
     if not has_scene(config) or not (config.gallery.grids or shows_all):
         return False
-    if variants and (config.variant, config.fit.seed) != (variants[0], config.sweep.seeds[0]):
+    first = variants[:1], config.sweep.seeds[:1], config.sweep.edit_seeds[:1]
+    if variants and ([config.variant], [config.fit.seed], [config.edit.seed]) != first:
         return False
     return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 

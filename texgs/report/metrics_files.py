@@ -17,6 +17,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.report.results import Result, result_of
 
+COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs, see texgs/track/sqlite.py
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
@@ -90,9 +91,14 @@ def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
 
 
 def below(folder: str | Path) -> list[Path]:
-    """The metrics files of all results in a folder, without those of jobs that are still at work."""
+    """The metrics files of all results in a folder, but for jobs at work and the copies of tracked runs."""
     paths = Path(folder).rglob("metrics.json")
-    return sorted(path for path in paths if not any(part.startswith(".") for part in path.parts))
+    return sorted(path for path in paths if not any(is_aside(part) for part in path.parts))
+
+
+def is_aside(folder: str) -> bool:
+    """Whether a folder holds no results, by its name."""
+    return folder.startswith(".") or folder == COPIES
 
 
 def phases() -> list[str]:
