@@ -136,9 +136,7 @@ def test_a_method_and_a_field_of_one_file_each_are_in_tables_and_report(project)
     report = (results / "report.html").read_text()
     assert "<b>ball fade</b>" in report
     assert "<b>TF01 ball</b>" in report
-    compared = json.loads(
-        (results / "sphere" / "TF01" / "comparison" / "looks" / "metrics.json").read_text()
-    )
+    compared = json.loads((results / "sphere" / "TF01" / "comparison" / "looks" / "metrics.json").read_text())
     assert compared["numbers"]["recipes"] == ["demo", "ball"]
     assert compared["pictures"]["comparison.png"] in report
     words = ("edit_fade", "dataset=sphere", "fit=ball", "edit=glass", "tracking=none")
