@@ -1,9 +1,16 @@
 """The stages of the workflow: a row for each, and one for each method of editing."""
 
-from collections.abc import Callable
-
 from omegaconf import DictConfig
 
+from texgs.config.applies import (
+    has_gallery,
+    has_mesh,
+    has_scene,
+    has_volume,
+    is_compared,
+    is_fit,
+    is_fit_of,
+)
 from texgs.config.fields import Kind, kinds
 from texgs.config.galleries import gallery_inputs, gallery_settings
 from texgs.config.inputs import (
@@ -25,56 +32,10 @@ from texgs.config.inputs import (
     view_set,
     view_settings,
     volume_inputs,
-    with_recipe,
 )
 from texgs.config.locate import basic_tf, tf_names
-from texgs.config.methods import NO_METHOD, Method, methods
+from texgs.config.methods import Method, methods
 from texgs.config.stage import Stage, for_tf
-from texgs.config.variants import changes
-
-
-def is_fit(config: DictConfig) -> bool:
-    """Whether a configuration is of views and fits; the scene that is edited is that of another one."""
-    return bool(config.edit.method == NO_METHOD)
-
-
-def is_fit_of(kind: str) -> Callable[[DictConfig], bool]:
-    """Whether a configuration is of fits of a kind of field."""
-    return lambda config: is_fit(config) and config.fit.field == kind
-
-
-def has_volume(config: DictConfig) -> bool:
-    """Whether the data set starts from a volume, not from views."""
-    return is_fit(config) and config.dataset.views_folder is None
-
-
-def has_mesh(config: DictConfig) -> bool:
-    """Whether a mesh is made of the fit of a basic TF."""
-    return has_volume(config) and config.tf in config.mesh.tfs and bool(kinds()[config.fit.field].depth)
-
-
-def is_compared(config: DictConfig) -> bool:
-    """Whether this is the first of several recipes: its configuration stands for all of them."""
-    if not is_fit(config) or changes(config) or len(config.fits) < 2:
-        return False
-    return bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
-
-
-def has_scene(config: DictConfig) -> bool:
-    """Whether the configuration is of all basic TFs."""
-    return is_fit(config) and config.tf is None
-
-
-def has_gallery(config: DictConfig) -> bool:
-    """Whether this is the first of the recipes and variants of an experiment that has scenes to show."""
-    variants = list(changes(config))
-    shows_all = len(config.edits) > 1 and not variants
-    if not has_scene(config) or not (config.gallery.grids or shows_all):
-        return False
-    first = variants[:1], config.sweep.seeds[:1], config.sweep.edit_seeds[:1]
-    if variants and ([config.variant], [config.fit.seed], [config.edit.seed]) != first:
-        return False
-    return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
 
 def edit_stage(method: Method) -> Stage:
