@@ -30,6 +30,7 @@ def test_seconds_follow_pixels_and_iterations():
 def test_iterations_are_found_wherever_settings_name_them():
     settings = {"phase": {"iterations": 7, "losses": {"iterations": 2}}, "iterations": 100, "name": "a"}
     assert forecast.iterations(settings) == 109
+    assert forecast.iterations({"stages": [{"steps": 3, "size": 8}, {"steps": 4}], "base_steps": 10}) == 17
 
 
 def test_the_jobs_of_a_run_are_counted_each_once():

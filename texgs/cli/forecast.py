@@ -86,11 +86,12 @@ def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
             continue
 
 
-def iterations(settings: Mapping[str, Any]) -> int:
-    """All iterations that the settings of a job name."""
-    own = settings.get("iterations", 0)
-    below = (iterations(value) for value in settings.values() if isinstance(value, Mapping))
-    return (own if isinstance(own, int) else 0) + sum(below)
+def iterations(settings: Any) -> int:
+    """All iterations and steps that the settings of a job name."""
+    if isinstance(settings, Mapping):
+        own = [value for key, value in settings.items() if key == "iterations" or key.endswith("steps")]
+        return sum(each for each in own if isinstance(each, int)) + sum(map(iterations, settings.values()))
+    return sum(map(iterations, settings)) if isinstance(settings, list) else 0
 
 
 def speeds() -> dict[str, Speed]:
