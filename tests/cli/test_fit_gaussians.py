@@ -78,12 +78,13 @@ def test_two_recipes_side_by_side_are_fitted_first(results, monkeypatch):
     few = ["fits=[gaussians_quick,demo]", "fit.shading.iterations=10"]
     assert main(["comparison", *TINY, *few]) == 0
     folder = results / "sphere" / "TF01"
-    numbers = json.loads((folder / "comparison" / "metrics.json").read_text())["numbers"]
+    compared = folder / "comparison" / "looks"
+    numbers = json.loads((compared / "metrics.json").read_text())["numbers"]
     assert numbers == {
         "recipes": ["gaussians_quick", "demo"],
         "shown": ["test view 0", "test view 1"],
     }
-    assert (folder / "comparison" / "comparison.png").stat().st_size > 1000
+    assert (compared / "comparison.png").stat().st_size > 1000
     assert (folder / "demo" / "texture" / "model.safetensors").exists()
 
 

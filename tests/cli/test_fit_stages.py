@@ -164,7 +164,12 @@ def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
     shown = []
     read = figure.read_views
     monkeypatch.setattr(figure, "read_views", lambda folder: replace(read(folder), test=[]))
-    monkeypatch.setattr(figure, "write_fit_figure", lambda *args: shown.extend(args[2]) or args[0])
+
+    def write(path, _models, views, *_):
+        shown.extend(views)
+        path.touch()
+
+    monkeypatch.setattr(figure, "write_fit_figure", write)
     assert main(["figure", *TINY]) == 0
     assert shown == ["training view 0", "training view 4"]
 

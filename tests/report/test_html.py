@@ -70,7 +70,7 @@ def paths(tmp_path):
     part = EditResult("red", "text", "how", 6.0, follows="instruction", followed={"TF01/lobe": "red"})
     timing = TimingResult(4.0, 5.0, 4.0, primitives=9, width=8, height=6, threads=2)
     return [
-        job(folder, "gallery", GalleryResult(["before", "painted", "red"]), ["gallery.png"], recipe=None),
+        job(folder, "gallery", GalleryResult("image", []), ["gallery.png"], recipe=None),
         job(folder, "timing", timing),
         job(folder, "edit_text", part, ["edit.png"], recipe="other"),
         job(folder, "edit_image", edit, ["edit.png", "style-TF01.png"]),
@@ -109,7 +109,6 @@ def test_every_figure_has_its_words_and_command(tmp_path, paths):
     names = ["gallery", "edit", "style-TF01", "pse", "relight", "comparison", "sheet", "new"]
     assert all(f"Words of {name}.png." in captions for name in names)
     assert set(found.of("code")) >= {
-        "texgs gallery dataset=engine fit=quick 'fits=[quick,other]' 'edits=[painted,red]'",
         "texgs edit_image dataset=engine fit=quick edit=painted",
         "texgs comparison dataset=engine tf=TF01 fit=a 'fits=[a,b]'",
         "texgs sheet dataset=engine tf=TF01",
@@ -133,7 +132,7 @@ def test_figures_are_in_their_sections(tmp_path, paths):
     assert section("Words of sheet.png") == "data"
     assert section("Words of comparison.png") == "fitting"
     assert section("Words of relight.png") == "relight"
-    assert section("Words of gallery.png") == "image", "its first look follows a picture"
+    assert section("Words of gallery.png") == "image", "as its experiment says"
     assert section("Words of style-TF01.png") == "image"
     assert section("Words of new.png") == "more", "a stage that no section names"
     assert section("edit=red") == "parts", "it follows words, but for a segment"

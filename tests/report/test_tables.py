@@ -86,7 +86,7 @@ def test_captions_say_what_is_left_out(tmp_path):
     said = {
         name for name, table in tables.items() if table.caption.endswith("Left out: data set wood: no file.")
     }
-    assert said == {"fitting", "views", "resolution", "model_size", "fits"}
+    assert said == {"fitting", "views", "resolution", "model_size", "fits", "differences"}
 
 
 def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
