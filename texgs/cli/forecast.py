@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from texgs.cli.job import Job
     from texgs.config.experiments import Selection
 
-PROBE_SECONDS = 0.0109  # of one probe, see `probe`, on the two cores that speeds.csv was measured on
+PROBE_SECONDS = 0.005  # of one probe, see `probe`, on the two cores that speeds.csv was measured on
 REPEATS = 15  # of the probe; the median counts
 
 
