@@ -54,7 +54,7 @@ def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, t
     told = capsys.readouterr().out
     assert re.search(r"ok +data set engine +to be downloaded from https://", told)
     assert re.search(r"ok +data set orbital +generated: orbital", told)
-    assert re.search(r"left out data set wood: .*woodbranch\S* is not there", told)
+    assert re.search(r"left out data set wood: \S*woodbranch\S* is not there", told)
     assert re.search(r"left out edit style: .*weights of vgg16 are not on this machine", told)
     assert re.search(r"jobs +\d+ to do \(.*4 views.*\), 0 done", told)
     assert re.search(r"time +about \d+\.\d hours: an estimate", told)
@@ -63,6 +63,8 @@ def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, t
 
 def test_a_run_that_would_not_start_is_told(capsys):
     assert main(["doctor", "dataset=wood", "fit=quick"]) == 1
-    assert re.search(r"missing +data set wood: .* is not there", capsys.readouterr().out)
+    told = capsys.readouterr().out
+    assert re.search(r"missing +data set wood: .* is not there", told)
+    assert "ok  " not in told
     assert main(["doctor", "--experiment", "papr"]) == 2
     assert "paper" in capsys.readouterr().err

@@ -128,13 +128,13 @@ def show(words: tuple[str, ...]) -> int:
     expected = forecast(words)
     selection = expected.selection
     configs = [each for some in selection.by_sweep.values() for each in some]
-    stops: dict[str, None] = {}
-    for config in {config.dataset.name: config for config in configs}.values():
-        print(f"ok       data set {config.dataset.name:16} {source(config)}")
+    for config in {config.dataset.name: config for config in configs[::-1]}.values():  # of its fits
+        if selection.skips or not selection.lacking(config):
+            print(f"ok       data set {config.dataset.name:16} {source(config)}")
     for entry in selection.left_out:
         print(f"left out {entry.what}: {entry.why}")
-    if not selection.skips:
-        stops = dict.fromkeys(line for config in configs for line in selection.lacking(config))
+    needed = () if selection.skips else configs
+    stops = dict.fromkeys(line for config in needed for line in selection.lacking(config))
     for line in stops:
         print(f"missing  {line}")
     kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())

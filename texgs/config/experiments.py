@@ -49,7 +49,7 @@ class Selection:
         """Whether a configuration is run; what is left out is noted."""
         reasons = self.lacking(config) if self.skips else ()
         for why in reasons:
-            places = self.left_out.setdefault(LeftOut(what, why), {})
+            places = self.left_out.setdefault(LeftOut(what, why.removeprefix(f"{what}: ")), {})
             places.update(dict.fromkeys(stage.place for stage in STAGES.values() if stage.applies(config)))
         return not reasons
 
