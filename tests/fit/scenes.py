@@ -98,3 +98,13 @@ def is_finite(parameters):
 def logit(value):
     """Of a number."""
     return math.log(value / (1 - value))
+
+
+def striped():
+    """The ball with stripes that its surfels are too few to show."""
+    views = cameras()
+    planes = [ball_planes(camera) for camera in views]
+    for camera, plane in zip(views, planes, strict=True):
+        rows = torch.arange(camera.height)[None, :, None]
+        plane[:3] -= 0.15 * plane[3] * (rows // 3 % 2)
+    return images_of(planes, views)

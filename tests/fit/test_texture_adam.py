@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras, images_of, new_fit, run
+from tests.fit.scenes import HEADLIGHT, ball_seeds, cameras, images_of, new_fit, run, striped
 from texgs.config.phase import Densify
 from texgs.core.errors import FitError
 from texgs.fields.surfels.model import Surfels, geometry
@@ -26,13 +26,7 @@ PAPER = PLAIN | {"rate": 0.025, "palette_rate": 0.01, "final": 1.0}
 
 @pytest.fixture(scope="module")
 def images():
-    """The ball with stripes that its surfels are too few to show."""
-    views = cameras()
-    planes = [ball_planes(camera) for camera in views]
-    for camera, plane in zip(views, planes, strict=True):
-        rows = torch.arange(camera.height)[None, :, None]
-        plane[:3] -= 0.15 * plane[3] * (rows // 3 % 2)
-    return images_of(planes, views)
+    return striped()
 
 
 @pytest.fixture(scope="module")

@@ -6,23 +6,13 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras, images_of, new_fit, run
+from tests.fit.scenes import HEADLIGHT, ball_seeds, cameras, images_of, new_fit, run, striped
 from texgs.config.phase import Densify
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.texels import textured
 from texgs.fit.texture_layout import look, sizes_for_budget
 from texgs.fit.texture_solve import curvature, sampled_error, solve
-
-
-def striped():
-    """The ball with stripes that its surfels are too few to show."""
-    views = cameras()
-    planes = [ball_planes(camera) for camera in views]
-    for camera, plane in zip(views, planes, strict=True):
-        rows = torch.arange(camera.height)[None, :, None]
-        plane[:3] -= 0.15 * plane[3] * (rows // 3 % 2)
-    return images_of(planes, views)
 
 
 @pytest.fixture(scope="module")
