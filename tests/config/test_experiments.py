@@ -5,7 +5,8 @@ import itertools
 
 import pytest
 
-from texgs.config.compose import ALONE, _compose, compose
+from texgs.config.compose import ALONE, compose, configuration
+from texgs.config.composition import composition
 from texgs.config.experiments import LeftOut, selected
 from texgs.config.locate import tf_names
 from texgs.config.places import fit_folder
@@ -43,8 +44,9 @@ def without(*names):
     ],
 )
 def test_groups_composed_alone_are_those_of_one_composition(words):
-    assert compose(words) == _compose(words, folders())
-    assert all(compose(words)[group] == _compose(words, folders())[group] for group in ALONE)
+    whole = configuration(composition(words, folders()))
+    assert compose(words) == whole
+    assert all(compose(words)[group] == whole[group] for group in ALONE)
 
 
 @pytest.fixture

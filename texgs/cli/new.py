@@ -41,7 +41,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
     from texgs.cli.stage import ensure
-    from texgs.config.compose import check_name
+    from texgs.config.check import check_name
     from texgs.config.dataset import BasicTF
     from texgs.config.files import shown
     from texgs.config.project import members, own_folder

@@ -1,44 +1,26 @@
 """Compose conf/ and overrides into one checked configuration; a mistake is a sentence that names the key."""
 
+import copy
+import pickle
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
-from hydra import compose as hydra_compose
-from hydra import initialize_config_dir
-from hydra.core.config_search_path import ConfigSearchPath
-from hydra.core.config_store import ConfigStore
-from hydra.core.plugins import Plugins
 from hydra.errors import HydraException
-from hydra.plugins.search_path_plugin import SearchPathPlugin
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig, OmegaConf, read_write
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from texgs.config.describe import Key, keys
-from texgs.config.files import origin, shortened
-from texgs.config.keys import numbers
+from texgs.config.check import check, check_below
+from texgs.config.composition import Places, Words, composition, schema
 from texgs.config.project import folders
-from texgs.config.schema import Config
-from texgs.config.slips import close, sentence
+from texgs.config.slips import sentence
 from texgs.core.errors import ConfigError
 
-RESERVED = (
-    "volume",
-    "transfer",
-    "gallery",
-    "logs",
-    "mlartifacts",
-    "tables",
-    "scene",
-    "study",
-)  # folders below `results`
 ALONE = ("fit", "edit")  # groups that depend on no other one but the experiment
-LONGEST = 100  # characters of a name: it becomes that of files and folders
-NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
-
 
 # What Hydra and OmegaConf raise for values and files that they do not understand.
 MISTAKES = (
@@ -51,17 +33,6 @@ MISTAKES = (
     TypeError,
     ValueError,
 )
-
-
-class OwnFolders(SearchPathPlugin):
-    """Tells Hydra of the folders before that of texgs."""
-
-    folders: ClassVar[tuple[Path, ...]] = ()
-
-    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
-        """Put the folders in front."""
-        for folder in reversed(self.folders):
-            search_path.prepend("texgs", f"file://{folder}")
 
 
 def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> DictConfig:
@@ -82,162 +53,85 @@ def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> DictC
 
 
 @lru_cache(maxsize=1024)
-def _assembled(overrides: tuple[str, ...], places: tuple[Path, ...]) -> DictConfig:
-    own = {group: _words(overrides, group) for group in ALONE}
+def _assembled(overrides: Words, places: Places) -> DictConfig:
+    if not places[-1].is_dir():
+        raise ConfigError(f"{places[-1]}: no configuration there; install texgs again")
+    by_group = {group: _words(overrides, group) for group in ALONE}
+    own = {group: words for group, words in by_group.items() if words}
     rest = tuple(word for word in overrides if not any(word in words for words in own.values()))
-    config = _compose(rest, places)
-    if rest == overrides:
-        return config
     chosen = _words(overrides, "experiment")
-    nodes = {group: _compose((*chosen, *words), places)[group] for group, words in own.items() if words}
-    return changed(config, **nodes)
+    with told():
+        nodes = {group: composition((*chosen, *words), places)[group] for group, words in own.items()}
+        made = {**composition(rest, places), **nodes}
+        config = configuration(composition(overrides, places) if refers(made, nodes) else made)
+    check(config)
+    return config
+
+
+def refers(made: dict[str, Any], nodes: dict[str, Any]) -> bool:
+    """Whether some groups refer to other keys of the configuration by ${...}, or these to them."""
+    return "${" in str(nodes) or any(f"${{{group}" in str(made) for group in nodes)
+
+
+def configuration(made: dict[str, Any]) -> DictConfig:
+    """A configuration with the types of the schema, interpolations resolved; read only.
+
+    Two configurations of a run are nearly the same. Tables with the same values are made once, and shared.
+
+    Raises:
+        ConfigError: for a value that is out of bounds.
+        OmegaConfBaseException: for an unknown key, or a value of the wrong type.
+    """
+    tables = [key for key, node in schema().items() if OmegaConf.is_dict(node) and key in made]
+    plain = {key: value for key, value in made.items() if key not in tables}
+    nodes: dict[str, Any] = {}
+    for key in map(str, schema()):
+        part = {key: made[key]} if key in tables else plain
+        node = _checked(pickle.dumps(part))._get_node(key)
+        nodes[key] = copy.deepcopy(node) if "${" in str(made.get(key)) else node
+    config = together(nodes)
+    with read_write(config):
+        OmegaConf.resolve(config)
+    return config
+
+
+@lru_cache(maxsize=1024)
+def _checked(part: bytes) -> DictConfig:
+    """The schema with the values of some keys at its top, pickled, that are checked."""
+    values = pickle.loads(part)
+    OmegaConf.to_container(OmegaConf.create(values), throw_on_missing=True)
+    config = cast(DictConfig, OmegaConf.merge(schema(), values))  # refuses keys added by +key=value
+    for key in values:
+        check_below(key, config)
+    return config
 
 
 def changed(config: DictConfig, **values: Any) -> DictConfig:
-    """The same configuration, or node of one, with other values of some keys; read only.
+    """The same configuration, or node of one, with other values of some keys; read only."""
+    return together({str(name): values.get(str(name), config[name]) for name in config})
 
-    What is below other keys is shared, not copied: a plan has hundreds of configurations.
-    """
+
+def together(nodes: dict[str, Any]) -> DictConfig:
+    """A configuration of some nodes, which are shared, not copied: a plan has hundreds of them; read only."""
     made = DictConfig({}, flags={"no_deepcopy_set_nodes": True})
-    for name in config:
-        made[name] = values.get(str(name), config[name])
+    for name, node in nodes.items():
+        made[name] = node
     OmegaConf.set_struct(made, True)
     OmegaConf.set_readonly(made, True)
     return made
 
 
-def _words(overrides: tuple[str, ...], group: str) -> tuple[str, ...]:
+def _words(overrides: Words, group: str) -> Words:
     """The words that choose the file of a group, or set a key of it."""
     return tuple(word for word in overrides if re.match(rf"[+~]*{group}(=|\.|$)", word))
 
 
-@lru_cache(maxsize=256)
-def _compose(overrides: tuple[str, ...], places: tuple[Path, ...]) -> DictConfig:
-    *own, shipped = places
-    if not shipped.is_dir():
-        raise ConfigError(f"{shipped}: no configuration there; install texgs again")
-    expected = schema()
-    Plugins.instance().register(OwnFolders)
-    OwnFolders.folders = tuple(own)
+@contextmanager
+def told() -> Iterator[None]:
+    """Make one sentence of what Hydra and OmegaConf raise."""
     try:
-        with initialize_config_dir(str(shipped), version_base="1.3"):
-            composed = hydra_compose("config", overrides=list(overrides))
-        resolved = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True)
-        checked = OmegaConf.merge(expected, resolved)  # refuses keys added by +key=value
+        yield
+    except ConfigError:
+        raise
     except MISTAKES as error:
         raise ConfigError(sentence(error)) from error
-    config = cast(DictConfig, checked)
-    check(config)
-    OmegaConf.set_readonly(config, True)
-    return config
-
-
-@lru_cache(maxsize=1)
-def schema() -> DictConfig:
-    """All keys with their types and defaults, known to Hydra as `schema`. Kept: making it takes 0.05 s."""
-    made: DictConfig = OmegaConf.structured(Config)
-    ConfigStore.instance().store(name="schema", node=made)
-    return made
-
-
-def check(config: DictConfig) -> None:
-    """Compare values with the choices and bounds of the schema.
-
-    Raises:
-        ConfigError: naming the first key that is out of bounds.
-    """
-    check_name("dataset.name", config.dataset.name)
-    check_name("fit.name", config.fit.name)
-    check_name("edit.name", config.edit.name)
-    if config.edit.base is not None and not is_scene_file(config.edit.base):
-        check_name("edit.base", config.edit.base)
-    if not re.fullmatch(r"[A-Za-z0-9_-]*", config.sweep.name):
-        raise ConfigError(f"sweep.name: expected letters, digits, _ or -, got {config.sweep.name!r}")
-    if not re.fullmatch(rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST - 1}}})?", config.variant):
-        got = shortened(repr(config.variant))
-        raise ConfigError(f"variant: expected at most {LONGEST} letters, digits, _, - or ., got {got}")
-    check_name("gallery.name", config.gallery.name)
-    for key, name in (("fit.name", config.fit.name), ("gallery.name", config.gallery.name)):
-        if re.fullmatch("sheet|comparison|views.*", name):
-            raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
-    if not re.fullmatch("views(-.*)?", config.views.name):
-        raise ConfigError(f"views.name: expected views or views-..., got {config.views.name}")
-    check_name("views.name", config.views.name)
-    for tf in config.dataset.basic_tfs:
-        check_name("dataset.basic_tfs", tf)
-    check_meshes(config)
-    for entry in keys():
-        for name, value in values(config, entry.name):
-            if value is not None:
-                check_value(entry, name, value)
-
-
-def check_meshes(config: DictConfig) -> None:
-    """Require of the basic TFs with meshes that the data set has them, and a volume to compare with.
-
-    Raises:
-        ConfigError: naming what it has not.
-    """
-    known = list(config.dataset.basic_tfs)
-    if config.mesh.tfs and config.dataset.views_folder is not None:
-        raise ConfigError(
-            f"mesh.tfs: data set {config.dataset.name} starts from views and has no volume to compare with; "
-            "leave mesh.tfs empty"
-        )
-    for tf in config.mesh.tfs:
-        if tf not in known:
-            raise ConfigError(f"mesh.tfs: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
-
-
-def check_value(entry: Key, name: str, value: Any) -> None:
-    """Compare one value with the choices and bounds of its key.
-
-    Raises:
-        ConfigError: naming the key, and the file where the value is from one.
-    """
-    if entry.choices and value not in entry.choices:
-        choices = f"{', '.join(entry.choices)}, got {shortened(value)}{close(value, entry.choices)}"
-        raise ConfigError(f"{origin(name, value)}{name}: expected one of {choices}")
-    for number in numbers(value):
-        if expected := entry.bounds.complaint(number):
-            raise ConfigError(f"{origin(name, number)}{name}: expected {expected}, got {shortened(number)}")
-
-
-def is_scene_file(base: str) -> bool:
-    """Whether what an edit starts from is the file of a scene, not the name of another edit."""
-    return base.endswith((".yaml", ".yml"))
-
-
-def check_name(key: str, name: str) -> None:
-    """Require a name that can be a folder beside the others below `results`.
-
-    Raises:
-        ConfigError: naming the key.
-    """
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", str(name)):
-        got = shortened(repr(name))
-        raise ConfigError(f"{key}: expected a letter and then letters, digits, _ or -, got {got}")
-    if len(name) > LONGEST:
-        raise ConfigError(
-            f"{key}: expected at most {LONGEST} characters, got {len(name)}; choose a shorter one"
-        )
-    if NO_TEXT.fullmatch(name):
-        raise ConfigError(
-            f"{key}: {name} is a word that YAML or Hydra does not read as text; choose another name"
-        )
-    if name in RESERVED:
-        raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
-
-
-def values(config: Any, name: str) -> Iterator[tuple[str, Any]]:
-    """The values of a key, by full name; keys below a list or a dict of tables have several."""
-    head, _, rest = name.partition(".")
-    if head == "*":
-        items = config.items() if hasattr(config, "items") else enumerate(config)
-    else:
-        items = [(head, config[head])]
-    for at, value in items:
-        if rest:
-            yield from ((f"{at}.{below}", leaf) for below, leaf in values(value, rest))
-        else:
-            yield str(at), value

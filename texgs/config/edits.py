@@ -1,6 +1,7 @@
 """The edits of an experiment, as more words for `compose`."""
 
-from texgs.config.compose import compose, is_scene_file
+from texgs.config.check import is_scene_file
+from texgs.config.compose import compose
 from texgs.config.inputs import scene_before
 from texgs.config.locate import tf_names
 from texgs.config.methods import NO_METHOD, method_of

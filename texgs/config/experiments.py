@@ -145,8 +145,9 @@ def parts(words: Words, base: DictConfig) -> list[Words]:
     rest = without(words, "experiment", "experiments")
     require_union(base, compose(rest))
     wanted, made = named(words), []
+    of_all = without(rest, "dataset", "datasets")
     for name in base.experiments:
-        part = compose((f"experiment={name}",))
+        part = compose((f"experiment={name}", *base.each, *of_all))
         if part.experiments:
             raise ConfigError(f"experiments: expected single experiments, got {name}, which has several")
         own = list(part.datasets) or [part.dataset.name]
@@ -155,7 +156,7 @@ def parts(words: Words, base: DictConfig) -> list[Words]:
             made.append((*own_words, *rest))
         elif chosen := [each for each in own if each in wanted]:
             of_set = f"datasets=[{','.join(chosen)}]"
-            made.append((*own_words, *without(rest, "dataset", "datasets"), of_set))
+            made.append((*own_words, *of_all, of_set))
     if not made:
         raise ConfigError(
             f"dataset: expected data sets of {', '.join(base.experiments)}, got {', '.join(wanted)}"

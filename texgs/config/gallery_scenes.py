@@ -2,7 +2,8 @@
 
 from omegaconf import DictConfig
 
-from texgs.config.compose import changed, compose, is_scene_file
+from texgs.config.check import is_scene_file
+from texgs.config.compose import changed, compose
 from texgs.config.gallery import AS_FITTED, ShotKeys
 from texgs.config.inputs import with_recipe
 from texgs.config.locate import tf_names

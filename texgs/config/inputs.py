@@ -7,7 +7,8 @@ from typing import Any
 
 from omegaconf import DictConfig
 
-from texgs.config.compose import changed, compose, is_scene_file
+from texgs.config.check import is_scene_file
+from texgs.config.compose import changed, compose
 from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder

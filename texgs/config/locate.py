@@ -4,7 +4,7 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
-from texgs.config.compose import check_name
+from texgs.config.check import check_name
 from texgs.config.dataset import Volume
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from omegaconf import DictConfig, OmegaConf
 
@@ -52,8 +52,7 @@ class Stage:
         selected = {"stage": self.name, **of_all, **self.select(config)}
         if self.per_tf:
             selected["tf"] = config.tf
-        settings = OmegaConf.to_container(OmegaConf.create(selected), resolve=True)
-        return {str(name): value for name, value in dict(settings).items()}  # type: ignore[arg-type]
+        return cast(dict[str, Any], plain(selected))
 
     def output(self, config: DictConfig) -> Path:
         """Folder of the job's files."""
@@ -100,6 +99,15 @@ def note_result(settings: str, note: str | None) -> None:
 def settings_digest(settings: dict[str, Any]) -> str:
     """Digest of a job's settings: the one in the name of its file."""
     return digest(_yaml(settings))
+
+
+def plain(value: Any) -> Any:
+    """A value of a configuration, or tables and lists of them, as plain dicts and lists."""
+    if OmegaConf.is_config(value):
+        return OmegaConf.to_container(value, resolve=True)
+    if isinstance(value, Mapping):
+        return {str(name): plain(each) for name, each in value.items()}
+    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def _yaml(settings: dict[str, Any]) -> str:

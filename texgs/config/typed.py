@@ -1,6 +1,9 @@
 """Plain values as instances of the dataclasses that describe them."""
 
+import copy
+import pickle
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any, TypeVar, cast
 
 T = TypeVar("T")
@@ -14,5 +17,14 @@ def typed(kind: type[T], values: Mapping[str, Any]) -> T:
     """
     from omegaconf import OmegaConf  # not at the top: the list of verbs needs methods, and none of this
 
-    merged = OmegaConf.merge(OmegaConf.structured(kind), OmegaConf.create(dict(values)))
+    plain = OmegaConf.to_container(values) if OmegaConf.is_config(values) else dict(values)
+    return copy.deepcopy(_made(kind, pickle.dumps(plain)))
+
+
+@lru_cache(maxsize=512)
+def _made(kind: type[T], values: bytes) -> T:
+    """The instance of some values, pickled. Kept: a plan asks for the same ones hundreds of times."""
+    from omegaconf import OmegaConf
+
+    merged = OmegaConf.merge(OmegaConf.structured(kind), OmegaConf.create(pickle.loads(values)))
     return cast(T, OmegaConf.to_object(merged))
