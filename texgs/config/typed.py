@@ -18,13 +18,13 @@ def typed(kind: type[T], values: Mapping[str, Any]) -> T:
     from omegaconf import OmegaConf  # not at the top: the list of verbs needs methods, and none of this
 
     plain = OmegaConf.to_container(values) if OmegaConf.is_config(values) else dict(values)
-    return copy.deepcopy(_made(kind, pickle.dumps(plain)))
+    return cast(T, copy.deepcopy(_made(cast(Any, kind), pickle.dumps(plain))))
 
 
 @lru_cache(maxsize=512)
-def _made(kind: type[T], values: bytes) -> T:
+def _made(kind: Any, values: bytes) -> Any:
     """The instance of some values, pickled. Kept: a plan asks for the same ones hundreds of times."""
     from omegaconf import OmegaConf
 
     merged = OmegaConf.merge(OmegaConf.structured(kind), OmegaConf.create(pickle.loads(values)))
-    return cast(T, OmegaConf.to_object(merged))
+    return OmegaConf.to_object(merged)
