@@ -1,5 +1,7 @@
 import hashlib
+import json
 import os
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +55,16 @@ def test_a_damaged_cache_is_an_empty_one(tmp_path, cache, content):
     assert Checksums.load().of(path) == sha256(path)
     cache.write_text(f'{{"{path}": "not a list"}}')
     assert Checksums.load().of(path) == sha256(path)
+
+
+def test_the_latest_files_are_kept(tmp_path, cache, monkeypatch):
+    monkeypatch.setattr(checksum, "MOST", 2)
+    checksums = Checksums.load()
+    for name in "abc":
+        (tmp_path / name).write_text(name)
+        checksums.of(tmp_path / name)
+    checksums.save()
+    assert [Path(path).name for path in json.loads(cache.read_text())] == ["b", "c"]
 
 
 def test_a_cache_that_cannot_be_written_costs_time_only(tmp_path, cache):

@@ -11,6 +11,7 @@ from texgs.core.folders import cache_folder
 from texgs.core.io import write_bytes
 
 CACHE = "checksums.json"  # in the cache folder
+MOST = 20_000  # files in it, the latest ones
 
 
 def sha256(path: str | Path) -> str:
@@ -53,6 +54,7 @@ class Checksums:
     def save(self) -> None:
         """Keep them for later processes; where the cache cannot be written, they will compute them again."""
         if self._is_new:
+            self._known = dict(list(self._known.items())[-MOST:])
             with contextlib.suppress(ArgumentError, OSError):
                 write_bytes(cache_folder() / CACHE, json.dumps(self._known).encode())
             self._is_new = False
