@@ -77,6 +77,9 @@ def test_numbers_name_the_method(results):
     assert gold["how"] == "procedural filters, default"
     assert set(glass["notes"]["seconds"]) == {"TF01", "TF02"}
     assert glass["edit_seconds"] > 0
+    assert {part.split("/")[0] for part in glass["losses"]} == {"TF01", "TF02"}
+    assert all(len(losses) == min(100, glass["iterations"]) for losses in glass["losses"].values())
+    assert gold["losses"] == {}
     assert json.loads((results / "edits" / "glass" / "metrics.json").read_text())["seed"] == 0
 
 

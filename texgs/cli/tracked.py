@@ -94,9 +94,11 @@ def curves(numbers: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, float]]]
         if isinstance(listed, list) and key.endswith("_ms"):
             yield from ((step, {key: float(value)}) for step, value in enumerate(listed))
     losses = numbers.get("losses", [])
-    total = numbers.get("iterations") or len(losses)
-    for index, loss in enumerate(losses):
-        yield round(total * (index + 1) / len(losses)), {"loss": float(loss)}
+    by_name = {f"loss/{name}": each for name, each in losses.items()} if isinstance(losses, dict) else {}
+    for name, listed in (by_name or {"loss": losses}).items():
+        total = numbers.get("iterations") or len(listed)
+        for index, loss in enumerate(listed):
+            yield round(total * (index + 1) / len(listed)), {name: float(loss)}
 
 
 def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:

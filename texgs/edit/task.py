@@ -91,3 +91,4 @@ class EditedScene:
     pictures: Mapping[str, str] = field(default_factory=dict)  # what files of the output show, by their names
     lambda_s: float | None = None  # share of NNFM against CLIP
     notes: Mapping[str, Any] = field(default_factory=dict)  # what else there is to tell: no table reads it
+    losses: Mapping[str, Mapping[str, Sequence[float]]] = field(default_factory=dict)  # by part and term

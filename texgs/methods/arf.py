@@ -31,7 +31,7 @@ class ArfKeys(FeatureKeys):
 
 
 def run(task: Task[ArfKeys]) -> EditedScene:
-    """Give the models the style; write style.png and convergence.png."""
+    """Give the models the style; write style.png."""
     from texgs.edit.voxel_style import ArfWeights, stylize_voxels
     from texgs.volume.images import load
 

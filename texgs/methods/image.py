@@ -54,23 +54,22 @@ class ImageKeys(StyleKeys):
 
 
 def run(task: Task[ImageKeys]) -> EditedScene:
-    """Give the parts the style; write style.png and convergence.png."""
+    """Give the parts the style; write style.png."""
     from texgs.edit.task import EditedScene
-    from texgs.report.convergence import write_convergence
 
     recipe = recipe_of(task.settings, task.edit.seed)
     pictures: dict[str, StylePicture] = {}
-    curves: dict[str, dict[str, list[float]]] = {}
+    losses: dict[str, dict[str, list[float]]] = {}
     seconds: dict[str, dict[str, float]] = {}
-    scene = task.each_part(stylist(task, recipe, pictures, curves, seconds))
-    write_convergence(task.output / "convergence.png", curves)
+    scene = task.each_part(stylist(task, recipe, pictures, losses, seconds))
     return EditedScene(
         scene,
         how(recipe, task.settings.clip),
         sum(each["all"] for each in seconds.values()),
-        style.CONVERGENCE | style.write_styles(task.output, pictures),
+        style.write_styles(task.output, pictures),
         recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
         {"seconds": seconds},
+        losses,
     )
 
 
@@ -78,7 +77,7 @@ def stylist(
     task: Task[ImageKeys],
     recipe: Recipe,
     pictures: dict[str, StylePicture],
-    curves: dict[str, dict[str, list[float]]],
+    losses: dict[str, dict[str, list[float]]],
     seconds: dict[str, dict[str, float]],
 ) -> Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]:
     """What gives one part the style, for `Task.each_part`; it notes picture, losses and seconds by name."""
@@ -107,7 +106,7 @@ def stylist(
             surfels=surfels,
             title=f"{task.title} {task.edit.name}, {name}",
         )
-        curves[name] = result.history.losses
+        losses[name] = result.history.losses
         seconds[name] = {"all": time.monotonic() - start, **result.history.seconds}
         return result.model
 

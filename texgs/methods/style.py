@@ -12,8 +12,6 @@ from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
 from texgs.methods.shares import MASKS, mask_weights, shares
 
-CONVERGENCE = {"convergence.png": "Terms of the loss in each iteration."}
-
 if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe
     from texgs.edit.style_picture import StylePicture
@@ -104,13 +102,11 @@ class Look:
         return f"{self.task.title} {self.task.edit.name}, {model}"
 
     def result(self, scene: Scene, seconds: float) -> EditedScene:
-        """The edited scene; writes its style pictures and convergence.png."""
+        """The edited scene; writes its style pictures."""
         from texgs.edit.task import EditedScene
-        from texgs.report.convergence import write_convergence
 
-        write_convergence(self.task.output / "convergence.png", self.losses)
-        shown = CONVERGENCE | write_styles(self.task.output, self.pictures)
-        return EditedScene(scene, self.task.settings.how, seconds, shown)
+        pictures = write_styles(self.task.output, self.pictures)
+        return EditedScene(scene, self.task.settings.how, seconds, pictures, losses=self.losses)
 
 
 def write_styles(folder: Path, pictures: Mapping[str, StylePicture]) -> dict[str, str]:

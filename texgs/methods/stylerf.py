@@ -34,7 +34,7 @@ class StyleRfKeys(FeatureKeys):
 
 
 def run(task: Task[StyleRfKeys]) -> EditedScene:
-    """Give the models the styles; write style.png and convergence.png."""
+    """Give the models the styles; write style.png."""
     from texgs.edit.palette_style import StyleRfWeights, stylize_palette
     from texgs.volume.images import load
 

@@ -27,7 +27,7 @@ class StyleSplatKeys(FeatureKeys):
 
 
 def run(task: Task[StyleSplatKeys]) -> EditedScene:
-    """Give the models the style; write style.png and convergence.png."""
+    """Give the models the style; write style.png."""
     from texgs.edit.gaussian_style import stylize_gaussians
     from texgs.volume.reduced import smaller
 

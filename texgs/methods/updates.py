@@ -106,7 +106,6 @@ def edit_by_updates(
     """
     from texgs.edit.dataset_update import Updated, update_field
     from texgs.edit.task import EditedScene
-    from texgs.report.convergence import write_convergence
     from texgs.volume.images import load
 
     keys, guidance, start = task.settings, task.settings.opened(task.device), time.monotonic()
@@ -127,15 +126,13 @@ def edit_by_updates(
     scene = task.each_model(one)
     seconds = time.monotonic() - start
     losses = {name: {"loss": each.losses} for name, each in updates.items()}
-    write_convergence(task.output / "convergence.png", losses)
     _write_views(task.output / "views.png", updates)
     notes: dict[str, Any] = {
         name: {"edits": each.edits, "seconds of them": each.guided} for name, each in updates.items()
     }
     notes["instruction"] = task.followed or keys.instruction
     how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
-    pictures = {**PICTURE, "convergence.png": "The loss in each iteration."}
-    return EditedScene(scene, how, seconds, pictures, notes=notes)
+    return EditedScene(scene, how, seconds, PICTURE, notes=notes, losses=losses)
 
 
 def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:

@@ -183,6 +183,8 @@ class EditResult:
     notes: dict[str, Any] = field(default_factory=dict)  # for people
     follows: str = ""  # "style" or "instruction"
     followed: dict[str, str] = field(default_factory=dict)  # the picture or the words, by model
+    iterations: int = 0  # of the method, for each part
+    losses: dict[str, list[float]] = field(default_factory=dict)  # over them, by part and term
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,11 @@
 """Stages `edit_METHOD`: a method of editing gives a scene a new look, or a new part."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.settings import Distance, FitLabel, OfDataset
@@ -12,9 +15,12 @@ from texgs.core.device import torch_device
 from texgs.edit.parts import parts_of
 from texgs.edit.task import Task
 from texgs.report.before_after import write_before_and_after
+from texgs.report.convergence import write_convergence
 from texgs.report.results import EditResult
 from texgs.scene.scene_file import read_scene, write_scene
 
+FALLEN = "How the loss of the edit fell, term by term."
+POINTS = 100  # of a curve of losses at most
 SHOWN = "Before and after the edit, under the light of the scene and under another one."
 VIEWS = "views."  # before the name of a model, in the names of inputs
 
@@ -59,12 +65,26 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     if method.is_look:
         write_before_and_after(before, edited.scene, settings.lens.lens, output, device, title)
         pictures["edit.png"] = SHOWN
+    if edited.losses:
+        write_convergence(output / "convergence.png", edited.losses)
+        pictures["convergence.png"] = FALLEN
     result = EditResult(
         *(task.edit.name, method.name, edited.how, edited.seconds, edited.lambda_s, dict(edited.notes)),
-        method.follows,
-        followed(task),
+        *(method.follows, followed(task), *fallen(edited.losses)),
     )
     return Outcome(result, pictures)
+
+
+def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, dict[str, list[float]]]:
+    """The number of iterations, and the means of losses over equal shares of them, by part and term."""
+    curves = {f"{part}/{term}": values for part, terms in losses.items() for term, values in terms.items()}
+    iterations = max(map(len, curves.values()), default=0)
+    shares = max(1, min(POINTS, iterations))
+    return iterations, {
+        name: [float(share.mean()) for share in np.array_split(values, min(shares, len(values)))]
+        for name, values in curves.items()
+        if values
+    }
 
 
 def followed(task: Task[Any]) -> dict[str, str]:
