@@ -37,6 +37,9 @@ from texgs.config.locate import basic_tf, tf_names
 from texgs.config.methods import Method, methods
 from texgs.config.stage import Stage, for_tf
 
+LAST_PHASES = tuple(kind.phases[-1] for kind in kinds().values())  # which need those before
+EDITS = tuple(method.stage for method in methods().values())
+
 
 def edit_stage(method: Method) -> Stage:
     """The stage of a method of editing."""
@@ -151,7 +154,7 @@ ROWS = (
         },
         inputs=models,
         place="figure",
-        needs=tuple(kind.phases[-1] for kind in kinds().values()),  # which need those before
+        needs=LAST_PHASES,
         applies=is_fit,
     ),
     Stage(
@@ -160,7 +163,7 @@ ROWS = (
         select=lambda config: {"reduce": config.fit.reduce},
         inputs=compared_models,
         place="comparison",
-        needs=("views", *(kind.phases[-1] for kind in kinds().values())),
+        needs=("views", *LAST_PHASES),
         applies=is_compared,
     ),
     Stage(
@@ -175,20 +178,16 @@ ROWS = (
         },
         inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
         place="mesh",
-        needs=("volume", "views", *(kind.phases[-1] for kind in kinds().values())),
+        needs=("volume", "views", *LAST_PHASES),
         applies=has_mesh,
     ),
     Stage(
         "compose",
         "texgs.cli.stages.compose",
-        select=lambda config: {
-            "image": config.dataset.image,
-            "lens": lens(config),
-            **fit_label(config),
-        },
+        select=lambda config: {"image": config.dataset.image, "lens": lens(config), **fit_label(config)},
         inputs=all_models,
         place="compose",
-        needs=tuple(kind.phases[-1] for kind in kinds().values()),
+        needs=LAST_PHASES,
         applies=has_scene,
     ),
     Stage(
@@ -216,7 +215,7 @@ ROWS = (
         select=gallery_settings,
         inputs=gallery_inputs,
         place="gallery",
-        needs=("volume", "compose", *(method.stage for method in methods().values())),
+        needs=("volume", "compose", *EDITS),
         applies=has_gallery,
     ),
     Stage(
@@ -230,7 +229,7 @@ ROWS = (
         },
         inputs=scenes_before_and_after,
         place="edit_metrics",
-        needs=("compose", "views", *(method.stage for method in methods().values())),
+        needs=("compose", "views", *EDITS),
         applies=lambda config: (
             config.tf is None
             and config.edit.method in [method.name for method in methods().values() if method.is_look]
