@@ -2,15 +2,7 @@
 
 from omegaconf import DictConfig
 
-from texgs.config.applies import (
-    has_gallery,
-    has_mesh,
-    has_scene,
-    has_volume,
-    is_compared,
-    is_fit,
-    is_fit_of,
-)
+from texgs.config.applies import has_gallery, has_mesh, has_scene, has_volume, is_compared, is_fit, is_fit_of
 from texgs.config.fields import Kind, kinds
 from texgs.config.galleries import gallery_inputs, gallery_settings
 from texgs.config.inputs import (
