@@ -60,6 +60,12 @@ def test_a_file_that_changes_is_read_again(cache, tmp_path):
     assert again(places=places)["views"]["width"] == 777
 
 
+def test_a_link_by_which_an_editor_locks_a_file_is_no_mistake(cache, tmp_path):
+    (tmp_path / "conf").mkdir()
+    (tmp_path / "conf" / ".#mine.yaml").symlink_to("me@machine.4711")
+    assert again(places=(tmp_path / "conf", SHIPPED))["views"]
+
+
 def test_other_keys_of_texgs_are_another_composition(cache, made, monkeypatch):
     again()
     monkeypatch.setattr(hydra, "libraries", lambda: ("a new key",))

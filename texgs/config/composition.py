@@ -84,8 +84,9 @@ def fingerprint(places: Places) -> Iterator[object]:
     """All that a composition depends on but its overrides."""
     yield libraries()
     for path in (path for place in places for path in sorted(place.rglob("*.yaml"))):
-        stat = path.stat()
-        yield str(path), stat.st_mtime_ns, stat.st_size
+        if path.is_file():  # not so for the links by which editors lock a file
+            stat = path.stat()
+            yield str(path), stat.st_mtime_ns, stat.st_size
 
 
 @cache
