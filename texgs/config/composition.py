@@ -3,7 +3,6 @@
 import contextlib
 import json
 import sqlite3
-from collections.abc import Iterator
 from functools import cache, lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -17,6 +16,7 @@ from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.describe import keys
+from texgs.config.kept import fingerprint
 from texgs.config.schema import Config
 from texgs.config.sources import sha256
 from texgs.core.folders import cache_folder
@@ -53,7 +53,7 @@ def composition(overrides: Words, places: Places) -> dict[str, Any]:
         HydraException, OmegaConfBaseException, YAMLError: for what Hydra does not understand.
         ArithmeticError, OSError, RecursionError, TypeError, ValueError: for files that cannot be read.
     """
-    made_of = sha256(repr((overrides, *fingerprint(places))).encode())
+    made_of = sha256(repr((overrides, places, fingerprint(*places), libraries())).encode())
     made = kept(made_of)
     if made is None:
         made = composed(overrides, places)
@@ -78,15 +78,6 @@ def schema() -> DictConfig:
     made: DictConfig = OmegaConf.structured(Config)
     ConfigStore.instance().store(name="schema", node=made)
     return made
-
-
-def fingerprint(places: Places) -> Iterator[object]:
-    """All that a composition depends on but its overrides."""
-    yield libraries()
-    for path in (path for place in places for path in sorted(place.rglob("*.yaml"))):
-        if path.is_file():  # not so for the links by which editors lock a file
-            stat = path.stat()
-            yield str(path), stat.st_mtime_ns, stat.st_size
 
 
 @cache
