@@ -58,7 +58,7 @@ def project(tmp_path, monkeypatch):
     texts = {
         "scenes": "datasets: [engine, jets, sphere]\nsweeps: {views: jets, resolution: sphere}\n",
         "pictures": "datasets: [engine, wood]\nfits: [quick, gaussians_quick]\nedits: [glass, stylesplat]\n",
-        "both": "experiments: [scenes, pictures]\nmissing: skip\n",
+        "both": "experiments: [scenes, pictures]\nmissing: skip\naimed: {wood: [dataset.image=99]}\n",
     }
     for name, text in texts.items():
         (folder / f"{name}.yaml").write_text(f"# @package _global_\n{text}")
@@ -130,6 +130,18 @@ def test_a_union_runs_each_of_its_experiments(project):
     }
 
 
+def test_a_union_can_aim_words(project):
+    configs = selected(("experiment=both", "fit=quick"), nothing).by_sweep[""]
+    assert {config.dataset.name for config in configs if config.views.width == 99} == {"wood"}
+    later = selected(("experiment=both", "fit=quick", "dataset.wood.image=77"), nothing).by_sweep[""]
+    assert {config.dataset.name for config in later if config.views.width == 77} == {"wood"}
+    (project / "both.yaml").write_text(
+        "# @package _global_\nexperiments: [scenes, pictures]\naimed: {woud: []}\n"
+    )
+    with pytest.raises(ConfigError, match=r"aimed: expected names of data sets, got woud, did you mean wood"):
+        selected(("experiment=both", "fit=quick", "results=elsewhere"), nothing)
+
+
 def test_of_a_union_the_experiments_with_the_data_set_that_is_named_are_run(project):
     assert data_sets("experiment=both", "dataset=jets") == {"": ["jets"], "views": ["jets"]}
     assert data_sets("experiment=both", "dataset=wood") == {"": ["wood"]}
@@ -139,7 +151,7 @@ def test_of_a_union_the_experiments_with_the_data_set_that_is_named_are_run(proj
 
 def test_a_union_sets_nothing_else_and_has_no_union(project):
     (project / "more.yaml").write_text("# @package _global_\nexperiments: [demo]\nviews: {width: 99}\n")
-    with pytest.raises(ConfigError, match="views: an experiment with `experiments` sets experiments and"):
+    with pytest.raises(ConfigError, match="views: an experiment with `experiments` sets experiments, each"):
         selected(("experiment=more",), nothing)
     (project / "nested.yaml").write_text("# @package _global_\nexperiments: [both]\n")
     with pytest.raises(ConfigError, match="expected single experiments, got both, which has several"):

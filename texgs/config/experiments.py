@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 from omegaconf import DictConfig
@@ -23,7 +23,7 @@ from texgs.config.variants import changes
 from texgs.core.errors import ConfigError
 
 Words = tuple[str, ...]
-OF_A_UNION = ("experiments", "each", "missing")  # the only keys that an experiment of experiments sets
+OF_A_UNION = ("experiments", "each", "aimed", "missing")  # all that an experiment of experiments sets
 NO_SWEEPS = ("sweeps={}", "sweeps=null", "sweep=none")  # what is written to switch them off
 AIMED = re.compile(r"dataset\.([\w-]+)\.(([\w-]+)[^=]*=.*)", re.DOTALL)  # dataset.NAME.KEY=VALUE
 
@@ -102,8 +102,9 @@ def selected(words: Words, lacking: Callable[[DictConfig], Sequence[str]]) -> Se
     base = compose(plain)
     selection = Selection(lacking, skips(plain, base))
     reached: set[str] = set()
+    of_union = base.aimed if base.experiments else {}
     for part in parts(plain, base):
-        reached |= add_part(part, aimed, selection)
+        reached |= add_part(part, joined(of_union, aimed), selection)
     if beside := [name for name in aimed if name not in reached]:
         raise ConfigError(
             f"dataset.{beside[0]}: expected one of the data sets of this run, {', '.join(sorted(reached))}; "
@@ -112,7 +113,7 @@ def selected(words: Words, lacking: Callable[[DictConfig], Sequence[str]]) -> Se
     return selection
 
 
-def add_part(words: Words, aimed: dict[str, Words], selection: Selection) -> set[str]:
+def add_part(words: Words, aimed: Mapping[str, Words], selection: Selection) -> set[str]:
     """Add one experiment, and return the names of its data sets."""
     base = compose(words)
     for key, listed in (("datasets", base.datasets), ("fits", base.fits)):
@@ -120,9 +121,7 @@ def add_part(words: Words, aimed: dict[str, Words], selection: Selection) -> set
             raise ConfigError(f"{key}: expected different names, got {repeated[0]} twice")
     names = named(words) or list(base.datasets) or [base.dataset.name]
     is_listed = bool(named(words) or base.datasets)
-    if unknown := [name for name in base.aimed if name not in members("dataset")]:
-        raise ConfigError(f"aimed: expected names of data sets, got {unknown[0]}{close(unknown[0], names)}")
-    aimed = {name: (*base.aimed.get(name, ()), *aimed.get(name, ())) for name in {*base.aimed, *aimed}}
+    aimed = joined(base.aimed, aimed)
     for name in names:
         of_set = (*words, *((f"dataset={name}",) if is_listed else ()), *aimed.get(name, ()))
         for each in [(*of_set, f"fit={fit}") for fit in base.fits] or [of_set]:
@@ -132,6 +131,18 @@ def add_part(words: Words, aimed: dict[str, Words], selection: Selection) -> set
     for sweep, name in of_sweeps.items():
         selection.add((*beside, f"dataset={name}", *aimed.get(name, ()), f"sweep={sweep}"), False)
     return {*names, *of_sweeps.values()}
+
+
+def joined(aimed: Mapping[str, Sequence[str]], later: Mapping[str, Sequence[str]]) -> dict[str, Words]:
+    """The words that are aimed at each data set, first those of an experiment.
+
+    Raises:
+        ConfigError: if the experiment names a data set that there is not.
+    """
+    known = members("dataset")
+    if unknown := [name for name in aimed if name not in known]:
+        raise ConfigError(f"aimed: expected names of data sets, got {unknown[0]}{close(unknown[0], known)}")
+    return {name: (*aimed.get(name, ()), *later.get(name, ())) for name in {*aimed, *later}}
 
 
 def parts(words: Words, base: DictConfig) -> list[Words]:
@@ -173,7 +184,7 @@ def require_union(union: DictConfig, plain: DictConfig) -> None:
     for key in (each.name for each in fields(Config)):
         if key not in OF_A_UNION and union[key] != plain[key]:
             raise ConfigError(
-                f"{key}: an experiment with `experiments` sets {' and '.join(OF_A_UNION)} alone; put {key} "
+                f"{key}: an experiment with `experiments` sets {', '.join(OF_A_UNION)} alone; put {key} "
                 "into the experiments that it names"
             )
 
