@@ -92,6 +92,10 @@ def begin():
 
     try:
         RUN_LOCK = run_alone(RESULTS)  # it goes with the process, however that ends
+        if workflow.local_exec:
+            # A limit of jobs a second makes Snakemake look at all jobs once more after each look, so that a long
+            # run looks at them all the time, with half of a core: github.com/snakemake/snakemake/issues/2967.
+            workflow.scheduler.job_rate_limiter = None
         jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in PLACES]
         if workflow.local_exec and len(jobs) > 1:
             FORK_SERVER = fork_server.start(ENVIRONMENT)
