@@ -66,10 +66,7 @@ def write_compact(
     model = model.to("cpu")
     if seen is not None:
         model = _without_unseen(model, seen.cpu())
-    stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
-    if model.stage == "texture":
-        stored |= _texture(path, model.parameters, step)
-    packed = lzma.compress(save(stored), preset=6)
+    packed = lzma.compress(save(compact_tensors(path, model, step)), preset=6)
     return write_bytes(path, json.dumps(header, separators=(",", ":")).encode() + b"\n" + packed)
 
 
@@ -119,6 +116,18 @@ def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
 
 
 # -- writing ---
+
+
+def compact_tensors(path: str | Path, model: Surfels, step: float = STEP) -> dict[str, np.ndarray]:
+    """The tensors of a compact file, see `write_compact`, of a model on the CPU.
+
+    Raises:
+        ArgumentError: naming the file at `path`, if a texel is beyond 2^23 steps.
+    """
+    stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
+    if model.stage == "texture":
+        stored |= _texture(path, model.parameters, step)
+    return stored
 
 
 def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
