@@ -14,12 +14,12 @@ def test_modules_come_once_and_behind_what_they_import():
 
 
 def test_nothing_is_imported_or_exported_any_more():
-    text = joined_modules("webgl.js")
+    text = joined_modules("standalone.js")
     assert not re.search(r"^\s*(import|export)\b", text, re.MULTILINE)
     assert IMPORT.findall(web_file("shaders.js")) == ["surfels.js"]
 
 
 def test_names_on_the_top_level_differ():
-    names = [name for group in TOP.findall(joined_modules("webgl.js")) for name in group.split(", ")]
+    names = [name for group in TOP.findall(joined_modules("standalone.js")) for name in group.split(", ")]
     assert len(names) > 20
     assert len(names) == len(set(names))

@@ -61,7 +61,7 @@ def packed(scene, tmp_path_factory):
 @pytest.fixture(scope="module")
 def description(scene):
     composed = scene.open()
-    return describe("test", scene, composed, composed.means)
+    return describe("test", scene, composed)
 
 
 @pytest.fixture(scope="module")
@@ -167,7 +167,7 @@ def test_texels_beyond_eight_bits_have_sixteen(chromium, tmp_path):
     scene = Scene({"A": SceneModel(write_model(tmp_path / "a.safetensors", model), PartEdit(ambient=0.2))})
     composed = scene.open()
     packed = pack(tmp_path / "page.html", composed)
-    description = describe("bright", scene, composed, composed.means)
+    description = describe("bright", scene, composed)
     page = chromium.new_page()
     open_renderer(page, packed, description)
     assert difference(page, packed, description, scene, CAMERAS[0]) <= LEVELS

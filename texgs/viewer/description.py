@@ -1,80 +1,83 @@
-"""What a front end needs to know of a scene: its parts, what edits they can show, where it is in space."""
+"""What a page has to know of a scene, as JSON: its parts, their edits, and which edits each can show."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from math import radians, sin
-from typing import Any
-
-import numpy as np
-import torch
-from torch import Tensor
+from typing import Any, get_args
 
 from texgs.config.fields import Kind
-from texgs.core.camera import Camera, intrinsics, look_at, orbit_direction
 from texgs.core.lens import Lens
-from texgs.fields.field import Composed
+from texgs.core.light import Light
+from texgs.fields.field import Composed, Look
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import NEEDS, PartEdit
-from texgs.scene.scene import Scene
+from texgs.fields.surfels.composition import Composition
+from texgs.scene.frame import Mode
+from texgs.scene.scene import Scene, SceneModel
 
-AZIMUTH, POLAR = 30.0, 20.0  # of the first view, degrees, as `texgs render` has them
-FLOATERS = 0.01  # share of the primitives at either end that bounds leave out
-MARGIN = 1.2  # of the first view around the bounds
+LENS = Lens()
+LIT = get_args(Look)[2:]  # factors of a material
 
 
-def describe(name: str, scene: Scene, composed: Composed, means: Tensor) -> dict[str, Any]:
-    """A scene as JSON: every part with its edit, light, background, bounds and views.
+def describe(name: str, scene: Scene, composed: Composed) -> dict[str, Any]:
+    """A scene as a page needs it.
+
+    Bounds and field of view are those of the paper's cameras: volumes are centred and scaled alike.
 
     Args:
-        name: of the scene, shown to the user.
-        scene: to describe.
-        composed: its models, opened.
-        means: [N, 3] places of their primitives, world units.
+        name: of the scene, to show.
+        scene: with its edits.
+        composed: its models.
     """
+    kind = kind_of(next(iter(scene.models.values())).file)
+    keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
+    palettes = zip(composed.palettes, has_palette(composed), strict=True)
     models = [
-        {
-            "name": str(model),
-            "kind": kind_of(entry.file).name,
-            "edit": asdict(entry.edit),
-            "fitted_palette": [float(x) for x in palette],
-            "can": editable(kind_of(entry.file)),
-            "segments": [{"name": key, "edit": asdict(each.edit)} for key, each in entry.segments.items()],
-        }
-        for (model, entry), palette in zip(scene.models.items(), composed.palettes, strict=True)
+        describe_model(model, entry, kind.name, palette, [k for k in keys if has or k != "palette"])
+        for (model, entry), (palette, has) in zip(scene.models.items(), palettes, strict=True)
     ]
-    light = scene.light
-    bounds, fov_y = bounds_of(means), Lens().fov_y
-    first = {"name": "start", "target": bounds["center"], "azimuth": AZIMUTH, "polar": POLAR}
     return {
         "name": name,
         "background": list(scene.background),
-        "light": None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar},
+        "light": describe_light(scene.light),
         "models": models,
-        "bounds": bounds,
+        "modes": modes_of(kind),
+        "bounds": {"center": [0.0, 0.0, 0.0], "radius": LENS.radius * sin(radians(LENS.fov_y / 2))},
         "up": [0.0, 1.0, 0.0],
-        "fov_y": fov_y,
-        "views": [first | {"distance": MARGIN * bounds["radius"] / sin(radians(fov_y / 2))}],
+        "fov_y": LENS.fov_y,
+        "views": [],
     }
 
 
-def editable(kind: Kind[Any]) -> list[str]:
-    """Keys of an edit that fields of a kind can show."""
-    return [key for key in asdict(PartEdit()) if NEEDS.get(key, "relight") in kind.can]
+def describe_model(
+    name: str, entry: SceneModel, kind: str, palette: tuple[float, ...], can: list[str]
+) -> dict[str, Any]:
+    """A model and its segments."""
+    segments = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
+    return {
+        "name": name,
+        "kind": kind,
+        "edit": asdict(entry.edit),
+        "fitted_palette": list(palette),
+        "can": can,
+        "segments": segments,
+    }
 
 
-def bounds_of(means: Tensor) -> dict[str, Any]:
-    """Centre [3] and radius of a sphere around nearly all places [N, 3], world units."""
-    places = means.detach().cpu().double().numpy()
-    center = np.quantile(places, [FLOATERS, 1 - FLOATERS], axis=0).mean(axis=0)
-    radius = float(np.quantile(np.linalg.norm(places - center, axis=1), 1 - FLOATERS))
-    return {"center": center.tolist(), "radius": max(radius, 1e-3)}
+def describe_light(light: Light) -> dict[str, float] | None:
+    """Angles of a directional light, degrees; None for the headlight."""
+    return None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar}
 
 
-def first_view(description: dict[str, Any], width: int, height: int) -> Camera:
-    """The camera that a page begins with."""
-    view = description["views"][0]
-    target = torch.tensor(view["target"], dtype=torch.float64)
-    position = target + view["distance"] * orbit_direction(view["azimuth"], view["polar"])
-    viewmat = look_at(position, target, torch.tensor(description["up"], dtype=torch.float64))
-    return Camera(viewmat.float(), intrinsics(description["fov_y"], width, height), width, height)
+def modes_of(kind: Kind[Any]) -> list[str]:
+    """What frames of a kind of field can show."""
+    needs = {"unshaded": "unlit", "normal": "normals", **dict.fromkeys(LIT, "relight")}
+    return [mode for mode in get_args(Mode) if mode not in needs or needs[mode] in kind.can]
+
+
+def has_palette(composed: Composed) -> list[bool]:
+    """Of each model, whether it has a palette that can be replaced: surfels without texture have none."""
+    if isinstance(composed, Composition):
+        return [part.palette is not None for part in composed.parts]
+    return [False] * len(composed.palettes)

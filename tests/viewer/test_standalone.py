@@ -1,0 +1,222 @@
+"""The page of a scene: its bytes, and what it does in a real browser that opens it as a file."""
+
+import base64
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.surfels.test_composition import ball
+from tests.viewer.browser import browser
+from tests.viewer.drawing import rendered
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.core.lens import Lens
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.gaussians.model_file import write_gaussians
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
+from texgs.viewer import standalone
+from texgs.viewer.modules import web_file
+
+HOSTILE = "</script><b>&'\""
+LEVELS = 3  # of 255, see test_webgl.py
+REST = int(re.search(r"const REST = (\d+);", web_file("standalone.js"))[1])  # milliseconds
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("scene")
+
+
+@pytest.fixture(scope="module")
+def scene(folder):
+    """A scene file of two models, one with a name that is HTML."""
+    models = {
+        HOSTILE: SceneModel(write_model(folder / "a.safetensors", ball(1)), PartEdit(opacity=0.8)),
+        "B": SceneModel(write_model(folder / "b.safetensors", ball(2, n=80, middle=0.2))),
+    }
+    return write_scene(folder / "scene.yaml", Scene(models, background=(0.9, 0.9, 1.0)))
+
+
+@pytest.fixture(scope="module")
+def file(scene, folder):
+    assert main(["export", str(scene), "--to", str(folder / "scene.html")]) == 0
+    return folder / "scene.html"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as launched:
+        yield launched
+
+
+@pytest.fixture
+def page(chromium, file):
+    """The page, opened as a file; nothing may go wrong in it, and it may ask for nothing."""
+    page = chromium.new_page(viewport={"width": 300, "height": 200})
+    wrong, asked = [], []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda message: wrong.append(message.text))
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_selector("#view:not([hidden])")
+    settle(page)
+    yield page
+    assert wrong == []
+    assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
+    page.close()
+
+
+def settle(page):
+    """Wait for the frame in full that follows a movement."""
+    page.wait_for_timeout(REST + 50)
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def shown(page):
+    """What the canvas shows [H, W, 3]."""
+    picture = page.locator("#view").screenshot(type="png")
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"))
+
+
+def surfels(file):
+    return re.search(r'id="surfels">([^<]*)<', file.read_text())[1]
+
+
+def expected(file, size, light=HEADLIGHT, edits=None, azimuth=30.0, polar=20.0):
+    """What the rasterizer makes of it, from where the page begins."""
+    lens = Lens()
+    camera = orbit(azimuth, polar, lens.radius, lens.fov_y, *size)
+    edits = [PartEdit(opacity=0.8), PartEdit()] if edits is None else edits
+    return rendered(surfels(file), camera, light, edits, (0.9, 0.9, 1.0))
+
+
+def differ(page, *rest, **edited):
+    """Largest difference of what is shown from what is expected, within the outline, above the controls."""
+    found = shown(page)
+    height, width = found.shape[:2]
+    difference = np.abs(found.astype(int) - expected(*rest, (width, height), **edited))
+    return int(difference[4 : height - 60, 4:-4].max())
+
+
+def test_the_same_scene_gives_the_same_bytes(scene, file, tmp_path):
+    assert main(["export", str(scene), "--to", str(tmp_path / "scene.html")]) == 0
+    assert (tmp_path / "scene.html").read_bytes() == file.read_bytes()
+
+
+def test_names_are_text_and_only_its_own_script_may_run(file):
+    text = file.read_text()
+    assert HOSTILE not in text
+    assert text.count("</script>") == 3
+    assert "default-src &#39;none&#39;" in text or "default-src 'none'" in text
+    assert "unsafe" not in text.split("<style>")[0]
+    description = json.loads(re.search(r'id="scene">([^<]*)<', text)[1])
+    assert [model["name"] for model in description["models"]] == [HOSTILE, "B"]
+
+
+def test_it_holds_a_picture_of_the_first_view(file):
+    poster = re.search(r"data:image/jpeg;base64,([^\"]*)", file.read_text())[1]
+    found = np.asarray(Image.open(io.BytesIO(base64.b64decode(poster))))
+    assert np.abs(found.astype(int) - expected(file, found.shape[:2])).mean() < 3
+
+
+def test_it_opens_as_a_file_and_shows_what_the_rasterizer_renders(page, file):
+    assert differ(page, file) <= LEVELS
+
+
+def test_edits_and_lights_show(page, file):
+    page.locator("summary").click()
+    first = page.locator("fieldset").first
+    assert first.locator("legend").text_content() == HOSTILE
+    first.get_by_label("palette").fill("#ff2040")
+    first.get_by_label("opacity").fill("0.5")
+    page.get_by_label("visible").nth(1).uncheck()
+    page.get_by_label("polar").fill("50")
+    assert page.locator(".words").input_value() == (
+        f"{HOSTILE}.palette=#ff2040 {HOSTILE}.opacity=0.5 B.visible=false light=30,50"
+    )
+    page.locator("summary").click()
+    settle(page)
+    edits = [PartEdit(palette=(1, 32 / 255, 64 / 255), opacity=0.5), PartEdit(visible=False)]
+    assert differ(page, file, light=Light("directional", 30, 50), edits=edits) <= LEVELS
+    page.locator("summary").click()
+    page.get_by_text("Reset edits").click()
+    page.locator("summary").click()
+    settle(page)
+    assert differ(page, file) <= LEVELS
+
+
+def test_pointers_and_keys_turn_the_camera(page, file):
+    page.mouse.move(100, 60)
+    page.mouse.down()
+    page.mouse.move(80, 70)
+    page.mouse.up()
+    page.locator("#view").press("ArrowLeft")
+    page.locator("#view").press("ArrowUp")
+    settle(page)
+    assert differ(page, file, azimuth=30 + 18 - 5, polar=20 + 9 + 5) <= LEVELS
+    page.locator("#view").press("Home")
+    settle(page)
+    assert differ(page, file) <= LEVELS
+
+
+def test_the_picture_comes_again_after_the_context_was_lost(page, file):
+    before = shown(page)
+    lose = "document.getElementById('view').getContext('webgl2').getExtension('WEBGL_lose_context')"
+    page.evaluate(f"() => {{ globalThis.lose = {lose}; lose.loseContext(); }}")
+    page.wait_for_function("document.getElementById('notice').textContent.includes('graphics driver')")
+    page.evaluate("() => lose.restoreContext()")
+    page.wait_for_function("document.getElementById('notice').textContent === ''")
+    settle(page)
+    assert np.array_equal(shown(page), before)
+
+
+def test_it_follows_the_size_of_the_window(page, file):
+    page.set_viewport_size({"width": 210, "height": 260})
+    settle(page)
+    assert differ(page, file) <= LEVELS
+
+
+def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):
+    page = chromium.new_page()
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto(file.as_uri())
+    page.wait_for_function("document.getElementById('notice').textContent.includes('has no WebGL2')")
+    assert page.locator("#poster").is_visible()
+    page.close()
+
+
+def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
+    assert main(["export", str(scene), "--to", str(tmp_path / "b.html"), "--model", HOSTILE]) == 0
+    text = (tmp_path / "b.html").read_text()
+    (model,) = json.loads(re.search(r'id="scene">([^<]*)<', text)[1])["models"]
+    assert model["name"] == HOSTILE
+    assert model["edit"]["opacity"] == 0.8
+
+
+def test_a_model_file_becomes_a_page(folder, scene, tmp_path):
+    assert main(["export", str(folder / "a.safetensors"), "--to", str(tmp_path / "a.html")]) == 0
+    assert "<title>a</title>" in (tmp_path / "a.html").read_text()
+
+
+def test_other_fields_are_refused(tmp_path, capsys):
+    file = write_gaussians(tmp_path / "g.safetensors", gaussians())
+    assert main(["export", str(file), "--to", str(tmp_path / "g.html")]) == 2
+    assert "--kind html: expected surfels, got gaussians, which can be exported as 3dgs or mesh" in (
+        capsys.readouterr().err
+    )
+    assert not (tmp_path / "g.html").exists()
+
+
+def test_scenes_that_are_too_large_are_refused(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(standalone, "LARGEST", 0)
+    assert main(["export", str(scene), "--to", str(tmp_path / "s.html")]) == 2
+    message = "expected surfels of at most 0 MiB, got 0 MiB for 230 of them; export fewer models"
+    assert message in capsys.readouterr().err
