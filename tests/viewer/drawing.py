@@ -72,11 +72,16 @@ def unpacked(packed):
     return models, labels
 
 
-def rendered(packed, camera, light, edits, background, mode="shaded"):
-    """What the rasterizer makes of the numbers in a packed text [H, W, 3], uint8."""
+def composed_of(packed):
+    """The scene in a packed text."""
     models, labels = unpacked(packed)
     masks = [
         [] if own is None else [torch.tensor(own == k) for k in range(1, int(own.max()) + 1)]
         for own in labels
     ]
-    return frame(Composition(models, masks), camera, light, edits, mode, background)
+    return Composition(models, masks)
+
+
+def rendered(packed, camera, light, edits, background, mode="shaded"):
+    """What the rasterizer makes of the numbers in a packed text [H, W, 3], uint8."""
+    return frame(composed_of(packed), camera, light, edits, mode, background)

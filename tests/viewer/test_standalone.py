@@ -193,6 +193,27 @@ def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):
     page.close()
 
 
+def test_a_damaged_page_keeps_its_picture_and_says_so(chromium, file, tmp_path):
+    damaged = tmp_path / "damaged.html"
+    text = surfels(file)
+    damaged.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
+    page = chromium.new_page()
+    page.goto(damaged.as_uri())
+    page.wait_for_function("document.getElementById('notice').textContent.includes('copy the page again')")
+    assert page.locator("#poster").is_visible()
+    page.close()
+
+
+def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
+    page.locator("summary").click()
+    with page.expect_download() as saved:
+        page.get_by_text("Save picture").click()
+    saved.value.save_as(tmp_path / "saved.png")
+    assert saved.value.suggested_filename == "scene.png"
+    picture = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB")).astype(int)
+    assert np.abs(picture - expected(file, picture.shape[1::-1])).max() <= LEVELS
+
+
 def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
     assert main(["export", str(scene), "--to", str(tmp_path / "b.html"), "--model", HOSTILE]) == 0
     text = (tmp_path / "b.html").read_text()

@@ -151,9 +151,9 @@ def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
 
 def _rounded(name: str, values: Tensor) -> np.ndarray:
     """Values in half precision where that can hold them."""
-    if name == "quats":
-        values = normalize(values, dim=1)  # any length is the same rotation, but half has few of them
     half = values.half()
+    if name == "quats" and not torch.equal(half.float(), values):  # those of a compact file stay as they are
+        half = normalize(values, dim=1).half()  # any length is the same rotation, but half has few of them
     exact = name in EXACT or values.shape == (1,) or not bool(half.isfinite().all())
     return (values if exact else half).contiguous().numpy()
 

@@ -6,12 +6,17 @@ const TYPES = { F32: Float32Array, F16: Uint16Array, I32: Int32Array, U8: Uint8A
  * Unpacks tensors without a fetch, which pages opened as files may not do.
  *
  * @param {string} text base64.
+ * @throws {Error} where that is not possible.
  * @returns {Promise<{tensors: Map<string, {shape: number[], data: ArrayLike<number>}>, metadata: object}>}
  */
 export async function unpack(text) {
-  const packed = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return readTensors(await new Response(stream).arrayBuffer());
+  try {
+    const packed = Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
+    return readTensors(await new Response(stream).arrayBuffer());
+  } catch (error) {
+    throw new Error(`The scene in this page cannot be unpacked (${error.message}): update the browser, or copy the page again.`);
+  }
 }
 
 /** The tensors of a safetensors file; half precision becomes single. */
