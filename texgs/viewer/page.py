@@ -34,6 +34,7 @@ class Page:
         self._scene: dict[str, Any] | None = None
         self._view: View | None = None
         self._pace = Pace()
+        self.answered = 0  # messages, other than views
         self._wake = asyncio.Event()
 
     def show(self, view: View) -> None:
@@ -67,7 +68,7 @@ class Page:
                 await self._socket.send_str(json.dumps(self._notices.popleft()))
             if self._scene is not None:
                 message, self._scene = self._scene, None
-                await self._socket.send_str(json.dumps(message))
+                await self._socket.send_str(json.dumps({**message, "answered": self.answered}))
             if self._view is not None:
                 view, self._view = self._view, None
                 await self._send_frame(view)

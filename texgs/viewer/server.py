@@ -128,9 +128,9 @@ class Server:
         if isinstance(message, View):
             page.show(message)
             return
+        page.answered += 1
         if isinstance(message, Save):
-            if not await self._save(message, page):
-                return
+            await self._save(message, page)
         elif isinstance(message, Edit):
             self.edits.edit(message, number)
         elif isinstance(message, Undo):
@@ -141,14 +141,13 @@ class Server:
         for each in self._pages:
             each.tell_scene(news)
 
-    async def _save(self, message: Save, page: Page) -> bool:
-        """Whether the scene is saved; where that would replace another file, the page is asked first."""
+    async def _save(self, message: Save, page: Page) -> None:
+        """Save the scene; where that would replace another file, the page is asked first."""
         if not message.replace and self.edits.would_replace(message.name):
             page.tell(f"{message.name} is there already.", level="question", name=message.name)
-            return False
+            return
         path = await asyncio.to_thread(self.edits.save, message.name)
         page.tell(f"Saved as {path}", level="info")
-        return True
 
     def scene_message(self) -> dict[str, Any]:
         """The scene and its history, for all pages."""
