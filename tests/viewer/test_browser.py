@@ -184,11 +184,15 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
     with served(scene_file) as (process, address):
         port = int(re.search(r":(\d+)/", address).group(1))
         with opened(chromium, address) as page:
+            page.get_by_role("checkbox", name="Headlight").uncheck()
+            page.get_by_role("checkbox", name="TF02").uncheck()
+            expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
             process.kill()
             lost = page.get_by_text("No connection to texgs view")
             expect(lost).to_be_visible(timeout=WAIT)
             with served(scene_file, port) as (_, again):
                 assert again == address
                 expect(lost).to_be_hidden(timeout=WAIT)
-                page.get_by_role("checkbox", name="TF01").uncheck()
-                expect(page.get_by_role("listitem")).to_have_text(["TF01 visible"])
+                page.get_by_role("button", name="Make them again").click()
+                expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
+                expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()

@@ -138,6 +138,7 @@ def test_sockets_of_strangers_get_403(scene_file, path, headers):
         ("evil.example", "0.0.0.0", False),
         ("box.lab:80", "box.lab", True),
         ("", "0.0.0.0", False),
+        ("localhost:80 evil.example", "127.0.0.1", False),
     ],
 )
 def test_hosts(name, host, is_own):

@@ -17,12 +17,13 @@ from aiohttp.typedefs import Handler, Middleware
 from texgs.core.errors import ArgumentError
 
 TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")  # 32 random bytes
+HOST = re.compile(r"[A-Za-z0-9._:\[\]-]+")
+POLICY = (  # not every browser takes the socket for a part of 'self'
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+    "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
 HEADERS = {
     "Cache-Control": "no-store",
-    "Content-Security-Policy": (
-        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
-        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
-    ),
     "Cross-Origin-Resource-Policy": "same-origin",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -53,6 +54,7 @@ def guard(token: str, host: str) -> Middleware:
         response = await handler(request)
         if not response.prepared:
             response.headers.update(HEADERS)
+            response.headers["Content-Security-Policy"] = POLICY.format(host=name)
         return response
 
     return middleware
@@ -64,7 +66,7 @@ def is_own_host(header: str, host: str) -> bool:
     A server on the loopback interface has its names only. Another one has addresses, which no foreign site
     can have as its name, the name that it was given, and the machine's.
     """
-    name = hostname(f"//{header}")
+    name = hostname(f"//{header}") if HOST.fullmatch(header) else None
     if name is None:
         return False
     if name == "localhost" or is_loopback(name):

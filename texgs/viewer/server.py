@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import secrets
 from collections.abc import AsyncIterator
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,7 @@ class Server:
         self.frames = Frames(session)
         self._pages: dict[Page, web.WebSocketResponse] = {}
         self._count = 0  # of pages so far
+        self._run = secrets.token_hex(8)  # tells pages that they have met another server
 
     def application(self, token: str, host: str = "127.0.0.1") -> web.Application:
         """The application to serve.
@@ -152,7 +154,7 @@ class Server:
     def scene_message(self) -> dict[str, Any]:
         """The scene and its history, for all pages."""
         scene = describe(self._title, self.edits.scene, self._composed)
-        return {"type": "scene", "scene": scene, **self.edits.state()}
+        return {"type": "scene", "run": self._run, "scene": scene, **self.edits.state()}
 
     # ---- End ----------------------------------------------------------------
 

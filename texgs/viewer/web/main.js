@@ -9,6 +9,7 @@ import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
 import { Remote } from "./remote.js";
 import { SharedState } from "./shared.js";
+import { difference } from "./state.js";
 import { Toolbar } from "./toolbar.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is asked for
@@ -87,10 +88,16 @@ class Page {
     this.moved();
   }
 
-  /** As it was, with what the server has now. */
+  /** Show what the server has now. One that was started again knows nothing of edits before. */
   adopt(message) {
-    document.title = get("title").textContent = message.scene.name;
+    get("title").textContent = message.scene.name;
+    const lost = this.run && this.run !== message.run ? difference(message.scene, this.state.scene) : [];
+    this.run = message.run;
     this.state.adopt(message);
+    if (!lost.length) return;
+    this.notices.offer("The server was started again, without the edits of this page.", "Make them again", () => {
+      for (const { part, key, value } of lost) this.state.edit(part, key, value);
+    });
   }
 
   #rest(moving) {

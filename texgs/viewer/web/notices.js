@@ -2,7 +2,7 @@
 
 import { element } from "./inputs.js";
 
-const SECONDS = { info: 5, error: 12 };
+const SECONDS = { info: 5, error: 12 }; // others stay
 const MOST = 4;
 
 export class Notices {
@@ -14,7 +14,7 @@ export class Notices {
     root.append(this.#lasting);
   }
 
-  /** Tell something for a while; the same sentence is told once. */
+  /** Tell something for a while; the same sentence is told once. Returns its element. */
   tell(text, level = "info") {
     const shown = [...this.#root.querySelectorAll(".passing")];
     shown.find((each) => each.dataset.text === text)?.remove();
@@ -23,7 +23,15 @@ export class Notices {
     notice.dataset.text = text;
     notice.append(element("button", { "aria-label": "Close", onclick: () => notice.remove() }, "×"));
     this.#root.append(notice);
-    setTimeout(() => notice.remove(), 1000 * SECONDS[level]);
+    if (SECONDS[level]) setTimeout(() => notice.remove(), 1000 * SECONDS[level]);
+    return notice;
+  }
+
+  /** Tell something with a button that does something about it; it stays until one of its buttons is used. */
+  offer(text, action, act) {
+    const notice = this.tell(text, "offer");
+    const button = element("button", { className: "main", onclick: () => { notice.remove(); act(); } }, action);
+    notice.lastChild.before(button);
   }
 
   /** Tell something until it is another, or nothing. */

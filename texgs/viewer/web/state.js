@@ -18,6 +18,29 @@ export function edited(scene, { part, key, value }) {
   return { ...scene, models: scene.models.map((m) => m.name === part ? change(m) : inModel(m)) };
 }
 
+/** The edits that make one description another, as far as it has the same parts. */
+export function difference(from, to) {
+  const edits = [], same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+  for (const key of ["light", "background"]) {
+    if (!same(from[key], to[key])) edits.push({ part: "", key, value: to[key] });
+  }
+  const parts = partsOf(from);
+  for (const [part, edit] of partsOf(to)) {
+    for (const [key, value] of Object.entries(parts.has(part) ? edit : {})) {
+      if (!same(parts.get(part)[key], value)) edits.push({ part, key, value });
+    }
+  }
+  return edits;
+}
+
+/** Edits by the names of parts. */
+function partsOf(scene) {
+  return new Map(scene.models.flatMap((model) => [
+    [model.name, model.edit],
+    ...model.segments.map((each) => [`${model.name}/${each.name}`, each.edit]),
+  ]));
+}
+
 /** Whether a value of an edit changes nothing. */
 export function isUnedited(key, value) {
   return value === UNEDITED[key];
