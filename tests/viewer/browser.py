@@ -11,7 +11,7 @@ SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-
 
 def found():
     """The path of a Chromium; skips the test that asks where it or Playwright is missing."""
-    pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install playwright")
+    pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install '.[browser]'")
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         pytest.skip(f"needs a browser on the PATH: {', '.join(BROWSERS)}")

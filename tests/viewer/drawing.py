@@ -15,7 +15,8 @@ from texgs.scene.frame import frame
 from texgs.viewer.modules import joined_modules
 
 START = """
-Object.assign(globalThis, { DepthOrder, halfToFloat });
+const { WebglRenderer } = modules["webgl.js"];
+Object.assign(globalThis, modules["sort.js"], modules["tensors.js"]);
 globalThis.start = async (packed, scene) => {
   const canvas = document.body.appendChild(document.createElement("canvas"));
   globalThis.renderer = new WebglRenderer(canvas, (text) => console.log(text));

@@ -2,24 +2,33 @@
 
 import re
 
-from texgs.viewer.modules import IMPORT, joined_modules, web_file
+import pytest
 
-TOP = re.compile(r"^(?:async )?(?:function|class|const|let) (?:\[?([\w, ]+)\]?)", re.MULTILINE)
+from texgs.viewer.modules import EXPORT, IMPORT, joined_modules, web_file
 
-
-def test_modules_come_once_and_behind_what_they_import():
-    text = joined_modules("webgl.js", "sort.js")
-    assert text.count("class DepthOrder") == 1
-    assert text.index("const WIDTH") < text.index("const SURFEL_VERTEX") < text.index("class WebglRenderer")
+PAGES = ("standalone.js", "main.js")
 
 
-def test_nothing_is_imported_or_exported_any_more():
-    text = joined_modules("standalone.js")
+@pytest.mark.parametrize("page", PAGES)
+def test_modules_come_once_and_behind_what_they_import(page):
+    text = joined_modules(page)
+    begun = re.findall(r'^modules\["([\w-]+\.js)"\] = ', text, re.MULTILINE)
+    assert len(begun) == len(set(begun)) > 5
+    assert begun[-1] == page
+    for name in begun:
+        imported = [other for _, other in IMPORT.findall(web_file(name))]
+        assert all(begun.index(other) < begun.index(name) for other in imported)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_all_imports_and_exports_are_known_ones(page):
+    text = joined_modules(page)
     assert not re.search(r"^\s*(import|export)\b", text, re.MULTILINE)
-    assert IMPORT.findall(web_file("shaders.js")) == ["surfels.js"]
+    assert " as " not in "".join(names for names, _ in IMPORT.findall(web_file(page)))
 
 
-def test_names_on_the_top_level_differ():
-    names = [name for group in TOP.findall(joined_modules("standalone.js")) for name in group.split(", ")]
-    assert len(names) > 20
-    assert len(names) == len(set(names))
+def test_what_a_module_imports_is_exported():
+    for name in ("standalone.js", "webgl.js", "shaders.js", "light.js"):
+        for names, other in IMPORT.findall(web_file(name)):
+            exported = {export for _, export in EXPORT.findall(web_file(other))}
+            assert set(re.findall(r"\w+", names)) <= exported

@@ -27,6 +27,7 @@ from texgs.viewer.modules import web_file
 
 HOSTILE = "</script><b>&'\""
 LEVELS = 3  # of 255, see test_webgl.py
+SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
 REST = int(re.search(r"const REST = (\d+);", web_file("standalone.js"))[1])  # milliseconds
 
 
@@ -60,13 +61,13 @@ def chromium():
 @pytest.fixture
 def page(chromium, file):
     """The page, opened as a file; nothing may go wrong in it, and it may ask for nothing."""
-    page = chromium.new_page(viewport={"width": 300, "height": 200})
+    page = chromium.new_page(viewport=SIZE)
     wrong, asked = [], []
     page.on("pageerror", lambda error: wrong.append(str(error)))
     page.on("console", lambda message: wrong.append(message.text))
     page.on("request", lambda request: asked.append(request.url))
     page.goto(file.as_uri())
-    page.wait_for_selector("#view:not([hidden])")
+    page.wait_for_selector("#picture:not([hidden])")
     settle(page)
     yield page
     assert wrong == []
@@ -82,28 +83,35 @@ def settle(page):
 
 def shown(page):
     """What the canvas shows [H, W, 3]."""
-    picture = page.locator("#view").screenshot(type="png")
+    picture = page.locator("#picture").screenshot(type="png")
     return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"))
+
+
+def described(file):
+    return json.loads(re.search(r'id="scene">([^<]*)<', file.read_text())[1])
 
 
 def surfels(file):
     return re.search(r'id="surfels">([^<]*)<', file.read_text())[1]
 
 
-def expected(file, size, light=HEADLIGHT, edits=None, azimuth=30.0, polar=20.0):
-    """What the rasterizer makes of it, from where the page begins."""
-    lens = Lens()
-    camera = orbit(azimuth, polar, lens.radius, lens.fov_y, *size)
+def expected(file, size, light=HEADLIGHT, edits=None, turned=(0.0, 0.0)):
+    """What the rasterizer makes of it, from where the page begins and then turned by so many degrees."""
+    view = described(file)["views"][0]
+    width, height = size
+    distance = view["distance"] * max(1, height / width)
+    angles = view["azimuth"] + turned[0], view["polar"] + turned[1]
+    camera = orbit(*angles, distance, Lens().fov_y, width, height, target=view["target"])
     edits = [PartEdit(opacity=0.8), PartEdit()] if edits is None else edits
     return rendered(surfels(file), camera, light, edits, (0.9, 0.9, 1.0))
 
 
 def differ(page, *rest, **edited):
-    """Largest difference of what is shown from what is expected, within the outline, above the controls."""
+    """Largest difference of what is shown from what is expected, within the outline of what has the focus."""
     found = shown(page)
     height, width = found.shape[:2]
     difference = np.abs(found.astype(int) - expected(*rest, (width, height), **edited))
-    return int(difference[4 : height - 60, 4:-4].max())
+    return int(difference[4:-4, 4:-4].max())
 
 
 def test_the_same_scene_gives_the_same_bytes(scene, file, tmp_path):
@@ -117,8 +125,7 @@ def test_names_are_text_and_only_its_own_script_may_run(file):
     assert text.count("</script>") == 3
     assert "default-src &#39;none&#39;" in text or "default-src 'none'" in text
     assert "unsafe" not in text.split("<style>")[0]
-    description = json.loads(re.search(r'id="scene">([^<]*)<', text)[1])
-    assert [model["name"] for model in description["models"]] == [HOSTILE, "B"]
+    assert [model["name"] for model in described(file)["models"]] == [HOSTILE, "B"]
 
 
 def test_it_holds_a_picture_of_the_first_view(file):
@@ -131,55 +138,76 @@ def test_it_opens_as_a_file_and_shows_what_the_rasterizer_renders(page, file):
     assert differ(page, file) <= LEVELS
 
 
-def test_edits_and_lights_show(page, file):
-    page.locator("summary").click()
-    first = page.locator("fieldset").first
-    assert first.locator("legend").text_content() == HOSTILE
-    first.get_by_label("palette").fill("#ff2040")
-    first.get_by_label("opacity").fill("0.5")
-    page.get_by_label("visible").nth(1).uncheck()
-    page.get_by_label("polar").fill("50")
-    assert page.locator(".words").input_value() == (
-        f"{HOSTILE}.palette=#ff2040 {HOSTILE}.opacity=0.5 B.visible=false light=30,50"
-    )
-    page.locator("summary").click()
+def test_edits_and_lights_show_and_can_be_undone(page, file):
+    first, other = page.locator("fieldset.part").all()
+    assert HOSTILE in first.locator("legend").text_content()
+    first.get_by_label(f"Palette of {HOSTILE}", exact=True).fill("#ff2040")
+    first.get_by_label(f"Opacity of {HOSTILE}", exact=True).fill("0.5")
+    other.get_by_title("Visible").uncheck()
+    page.get_by_label("Headlight").uncheck()
+    page.get_by_label("Polar of the light, degrees", exact=True).fill("50")
+    words = f"light=30,50 {HOSTILE}.palette=#ff2040 {HOSTILE}.opacity=0.5 B.visible=false"
+    assert page.locator("#words textarea").input_value() == words
     settle(page)
     edits = [PartEdit(palette=(1, 32 / 255, 64 / 255), opacity=0.5), PartEdit(visible=False)]
     assert differ(page, file, light=Light("directional", 30, 50), edits=edits) <= LEVELS
-    page.locator("summary").click()
-    page.get_by_text("Reset edits").click()
-    page.locator("summary").click()
+    page.get_by_role("button", name="Compare").click()
     settle(page)
+    assert page.locator("#badge").is_visible()
+    page.locator("#badge").evaluate("each => { each.style.visibility = 'hidden'; }")
+    assert differ(page, file) <= LEVELS
+    page.get_by_role("button", name="Compare").click()
+    for _ in range(5):
+        page.get_by_role("button", name="Undo").click()
+    settle(page)
+    assert page.locator("#words").is_hidden()
     assert differ(page, file) <= LEVELS
 
 
 def test_pointers_and_keys_turn_the_camera(page, file):
-    page.mouse.move(100, 60)
+    page.mouse.move(100, 160)
     page.mouse.down()
-    page.mouse.move(80, 70)
+    page.mouse.move(80, 170)
     page.mouse.up()
-    page.locator("#view").press("ArrowLeft")
-    page.locator("#view").press("ArrowUp")
+    page.locator("#picture").press("ArrowLeft")
+    page.locator("#picture").press("ArrowUp")
     settle(page)
-    assert differ(page, file, azimuth=30 + 18 - 5, polar=20 + 9 + 5) <= LEVELS
-    page.locator("#view").press("Home")
+    assert differ(page, file, turned=(8 + 5, 4 - 5)) <= LEVELS
+    assert "azimuth=43" in page.url
+    page.locator("#picture").press("Home")
     settle(page)
     assert differ(page, file) <= LEVELS
 
 
+def test_a_link_leads_back_to_the_view(page, chromium, file):
+    page.locator("#picture").press("ArrowLeft")
+    page.get_by_label("Show").select_option("normal")
+    settle(page)
+    other = chromium.new_page(viewport=SIZE)
+    other.goto(page.url)
+    other.wait_for_selector("#picture:not([hidden])")
+    settle(other)
+    page.locator("#picture").evaluate("each => each.blur()")
+    assert other.get_by_label("Show").input_value() == "normal"
+    assert np.abs(shown(other).astype(int) - shown(page))[4:-4, 4:-4].max() <= 1
+    other.close()
+
+
 def test_the_picture_comes_again_after_the_context_was_lost(page, file):
     before = shown(page)
-    lose = "document.getElementById('view').getContext('webgl2').getExtension('WEBGL_lose_context')"
+    lose = "document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context')"
     page.evaluate(f"() => {{ globalThis.lose = {lose}; lose.loseContext(); }}")
-    page.wait_for_function("document.getElementById('notice').textContent.includes('graphics driver')")
+    page.wait_for_function("document.getElementById('notices').textContent.includes('graphics driver')")
     page.evaluate("() => lose.restoreContext()")
-    page.wait_for_function("document.getElementById('notice').textContent === ''")
+    page.wait_for_function("document.getElementById('notices').textContent === ''")
     settle(page)
     assert np.array_equal(shown(page), before)
 
 
 def test_it_follows_the_size_of_the_window(page, file):
-    page.set_viewport_size({"width": 210, "height": 260})
+    page.set_viewport_size({"width": 850, "height": 620})
+    settle(page)
+    page.locator("#picture").press("Home")
     settle(page)
     assert differ(page, file) <= LEVELS
 
@@ -188,7 +216,7 @@ def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):
     page = chromium.new_page()
     page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page.goto(file.as_uri())
-    page.wait_for_function("document.getElementById('notice').textContent.includes('has no WebGL2')")
+    page.wait_for_function("document.getElementById('notices').textContent.includes('has no WebGL2')")
     assert page.locator("#poster").is_visible()
     page.close()
 
@@ -199,15 +227,14 @@ def test_a_damaged_page_keeps_its_picture_and_says_so(chromium, file, tmp_path):
     damaged.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
     page = chromium.new_page()
     page.goto(damaged.as_uri())
-    page.wait_for_function("document.getElementById('notice').textContent.includes('copy the page again')")
+    page.wait_for_function("document.getElementById('notices').textContent.includes('copy the page again')")
     assert page.locator("#poster").is_visible()
     page.close()
 
 
 def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
-    page.locator("summary").click()
     with page.expect_download() as saved:
-        page.get_by_text("Save picture").click()
+        page.get_by_role("button", name="Picture").click()
     saved.value.save_as(tmp_path / "saved.png")
     assert saved.value.suggested_filename == "scene.png"
     picture = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB")).astype(int)
@@ -216,8 +243,7 @@ def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
 
 def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
     assert main(["export", str(scene), "--to", str(tmp_path / "b.html"), "--model", HOSTILE]) == 0
-    text = (tmp_path / "b.html").read_text()
-    (model,) = json.loads(re.search(r'id="scene">([^<]*)<', text)[1])["models"]
+    (model,) = described(tmp_path / "b.html")["models"]
     assert model["name"] == HOSTILE
     assert model["edit"]["opacity"] == 0.8
 

@@ -1,1 +1,1 @@
-"""Scenes in a browser: what the page of a viewer and the page of an export have in common."""
+"""Scenes in a browser: a server that renders and edits them, and the page that it serves."""

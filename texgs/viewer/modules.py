@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from importlib.resources import files
 
-IMPORT = re.compile(r'^import \{[^}]*\} from "\./([\w-]+\.js)";\n', re.MULTILINE)
-EXPORT = re.compile(r"^export (?=(?:async )?(?:function|class|const) )", re.MULTILINE)
+IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([\w-]+\.js)";$', re.MULTILINE)
+EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) (\w+))", re.MULTILINE)
 
 
 def web_file(name: str) -> str:
@@ -17,8 +17,8 @@ def web_file(name: str) -> str:
 def joined_modules(*entries: str) -> str:
     """Modules and all that they import, each once and behind what it imports.
 
-    Modules import by name from the same folder, so that leaving out the words `import` and `export` makes
-    them one module. For this their names on the top level differ, which a test checks.
+    Each becomes a function with its own names, which returns what the module exports into `modules`. That
+    does for modules that import by name, from the same folder, and whose exports are declarations.
 
     Args:
         entries: names of files.
@@ -29,10 +29,12 @@ def joined_modules(*entries: str) -> str:
         if name in texts:
             return
         text = web_file(name)
-        for imported in IMPORT.findall(text):
+        for _, imported in IMPORT.findall(text):
             add(imported)
-        texts[name] = EXPORT.sub("", IMPORT.sub("", text)).strip()
+        exports = ", ".join(exported for _, exported in EXPORT.findall(text))
+        body = EXPORT.sub(r"\1", IMPORT.sub(r'const \1 = modules["\2"];', text)).strip()
+        texts[name] = f'modules["{name}"] = (() => {{\n{body}\nreturn {{ {exports} }};\n}})();'
 
     for entry in entries:
         add(entry)
-    return "\n\n".join(texts.values()) + "\n"
+    return "\n\n".join(["const modules = {};", *texts.values()]) + "\n"

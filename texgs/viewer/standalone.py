@@ -16,7 +16,6 @@ from texgs import __version__
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
-from texgs.core.lens import Lens
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
@@ -26,7 +25,6 @@ from texgs.viewer.packing import pack
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
 POSTER = 512  # pixels of either side
-START = (30.0, 20.0)  # azimuth and polar angle of the first view, degrees: START of standalone.js
 QUALITY = 80  # of the poster, a JPEG
 
 
@@ -58,8 +56,9 @@ def write_page(path: str | Path, scene: Scene, name: str) -> Path:
             f"{path}: expected surfels of at most {LARGEST >> 20} MiB, got {len(surfels) >> 20} MiB for "
             f"{len(composed)} of them; export fewer models"
         )
-    page = page_of(describe(name, scene, composed), surfels, poster(scene, composed))
-    return write_bytes(path, page.encode())
+    description = describe(name, scene, composed)
+    picture = poster(scene, composed, description["views"][0], description["fov_y"])
+    return write_bytes(path, page_of(description, surfels, picture).encode())
 
 
 def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
@@ -75,7 +74,8 @@ def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
     from jinja2 import Environment
     from markupsafe import Markup
 
-    script, style = f"\n{joined_modules('standalone.js')}", f"\n{web_file('standalone.css')}"
+    script = f"\n{joined_modules('standalone.js')}"
+    style = f"\n{web_file('style.css')}{web_file('standalone.css')}"
     template = files("texgs.viewer").joinpath("web", "standalone.html.j2").read_text(encoding="utf-8")
     return (
         Environment(autoescape=True)
@@ -94,10 +94,10 @@ def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
     )
 
 
-def poster(scene: Scene, composed: Composition) -> bytes:
-    """The first view of a scene, JPEG."""
-    lens = Lens().square(POSTER)
-    camera = orbit(*START, lens.radius, lens.fov_y, lens.width, lens.height)
+def poster(scene: Scene, composed: Composition, view: dict[str, Any], fov_y: float) -> bytes:
+    """A view of a scene, see `describe`, as JPEG."""
+    place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER, POSTER)
+    camera = orbit(*place, target=view["target"])
     shown = frame(composed, camera, scene.light, scene.edits, background=scene.background)
     file = BytesIO()
     Image.fromarray(shown).save(file, "JPEG", quality=QUALITY, optimize=True)

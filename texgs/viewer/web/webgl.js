@@ -11,12 +11,13 @@ import { unpack } from "./tensors.js";
 const MODES = ["shaded", "unshaded", "normal", "alpha", "ambient", "diffuse", "specular", "shininess"];
 const OVER_BLACK = MODES.slice(3);
 const NEAR = 0.2; // camera z, world units, as the rasterizer has it
+const MOST_PIXELS = 4096; // of a side, as `texgs view` has it
 const SLOW = 40; // milliseconds from frame to frame above which moving frames have half the resolution
 const MISSING = "This browser has no WebGL2, which the picture needs: switch on hardware acceleration, or use another browser.";
 
 export class WebglRenderer {
   /**
-   * @param {HTMLCanvasElement} canvas to draw on; its size becomes that of the camera.
+   * @param {HTMLCanvasElement} canvas to draw on; its size follows that on the page.
    * @param {function(string)} notice tells the user what went wrong, "" that it is over.
    * @throws {Error} where there is no WebGL2.
    */
@@ -48,29 +49,53 @@ export class WebglRenderer {
    */
   async open(packed, scene) {
     const { tensors, metadata } = await unpack(packed);
+    this._original = scene;
     this._optics = JSON.parse(metadata.optics);
     this._surfels = joinSurfels(tensors, this._optics.models, firstRows(scene.models));
     this._order = new DepthOrder(this._surfels.count);
     this._upload();
   }
 
+  /** Size of the picture in pixels of the screen. */
+  size() {
+    const { clientWidth, clientHeight } = this._canvas;
+    const ratio = Math.min(devicePixelRatio, MOST_PIXELS / Math.max(clientWidth, clientHeight, 1));
+    return [clientWidth, clientHeight].map((side) => Math.max(1, Math.round(ratio * side)));
+  }
+
   /**
    * Asks for a frame; of several, the newest wins.
    *
-   * @param {object} camera viewmat [3, 4] world to camera (OpenCV axes), fov_y in degrees, width and height in pixels.
+   * @param {OrbitCamera} camera
    * @param {object} scene description with its edits, light and background.
-   * @param {object} how `mode`, and whether the camera is `moving`: then slow frames are coarser.
+   * @param {object} how `mode`; whether to show the scene as it was `before`; whether something is `moving`: then
+   *   slow frames are coarser.
    */
-  draw(camera, scene, { mode = "shaded", moving = false } = {}) {
-    this._wanted = { camera, scene, mode, moving };
+  draw(camera, scene, { mode = "shaded", moving = false, before = false } = {}) {
+    this._wanted = { view: this._view(camera), scene: before ? this._original : scene, mode, moving };
     this._ask();
   }
 
-  /** Draws now and returns the picture [H, W, 4], 8 bits, first row on top. */
-  pixels(camera, scene, mode = "shaded") {
-    this._frame(camera, scene, mode);
+  /** The same picture as a canvas of its own. */
+  still(camera, scene, { mode, before }) {
+    const view = this._view(camera);
+    const { width, height } = view;
+    const pixels = this.pixels(view, before ? this._original : scene, mode);
+    const canvas = Object.assign(document.createElement("canvas"), { width, height });
+    canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
+    return canvas;
+  }
+
+  /**
+   * Draws now.
+   *
+   * @param {object} view viewmat [3, 4] world to camera (OpenCV axes), fov_y in degrees, width and height in pixels.
+   * @returns {Uint8ClampedArray} the picture [H, W, 4], first row on top.
+   */
+  pixels(view, scene, mode = "shaded") {
+    this._frame(view, scene, mode);
     const gl = this._gl;
-    const [width, height] = [camera.width, camera.height];
+    const { width, height } = view;
     const upside = new Uint8Array(4 * width * height);
     gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upside);
     const picture = new Uint8ClampedArray(upside.length);
@@ -89,15 +114,20 @@ export class WebglRenderer {
 
   // ---- Frames ----
 
+  _view(camera) {
+    const [width, height] = this.size();
+    return { viewmat: camera.viewmat(), fov_y: camera.fov_y, width, height };
+  }
+
   _ask() {
     if (this._request || !this._wanted || this._gl.isContextLost()) return;
     this._request = requestAnimationFrame((time) => {
       this._request = 0;
-      const { camera, scene, mode, moving } = this._wanted;
+      const { view, scene, mode, moving } = this._wanted;
       this._pace(time, moving);
       const share = moving && this._isSlow ? 0.5 : 1;
-      const size = { width: Math.ceil(share * camera.width), height: Math.ceil(share * camera.height) };
-      this._frame({ ...camera, ...size }, scene, mode);
+      const [width, height] = [view.width, view.height].map((side) => Math.ceil(share * side));
+      this._frame({ ...view, width, height }, scene, mode);
     });
   }
 
