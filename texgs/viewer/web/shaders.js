@@ -1,4 +1,4 @@
-// Surfels on screen as texgs/raster defines them: the forms of fragments, their alpha, their texels and their light.
+// Surfels on screen as texgs/raster defines them: the forms of fragments, their alpha, texels and light.
 
 import { LAYERS, WIDTH } from "./surfels.js";
 

@@ -1,7 +1,7 @@
 // Surfels of all models, laid out as the textures that the shaders read.
 
 export const WIDTH = 2048; // texels in a row of every texture; WebGL2 always has so many
-export const LAYERS = ["place", "quats", "scales", "colors", "material"]; // of 4 floats; a place is mean and opacity
+export const LAYERS = ["place", "quats", "scales", "colors", "material"]; // of 4 floats; place: mean and opacity
 const SHININESS = [1, 100]; // range of the bounded exponent
 
 const sigmoid = (x) => 1 / (1 + Math.exp(-x));
@@ -92,7 +92,9 @@ function texelsOf(codes) {
   };
   for (let i = 0; i < count; i++) {
     const green = step(0, i);
-    texels.set([green + step(1, i), green, green + step(2, i)], 3 * i);
+    texels[3 * i] = green + step(1, i);
+    texels[3 * i + 1] = green;
+    texels[3 * i + 2] = green + step(2, i);
   }
   return texels;
 }

@@ -15,14 +15,16 @@ export async function unpack(text) {
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
     return readTensors(await new Response(stream).arrayBuffer());
   } catch (error) {
-    throw new Error(`The scene in this page cannot be unpacked (${error.message}): update the browser, or copy the page again.`);
+    const help = "update the browser, or copy the page again";
+    throw new Error(`The scene in this page cannot be unpacked (${error.message}): ${help}.`);
   }
 }
 
 /** The tensors of a safetensors file; half precision becomes single. */
 export function readTensors(buffer) {
   const length = Number(new DataView(buffer).getBigUint64(0, true));
-  const { __metadata__: metadata = {}, ...entries } = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, length)));
+  const header = new TextDecoder().decode(new Uint8Array(buffer, 8, length));
+  const { __metadata__: metadata, ...entries } = JSON.parse(header);
   const tensors = new Map();
   for (const [name, { dtype, shape, data_offsets: [begin, end] }] of Object.entries(entries)) {
     const data = new TYPES[dtype](buffer.slice(8 + length + begin, 8 + length + end));
