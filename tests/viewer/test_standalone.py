@@ -64,7 +64,7 @@ def page(chromium, file):
     page = chromium.new_page(viewport=SIZE)
     wrong, asked = [], []
     page.on("pageerror", lambda error: wrong.append(str(error)))
-    page.on("console", lambda message: wrong.append(message.text))
+    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
     page.on("request", lambda request: asked.append(request.url))
     page.goto(file.as_uri())
     page.wait_for_selector("#picture:not([hidden])")

@@ -75,7 +75,7 @@ def page(chromium, packed, description):
     page = chromium.new_page()
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
-    page.on("console", lambda message: errors.append(message.text))
+    page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
     open_renderer(page, packed, description)
     yield page
     assert errors == []
@@ -171,6 +171,26 @@ def test_texels_beyond_eight_bits_have_sixteen(chromium, tmp_path):
     page = chromium.new_page()
     open_renderer(page, packed, description)
     assert difference(page, packed, description, scene, CAMERAS[0]) <= LEVELS
+
+
+WITHOUT_FLOAT_BLEND = """() => {
+  const known = WebGL2RenderingContext.prototype.getExtension;
+  WebGL2RenderingContext.prototype.getExtension = function (name) {
+    return name === "EXT_float_blend" ? null : known.call(this, name);
+  };
+}"""
+
+
+def test_half_precision_is_used_where_floats_cannot_be_blended(chromium, packed, description, scene):
+    page = chromium.new_page()
+    page.evaluate(WITHOUT_FLOAT_BLEND)
+    open_renderer(page, packed, description)
+    assert page.evaluate("renderer._pass._format === WebGL2RenderingContext.RGBA16F")
+    assert (
+        max(difference(page, packed, description, scene, camera, light=SIDE) for camera in CAMERAS) <= LEVELS
+    )
+    faint = [PartEdit(opacity=0.1)] * 5
+    assert difference(page, packed, description, scene, CAMERAS[0], edits=faint) <= 1
 
 
 def test_texels_that_no_page_can_hold_are_refused(tmp_path):

@@ -66,12 +66,42 @@ float conic(float sigma2, vec3 a, vec3 b) {
   return sigma2 * (a.x * b.x + a.y * b.y) - a.z * b.z;
 }
 
-// The box of u^2 + v^2 <= cut on screen: half of its sides, and its middle from the low-pass centre. It is a little
-// larger, because a thin ellipse is ill-conditioned.
-vec4 ellipse(float cut, vec3 row_u, vec3 row_v, vec3 row_w, float ww) {
-  vec2 middle = vec2(conic(cut, row_u, row_w), conic(cut, row_v, row_w)) / ww;
-  vec2 squared = middle * middle - vec2(conic(cut, row_u, row_u), conic(cut, row_v, row_v)) / ww;
-  return vec4(sqrt(max(squared, 0.0) * (1.0 + 1e-6) + 2e-2), middle);
+// Rows of the homography from (u, v, 1) to pixels, counted from the low-pass centre: the mean on screen.
+struct Rows { vec3 u, v, w; };
+
+Rows homography(vec3 a, vec3 b, vec3 p, vec2 middle) {
+  vec3 w = vec3(a.z, b.z, p.z);
+  vec2 u = focal.x * vec2(a.x, b.x) - middle.x * w.xy, v = focal.y * vec2(a.y, b.y) - middle.y * w.xy;
+  return Rows(vec3(u, 0.0), vec3(v, 0.0), w);
+}
+
+// Below this ratio of the sides of its image a surfel is seen edge-on: only the low-pass disc is left of it.
+bool is_edge_on(Rows m, float determinant) {
+  return abs(determinant) <= 1e-6 * (dot(m.u.xy, m.u.xy) + dot(m.v.xy, m.v.xy));
+}
+
+// The box of u^2 + v^2 <= cut from the low-pass centre, low and high corner; a little larger, because a thin ellipse
+// is ill-conditioned.
+vec4 ellipse_box(Rows m, float cut, float ww) {
+  vec2 middle = vec2(conic(cut, m.u, m.w), conic(cut, m.v, m.w)) / ww;
+  vec2 squared = middle * middle - vec2(conic(cut, m.u, m.u), conic(cut, m.v, m.v)) / ww;
+  vec2 reach = sqrt(max(squared, 0.0) * (1.0 + 1e-6) + 2e-2);
+  return vec4(middle - reach, middle + reach);
+}
+
+// The pixels in which alpha can reach ALPHA_MIN, low and high corner: those of the ellipse and the low-pass disc.
+vec4 box_of(Rows m, bool edge_on, float opacity) {
+  float cut = max(2.0 * log(opacity / ALPHA_MIN) * 1.0001 + 1e-3, 1e-3);
+  float ww = conic(cut, m.w, m.w), depth = m.w.z, radius = sqrt(cut / low_pass);
+  bool reaches_behind = ww > -1e-3 * depth * depth && depth - sqrt(cut * dot(m.w.xy, m.w.xy)) <= near;
+  if (reaches_behind) return vec4(vec2(0.0), size);
+  vec4 box = vec4(vec2(-radius), vec2(radius));
+  if (!edge_on) {
+    vec4 ellipse = ellipse_box(m, cut, ww);
+    box = vec4(min(box.xy, ellipse.xy), max(box.zw, ellipse.zw));
+  }
+  // Whole pixels: cards round corners to a fraction of one, and pixels at the edge of the box would be lost.
+  return vec4(max(floor(box.xy + centre), vec2(0.0)), min(ceil(box.zw + centre), size));
 }
 
 // The colour of each mode of texgs/scene/frame.py, and the factor on texels.
@@ -98,34 +128,17 @@ void main() {
   vec3 p = rotation * place.xyz + translation;
   vec3 a = scales.x * (rotation * world.u), b = scales.y * (rotation * world.v);
 
-  // Rows of the homography from (u, v, 1) to pixels, counted from the low-pass centre: the mean on screen.
   vec2 middle = focal * p.xy / p.z;
-  vec3 row_w = vec3(a.z, b.z, p.z);
-  vec3 row_u = focal.x * vec3(a.x, b.x, p.x) - middle.x * row_w;
-  vec3 row_v = focal.y * vec3(a.y, b.y, p.y) - middle.y * row_w;
-  row_u.z = 0.0, row_v.z = 0.0;
-  vec3 A = cross(row_v, row_w), B = cross(row_w, row_u);
-  float C = row_u.x * row_v.y - row_u.y * row_v.x;
-
-  // Below this ratio of the sides of its image a surfel is seen edge-on: only the low-pass disc is left of it.
-  bool edge_on = abs(C) <= 1e-6 * (dot(row_u.xy, row_u.xy) + dot(row_v.xy, row_v.xy));
+  Rows m = homography(a, b, p, middle);
+  vec3 A = cross(m.v, m.w), B = cross(m.w, m.u); // with C, the columns of the adjugate
+  float C = m.u.x * m.v.y - m.u.y * m.v.x;
+  bool edge_on = is_edge_on(m, C);
   float steep = 1e4 * sqrt(low_pass), scale = edge_on ? 0.0 : 1.0 / C;
+  centre = middle + 0.5 * size;
   forms = edge_on ? vec4(steep, 0.0, 0.0, steep) : scale * vec4(A.x, B.x, A.y, B.y);
   perspective = vec3(scale * A.z, scale * B.z, p.z);
-  centre = middle + 0.5 * size;
-
-  float cut = max(2.0 * log(opacity / ALPHA_MIN) * 1.0001 + 1e-3, 1e-3);
-  float radius = sqrt(cut / low_pass), ww = conic(cut, row_w, row_w);
-  vec2 low = centre - radius, high = centre + radius;
-  if (ww > -1e-3 * p.z * p.z && p.z - sqrt(cut * (a.z * a.z + b.z * b.z)) <= near) {
-    low = vec2(0.0), high = size; // it reaches behind the camera
-  } else if (!edge_on) {
-    vec4 box = ellipse(cut, row_u, row_v, row_w, ww);
-    low = min(low, centre + box.zw - box.xy), high = max(high, centre + box.zw + box.xy);
-  }
-  // Whole pixels: cards round corners to a fraction of one, and pixels at the edge of the box would be lost.
-  low = max(floor(low), vec2(0.0)), high = min(ceil(high), size);
-  if (any(greaterThanEqual(low, high))) return;
+  vec4 box = box_of(m, edge_on, opacity);
+  if (any(greaterThanEqual(box.xy, box.zw))) return;
 
   vec4 material = texelFetch(surfels, ivec3(at, MATERIAL), 0) * texelFetch(parts, ivec2(1, lookup.w), 0);
   vec3 color = texelFetch(surfels, ivec3(at, COLORS), 0).xyz + part.xyz;
@@ -134,7 +147,7 @@ void main() {
   gain = shaded.w * texel_step;
   texture_place = lookup.xyz;
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1);
-  gl_Position = vec4(2.0 * mix(low, high, corner) / size - 1.0, 0.0, 1.0); // the first row of the target is the top
+  gl_Position = vec4(2.0 * mix(box.xy, box.zw, corner) / size - 1.0, 0.0, 1.0); // the first row of the target is the top
 }
 `;
 
