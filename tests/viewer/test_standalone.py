@@ -128,6 +128,20 @@ def test_names_are_text_and_only_its_own_script_may_run(file):
     assert [model["name"] for model in described(file)["models"]] == [HOSTILE, "B"]
 
 
+def test_nothing_else_may_run_or_load(chromium, file):
+    page = chromium.new_page()
+    page.goto(file.as_uri())
+    page.evaluate(
+        "() => { const script = document.createElement('script');"
+        " script.textContent = 'globalThis.ran = true'; document.head.append(script);"
+        " document.body.setAttribute('onclick', 'globalThis.ran = true'); }"
+    )
+    page.locator("h1").click()
+    assert page.evaluate("globalThis.ran") is None
+    assert page.evaluate("fetch('data:,x').then(() => 'loaded', () => 'refused')") == "refused"
+    page.close()
+
+
 def test_it_holds_a_picture_of_the_first_view(file):
     poster = re.search(r"data:image/jpeg;base64,([^\"]*)", file.read_text())[1]
     found = np.asarray(Image.open(io.BytesIO(base64.b64decode(poster))))

@@ -135,7 +135,7 @@ def of_page(arguments: argparse.Namespace, scene: "Scene | None") -> Path:
         scene = replace(scene, models={arguments.model: chosen(scene, arguments.model)})
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
-    return write_page(arguments.to, scene, source.stem)
+    return write_page(arguments.to, scene, arguments.to.stem)
 
 
 def of_scene(arguments: argparse.Namespace, scene: "Scene", kind: str) -> Path:
