@@ -11,10 +11,15 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+import torch
 from PIL import Image
 
+from tests.edit.lift_scenes import two_balls
 from texgs.cli.main import main
-from texgs.scene.scene_file import read_scene
+from texgs.core.camera import orbit
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
 
 try:
     from playwright.sync_api import expect, sync_playwright
@@ -39,7 +44,7 @@ def chromium():
 
 
 @contextmanager
-def served(scene_file, port=0):
+def served(scene_file, port=0, **environment):
     """A server in a process of its own, and its address."""
     words = [
         sys.executable,
@@ -51,7 +56,7 @@ def served(scene_file, port=0):
         "--port",
         str(port),
     ]
-    env = {**os.environ, "TEXGS_CACHE": str(scene_file.parent / "cache")}
+    env = {**os.environ, "TEXGS_CACHE": str(scene_file.parent / "cache"), **environment}
     process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
     try:
         yield process, process.stdout.readline().strip()
@@ -166,6 +171,33 @@ def test_comparing_shows_the_scene_as_it_was_opened(chromium, scene_file):
         page.keyboard.press("b")
         expect(page.get_by_text("As opened", exact=True)).to_be_visible()
         assert still(page) == first
+
+
+def test_a_click_makes_a_segment(chromium, tmp_path):
+    file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
+    scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))
+    weights = {"TEXGS_WEIGHTS": str(tmp_path)}  # GrabCut, wherever this runs
+    with served(scene_file, **weights) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New segment of balls").click()
+        box = page.locator("#picture").bounding_box()
+        place = orbit(
+            *(PLACE[key] for key in ("azimuth", "polar", "distance", "fov_y")),
+            round(box["width"]),
+            round(box["height"]),
+        ).project(torch.tensor([0.3, 0.1, 0.1]))[0]
+        page.locator("#picture").click(position={"x": float(place[0]), "y": float(place[1])})
+        expect(page.get_by_text("Mask by GrabCut.")).to_be_visible(timeout=WAIT)
+        page.get_by_label("Name", exact=True).fill("blue")
+        page.get_by_role("button", name="Make segment").click()
+        page.get_by_role("checkbox", name="blue").uncheck(timeout=WAIT)
+        expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible"])
+        reds = shown(page)
+        is_blue = (reds[..., 2] - reds[..., 0] > 100).mean()
+        assert (reds[..., 0] - reds[..., 2] > 100).mean() > 0.01
+        assert is_blue < 0.001
+        page.get_by_role("button", name="Undo").click()
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("checkbox", name="blue")).to_have_count(0)
 
 
 def test_pages_share_their_edits(chromium, scene_file):

@@ -37,10 +37,13 @@ def describe(name: str, scene: Scene, composed: Composed) -> dict[str, Any]:
         composed: its models.
     """
     kind = kind_of(next(iter(scene.models.values())).file)
+    segments = ["segments"] if "segments" in kind.can else []
     keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
     palettes = zip(composed.palettes, has_palette(composed), strict=True)
     models = [
-        describe_model(model, entry, kind.name, palette, [k for k in keys if has or k != "palette"])
+        describe_model(
+            model, entry, kind.name, palette, [k for k in keys if has or k != "palette"] + segments
+        )
         for (model, entry), (palette, has) in zip(scene.models.items(), palettes, strict=True)
     ]
     center, radius = bounds_of(composed)

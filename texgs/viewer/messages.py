@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, NoReturn, get_args
+from typing import Any, get_args
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
-from texgs.core.numbers import is_number
 from texgs.scene.frame import Mode
 from texgs.scene.scene_file import known
+from texgs.viewer.values import flag, number, parse_json, whole, words
 
 LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
 MOST_PIXELS = 4096  # of a side
 FARTHEST = 1000.0  # world units
+MOST_POINTS = 100
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,7 @@ class View:
     mode: Mode
     moving: bool  # another one follows at once: speed counts more than quality
     before: bool  # the scene as it was opened
+    only: str = ""  # a model that is shown alone and unedited, to be clicked on
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,47 @@ class Save:
     replace: bool  # a file that is there already
 
 
-Message = View | Edit | Undo | Redo | Save
+@dataclass(frozen=True)
+class Clicked:
+    """Clicks on a view of a model alone."""
+
+    camera: Orbit
+    points: tuple[
+        tuple[float, float, bool], ...
+    ]  # pixels to the right and down, and whether it is on the object
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Show what clicks select."""
+
+    id: int  # comes back with the mask
+    model: str
+    clicked: Clicked
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Make a segment of what clicks select."""
+
+    part: str  # MODEL/SEGMENT, a new name
+    clicked: Clicked
+
+
+@dataclass(frozen=True)
+class Remove:
+    """Give the surfels of a segment back to its model."""
+
+    part: str  # MODEL/SEGMENT
+
+
+@dataclass(frozen=True)
+class Cancel:
+    """Stop the segment that is being made."""
+
+
+Message = View | Edit | Undo | Redo | Save | Mask | Segment | Remove | Cancel
+Reader = Callable[[Mapping[str, Any]], Message]
 
 
 def parse(text: str) -> Message:
@@ -93,29 +134,13 @@ def parse(text: str) -> Message:
     return reader(values)
 
 
-def parse_json(text: str) -> Any:
-    """Plain values.
-
-    Raises:
-        ArgumentError: if it is no JSON.
-    """
-
-    def no_number(name: str) -> NoReturn:
-        raise ValueError(f"{name} is no number of JSON")
-
-    try:
-        return json.loads(text, parse_constant=no_number)
-    except (ValueError, RecursionError) as error:
-        raise ArgumentError(f"message: expected JSON, got {text[:100]!r} ({error})") from error
-
-
 def view_of(values: Mapping[str, Any]) -> View:
     """The view that plain values describe.
 
     Raises:
         ArgumentError: naming the key that is not as it should be.
     """
-    known(values, ("id", "camera", "mode", "moving", "before"), "view")
+    known(values, ("id", "camera", "mode", "moving", "before", "only"), "view")
     mode = values.get("mode", "shaded")
     if mode not in get_args(Mode):
         raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode!r:.100}")
@@ -125,6 +150,7 @@ def view_of(values: Mapping[str, Any]) -> View:
         mode=mode,
         moving=flag("moving", values.get("moving", False)),
         before=flag("before", values.get("before", False)),
+        only=words("only", values.get("only", "")),
     )
 
 
@@ -150,79 +176,73 @@ def orbit_of(values: Any) -> Orbit:
     )
 
 
+def clicked_of(values: Mapping[str, Any]) -> Clicked:
+    """The clicks in a message.
+
+    Raises:
+        ArgumentError: naming the key that is not as it should be.
+    """
+    camera, points = orbit_of(values.get("camera")), values.get("points")
+    if not isinstance(points, list) or not 1 <= len(points) <= MOST_POINTS:
+        raise ArgumentError(f"points: expected 1 to {MOST_POINTS} of them, got {points!r:.100}")
+    found = []
+    for point in points:
+        if not isinstance(point, list) or len(point) != 3:
+            raise ArgumentError(f"points: expected x, y, and true or false, got {point!r:.100}")
+        x, y = (number("points", each, -MOST_PIXELS, 2 * MOST_PIXELS) for each in point[:2])
+        found.append((x, y, flag("points", point[2])))
+    return Clicked(camera, tuple(found))
+
+
+def _mask(values: Mapping[str, Any]) -> Mask:
+    known(values, ("id", "model", "camera", "points"), "mask")
+    number_of = whole("id", values.get("id", 0), 0, 2**53)
+    return Mask(number_of, words("model", values.get("model")), clicked_of(values))
+
+
+def _segment(values: Mapping[str, Any]) -> Segment:
+    known(values, ("part", "camera", "points"), "segment")
+    return Segment(words("part", values.get("part")), clicked_of(values))
+
+
+def _remove(values: Mapping[str, Any]) -> Remove:
+    known(values, ("part",), "remove")
+    return Remove(words("part", values.get("part")))
+
+
 def _edit(values: Mapping[str, Any]) -> Edit:
     known(values, ("part", "key", "value", "step"), "edit")
     return Edit(
-        text("part", values.get("part")),
-        text("key", values.get("key")),
+        words("part", values.get("part")),
+        words("key", values.get("key")),
         values.get("value"),
         whole("step", values.get("step", 0), 0, 2**53),
     )
 
 
-def _undo(values: Mapping[str, Any]) -> Undo:
-    known(values, (), "undo")
-    return Undo()
-
-
-def _redo(values: Mapping[str, Any]) -> Redo:
-    known(values, (), "redo")
-    return Redo()
-
-
 def _save(values: Mapping[str, Any]) -> Save:
     known(values, ("name", "replace"), "save")
-    return Save(text("name", values.get("name")), flag("replace", values.get("replace", False)))
+    return Save(words("name", values.get("name")), flag("replace", values.get("replace", False)))
 
 
-READERS: dict[str, Callable[[Mapping[str, Any]], Message]] = {
+def _bare(message: Message) -> Reader:
+    """Reads a message that has no values."""
+
+    def reader(values: Mapping[str, Any]) -> Message:
+        known(values, (), "message")
+        return message
+
+    return reader
+
+
+READERS: dict[str, Reader] = {
     "view": view_of,
     "edit": _edit,
-    "undo": _undo,
-    "redo": _redo,
+    "undo": _bare(Undo()),
+    "redo": _bare(Redo()),
     "save": _save,
+    "mask": _mask,
+    "segment": _segment,
+    "remove": _remove,
+    "cancel": _bare(Cancel()),
 }
-
-
-def number(where: str, value: object, least: float, most: float) -> float:
-    """A number of a range.
-
-    Raises:
-        ArgumentError: if it is none.
-    """
-    if not is_number(value) or not least <= value <= most:  # type: ignore[operator]
-        raise ArgumentError(f"{where}: expected a number from {least:g} to {most:g}, got {value!r:.100}")
-    return float(value)  # type: ignore[arg-type]
-
-
-def whole(where: str, value: object, least: int, most: int) -> int:
-    """A whole number of a range.
-
-    Raises:
-        ArgumentError: if it is none.
-    """
-    if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-        raise ArgumentError(f"{where}: expected a whole number from {least} to {most}, got {value!r:.100}")
-    return value
-
-
-def flag(where: str, value: object) -> bool:
-    """True or false.
-
-    Raises:
-        ArgumentError: if it is neither.
-    """
-    if not isinstance(value, bool):
-        raise ArgumentError(f"{where}: expected true or false, got {value!r:.100}")
-    return value
-
-
-def text(where: str, value: object) -> str:
-    """A text.
-
-    Raises:
-        ArgumentError: if it is none.
-    """
-    if not isinstance(value, str):
-        raise ArgumentError(f"{where}: expected a text, got {value!r:.100}")
-    return value

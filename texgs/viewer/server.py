@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import AsyncIterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,16 +13,35 @@ import torch
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.names import require_name
+from texgs.scene.parts import require_new, split
 from texgs.scene.scene_file import known
 from texgs.scene.session import Session
 from texgs.viewer.description import describe
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
-from texgs.viewer.messages import LARGEST, Edit, Message, Redo, Save, Undo, View, parse, parse_json, view_of
+from texgs.viewer.messages import (
+    LARGEST,
+    Cancel,
+    Edit,
+    Mask,
+    Message,
+    Redo,
+    Remove,
+    Save,
+    Segment,
+    Undo,
+    View,
+    parse,
+    view_of,
+)
 from texgs.viewer.opening import Opened
 from texgs.viewer.page import Page
+from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
+from texgs.viewer.values import parse_json
 
+Change = Edit | Undo | Redo | Save | Remove
 WEB = Path(__file__).parent / "web"
 SERVED = (".js", ".css", ".svg")
 MOST_PAGES = 16
@@ -44,6 +64,10 @@ class Server:
         self._title, self._composed = opened.title, session.composition
         self.edits = SharedEdits(session, opened.folder, opened.name)
         self.frames = Frames(session)
+        self.segmenter = Segmenter(device)
+        self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
+        self._job: asyncio.Task[None] | None = None
+        self._at_work: Page | None = None  # that the job is for
         self._pages: dict[Page, web.WebSocketResponse] = {}
         self._count = 0  # of pages so far
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
@@ -100,7 +124,7 @@ class Server:
             raise web.HTTPServiceUnavailable(text=f"expected at most {MOST_PAGES} pages; close one")
         socket = web.WebSocketResponse(max_msg_size=LARGEST, heartbeat=HEARTBEAT, compress=False)
         await socket.prepare(request)
-        page = Page(socket, self.edits, self.frames)
+        page = Page(socket, self.edits, self.frames, self.segmenter)
         self._count += 1
         number = self._count
         self._pages[page] = socket
@@ -110,6 +134,8 @@ class Server:
             await self._listen(socket, page, number)
         finally:
             del self._pages[page]
+            if self._at_work is page:
+                self.segmenter.stop()
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
         return socket
@@ -129,19 +155,62 @@ class Server:
     async def _answer(self, message: Message, page: Page, number: int) -> None:
         if isinstance(message, View):
             page.show(message)
-            return
-        page.answered += 1
+        elif isinstance(message, Mask):
+            page.show_mask(message)
+        elif isinstance(message, Segment):
+            self._begin(message, page)
+        elif isinstance(message, Cancel):
+            self.segmenter.stop()
+        else:
+            page.answered += 1
+            async with self._changing:
+                await self._change(message, page, number)
+            self._tell_all()
+
+    async def _change(self, message: Change, page: Page, number: int) -> None:
         if isinstance(message, Save):
             await self._save(message, page)
         elif isinstance(message, Edit):
             self.edits.edit(message, number)
+        elif isinstance(message, Remove):
+            self.edits.remove_segment(message.part)
         elif isinstance(message, Undo):
             self.edits.undo()
         elif isinstance(message, Redo):
             self.edits.redo()
+
+    def _tell_all(self) -> None:
         news = self.scene_message()
         for each in self._pages:
             each.tell_scene(news)
+
+    def _begin(self, asked: Segment, page: Page) -> None:
+        """Begin to make a segment.
+
+        Raises:
+            ArgumentError: if another one is being made, or it cannot have this name.
+        """
+        if self._job is not None and not self._job.done():
+            raise ArgumentError("segment: another one is being made; wait for it, or cancel it")
+        require_new(self.edits.scene, asked.part)
+        require_name(split(self.edits.scene, asked.part)[1], "segment")
+        self._at_work = page
+        self._job = asyncio.create_task(self._make_segment(asked, page))
+
+    async def _make_segment(self, asked: Segment, page: Page) -> None:
+        page.tell_job(asked.part, 0.0)
+        try:
+            tell = partial(page.tell_job, asked.part)
+            lifted = await self.segmenter.lift(self.edits.scene, asked, tell)
+            facts = self.segmenter.facts(asked)
+            async with self._changing:
+                await asyncio.to_thread(self.edits.make_segment, asked.part, lifted.mask, facts)
+            page.tell(f"{asked.part}: {lifted.basis}", level="info")
+        except Exception as error:  # whatever it is, the server goes on
+            page.tell_error(error)
+        page.tell_job(asked.part, None)
+        self._at_work = None
+        self._tell_all()
 
     async def _save(self, message: Save, page: Page) -> None:
         """Save the scene; where that would replace another file, the page is asked first."""
@@ -164,4 +233,5 @@ class Server:
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:
         yield
+        self.segmenter.close()
         self.frames.close()

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import count
 from pathlib import Path
 from typing import Any
 
+from torch import Tensor
+
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import HEADLIGHT
-from texgs.core.names import file_name
+from texgs.core.names import file_name, part_file
 from texgs.scene.scene import WHITE, Scene
 from texgs.scene.scene_file import known, light_of, write_scene
 from texgs.scene.session import Session
@@ -63,10 +67,28 @@ class SharedEdits:
             if goes_on:
                 self._session.redo()
             raise
-        if not goes_on:
-            self._past.append(f"{edit.part} {edit.key}".strip())
-        self._future.clear()
+        if goes_on:
+            self._past.pop()
+        self._step(f"{edit.part} {edit.key}".strip())
         self._latest = step
+
+    def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
+        """Write the file of a new segment, and add it.
+
+        Raises:
+            ArgumentError: if it is there already, or other segments have all of its surfels.
+        """
+        self._session.make_segment(part, mask, self._new_file(part), facts)
+        self._step(f"{part} new")
+
+    def remove_segment(self, part: str) -> None:
+        """Give the surfels of a segment back to its model; its file stays.
+
+        Raises:
+            ArgumentError: if there is no such segment.
+        """
+        self._session.remove_segment(part)
+        self._step(f"{part} removed")
 
     def undo(self) -> None:
         """Take the latest step back, if there is one."""
@@ -108,6 +130,20 @@ class SharedEdits:
         write_scene(path, scene)
         self.name, self._saved = name, scene
         return path
+
+    def _step(self, name: str) -> None:
+        self._past.append(name)
+        self._future.clear()
+        self._latest = None
+
+    def _new_file(self, part: str) -> Path:
+        """A file for a segment that is not there yet: scenes that were saved may name the others."""
+        stem = Path(self.name).stem
+        for number in count(1):
+            file = self._folder / part_file("segment", stem, part, *([str(number)] if number > 1 else []))
+            if not file.exists():
+                break
+        return file
 
     def _change(self, edit: Edit) -> None:
         session, value = self._session, edit.value

@@ -11,8 +11,9 @@ const AXIS_KEYS = ["+x", "−x", "+y", "−y", "+z", "−z"];
  * @param {() => OrbitCamera} camera
  * @param {() => void} moved - is called after each change
  * @param {(name: string) => void} goTo - "home" or a name of AXES
+ * @param {() => boolean} isLocked - whether nothing may move
  */
-export function control(canvas, camera, moved, goTo) {
+export function control(canvas, camera, moved, goTo, isLocked = () => false) {
   const pointers = new Map();
 
   canvas.addEventListener("pointerdown", (event) => {
@@ -24,7 +25,7 @@ export function control(canvas, camera, moved, goTo) {
   }
   canvas.addEventListener("pointermove", (event) => {
     const before = pointers.get(event.pointerId);
-    if (!before) return;
+    if (!before || isLocked()) return;
     const others = [...pointers.values()].filter((each) => each.pointerId !== event.pointerId);
     if (others.length) pinch(camera(), canvas, before, event, others[0]);
     else drag(camera(), canvas, before, event);
@@ -32,15 +33,18 @@ export function control(canvas, camera, moved, goTo) {
     moved();
   });
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-  canvas.addEventListener("dblclick", () => goTo("home"));
+  canvas.addEventListener("dblclick", () => {
+    if (!isLocked()) goTo("home");
+  });
   canvas.addEventListener("wheel", (event) => {
     event.preventDefault();
+    if (isLocked()) return;
     const pixels = event.deltaY * [1, LINE, PAGE][event.deltaMode];
     camera().dolly(Math.exp(NOTCH * Math.max(-PAGE, Math.min(PAGE, pixels))));
     moved();
   }, { passive: false });
   canvas.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || !press(camera(), event, goTo)) return;
+    if (isLocked() || event.ctrlKey || event.metaKey || event.altKey || !press(camera(), event, goTo)) return;
     event.preventDefault();
     moved();
   });

@@ -8,6 +8,7 @@ import { LightControl } from "./light.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
 import { Remote } from "./remote.js";
+import { SegmentTool } from "./segment.js";
 import { SharedState } from "./shared.js";
 import { difference } from "./state.js";
 import { Toolbar } from "./toolbar.js";
@@ -21,7 +22,7 @@ const get = (id) => document.getElementById(id);
 
 class Page {
   #resting = 0; // timer
-  #shown = { mode: "shaded", before: false };
+  #shown = { mode: "shaded", before: false, only: "" };
 
   constructor(scene, connection, notices) {
     this.canvas = get("picture");
@@ -35,11 +36,14 @@ class Page {
     };
     this.renderer.open(connection, scene);
     this.#views(scene);
+    this.segments = new SegmentTool(this);
     this.panel = new Panel(this.state,
-      { models: get("models"), background: get("background"), steps: get("steps") });
+      { models: get("models"), background: get("background"), steps: get("steps") },
+      { segment: (model) => this.segments.start(model), remove: (part) => this.state.remove(part) });
     this.light = new LightControl(get("light"), this.state, this.camera);
     this.toolbar = new Toolbar(this);
-    control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name));
+    control(this.canvas, () => this.camera, () => this.moved(), (name) => this.goTo(name),
+      () => this.segments.isLocked);
     this.state.addEventListener("change", () => this.draw(true));
     new ResizeObserver(() => this.draw(true)).observe(this.canvas);
     window.addEventListener("hashchange", () => this.#follow());
@@ -62,7 +66,7 @@ class Page {
     this.draw(true);
   }
 
-  /** Show something else of the scene: `mode`, or how it was `before`. */
+  /** Show something else of the scene: `mode`, how it was `before`, or `only` one model. */
   show(values) {
     Object.assign(this.#shown, values);
     get("mode").value = this.#shown.mode;
@@ -76,6 +80,7 @@ class Page {
 
   /** Go to a named view: "home", an axis, or one of the scene's. */
   goTo(name) {
+    if (this.segments.isLocked) return;
     const view = this.state.scene.views.find((each) => each.name === name);
     if (AXES[name]) {
       const [azimuth, polar] = AXES[name];
@@ -127,6 +132,7 @@ class Page {
       view.value = value;
     });
     fov.addEventListener("input", () => {
+      if (this.segments.isLocked) return;
       this.camera.place({ fov_y: Number(fov.value) });
       this.moved();
     });
@@ -142,7 +148,7 @@ connection.addEventListener("message", ({ detail }) => {
     page.adopt(detail);
   } else if (detail.level === "question") {
     page.toolbar.askToReplace(detail);
-  } else {
+  } else if (detail.type === "notice") {
     notices.tell(detail.text, detail.level);
   }
 });

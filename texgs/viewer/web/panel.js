@@ -6,17 +6,23 @@ import { capital, colorInput, element, slider, tick } from "./inputs.js";
 const FACTORS = { ambient: 3, diffuse: 3, specular: 4, shininess: 4 }; // and where their sliders end
 const OPAQUE = 2;
 
+const button = (text, what, onclick) =>
+  element("button", { type: "button", "aria-label": what, onclick }, text);
+
 export class Panel {
-  #state; #root; #steps; #background;
+  #state; #root; #steps; #background; #actions;
   #structure = ""; // names of all parts that there are inputs for
   #parts = new Map(); // by part: a function that shows its edit
 
   /**
    * @param {State} state
    * @param {{models: Element, background: Element, steps: Element}} places - for its inputs
+   * @param {{segment?: (model: object) => void, remove?: (part: string) => void}} actions - on segments, where
+   *   these can be made and removed
    */
-  constructor(state, { models, background, steps }) {
+  constructor(state, { models, background, steps }, actions = {}) {
     this.#state = state;
+    this.#actions = actions;
     this.#root = models;
     this.#steps = steps;
     this.#background = colorInput("Background", "background", (color, step) =>
@@ -44,10 +50,19 @@ export class Panel {
     this.#parts.clear();
     this.#root.replaceChildren(...this.#state.scene.models.map((model) => {
       const box = this.#part(model.name, model.name, model.can);
-      box.append(...model.segments.map((each) =>
-        this.#part(`${model.name}/${each.name}`, each.name, model.can)));
+      box.append(...model.segments.map((each) => this.#segment(model, each.name)));
+      if (this.#actions.segment && model.can.includes("segments")) {
+        const current = () => this.#state.scene.models.find((each) => each.name === model.name);
+        box.append(button("New segment…", `New segment of ${model.name}`, () => this.#actions.segment(current())));
+      }
       return box;
     }));
+  }
+
+  #segment(model, name) {
+    const part = `${model.name}/${name}`, box = this.#part(part, name, model.can);
+    if (this.#actions.remove) box.append(button("Remove", `Remove ${part}`, () => this.#actions.remove(part)));
+    return box;
   }
 
   /** The inputs of a model or a segment. */

@@ -45,8 +45,8 @@ export class Remote {
   }
 
   /** Ask for a frame; of those that cannot be asked for at once, the newest is. */
-  draw(camera, scene, { moving, mode = "shaded", before = false }) {
-    this.#wanted = { camera: camera.wire(...this.size()), mode, moving, before };
+  draw(camera, scene, { moving, mode = "shaded", before = false, only = "" }) {
+    this.#wanted = { camera: camera.wire(...this.size()), mode, moving, before, only };
     if (this.#asked === null) this.#next();
   }
 

@@ -35,6 +35,11 @@ export class SharedState extends State {
     this.#send({ type: "redo" });
   }
 
+  /** Give the surfels of a segment back to its model. */
+  remove(part) {
+    this.#send({ type: "remove", part });
+  }
+
   /** Write the scene file; asks before another file is replaced. */
   save(name, replace = false) {
     this.#send({ type: "save", name, replace });
