@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 
 from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from tests.viewer.browser import browser
 from tests.viewer.drawing import rendered
@@ -265,6 +266,18 @@ def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
 def test_a_model_file_becomes_a_page(folder, scene, tmp_path):
     assert main(["export", str(folder / "a.safetensors"), "--to", str(tmp_path / "a.html")]) == 0
     assert "<title>a</title>" in (tmp_path / "a.html").read_text()
+
+
+def test_a_scene_without_surfels_shows_its_background(chromium, tmp_path):
+    file = write_model(tmp_path / "none.safetensors", sample(n=0))
+    scene = write_scene(tmp_path / "none.yaml", Scene({"A": SceneModel(file)}, background=(0.2, 0.4, 0.6)))
+    assert main(["export", str(scene), "--to", str(tmp_path / "none.html")]) == 0
+    page = chromium.new_page(viewport=SIZE)
+    page.goto((tmp_path / "none.html").as_uri())
+    page.wait_for_selector("#picture:not([hidden])")
+    settle(page)
+    assert (shown(page)[4:-4, 4:-4] == [51, 102, 153]).all()
+    page.close()
 
 
 def test_other_fields_are_refused(tmp_path, capsys):

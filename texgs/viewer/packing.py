@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
+from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.compact import STEP, compact_tensors
@@ -35,7 +36,7 @@ def pack(path: Path, composition: Composition) -> str:
     for number, part in enumerate(composition.parts):
         model = part.model.to("cpu")
         if "texels" in model.parameters:
-            require_range(path, float(model.parameters["texels"].abs().max()))
+            require_range(path, model.parameters["texels"])
         own = compact_tensors(path, model)
         if part.labels is not None:
             own["labels"] = part.labels.cpu().numpy().astype(np.uint8 if part.segments < 256 else np.int32)
@@ -46,12 +47,13 @@ def pack(path: Path, composition: Composition) -> str:
     return b64encode(zlib.compress(save(tensors, {"optics": json.dumps(facts)}), 9)).decode()
 
 
-def require_range(path: Path, largest: float) -> None:
-    """Require texels that 16 bits hold.
+def require_range(path: Path, texels: Tensor) -> None:
+    """Require texels [T, 3] that 16 bits hold.
 
     Raises:
         ArgumentError: naming the file and the largest of them.
     """
+    largest = float(texels.abs().max()) if len(texels) else 0.0
     if largest > MOST_STEPS * STEP:
         raise ArgumentError(
             f"{path}: texels: expected at most {MOST_STEPS * STEP:g}, got {largest:g}; fit the texture again"
