@@ -51,6 +51,7 @@ INSTEAD = (
     ),
     (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
+    (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),
     (r"texgs votes", "texgs votes --help", "it takes votes of people"),
     (r"source ", "", "activates the environment that `make install` makes"),
     (r"pip install ", "{python} -m pip {words} --help", "it would change the environment of this test"),

@@ -113,7 +113,7 @@ def test_a_mesh(scene, model, tmp_path, kind):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--to", "x.obj"], "--to: expected a file that ends in .ply or .texgs, got x.obj"),
+        (["--to", "x.obj"], "--to: expected a file that ends in .ply, .texgs or .html, got x.obj"),
         (["--to", "x.ply", "--kind", "compact"], "--to: expected a file that ends in .texgs, got x.ply"),
         (["--to", "x.texgs", "--kind", "mesh"], "--to: expected a file that ends in .ply, got x.texgs"),
         (["--to", "x.texgs"], "--kind compact: expected a model file, got"),

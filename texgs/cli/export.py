@@ -1,7 +1,8 @@
-"""Export a scene or a model for other programs: Gaussians, points or a mesh, or as a compact model file."""
+"""Export a scene or a model: Gaussians, points or a mesh, a compact model file, or a page for a browser."""
 
 import argparse
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -14,26 +15,28 @@ if TYPE_CHECKING:
     from texgs.raster import Render
     from texgs.scene.scene import Scene, SceneModel
 
-KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact")
+KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact", "html")
 SCENES = (".yaml", ".yml")
-DEFAULTS = {".ply": "3dgs", ".texgs": "compact"}
+ENDINGS = {"compact": ".texgs", "html": ".html"}  # of kinds that are not .ply
+DEFAULTS = {".ply": "3dgs", **{ending: kind for kind, ending in ENDINGS.items()}}
 OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to export, and where to."""
     parser.add_argument("source", type=Path, help="scene.yaml or a model file")
-    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=".ply, or .texgs for compact")
+    parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=".ply, .texgs or .html")
     parser.add_argument(
         "--kind",
         choices=KINDS,
         help="3dgs or 2dgs for viewers of Gaussians, release as the paper's code has them, points with "
-        "colours, mesh, or compact; default 3dgs for .ply, compact for .texgs",
+        "colours, mesh, compact, or html, a page that shows and edits the scene; default 3dgs for .ply, "
+        "compact for .texgs, html for .html",
     )
     parser.add_argument(
         "--model",
         metavar="NAME",
-        help="one model of a scene, with the textures that it has there and no other edit of it",
+        help="one model of a scene, with the textures that it has there; other edits of it only in html",
     )
     parser.add_argument("--opacity", type=float, default=0.5, help="least of points (%(default)s)")
     parser.add_argument("--voxel", type=float, default=1 / 256, help="of a mesh, world units (%(default)s)")
@@ -52,6 +55,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     kind = kind_of(arguments)
     scene = read_scene(arguments.source) if arguments.source.suffix in SCENES else None
+    if kind == "html":
+        print(of_page(arguments, scene))
+        return 0
     if scene is not None and arguments.model is None:
         print(of_scene(arguments, scene, kind))
         return 0
@@ -100,7 +106,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
 
     ending = arguments.to.suffix
     kind: str | None = arguments.kind or DEFAULTS.get(ending)
-    expected = {None: ".ply or .texgs", "compact": ".texgs"}.get(kind, ".ply")
+    expected = ".ply, .texgs or .html" if kind is None else ENDINGS.get(kind, ".ply")
     if kind is None or ending != expected:
         raise ArgumentError(f"--to: expected a file that ends in {expected}, got {arguments.to}")
     is_scene = arguments.source.suffix in SCENES
@@ -114,6 +120,22 @@ def kind_of(arguments: argparse.Namespace) -> str:
             "by --model"
         )
     return kind
+
+
+def of_page(arguments: argparse.Namespace, scene: "Scene | None") -> Path:
+    """Export a scene, one model of it or a model file as a web page."""
+    from texgs.fields import files
+    from texgs.scene.scene import Scene, SceneModel
+    from texgs.viewer.standalone import write_page
+
+    source: Path = arguments.source
+    if scene is None:
+        scene = Scene({source.stem: SceneModel(source)})
+    elif arguments.model is not None:
+        scene = replace(scene, models={arguments.model: chosen(scene, arguments.model)})
+    for entry in scene.models.values():
+        require_export(files.kind_of(entry.file), "html")
+    return write_page(arguments.to, scene, arguments.to.stem)
 
 
 def of_scene(arguments: argparse.Namespace, scene: "Scene", kind: str) -> Path:

@@ -42,6 +42,7 @@ VERBS = {
     **STAGE_VERBS,
     "edit": "change colours, opacities and lights of a scene",
     "segment": "segment a model of a scene by clicks, to edit a part of it",
+    "view": "look at a scene and edit it in the browser",
     "render": "render a scene to PNG, GIF or MP4",
     "export": "export a scene or a model as Gaussians, points, a mesh or a compact file",
     "tables": "write the tables that metrics files hold",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, isfinite, radians, sin, tan
 
@@ -145,8 +146,16 @@ def orbit_direction(azimuth: float, polar: float) -> Tensor:
     return torch.tensor([cos(a) * cos(p), sin(p), -sin(a) * cos(p)], dtype=torch.float64)
 
 
-def orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:
-    """Camera on a sphere around the origin that looks at the origin; float32.
+def orbit(
+    azimuth: float,
+    polar: float,
+    radius: float,
+    fov_y: float,
+    width: int,
+    height: int,
+    target: Sequence[float] = (0.0, 0.0, 0.0),
+) -> Camera:
+    """Camera on a sphere around a target that looks at the target; float32.
 
     Args:
         azimuth: degrees, see `orbit_direction`.
@@ -155,6 +164,7 @@ def orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int,
         fov_y: vertical field of view, degrees.
         width: pixels.
         height: pixels.
+        target: [3] world units.
 
     Raises:
         ArgumentError: if an argument is out of range.
@@ -166,5 +176,6 @@ def orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int,
     a, p = radians(azimuth), radians(polar)
     # The tangent towards growing polar angle: the projected +y where that exists, and defined at the poles.
     up = torch.tensor([-cos(a) * sin(p), cos(p), sin(a) * sin(p)], dtype=torch.float64)
-    viewmat = look_at(radius * orbit_direction(azimuth, polar), torch.zeros(3, dtype=torch.float64), up)
+    middle = torch.tensor(tuple(target), dtype=torch.float64)
+    viewmat = look_at(middle + radius * orbit_direction(azimuth, polar), middle, up)
     return Camera(viewmat.float(), intrinsics(fov_y, width, height), width, height)

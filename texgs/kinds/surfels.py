@@ -47,6 +47,6 @@ FIELD: Kind[None] = Kind(
     write,
     compose,
     phases=("surfels", "shading", "texture"),
-    exports=("3dgs", "2dgs", "release", "points", "mesh", "compact"),
+    exports=("3dgs", "2dgs", "release", "points", "mesh", "compact", "html"),
     depth="median",
 )

@@ -191,17 +191,21 @@ class Session:
         Raises:
             ArgumentError, ShapeError: naming the model and its file.
         """
-        states: list[object] = [state_of(file) for file in files_of(self.scene)]
-        if self._opened is not None and self._opened[0] == states:
-            return self._opened[1]
-        composition = self.scene.open(self._device)
-        self._opened = (states, composition)
-        return composition
+        return self._composition_of(self.scene)
 
-    def frame(self, camera: Camera, mode: Mode = "shaded") -> np.ndarray:
-        """One frame [H, W, 3], uint8; see `texgs.scene.frame.frame`."""
-        scene = self.scene
-        return frame(self.composition, camera, scene.light, scene.edits, mode, scene.background)
+    def frame(self, camera: Camera, mode: Mode = "shaded", scene: Scene | None = None) -> np.ndarray:
+        """One frame [H, W, 3], uint8; see `texgs.scene.frame.frame`.
+
+        Changes may be made in one thread while another one renders the scene that it was given.
+
+        Args:
+            camera: from where.
+            mode: what to show.
+            scene: one of the history; default as it is now.
+        """
+        scene = self.scene if scene is None else scene
+        composition = self._composition_of(scene)
+        return frame(composition, camera, scene.light, scene.edits, mode, scene.background)
 
     def pick(self, camera: Camera, x: int, y: int) -> Picked | None:
         """What a pixel of a frame shows most of; see `texgs.scene.pick.pick`."""
@@ -214,6 +218,14 @@ class Session:
             ArgumentError: if it cannot be written.
         """
         return write_scene(path, self.scene)
+
+    def _composition_of(self, scene: Scene) -> Composed:
+        states: list[object] = [state_of(file) for file in files_of(scene)]
+        if self._opened is not None and self._opened[0] == states:
+            return self._opened[1]
+        composition = scene.open(self._device)
+        self._opened = (states, composition)
+        return composition
 
     # ---- History ------------------------------------------------------------
 

@@ -153,6 +153,11 @@ def test_no_surfels_are_a_model_and_the_same_model_gives_the_same_bytes(tmp_path
     )
 
 
+def test_what_a_compact_file_holds_is_not_rounded_again(tmp_path):
+    first = write_compact(tmp_path / "a.texgs", sample(n=500))
+    assert write_compact(tmp_path / "b.texgs", read_compact(first)).read_bytes() == first.read_bytes()
+
+
 def test_the_format_is_public(tmp_path):
     line, _, packed = write_compact(tmp_path / "m", sample(low_pass=3.0)).read_bytes().partition(b"\n")
     header = json.loads(line)

@@ -66,10 +66,7 @@ def write_compact(
     model = model.to("cpu")
     if seen is not None:
         model = _without_unseen(model, seen.cpu())
-    stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
-    if model.stage == "texture":
-        stored |= _texture(path, model.parameters, step)
-    packed = lzma.compress(save(stored), preset=6)
+    packed = lzma.compress(save(compact_tensors(path, model, step)), preset=6)
     return write_bytes(path, json.dumps(header, separators=(",", ":")).encode() + b"\n" + packed)
 
 
@@ -121,6 +118,18 @@ def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
 # -- writing ---
 
 
+def compact_tensors(path: str | Path, model: Surfels, step: float = STEP) -> dict[str, np.ndarray]:
+    """The tensors of a compact file, see `write_compact`, of a model on the CPU.
+
+    Raises:
+        ArgumentError: naming the file at `path`, if a texel is beyond 2^23 steps.
+    """
+    stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
+    if model.stage == "texture":
+        stored |= _texture(path, model.parameters, step)
+    return stored
+
+
 def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
     """The model with one texel, the mean, for each unseen surfel."""
     check.shape("seen", seen, "N", N=len(model))
@@ -142,9 +151,9 @@ def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
 
 def _rounded(name: str, values: Tensor) -> np.ndarray:
     """Values in half precision where that can hold them."""
-    if name == "quats":
-        values = normalize(values, dim=1)  # any length is the same rotation, but half has few of them
     half = values.half()
+    if name == "quats" and not torch.equal(half.float(), values):  # those of a compact file stay as they are
+        half = normalize(values, dim=1).half()  # any length is the same rotation, but half has few of them
     exact = name in EXACT or values.shape == (1,) or not bool(half.isfinite().all())
     return (values if exact else half).contiguous().numpy()
 

@@ -1,0 +1,88 @@
+"""Pictures that webgl.js draws in a browser, and those of the rasterizer for the same numbers."""
+
+import json
+import zlib
+from base64 import b64decode
+
+import numpy as np
+import torch
+from safetensors.numpy import load
+
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel
+from texgs.scene.frame import frame
+from texgs.viewer.modules import joined_modules
+
+START = """
+const { WebglRenderer } = modules["webgl.js"];
+Object.assign(globalThis, modules["sort.js"], modules["tensors.js"]);
+globalThis.start = async (packed, scene) => {
+  const canvas = document.body.appendChild(document.createElement("canvas"));
+  globalThis.renderer = new WebglRenderer(canvas, (text) => console.log(text));
+  await renderer.open(packed, scene);
+};
+globalThis.shoot = (camera, scene, mode) => {
+  const pixels = renderer.pixels(camera, scene, mode);
+  let text = "";
+  for (let i = 0; i < pixels.length; i += 4096) text += String.fromCharCode(...pixels.subarray(i, i + 4096));
+  return btoa(text);
+};
+"""
+
+
+def open_renderer(page, packed, description):
+    """Give a blank page the renderer with a scene."""
+    page.set_content(f"<!doctype html><body><script type=module>{joined_modules('webgl.js')}{START}</script>")
+    page.wait_for_function("globalThis.start !== undefined")
+    page.evaluate("([packed, scene]) => start(packed, scene)", [packed, description])
+
+
+def drawn(page, camera, description, mode="shaded"):
+    """What the renderer draws [H, W, 3], uint8."""
+    fov_y = 2 * np.degrees(np.arctan(0.5 * camera.height / float(camera.K[1, 1])))
+    seen = {
+        "viewmat": camera.viewmat[:3].tolist(),
+        "fov_y": fov_y,
+        "width": camera.width,
+        "height": camera.height,
+    }
+    text = page.evaluate("([camera, scene, mode]) => shoot(camera, scene, mode)", [seen, description, mode])
+    return np.frombuffer(b64decode(text), np.uint8).reshape(camera.height, camera.width, 4)[..., :3]
+
+
+def unpacked(packed):
+    """The models in a packed text, and the labels of their surfels, read without the code that wrote them."""
+    raw = zlib.decompress(b64decode(packed))
+    length = int.from_bytes(raw[:8], "little")
+    facts = json.loads(json.loads(raw[8 : 8 + length])["__metadata__"]["optics"])
+    tensors = load(raw)
+    models, labels = [], []
+    for number, optics in enumerate(facts["models"]):
+        own = {name.partition(".")[2]: x for name, x in tensors.items() if name.startswith(f"{number}.")}
+        labels.append(own.pop("labels", None))
+        if "codes" in own:
+            whole = sum(plane.astype(np.int64) << 8 * k for k, plane in enumerate(own.pop("codes")))
+            green, red, blue = np.where(whole % 2, -(whole + 1) // 2, whole // 2)
+            own["texels"] = np.stack([red + green, green, blue + green], 1) * np.float32(facts["step"])
+            counts = own["sizes"].astype(np.int64).prod(1)
+            own["offsets"] = counts.cumsum() - counts
+        exact = ("sizes", "offsets")
+        p = {name: torch.tensor(x if name in exact else x.astype(np.float32)) for name, x in own.items()}
+        models.append(Surfels(p, ShadingModel(**optics)))
+    return models, labels
+
+
+def composed_of(packed):
+    """The scene in a packed text."""
+    models, labels = unpacked(packed)
+    masks = [
+        [] if own is None else [torch.tensor(own == k) for k in range(1, int(own.max()) + 1)]
+        for own in labels
+    ]
+    return Composition(models, masks)
+
+
+def rendered(packed, camera, light, edits, background, mode="shaded"):
+    """What the rasterizer makes of the numbers in a packed text [H, W, 3], uint8."""
+    return frame(composed_of(packed), camera, light, edits, mode, background)

@@ -1,0 +1,230 @@
+"""The page in a real browser: what it shows is what `texgs render` writes, and it finds a server again."""
+
+import io
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from tests.edit.lift_scenes import two_balls
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
+
+try:
+    from playwright.sync_api import expect, sync_playwright
+except ImportError:
+    pytest.skip("playwright is not installed: pip install 'texgs[browser]'", allow_module_level=True)
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
+LINK = "#" + "&".join(f"{key}={value}" for key, value in PLACE.items()) + "&target=0,0,0"
+WAIT = 60_000  # milliseconds, on a busy machine
+JPEG = 1.5  # levels of 255: what quality 95 costs on average
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    if CHROMIUM is None:
+        pytest.skip("there is no Chromium on the PATH: apt-get install chromium")
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=CHROMIUM)
+        yield browser
+        browser.close()
+
+
+@contextmanager
+def served(scene_file, port=0, **environment):
+    """A server in a process of its own, and its address."""
+    words = [
+        sys.executable,
+        "-m",
+        "texgs.cli.main",
+        "view",
+        str(scene_file),
+        "--no-browser",
+        "--port",
+        str(port),
+    ]
+    env = {**os.environ, "TEXGS_CACHE": str(scene_file.parent / "cache"), **environment}
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=env)
+    try:
+        yield process, process.stdout.readline().strip()
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=60)
+
+
+@contextmanager
+def opened(chromium, address):
+    """A page at a known camera, whose first whole frame is there. It must log no error."""
+    page = chromium.new_page(viewport={"width": 800, "height": 500})
+    page.set_default_timeout(WAIT)
+    errors = []
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.goto(address + LINK)
+    expect(page.locator("#pace")).to_contain_text("ms", timeout=WAIT)
+    page.wait_for_timeout(500)
+    yield page
+    page.close()
+    assert errors == []
+
+
+def rendered(scene_file, page):
+    """What `texgs render` writes for the page's camera: bytes of a PNG."""
+    box, output = page.locator("#picture").bounding_box(), scene_file.parent / "render.png"
+    size = ["--width", str(round(box["width"])), "--height", str(round(box["height"]))]
+    camera = ["--azimuth", str(PLACE["azimuth"]), "--polar", str(PLACE["polar"])]
+    lens = ["--radius", str(PLACE["distance"]), "--fov", str(PLACE["fov_y"])]
+    assert main(["render", str(scene_file), "--output", str(output), *size, *camera, *lens]) == 0
+    return output.read_bytes()
+
+
+def still(page):
+    """What the button writes: bytes of a PNG."""
+    with page.expect_download() as download:
+        page.get_by_role("button", name="Picture").click()
+    with open(download.value.path(), "rb") as file:  # noqa: PTH123
+        return file.read()
+
+
+def pixels(png):
+    return np.asarray(Image.open(io.BytesIO(png)).convert("RGB")).astype(int)
+
+
+def shown(page):
+    """Pixels of the picture on the screen, without what lies over its last rows."""
+    page.wait_for_timeout(500)
+    return pixels(page.locator("#picture").screenshot())[:-50]
+
+
+def save_as(page, name):
+    page.get_by_role("button", name="Save").click()
+    page.get_by_label("File name").fill(name)
+    page.get_by_role("dialog").get_by_role("button", name="Save", exact=True).click()
+    expect(page.get_by_text(f"/{name}")).to_be_visible(timeout=WAIT)
+
+
+def test_what_is_edited_shows_and_is_saved(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        assert still(page) == rendered(scene_file, page)
+        page.get_by_role("textbox", name="Palette of TF01").fill("#ff0000")
+        page.get_by_role("spinbutton", name="Opacity of TF02, as a number").fill("0.3")
+        page.keyboard.press("Tab")
+        page.get_by_role("checkbox", name="TF02").uncheck()
+        save_as(page, "red.yaml")
+        red = scene_file.parent / "red.yaml"
+        edits = [model.edit for model in read_scene(red).models.values()]
+        assert edits[0].palette == (1, 0, 0)
+        assert (edits[1].opacity, edits[1].visible) == (0.3, False)
+        expected = rendered(red, page)
+        assert still(page) == expected
+        assert np.abs(shown(page) - pixels(expected)[:-50]).mean() < JPEG
+        expect(page.get_by_role("listitem")).to_have_text(["TF01 palette", "TF02 opacity", "TF02 visible"])
+        page.get_by_role("button", name="Undo").click()
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("checkbox", name="TF02")).to_be_checked()
+        expect(page.get_by_role("spinbutton", name="Opacity of TF02, as a number")).to_have_value("1")
+        save_as(page, "undone.yaml")
+        kept = still(page)
+        page.keyboard.press("Control+Shift+Z")
+        expect(page.get_by_role("spinbutton", name="Opacity of TF02, as a number")).to_have_value("0.3")
+    undone = scene_file.parent / "undone.yaml"
+    with served(undone) as (_, address), opened(chromium, address) as page:
+        assert still(page) == kept
+
+
+def test_the_camera_moves_and_stands_in_the_link(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        first = shown(page)
+        page.mouse.move(200, 250)
+        page.mouse.down()
+        page.mouse.move(300, 250, steps=5)
+        page.mouse.up()
+        expect(page).to_have_url(re.compile(r"azimuth=0&polar=10&"), timeout=WAIT)  # 0.4 degrees a pixel
+        assert np.abs(shown(page) - first).mean() > 2
+        page.keyboard.press("Tab")
+        page.locator("#picture").press("ArrowLeft")
+        expect(page).to_have_url(re.compile(r"azimuth=5&"), timeout=WAIT)
+        page.get_by_label("From").select_option("From +y")
+        expect(page).to_have_url(re.compile(r"azimuth=-90&polar=90&"), timeout=WAIT)
+        page.get_by_label("Show").select_option("Normals")
+        expect(page).to_have_url(re.compile("mode=normal"), timeout=WAIT)
+
+
+def test_comparing_shows_the_scene_as_it_was_opened(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        first = still(page)
+        page.get_by_role("checkbox", name="TF01").uncheck()
+        assert still(page) != first
+        page.keyboard.press("b")
+        expect(page.get_by_text("As opened", exact=True)).to_be_visible()
+        assert still(page) == first
+
+
+def test_a_click_makes_a_segment(chromium, tmp_path):
+    file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
+    scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))
+    weights = {"TEXGS_WEIGHTS": str(tmp_path)}  # GrabCut, wherever this runs
+    with served(scene_file, **weights) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New segment of balls").click()
+        box = page.locator("#picture").bounding_box()
+        place = orbit(
+            *(PLACE[key] for key in ("azimuth", "polar", "distance", "fov_y")),
+            round(box["width"]),
+            round(box["height"]),
+        ).project(torch.tensor([0.3, 0.1, 0.1]))[0]
+        page.locator("#picture").click(position={"x": float(place[0]), "y": float(place[1])})
+        expect(page.get_by_text("Mask by GrabCut.")).to_be_visible(timeout=WAIT)
+        page.get_by_label("Name", exact=True).fill("blue")
+        page.get_by_role("button", name="Make segment").click()
+        page.get_by_role("checkbox", name="blue").uncheck(timeout=WAIT)
+        expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible"])
+        reds = shown(page)
+        is_blue = (reds[..., 2] - reds[..., 0] > 100).mean()
+        assert (reds[..., 0] - reds[..., 2] > 100).mean() > 0.01
+        assert is_blue < 0.001
+        page.get_by_role("button", name="Undo").click()
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("checkbox", name="blue")).to_have_count(0)
+
+
+def test_pages_share_their_edits(chromium, scene_file):
+    with (
+        served(scene_file) as (_, address),
+        opened(chromium, address) as one,
+        opened(chromium, address) as other,
+    ):
+        one.get_by_role("checkbox", name="Headlight").uncheck()
+        expect(other.get_by_role("checkbox", name="Headlight")).not_to_be_checked()
+        other.get_by_role("button", name="Undo").click()
+        expect(one.get_by_role("checkbox", name="Headlight")).to_be_checked()
+
+
+def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
+    with served(scene_file) as (process, address):
+        port = int(re.search(r":(\d+)/", address).group(1))
+        with opened(chromium, address) as page:
+            page.get_by_role("checkbox", name="Headlight").uncheck()
+            page.get_by_role("checkbox", name="TF02").uncheck()
+            expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
+            process.kill()
+            lost = page.get_by_text("No connection to texgs view")
+            expect(lost).to_be_visible(timeout=WAIT)
+            with served(scene_file, port) as (_, again):
+                assert again == address
+                expect(lost).to_be_hidden(timeout=WAIT)
+                page.get_by_role("button", name="Make them again").click()
+                expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
+                expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()

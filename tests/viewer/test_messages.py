@@ -1,0 +1,99 @@
+"""Messages of pages: the right ones are read, all others are told in one sentence."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.viewer.messages import Edit, Redo, Save, Undo, View, parse
+
+CAMERA = {
+    "target": [0, 0, 0],
+    "azimuth": 30,
+    "polar": 20,
+    "distance": 3,
+    "fov_y": 40,
+    "width": 64,
+    "height": 48,
+}
+VIEW = {"type": "view", "id": 7, "camera": CAMERA, "mode": "normal", "moving": True, "before": False}
+
+
+def test_messages_are_read():
+    view = parse(json.dumps(VIEW))
+    assert isinstance(view, View)
+    assert (view.id, view.mode, view.moving, view.before) == (7, "normal", True, False)
+    edit = {"type": "edit", "part": "TF01", "key": "opacity", "value": 0.5, "step": 3}
+    assert parse(json.dumps(edit)) == Edit("TF01", "opacity", 0.5, 3)
+    assert parse('{"type": "undo"}') == Undo()
+    assert parse('{"type": "redo"}') == Redo()
+    assert parse('{"type": "save", "name": "a.yaml"}') == Save("a.yaml", False)
+
+
+def test_a_camera_is_that_of_the_renderer():
+    camera, expected = parse(json.dumps(VIEW)).camera.camera(), orbit(30, 20, 3, 40, 64, 48)
+    assert camera.viewmat.equal(expected.viewmat)
+    assert camera.K.equal(expected.K)
+
+
+def test_half_of_a_camera_sees_the_same():
+    half, whole = (parse(json.dumps(VIEW)).camera.camera(scale) for scale in (0.5, 1))
+    assert (half.width, half.height) == (32, 24)
+    point = half.viewmat.new_tensor([0.2, -0.1, 0.3])
+    assert (2 * half.project(point)[0]).allclose(whole.project(point)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            {"type": "run"},
+            "type: expected one of view, edit, undo, redo, save, mask, segment, remove, cancel, got",
+        ),
+        ({"type": ["view"]}, "type: expected one of view, edit, undo, redo,"),
+        ({"mode": "x"}, "mode: expected one of shaded"),
+        ({"id": -1}, "id: expected a whole number from 0 to"),
+        ({"moving": 1}, "moving: expected true or false, got 1"),
+        ({"colour": 1}, "view: no such key 'colour'"),
+        ({"camera": None}, "camera: expected a table"),
+        ({"camera": {**CAMERA, "polar": 91}}, "camera.polar: expected a number from -90 to 90, got 91"),
+        ({"camera": {**CAMERA, "width": 1e3}}, "camera.width: expected a whole number from 1 to 4096"),
+        ({"camera": {**CAMERA, "width": 9000}}, "camera.width: expected a whole number from 1 to 4096"),
+        ({"camera": {**CAMERA, "target": [0, 0]}}, "camera.target: expected three numbers, got [0, 0]"),
+        ({"camera": {**CAMERA, "distance": "3"}}, "camera.distance: expected a number from 0.001 to 1000"),
+    ],
+)
+def test_what_is_wrong_is_named(change, message):
+    with pytest.raises(ArgumentError) as error:
+        parse(json.dumps({**VIEW, **change}))
+    assert str(error.value).startswith(message)
+
+
+@pytest.mark.parametrize("text", ["", "{", "NaN", '{"type": NaN}', "[" * 5000, '"' * 3, "1" * 5000])
+def test_what_is_no_json_is_told(text):
+    with pytest.raises(ArgumentError, match="message: expected"):
+        parse(text)
+
+
+VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.sampled_from([*CAMERA, "x"]), inner),
+    max_leaves=8,
+)
+
+
+KEYS = ("id", "camera", "mode", "moving", "before", "part", "key", "value", "step", "name", "replace")
+
+
+@given(
+    st.sampled_from(["view", "edit", "undo", "redo", "save"]),
+    st.dictionaries(st.sampled_from(KEYS), VALUES),
+)
+def test_nothing_else_is_raised(kind, values):
+    try:
+        parse(json.dumps({"type": kind, **values}))
+    except ArgumentError as error:
+        assert len(str(error)) < 2100  # noqa: PT017  one sentence, of bounded length

@@ -1,0 +1,34 @@
+"""The modules of the front end as one script."""
+
+import re
+
+import pytest
+
+from texgs.viewer.modules import EXPORT, IMPORT, joined_modules, web_file
+
+PAGES = ("standalone.js", "main.js")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_modules_come_once_and_behind_what_they_import(page):
+    text = joined_modules(page)
+    begun = re.findall(r'^modules\["([\w-]+\.js)"\] = ', text, re.MULTILINE)
+    assert len(begun) == len(set(begun)) > 5
+    assert begun[-1] == page
+    for name in begun:
+        imported = [other for _, other in IMPORT.findall(web_file(name))]
+        assert all(begun.index(other) < begun.index(name) for other in imported)
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_all_imports_and_exports_are_known_ones(page):
+    text = joined_modules(page)
+    assert not re.search(r"^\s*(import|export)\b", text, re.MULTILINE)
+    assert " as " not in "".join(names for names, _ in IMPORT.findall(web_file(page)))
+
+
+def test_what_a_module_imports_is_exported():
+    for name in ("standalone.js", "webgl.js", "shaders.js", "light.js"):
+        for names, other in IMPORT.findall(web_file(name)):
+            exported = {export for _, export in EXPORT.findall(web_file(other))}
+            assert set(re.findall(r"\w+", names)) <= exported

@@ -1,0 +1,102 @@
+"""What a viewer is started with, and what pages are told of it."""
+
+import math
+
+import pytest
+import torch
+
+from tests.fields.surfels.test_composition import ball
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.segment_file import write_segment
+from texgs.scene.session import Session
+from texgs.viewer.description import describe
+from texgs.viewer.opening import open_scene
+
+
+def test_a_scene_is_saved_in_its_place(scene_file, tmp_path):
+    opened = open_scene(scene_file)
+    assert list(opened.scene.models) == ["TF01", "TF02"]
+    assert (opened.folder, opened.name) == (tmp_path, "scene.yaml")
+    assert open_scene(scene_file, tmp_path / "mine").folder == tmp_path / "mine"
+
+
+def test_a_job_keeps_its_scene(scene_file, tmp_path):
+    (tmp_path / "metrics.json").write_text("{}")
+    assert open_scene(scene_file).name == "edited.yaml"
+
+
+def test_a_folder_with_one_scene(scene_file, tmp_path):
+    assert open_scene(tmp_path.parent / tmp_path.name).scene == open_scene(scene_file).scene
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "scene.yaml").write_text(scene_file.read_text())
+    with pytest.raises(ArgumentError, match=r"got 2 \(other/scene.yaml, scene.yaml\); name one of them"):
+        open_scene(tmp_path)
+
+
+def test_a_model_is_a_scene(tmp_path):
+    opened = open_scene(write_model(tmp_path / "shell.safetensors", ball(1)))
+    assert list(opened.scene.models) == ["shell"]
+    assert (opened.folder, opened.name) == (tmp_path, "scene.yaml")
+
+
+def test_what_is_missing_is_told(tmp_path):
+    with pytest.raises(ArgumentError, match="no such scene, folder or model"):
+        open_scene(tmp_path / "none.safetensors")
+    with pytest.raises(ArgumentError, match=r"expected one scene.yaml .* got none; texgs compose writes one"):
+        open_scene(tmp_path)
+
+
+def described(tmp_path, *models, **values):
+    entries = {
+        f"TF{i}": SceneModel(write_model(tmp_path / f"{i}.safetensors", model))
+        for i, model in enumerate(models)
+    }
+    session = Session(Scene(entries, **values))
+    return session, describe("name", session.scene, session.composition)
+
+
+def test_a_description_has_all_parts_and_what_they_can_show(tmp_path):
+    model = ball(1)
+    session, _ = described(tmp_path, model, ball(2, stage="shading"), light=Light("directional", 10.0, 20.0))
+    half = write_segment(tmp_path / "half", model, torch.arange(len(model)) % 2 == 0)
+    session.add_segment("TF0/half", half)
+    session.set("TF0/half", "opacity", 0.5)
+    told = describe("name", session.scene, session.composition)
+    first, second = told["models"]
+    assert [each["name"] for each in first["segments"]] == ["half"]
+    assert first["segments"][0]["edit"]["opacity"] == 0.5
+    assert first["fitted_palette"] == pytest.approx(model.parameters["palette"].tolist())
+    assert first["can"] == [
+        "visible",
+        "palette",
+        "opacity",
+        "ambient",
+        "diffuse",
+        "specular",
+        "shininess",
+        "segments",
+    ]
+    assert "palette" not in second["can"], "there is none without a texture"
+    assert told["light"] == {"azimuth": 10, "polar": 20}
+    assert told["modes"][0] == "shaded"
+    assert "normal" in told["modes"]
+
+
+def test_the_first_view_shows_the_whole_scene(tmp_path):
+    model = ball(1, middle=2.0)
+    _, told = described(tmp_path, model)
+    view, means = told["views"][0], model.parameters["means"]
+    assert told["bounds"]["center"] == pytest.approx([2, 2, 2], abs=0.1)
+    assert told["bounds"]["radius"] == pytest.approx(0.5, abs=0.1)
+    camera = orbit(view["azimuth"], view["polar"], view["distance"], told["fov_y"], 100, 100, view["target"])
+    places, depth = camera.project(means)
+    assert bool((depth > 0).all())
+    inside = ((places > 0) & (places < 100)).all(dim=1).float().mean()
+    assert inside > 0.98
+    spread = (places.amax(dim=0) - places.amin(dim=0)).max()
+    assert spread > 80, "it fills the picture"
+    assert math.isclose(camera.position.sub(2).norm(), view["distance"], rel_tol=0.05)

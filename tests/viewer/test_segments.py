@@ -1,0 +1,216 @@
+"""Segments from clicks on a page: their masks, their surfels, their history, and how they are stopped."""
+
+import asyncio
+import base64
+import io
+import threading
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+
+from tests.edit.lift_scenes import two_balls
+from tests.viewer.test_server import page, served
+from texgs.edit.clicks import Clicks
+from texgs.edit.lift import lift
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
+from texgs.models.grabcut import GrabCut
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.segment_file import read_segment
+from texgs.viewer.messages import Orbit
+from texgs.viewer.segments import LENS, Stopped, Watched, alone
+from texgs.volume.cameras import icosphere_of
+
+FRONT = Orbit((0.0, 0.0, 0.0), -90, 0, 4.0, 22.0, 120, 120)  # on +z
+VIEWS = 12
+RED, BESIDE = (-0.3, 0.0, 0.0), (0.0, -0.7, 0.0)
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """Few views and no weights, wherever the tests run."""
+    monkeypatch.setattr("texgs.viewer.segments.CHOICES", ("grabcut",))
+    monkeypatch.setattr("texgs.viewer.segments.VIEWS", VIEWS)
+
+
+@pytest.fixture
+def balls(tmp_path):
+    """A scene of one model, a red and a blue ball, and which surfels are red."""
+    model, numbers = two_balls()
+    file = write_model(tmp_path / "balls.safetensors", model)
+    return write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)})), numbers == 0
+
+
+def at(place):
+    """Pixel of a place."""
+    return FRONT.camera().project(torch.tensor(place))[0].tolist()
+
+
+def clicked(*points):
+    return {
+        "camera": asdict(FRONT) | {"target": [0, 0, 0]},
+        "points": [[*at(place), is_on] for place, is_on in points],
+    }
+
+
+def with_page(scene_file, work):
+    async def run():
+        async with served(scene_file) as client, page(client) as browser:
+            await browser.next("scene")
+            await work(browser)
+
+    asyncio.run(run())
+
+
+async def ended(browser):
+    """The notices of a job, until it has ended."""
+    while (await browser.next("job"))["done"] is not None:
+        pass
+
+
+def test_clicks_show_their_mask(balls):
+    scene_file, _ = balls
+
+    async def work(browser):
+        await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
+        message = await browser.next("mask")
+        assert (message["id"], message["by"]) == (3, "GrabCut")
+        png = base64.b64decode(message["picture"].removeprefix("data:image/png;base64,"))
+        mask = np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0
+        rows, columns = mask.nonzero()
+        assert mask.shape == (120, 120)
+        middle, (x, y) = (columns.mean(), rows.mean()), at(RED)
+        assert abs(middle[0] - x) < 2
+        assert abs(middle[1] - y) < 2
+        radius = 0.25 * 120 / (2 * 4 * np.tan(np.radians(11)))  # pixels
+        assert mask.sum() == pytest.approx(
+            np.pi * radius**2, rel=0.15
+        )  # its surfels reach beyond its outline
+
+    with_page(scene_file, work)
+
+
+def test_clicks_make_a_segment_that_is_edited_undone_and_saved(balls):
+    scene_file, red = balls
+
+    async def work(browser):
+        await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
+        await ended(browser)
+        await browser.send(type="edit", part="balls/red", key="opacity", value=0.5)
+        while len((news := await browser.next("scene"))["past"]) < 2:
+            pass
+        assert news["past"] == ["balls/red new", "balls/red opacity"]
+        await browser.send(type="save", name="scene.yaml")
+        await browser.next("notice")
+        await browser.send(type="undo")
+        await browser.send(type="remove", part="balls/red")
+        while (news := await browser.next("scene"))["past"] != ["balls/red new", "balls/red removed"]:
+            pass
+        assert news["scene"]["models"][0]["segments"] == []
+        await browser.send(type="undo")
+        (segment,) = (await browser.next("scene"))["scene"]["models"][0]["segments"]
+        assert segment["name"] == "red"
+
+    with_page(scene_file, work)
+    saved = read_scene(scene_file).models["balls"]
+    assert saved.segments["red"].edit == PartEdit(opacity=0.5)
+    model, _ = two_balls()
+    found = read_segment(saved.segments["red"].file, model)
+    clicks = Clicks(FRONT.camera(), torch.tensor([at(RED)]), torch.tensor([True]))
+    assert found.equal(lift(model, clicks, icosphere_of(VIEWS, LENS), GrabCut()).mask)
+    assert bool(found[red].all())
+
+
+def test_a_segment_replaces_no_file(balls):
+    scene_file, _ = balls
+    (taken := scene_file.parent / "scene-balls-red.safetensors").write_bytes(b"mine")
+
+    async def work(browser):
+        await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
+        await ended(browser)
+
+    with_page(scene_file, work)
+    assert taken.read_bytes() == b"mine"
+    assert (scene_file.parent / "scene-balls-red-2.safetensors").exists()
+
+
+@pytest.mark.parametrize(
+    ("part", "points", "message"),
+    [
+        ("balls/a.b", [(RED, True)], "segment: expected a name without"),
+        ("other/red", [(RED, True)], "expected a model of the scene (balls), got other"),
+        ("balls/red", [(BESIDE, True)], "expected a place on the model, got background"),
+        ("balls/red", [(RED, False)], "points: expected a positive one at least, got none"),
+        ("balls/red", [], "points: expected 1 to 100 of them, got []"),
+    ],
+)
+def test_clicks_that_select_nothing_are_told(balls, part, points, message):
+    async def work(browser):
+        await browser.send(type="segment", part=part, **clicked(*points))
+        assert message in (await browser.next("notice"))["text"]
+        assert (await browser.next("scene"))["past"] == []
+
+    with_page(balls[0], work)
+
+
+class Waiting(GrabCut):
+    """Waits at its second view until it may go on."""
+
+    def __init__(self):
+        self.reached, self.go_on, self.calls = threading.Event(), threading.Event(), 0
+
+    def __call__(self, image, points, positive):
+        self.calls += 1
+        if self.calls == 2:
+            self.reached.set()
+            self.go_on.wait(30)
+        return super().__call__(image, points, positive)
+
+
+def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(balls, monkeypatch):
+    masks = Waiting()
+    monkeypatch.setattr("texgs.viewer.segments.mask_model", lambda name, device: masks)
+
+    async def work(browser):
+        await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
+        await asyncio.to_thread(masks.reached.wait, 30)
+        await browser.send(type="segment", part="balls/other", **clicked((RED, True)))
+        assert "another one is being made" in (await browser.next("notice"))["text"]
+        await browser.send(type="edit", part="balls", key="opacity", value=0.5)
+        while not (await browser.next("scene"))["past"]:
+            pass  # edits go on meanwhile
+        await browser.send(type="cancel")
+        await browser.send(type="undo")
+        while (await browser.next("scene"))["past"]:
+            pass  # the server has read what came before
+        masks.go_on.set()
+        assert "it was cancelled" in (await browser.next("notice"))["text"]
+        await ended(browser)
+
+    with_page(balls[0], work)
+    assert masks.calls == 2
+    assert not list(balls[0].parent.glob("scene-*"))
+
+
+def test_a_watched_mask_model_tells_how_far_it_is():
+    told, stop = [], threading.Event()
+    watched = Watched(GrabCut(), 4, stop, told.append)
+    image = torch.rand(20, 20, 3)
+    for _ in range(2):
+        watched(image, torch.tensor([[5.0, 5.0]]), torch.tensor([True]))
+    assert told == [0.25, 0.5]
+    stop.set()
+    with pytest.raises(Stopped, match="cancelled"):
+        watched(image, torch.tensor([[5.0, 5.0]]), torch.tensor([True]))
+
+
+def test_a_model_alone_has_no_edits(balls):
+    scene = read_scene(balls[0])
+    models = {**scene.models, "other": SceneModel(scene.models["balls"].file, PartEdit(opacity=0.2))}
+    shown = alone(Scene(models), "other")
+    assert shown.models["other"].edit == PartEdit()
+    assert not shown.models["balls"].edit.visible

@@ -1,0 +1,380 @@
+"""The viewer's server: who may talk to it, what it answers, what pages share."""
+
+import asyncio
+import io
+import json
+import struct
+from contextlib import asynccontextmanager
+
+import numpy as np
+import pytest
+from aiohttp import WSMsgType, WSServerHandshakeError
+from aiohttp.test_utils import TestClient, TestServer
+from PIL import Image
+
+from tests.viewer.test_messages import CAMERA, VIEW
+from texgs.cli.main import main
+from texgs.scene.scene_file import read_scene
+from texgs.viewer import guard
+from texgs.viewer.opening import open_scene
+from texgs.viewer.server import Server
+
+TOKEN = "t" * 43
+WAIT = 30  # seconds, on a busy machine
+
+
+class Browser:
+    """A page as the server sees it."""
+
+    def __init__(self, socket):
+        self.socket = socket
+
+    async def send(self, **message):
+        await self.socket.send_str(json.dumps(message))
+
+    async def next(self, kind):
+        """The next message of a kind; a frame is its header and its picture."""
+        while True:
+            message = await asyncio.wait_for(self.socket.receive(), WAIT)
+            if message.type == WSMsgType.BINARY:
+                (length,) = struct.unpack_from("<I", message.data)
+                if kind == "frame":
+                    picture = Image.open(io.BytesIO(message.data[4 + length :]))
+                    return json.loads(message.data[4 : 4 + length]), np.asarray(picture).astype(int)
+                continue
+            assert message.type == WSMsgType.TEXT, message
+            values = json.loads(message.data)
+            if values["type"] == kind:
+                return values
+
+
+@asynccontextmanager
+async def served(scene_file):
+    server = Server(open_scene(scene_file))
+    client = TestClient(TestServer(server.application(TOKEN)))
+    await client.start_server()
+    client.server_side = server
+    try:
+        yield client
+    finally:
+        await client.close()
+
+
+def origin(client):
+    return {"Origin": f"http://{client.host}:{client.port}"}
+
+
+@asynccontextmanager
+async def page(client):
+    async with client.ws_connect(f"/{TOKEN}/socket", headers=origin(client)) as socket:
+        yield Browser(socket)
+
+
+def with_page(scene_file, work):
+    """Run work(browser, client) with a page that has got its scene."""
+
+    async def run():
+        async with served(scene_file) as client, page(client) as browser:
+            await browser.next("scene")
+            await work(browser, client)
+
+    asyncio.run(run())
+
+
+# ---- Who may talk to it -----------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("path", "headers"),
+    [
+        ("/", {}),
+        ("/x/", {}),
+        ("/ü/", {}),
+        (f"/{TOKEN[:-1]}/", {}),
+        (f"/{TOKEN}/", {"Host": "evil.example"}),
+        (f"/{TOKEN}/", {"Host": "127.0.0.1.evil.example:80"}),
+        (f"/{TOKEN}/", {"Host": "["}),
+        (f"/{TOKEN}/still.png", {"Origin": "http://evil.example"}),
+        (f"/{TOKEN}/still.png", {"Origin": "null"}),
+        (f"/{TOKEN}/still.png", {"Origin": "http://["}),
+        (f"/{TOKEN}/../x", {}),
+    ],
+)
+def test_strangers_get_403(scene_file, path, headers):
+    async def run():
+        async with served(scene_file) as client, client.get(path, headers=headers) as answer:
+            assert answer.status == 403
+            assert "open the address that texgs view printed" in await answer.text()
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("path", "headers"),
+    [
+        (f"/{TOKEN}/socket", {"Origin": "http://evil.example"}),
+        (f"/{TOKEN}/socket", {}),
+        ("/wrong/socket", None),
+        (f"/{TOKEN}/socket", {"Host": "evil.example", "Origin": "http://evil.example"}),
+    ],
+)
+def test_sockets_of_strangers_get_403(scene_file, path, headers):
+    async def run():
+        async with served(scene_file) as client:
+            with pytest.raises(WSServerHandshakeError) as error:
+                await client.ws_connect(path, headers=origin(client) if headers is None else headers)
+            assert error.value.status == 403
+
+    asyncio.run(run())
+
+
+@pytest.mark.parametrize(
+    ("name", "host", "is_own"),
+    [
+        ("localhost:1", "127.0.0.1", True),
+        ("[::1]:80", "127.0.0.1", True),
+        ("192.168.1.5:80", "127.0.0.1", False),
+        ("192.168.1.5:80", "0.0.0.0", True),
+        ("evil.example", "0.0.0.0", False),
+        ("box.lab:80", "box.lab", True),
+        ("", "0.0.0.0", False),
+        ("localhost:80 evil.example", "127.0.0.1", False),
+    ],
+)
+def test_hosts(name, host, is_own):
+    assert guard.is_own_host(name, host) is is_own
+
+
+def test_pages_are_served_with_a_strict_policy_and_nothing_else(scene_file):
+    async def run():
+        async with served(scene_file) as client:
+            async with client.get(f"/{TOKEN}/") as answer:
+                assert answer.status == 200
+                assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+                assert answer.headers["Referrer-Policy"] == "no-referrer"
+            for name in ("page.html", "server.py", "..%2Fserver.py", "%2e%2e%2fserver.py", "x.js"):
+                async with client.get(f"/{TOKEN}/{name}") as answer:
+                    assert answer.status in (403, 404), name
+
+    asyncio.run(run())
+
+
+def test_a_token_is_kept_where_only_its_owner_reads_it(tmp_path):
+    path = tmp_path / "new" / "token"
+    token = guard.kept_token(path)
+    assert path.stat().st_mode & 0o777 == 0o600
+    assert guard.kept_token(path) == token
+    path.chmod(0o644)
+    assert guard.kept_token(path) != token
+    path.write_text("short")
+    assert guard.TOKEN.fullmatch(guard.kept_token(path))
+
+
+# ---- Frames -----------------------------------------------------------------
+
+
+def test_frames_are_those_of_the_renderer(scene_file, tmp_path):
+    words = ["--width", "64", "--height", "48", "--radius", "3", "--fov", "40", "--mode", "normal"]
+    assert main(["render", str(scene_file), "--output", str(tmp_path / "a.png"), *words]) == 0
+    expected = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+
+    async def work(browser, client):
+        await browser.send(**{**VIEW, "moving": False})
+        header, shown = await browser.next("frame")
+        assert header["id"] == 7
+        assert np.abs(shown - expected).mean() < 2  # of JPEG at quality 95
+        query = {"view": json.dumps({"camera": CAMERA, "mode": "normal"})}
+        async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
+            assert await answer.read() == (tmp_path / "a.png").read_bytes()
+
+    with_page(scene_file, work)
+
+
+def test_a_still_without_a_view_says_so(scene_file):
+    async def work(browser, client):
+        for query, message in (("", "expected JSON"), ("[]", "view: expected a table"), ("{}", "camera")):
+            async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
+                assert answer.status == 400
+                assert message in await answer.text()
+
+    with_page(scene_file, work)
+
+
+def test_the_newest_camera_wins(scene_file):
+    async def work(browser, client):
+        for number in range(200):
+            await browser.send(**{**VIEW, "id": number})
+        shown = []
+        while not shown or shown[-1] != 199:
+            shown.append((await browser.next("frame"))[0]["id"])
+        assert shown == sorted(shown)
+        assert len(shown) < 100, "most cameras were old when their turn came"
+
+    with_page(scene_file, work)
+
+
+def test_frames_of_a_moving_camera_are_halved_where_whole_ones_are_slow(scene_file, monkeypatch):
+    async def work(browser, client):
+        sizes = []
+        for slow, moving in ((-1, False), (-1, True), (-1, False), (1e9, True)):
+            monkeypatch.setattr("texgs.viewer.frames.SLOW", slow)
+            await browser.send(**{**VIEW, "moving": moving})
+            sizes.append((await browser.next("frame"))[1].shape[:2])
+        assert sizes == [(48, 64), (24, 32), (48, 64), (48, 64)]
+
+    with_page(scene_file, work)
+
+
+def test_an_error_of_a_frame_is_a_notice(scene_file):
+    async def work(browser, client):
+        (model := scene_file.parent / "TF01.safetensors").rename(scene_file.parent / "away")
+        await browser.send(**VIEW)
+        notice = await browser.next("notice")
+        assert notice["level"] == "error"
+        assert notice["frame"] == 7
+        assert str(model) in notice["text"]
+        (scene_file.parent / "away").rename(model)
+        await browser.send(**VIEW)
+        assert (await browser.next("frame"))[0]["id"] == 7
+
+    with_page(scene_file, work)
+
+
+# ---- Edits ------------------------------------------------------------------
+
+
+def test_pages_share_edits_and_their_history(scene_file):
+    async def run():
+        async with served(scene_file) as client, page(client) as one, page(client) as other:
+            for each in (one, other):
+                assert (await each.next("scene"))["saved"]
+            await one.send(type="edit", part="TF01", key="palette", value="#ff0000")
+            for each in (one, other):
+                news = await each.next("scene")
+                assert news["scene"]["models"][0]["edit"]["palette"] == [1, 0, 0]
+                assert news["past"] == ["TF01 palette"]
+                assert not news["saved"]
+            await other.send(type="undo")
+            news = await one.next("scene")
+            assert news["scene"]["models"][0]["edit"]["palette"] is None
+            assert (news["past"], news["future"]) == ([], ["TF01 palette"])
+            assert news["saved"]
+            await one.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
+            await other.send(type="redo")
+            await other.send(type="edit", part="", key="background", value=None)
+            while (news := await one.next("scene"))["past"] != ["light", "background"]:
+                pass
+            assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
+
+    asyncio.run(run())
+
+
+def test_edits_of_one_movement_are_one_step(scene_file):
+    async def work(browser, client):
+        for value in (0.9, 0.5, -1, 0.2):
+            await browser.send(type="edit", part="TF01", key="opacity", value=value, step=1)
+        await browser.send(type="edit", part="TF01", key="opacity", value=0.1, step=2)
+        while len((news := await browser.next("scene"))["past"]) < 2:
+            pass
+        assert news["scene"]["models"][0]["edit"]["opacity"] == 0.1
+        await browser.send(type="undo")
+        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
+        await browser.send(type="undo")
+        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 1
+        await browser.send(type="redo")
+        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
+
+    with_page(scene_file, work)
+
+
+@pytest.mark.parametrize(
+    ("edit", "message"),
+    [
+        (
+            {"part": "TF03", "key": "opacity", "value": 1},
+            "expected a model of the scene (TF01, TF02), got TF03",
+        ),
+        ({"part": "TF01", "key": "opasity", "value": 1}, "no such key 'opasity', did you mean opacity?"),
+        ({"part": "TF01", "key": "opacity", "value": -1}, "expected a factor from 0 to 1000, got -1"),
+        ({"part": "TF01", "key": "palette", "value": {"a": 1}}, "expected three numbers from 0 to 1"),
+        ({"part": "TF01/x", "key": "opacity", "value": 1}, "expected a segment of TF01 (it has none), got x"),
+        ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
+        ({"part": "", "key": "models", "value": 1}, "the scene: no such key 'models'"),
+    ],
+)
+def test_edits_that_cannot_be_made_are_notices(scene_file, edit, message):
+    async def work(browser, client):
+        await browser.send(type="edit", **edit)
+        assert message in (await browser.next("notice"))["text"]
+        assert (await browser.next("scene"))["past"] == []
+
+    with_page(scene_file, work)
+
+
+def test_scenes_are_saved_in_their_folder_only(scene_file):
+    async def work(browser, client):
+        await browser.send(type="edit", part="TF02", key="visible", value=False)
+        for name in ("../a.yaml", "/tmp/a.yaml", "a\\b.yaml", ".a.yaml", "", "a.txt", "a\0.yaml"):
+            await browser.send(type="save", name=name, replace=True)
+            assert "save as: expected a name" in (await browser.next("notice"))["text"]
+        await browser.send(type="save", name="new.yaml")
+        notice = await browser.next("notice")
+        assert notice["level"] == "info"
+        news = await browser.next("scene")
+        assert news["saved"]
+        assert news["file"] == "new.yaml"
+        await browser.send(type="save", name="scene.yaml")
+        assert (await browser.next("notice"))["level"] == "question", "it is another file by now"
+        assert read_scene(scene_file).models["TF02"].edit.visible
+        await browser.send(type="save", name="scene.yaml", replace=True)
+        assert (await browser.next("notice"))["level"] == "info"
+        assert not read_scene(scene_file).models["TF02"].edit.visible
+
+    with_page(scene_file, work)
+    assert not read_scene(scene_file.parent / "new.yaml").models["TF02"].edit.visible
+
+
+def test_a_thousand_malformed_messages(scene_file, caplog):
+    rng = np.random.default_rng(0)
+    whole = json.dumps(VIEW)
+
+    async def work(browser, client):
+        for number in range(1000):
+            if number % 3 == 0:
+                await browser.socket.send_bytes(rng.bytes(20))
+            elif number % 3 == 1:
+                await browser.socket.send_str(whole[: rng.integers(len(whole))])
+            else:
+                letters = list(whole)
+                letters[rng.integers(len(whole))] = chr(rng.integers(1, 0x250))
+                await browser.socket.send_str("".join(letters).replace("view", "edit", int(number % 2)))
+        assert (await browser.next("notice"))["level"] == "error"
+        await browser.send(**VIEW)
+        await browser.next("frame")
+
+    with_page(scene_file, work)
+    assert "Traceback" not in caplog.text
+
+
+def test_messages_have_a_limit(scene_file):
+    async def work(browser, client):
+        await browser.socket.send_str("x" * 100_000)
+        while (message := await asyncio.wait_for(browser.socket.receive(), WAIT)).type == WSMsgType.TEXT:
+            pass
+        assert message.type == WSMsgType.CLOSE
+        async with page(client) as again:
+            await again.next("scene")
+
+    with_page(scene_file, work)
+
+
+def test_there_are_so_many_pages_at_most(scene_file, monkeypatch):
+    monkeypatch.setattr("texgs.viewer.server.MOST_PAGES", 1)
+
+    async def work(browser, client):
+        with pytest.raises(WSServerHandshakeError) as error:
+            async with page(client):
+                pass
+        assert error.value.status == 503
+
+    with_page(scene_file, work)

@@ -1,0 +1,296 @@
+"""The page of a scene: its bytes, and what it does in a real browser that opens it as a file."""
+
+import base64
+import io
+import json
+import re
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.surfels.samples import sample
+from tests.fields.surfels.test_composition import ball
+from tests.viewer.browser import browser
+from tests.viewer.drawing import rendered
+from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.core.lens import Lens
+from texgs.core.light import HEADLIGHT, Light
+from texgs.fields.gaussians.model_file import write_gaussians
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model_file import write_model
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import write_scene
+from texgs.viewer import standalone
+from texgs.viewer.modules import web_file
+
+HOSTILE = "</script><b>&'\""
+LEVELS = 3  # of 255, see test_webgl.py
+SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
+REST = int(re.search(r"const REST = (\d+);", web_file("standalone.js"))[1])  # milliseconds
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("scene")
+
+
+@pytest.fixture(scope="module")
+def scene(folder):
+    """A scene file of two models, one with a name that is HTML."""
+    models = {
+        HOSTILE: SceneModel(write_model(folder / "a.safetensors", ball(1)), PartEdit(opacity=0.8)),
+        "B": SceneModel(write_model(folder / "b.safetensors", ball(2, n=80, middle=0.2))),
+    }
+    return write_scene(folder / "scene.yaml", Scene(models, background=(0.9, 0.9, 1.0)))
+
+
+@pytest.fixture(scope="module")
+def file(scene, folder):
+    assert main(["export", str(scene), "--to", str(folder / "scene.html")]) == 0
+    return folder / "scene.html"
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    with browser() as launched:
+        yield launched
+
+
+@pytest.fixture
+def page(chromium, file):
+    """The page, opened as a file; nothing may go wrong in it, and it may ask for nothing."""
+    page = chromium.new_page(viewport=SIZE)
+    wrong, asked = [], []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda message: wrong.append(message.text) if message.type == "error" else None)
+    page.on("request", lambda request: asked.append(request.url))
+    page.goto(file.as_uri())
+    page.wait_for_selector("#picture:not([hidden])")
+    settle(page)
+    yield page
+    assert wrong == []
+    assert [url for url in asked if not url.startswith("data:")] == [file.as_uri()]
+    page.close()
+
+
+def settle(page):
+    """Wait for the frame in full that follows a movement."""
+    page.wait_for_timeout(REST + 50)
+    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
+def shown(page):
+    """What the canvas shows [H, W, 3]."""
+    picture = page.locator("#picture").screenshot(type="png")
+    return np.asarray(Image.open(io.BytesIO(picture)).convert("RGB"))
+
+
+def described(file):
+    return json.loads(re.search(r'id="scene">([^<]*)<', file.read_text())[1])
+
+
+def surfels(file):
+    return re.search(r'id="surfels">([^<]*)<', file.read_text())[1]
+
+
+def expected(file, size, light=HEADLIGHT, edits=None, turned=(0.0, 0.0)):
+    """What the rasterizer makes of it, from where the page begins and then turned by so many degrees."""
+    view = described(file)["views"][0]
+    width, height = size
+    distance = view["distance"] * max(1, height / width)
+    angles = view["azimuth"] + turned[0], view["polar"] + turned[1]
+    camera = orbit(*angles, distance, Lens().fov_y, width, height, target=view["target"])
+    edits = [PartEdit(opacity=0.8), PartEdit()] if edits is None else edits
+    return rendered(surfels(file), camera, light, edits, (0.9, 0.9, 1.0))
+
+
+def differ(page, *rest, **edited):
+    """Largest difference of what is shown from what is expected, within the outline of what has the focus."""
+    found = shown(page)
+    height, width = found.shape[:2]
+    difference = np.abs(found.astype(int) - expected(*rest, (width, height), **edited))
+    return int(difference[4:-4, 4:-4].max())
+
+
+def test_the_same_scene_gives_the_same_bytes(scene, file, tmp_path):
+    assert main(["export", str(scene), "--to", str(tmp_path / "scene.html")]) == 0
+    assert (tmp_path / "scene.html").read_bytes() == file.read_bytes()
+
+
+def test_names_are_text_and_only_its_own_script_may_run(file):
+    text = file.read_text()
+    assert HOSTILE not in text
+    assert text.count("</script>") == 3
+    assert "default-src &#39;none&#39;" in text or "default-src 'none'" in text
+    assert "unsafe" not in text.split("<style>")[0]
+    assert [model["name"] for model in described(file)["models"]] == [HOSTILE, "B"]
+
+
+def test_nothing_else_may_run_or_load(chromium, file):
+    page = chromium.new_page()
+    page.goto(file.as_uri())
+    page.evaluate(
+        "() => { const script = document.createElement('script');"
+        " script.textContent = 'globalThis.ran = true'; document.head.append(script);"
+        " document.body.setAttribute('onclick', 'globalThis.ran = true'); }"
+    )
+    page.locator("h1").click()
+    assert page.evaluate("globalThis.ran") is None
+    assert page.evaluate("fetch('data:,x').then(() => 'loaded', () => 'refused')") == "refused"
+    page.close()
+
+
+def test_it_holds_a_picture_of_the_first_view(file):
+    poster = re.search(r"data:image/jpeg;base64,([^\"]*)", file.read_text())[1]
+    found = np.asarray(Image.open(io.BytesIO(base64.b64decode(poster))))
+    assert np.abs(found.astype(int) - expected(file, found.shape[:2])).mean() < 3
+
+
+def test_it_opens_as_a_file_and_shows_what_the_rasterizer_renders(page, file):
+    assert differ(page, file) <= LEVELS
+
+
+def test_edits_and_lights_show_and_can_be_undone(page, file):
+    first, other = page.locator("fieldset.part").all()
+    assert HOSTILE in first.locator("legend").text_content()
+    first.get_by_label(f"Palette of {HOSTILE}", exact=True).fill("#ff2040")
+    first.get_by_label(f"Opacity of {HOSTILE}", exact=True).fill("0.5")
+    other.get_by_title("Visible").uncheck()
+    page.get_by_label("Headlight").uncheck()
+    page.get_by_label("Polar of the light, degrees", exact=True).fill("50")
+    words = f"light=30,50 {HOSTILE}.palette=#ff2040 {HOSTILE}.opacity=0.5 B.visible=false"
+    assert page.locator("#words textarea").input_value() == words
+    settle(page)
+    edits = [PartEdit(palette=(1, 32 / 255, 64 / 255), opacity=0.5), PartEdit(visible=False)]
+    assert differ(page, file, light=Light("directional", 30, 50), edits=edits) <= LEVELS
+    page.get_by_role("button", name="Compare").click()
+    settle(page)
+    assert page.locator("#badge").is_visible()
+    page.locator("#badge").evaluate("each => { each.style.visibility = 'hidden'; }")
+    assert differ(page, file) <= LEVELS
+    page.get_by_role("button", name="Compare").click()
+    for _ in range(5):
+        page.get_by_role("button", name="Undo").click()
+    settle(page)
+    assert page.locator("#words").is_hidden()
+    assert differ(page, file) <= LEVELS
+
+
+def test_pointers_and_keys_turn_the_camera(page, file):
+    page.mouse.move(100, 160)
+    page.mouse.down()
+    page.mouse.move(80, 170)
+    page.mouse.up()
+    page.locator("#picture").press("ArrowLeft")
+    page.locator("#picture").press("ArrowUp")
+    settle(page)
+    assert differ(page, file, turned=(8 + 5, 4 - 5)) <= LEVELS
+    assert "azimuth=43" in page.url
+    page.locator("#picture").press("Home")
+    settle(page)
+    assert differ(page, file) <= LEVELS
+
+
+def test_a_link_leads_back_to_the_view(page, chromium, file):
+    page.locator("#picture").press("ArrowLeft")
+    page.get_by_label("Show").select_option("normal")
+    settle(page)
+    other = chromium.new_page(viewport=SIZE)
+    other.goto(page.url)
+    other.wait_for_selector("#picture:not([hidden])")
+    settle(other)
+    page.locator("#picture").evaluate("each => each.blur()")
+    assert other.get_by_label("Show").input_value() == "normal"
+    assert np.abs(shown(other).astype(int) - shown(page))[4:-4, 4:-4].max() <= 1
+    other.close()
+
+
+def test_the_picture_comes_again_after_the_context_was_lost(page, file):
+    before = shown(page)
+    lose = "document.getElementById('picture').getContext('webgl2').getExtension('WEBGL_lose_context')"
+    page.evaluate(f"() => {{ globalThis.lose = {lose}; lose.loseContext(); }}")
+    page.wait_for_function("document.getElementById('notices').textContent.includes('graphics driver')")
+    page.evaluate("() => lose.restoreContext()")
+    page.wait_for_function("document.getElementById('notices').textContent === ''")
+    settle(page)
+    assert np.array_equal(shown(page), before)
+
+
+def test_it_follows_the_size_of_the_window(page, file):
+    page.set_viewport_size({"width": 850, "height": 620})
+    settle(page)
+    page.locator("#picture").press("Home")
+    settle(page)
+    assert differ(page, file) <= LEVELS
+
+
+def test_without_webgl_there_is_a_picture_and_a_sentence(chromium, file):
+    page = chromium.new_page()
+    page.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
+    page.goto(file.as_uri())
+    page.wait_for_function("document.getElementById('notices').textContent.includes('has no WebGL2')")
+    assert page.locator("#poster").is_visible()
+    page.close()
+
+
+def test_a_damaged_page_keeps_its_picture_and_says_so(chromium, file, tmp_path):
+    damaged = tmp_path / "damaged.html"
+    text = surfels(file)
+    damaged.write_text(file.read_text().replace(text, text[: len(text) // 8 * 4]))
+    page = chromium.new_page()
+    page.goto(damaged.as_uri())
+    page.wait_for_function("document.getElementById('notices').textContent.includes('copy the page again')")
+    assert page.locator("#poster").is_visible()
+    page.close()
+
+
+def test_pictures_are_saved_as_they_are_shown(page, file, tmp_path):
+    with page.expect_download() as saved:
+        page.get_by_role("button", name="Picture").click()
+    saved.value.save_as(tmp_path / "saved.png")
+    assert saved.value.suggested_filename == "scene.png"
+    picture = np.asarray(Image.open(tmp_path / "saved.png").convert("RGB")).astype(int)
+    assert np.abs(picture - expected(file, picture.shape[1::-1])).max() <= LEVELS
+
+
+def test_one_model_of_a_scene_keeps_its_edits(scene, tmp_path):
+    assert main(["export", str(scene), "--to", str(tmp_path / "b.html"), "--model", HOSTILE]) == 0
+    (model,) = described(tmp_path / "b.html")["models"]
+    assert model["name"] == HOSTILE
+    assert model["edit"]["opacity"] == 0.8
+
+
+def test_a_model_file_becomes_a_page(folder, scene, tmp_path):
+    assert main(["export", str(folder / "a.safetensors"), "--to", str(tmp_path / "a.html")]) == 0
+    assert "<title>a</title>" in (tmp_path / "a.html").read_text()
+
+
+def test_a_scene_without_surfels_shows_its_background(chromium, tmp_path):
+    file = write_model(tmp_path / "none.safetensors", sample(n=0))
+    scene = write_scene(tmp_path / "none.yaml", Scene({"A": SceneModel(file)}, background=(0.2, 0.4, 0.6)))
+    assert main(["export", str(scene), "--to", str(tmp_path / "none.html")]) == 0
+    page = chromium.new_page(viewport=SIZE)
+    page.goto((tmp_path / "none.html").as_uri())
+    page.wait_for_selector("#picture:not([hidden])")
+    settle(page)
+    assert (shown(page)[4:-4, 4:-4] == [51, 102, 153]).all()
+    page.close()
+
+
+def test_other_fields_are_refused(tmp_path, capsys):
+    file = write_gaussians(tmp_path / "g.safetensors", gaussians())
+    assert main(["export", str(file), "--to", str(tmp_path / "g.html")]) == 2
+    assert "--kind html: expected surfels, got gaussians, which can be exported as 3dgs or mesh" in (
+        capsys.readouterr().err
+    )
+    assert not (tmp_path / "g.html").exists()
+
+
+def test_scenes_that_are_too_large_are_refused(scene, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(standalone, "LARGEST", 0)
+    assert main(["export", str(scene), "--to", str(tmp_path / "s.html")]) == 2
+    message = "expected surfels of at most 0 MiB, got 0 MiB for 230 of them; export fewer models"
+    assert message in capsys.readouterr().err

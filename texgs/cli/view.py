@@ -1,0 +1,99 @@
+"""Look at a scene and edit it in the browser; Ctrl-C ends it."""
+
+import argparse
+import socket
+import sys
+import threading
+import webbrowser
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from texgs.viewer.shared_edits import SharedEdits
+
+HOST = "127.0.0.1"
+PORT = 8765
+TOKEN = "viewer-token"  # file in the cache folder
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to show, and where to serve it."""
+    parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
+    parser.add_argument("--folder", type=Path, help="that scenes are saved in; default that of the scene")
+    parser.add_argument("--port", type=int, help=f"default {PORT}, or another one where it is taken")
+    parser.add_argument(
+        "--host",
+        default=HOST,
+        help="to listen on (%(default)s: this machine only); 0.0.0.0 lets others in who know the address",
+    )
+    parser.add_argument("--no-browser", action="store_true", help="print the address and open nothing")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Serve until Ctrl-C."""
+    from aiohttp import web
+
+    from texgs.core.device import torch_device
+    from texgs.core.folders import cache_folder
+    from texgs.viewer.guard import is_loopback, kept_token
+    from texgs.viewer.opening import open_scene
+    from texgs.viewer.server import Server
+
+    server = Server(open_scene(arguments.scene, arguments.folder), torch_device(arguments.device))
+    listening = listen(arguments.host, arguments.port)
+    token = kept_token(cache_folder() / TOKEN)
+    address = f"http://{name_of(arguments.host)}:{listening.getsockname()[1]}/{token}/"
+    if not is_loopback(arguments.host):
+        sys.stderr.write(
+            "Who knows this address and reaches this machine can edit the scene, and nothing is encrypted; "
+            "a tunnel (ssh -L) is safer.\n"
+        )
+    print(f"{address}\nCtrl-C ends it.", flush=True)
+    if not arguments.no_browser:
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+    application = server.application(token, arguments.host)
+    web.run_app(application, sock=listening, print=None, access_log=None, shutdown_timeout=1.0)
+    ask_to_save(server.edits)
+    return 0
+
+
+def listen(host: str, port: int | None) -> socket.socket:
+    """A socket that listens; on any port where none is asked for and the usual one is taken.
+
+    Raises:
+        ArgumentError: if there is no such host or port, or it is taken.
+    """
+    from texgs.core.errors import ArgumentError
+
+    if port is not None and not 0 <= port <= 65535:
+        raise ArgumentError(f"--port: expected 0 to 65535, got {port}")
+    try:
+        family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
+    except OSError as error:
+        raise ArgumentError(f"--host: expected a name or an address of this machine, got {host}") from error
+    for choice in (PORT, 0) if port is None else (port,):
+        try:
+            return socket.create_server((host, choice), family=family)
+        except OSError as error:
+            reason = error.strerror
+    raise ArgumentError(f"--port: cannot listen on port {port} of {host} ({reason}); choose another one")
+
+
+def name_of(host: str) -> str:
+    """What stands for a host in an address: the machine's name for all of its interfaces."""
+    if host in ("0.0.0.0", "::"):
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host
+
+
+def ask_to_save(edits: "SharedEdits") -> None:
+    """Offer to save what would be lost, or say that it is, where nobody can be asked."""
+    if edits.is_saved:
+        return
+    if not sys.stdin.isatty():
+        sys.stderr.write("Edits were not saved.\n")
+        return
+    path = edits.path_of(edits.name)
+    if input(f"\nEdits are not saved. Write them to {path}? [y/N] ").strip().lower() in ("y", "yes"):
+        print(edits.save(edits.name))

@@ -1,0 +1,117 @@
+"""What a page has to know of a scene, as JSON: its parts, their edits, and which edits each can show."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, fields
+from math import radians, sin
+from typing import Any, get_args
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from texgs.config.fields import Kind
+from texgs.core.lens import Lens
+from texgs.core.light import Light
+from texgs.fields.field import Composed, Look
+from texgs.fields.files import kind_of
+from texgs.fields.gaussians.composition import JoinedGaussians
+from texgs.fields.part_edit import NEEDS, PartEdit
+from texgs.fields.surfels.composition import Composition
+from texgs.scene.frame import Mode
+from texgs.scene.scene import Scene, SceneModel
+
+LENS = Lens()
+HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
+STRAYS = 0.01  # part of the primitives, far from all others, that bounds leave out
+MARGIN = 1.1  # of the first view around the bounds
+LIT = get_args(Look)[2:]  # factors of a material
+
+
+def describe(name: str, scene: Scene, composed: Composed) -> dict[str, Any]:
+    """A scene as a page needs it.
+
+    Args:
+        name: of the scene, to show.
+        scene: with its edits.
+        composed: its models.
+    """
+    kind = kind_of(next(iter(scene.models.values())).file)
+    segments = ["segments"] if "segments" in kind.can else []
+    keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
+    palettes = zip(composed.palettes, has_palette(composed), strict=True)
+    models = [
+        describe_model(
+            model, entry, kind.name, palette, [k for k in keys if has or k != "palette"] + segments
+        )
+        for (model, entry), (palette, has) in zip(scene.models.items(), palettes, strict=True)
+    ]
+    center, radius = bounds_of(composed)
+    distance = MARGIN * radius / sin(radians(LENS.fov_y / 2))
+    return {
+        "name": name,
+        "background": list(scene.background),
+        "light": describe_light(scene.light),
+        "models": models,
+        "modes": modes_of(kind),
+        "bounds": {"center": center, "radius": radius},
+        "up": [0.0, 1.0, 0.0],
+        "fov_y": LENS.fov_y,
+        "views": [{"name": "home", "target": center, "distance": distance, **HOME}],
+    }
+
+
+def describe_model(
+    name: str, entry: SceneModel, kind: str, palette: tuple[float, ...], can: list[str]
+) -> dict[str, Any]:
+    """A model and its segments."""
+    segments = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
+    return {
+        "name": name,
+        "kind": kind,
+        "edit": asdict(entry.edit),
+        "fitted_palette": list(palette),
+        "can": can,
+        "segments": segments,
+    }
+
+
+def describe_light(light: Light) -> dict[str, float] | None:
+    """Angles of a directional light, degrees; None for the headlight."""
+    return None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar}
+
+
+def modes_of(kind: Kind[Any]) -> list[str]:
+    """What frames of a kind of field can show."""
+    needs = {"unshaded": "unlit", "normal": "normals", **dict.fromkeys(LIT, "relight")}
+    return [mode for mode in get_args(Mode) if mode not in needs or needs[mode] in kind.can]
+
+
+def has_palette(composed: Composed) -> list[bool]:
+    """Of each model, whether it has a palette that can be replaced: surfels without texture have none."""
+    if isinstance(composed, Composition):
+        return [part.palette is not None for part in composed.parts]
+    return [False] * len(composed.palettes)
+
+
+def bounds_of(composed: Composed) -> tuple[list[float], float]:
+    """Centre [3] and radius of a ball that holds nearly all primitives, world units.
+
+    Fields without means have the bounds that the paper's cameras see: volumes are centred and scaled alike.
+    """
+    means = means_of(composed)
+    if means is None or not len(means):
+        return [0.0, 0.0, 0.0], LENS.radius * sin(radians(LENS.fov_y / 2))
+    places = means.double().cpu().numpy()
+    center = np.quantile(places, [STRAYS, 1 - STRAYS], axis=0).mean(axis=0)
+    radius = float(np.quantile(np.linalg.norm(places - center, axis=1), 1 - STRAYS))
+    return center.tolist(), max(radius, 1e-3)
+
+
+def means_of(composed: Composed) -> Tensor | None:
+    """Means [N, 3] of all primitives, where they have some."""
+    if isinstance(composed, Composition):
+        return torch.cat([part.model.parameters["means"] for part in composed.parts])
+    if isinstance(composed, JoinedGaussians):
+        return composed.whole.parameters["means"]
+    return None

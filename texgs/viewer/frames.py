@@ -1,0 +1,101 @@
+"""Frames for pages: rendered one after the other in a thread of their own, as JPEG or PNG."""
+
+from __future__ import annotations
+
+import asyncio
+import io
+import json
+import struct
+import time
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from texgs.scene.scene import Scene
+from texgs.scene.session import Session
+from texgs.viewer.messages import View
+
+SLOW = 0.030  # seconds of a whole frame above which the ones of a moving camera have half as many rows
+MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
+STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+
+
+@dataclass
+class Pace:
+    """How long whole frames of one page take; it decides on the resolution while its camera moves."""
+
+    seconds: float = 0.0  # of the latest whole frame
+
+    def scale(self, moving: bool) -> float:
+        """Part of the sides of a frame to render."""
+        return 0.5 if moving and self.seconds > SLOW else 1.0
+
+    def took(self, seconds: float, scale: float) -> None:
+        """Take note of a frame."""
+        if scale == 1:
+            self.seconds = seconds
+
+
+class Frames:
+    """Renders scenes of a session in one thread, in the order they are asked for.
+
+    Args:
+        session: that the scenes belong to; its models are read by the thread.
+    """
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
+
+    async def frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
+        """A header and a JPEG picture, see `packed`.
+
+        Raises:
+            TexgsError: if the scene cannot be rendered.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._thread, self._frame, view, scene, pace)
+
+    async def still(self, view: View, scene: Scene) -> bytes:
+        """A PNG file with the pixels that `texgs render` writes.
+
+        Raises:
+            TexgsError: if the scene cannot be rendered.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._thread, self._still, view, scene)
+
+    def close(self) -> None:
+        """End the thread, once the frame that it renders is there."""
+        self._thread.shutdown(wait=True, cancel_futures=True)
+
+    def _frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
+        scale, start = pace.scale(view.moving), time.perf_counter()
+        pixels = self._session.frame(view.camera.camera(scale), view.mode, scene)
+        seconds = time.perf_counter() - start
+        pace.took(seconds, scale)
+        return packed(view, pixels, seconds)
+
+    def _still(self, view: View, scene: Scene) -> bytes:
+        file = io.BytesIO()
+        pixels = self._session.frame(view.camera.camera(), view.mode, scene)
+        Image.fromarray(pixels).save(file, format="PNG")
+        return file.getvalue()
+
+
+def packed(view: View, pixels: np.ndarray, seconds: float) -> bytes:
+    """Length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture.
+
+    Args:
+        view: that the frame answers.
+        pixels: [H, W, 3] uint8.
+        seconds: that it took to render.
+    """
+    quality, sampling = MOVING if view.moving else STILL
+    options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, sampling]
+    _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), options)
+    header = json.dumps({"id": view.id, "ms": round(1000 * seconds, 1)}).encode()
+    return struct.pack("<I", len(header)) + header + picture.tobytes()

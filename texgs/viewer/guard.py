@@ -1,0 +1,138 @@
+"""Who may talk to the server: pages that it served itself, under an address with its token."""
+
+from __future__ import annotations
+
+import hmac
+import ipaddress
+import os
+import re
+import secrets
+import socket
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+
+from texgs.core.errors import ArgumentError
+
+TOKEN = re.compile(r"[A-Za-z0-9_-]{43}")  # 32 random bytes
+HOST = re.compile(r"[A-Za-z0-9._:\[\]-]+")
+POLICY = (  # not every browser takes the socket for a part of 'self'
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+    "connect-src 'self' ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
+
+
+def guard(token: str, host: str) -> Middleware:
+    """A middleware that answers 403 to whatever has not this token, a host of ours, and our own origin.
+
+    A site that makes its name point to this machine has neither the host nor the origin; a page of another
+    site that opens a socket has not the origin.
+
+    Args:
+        token: first part of every path.
+        host: that the server listens on.
+    """
+
+    @web.middleware
+    async def middleware(request: web.Request, handler: Handler) -> web.StreamResponse:
+        given = request.path.split("/")[1]
+        name = request.headers.get("Host", "")
+        if not hmac.compare_digest(given.encode("utf-8", "replace"), token.encode()):
+            raise web.HTTPForbidden(text="Wrong token: open the address that texgs view printed.")
+        if not is_own_host(name, host):
+            raise web.HTTPForbidden(text="Wrong host: open the address that texgs view printed.")
+        if not is_own_origin(request.headers.get("Origin"), name, is_socket(request)):
+            raise web.HTTPForbidden(text="Wrong origin: open the address that texgs view printed.")
+        response = await handler(request)
+        if not response.prepared:
+            response.headers.update(HEADERS)
+            response.headers["Content-Security-Policy"] = POLICY.format(host=name)
+        return response
+
+    return middleware
+
+
+def is_own_host(header: str, host: str) -> bool:
+    """Whether a Host header names this machine. The port may be another one, that of a tunnel.
+
+    A server on the loopback interface has its names only. Another one has addresses, which no foreign site
+    can have as its name, the name that it was given, and the machine's.
+    """
+    name = hostname(f"//{header}") if HOST.fullmatch(header) else None
+    if name is None:
+        return False
+    if name == "localhost" or is_loopback(name):
+        return True
+    if is_loopback(host):
+        return False
+    return is_address(name) or name in (host.lower(), socket.gethostname().lower(), socket.getfqdn().lower())
+
+
+def is_own_origin(origin: str | None, header: str, required: bool) -> bool:
+    """Whether a request comes from a page of this server; browsers send no origin with simple requests."""
+    if origin is None:
+        return not required
+    try:
+        return urlsplit(origin).netloc.lower() == header.lower()
+    except ValueError:
+        return False
+
+
+def is_socket(request: web.Request) -> bool:
+    """Whether a request opens a WebSocket."""
+    return request.headers.get("Upgrade", "").lower() == "websocket"
+
+
+def hostname(address: str) -> str | None:
+    """Lower-case name in an address; None where there is none."""
+    try:
+        return urlsplit(address).hostname
+    except ValueError:
+        return None
+
+
+def is_address(name: str) -> bool:
+    """Whether a name is an IP address."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def is_loopback(name: str) -> bool:
+    """Whether a name is one of this machine alone."""
+    return name.lower() == "localhost" or (is_address(name) and ipaddress.ip_address(name).is_loopback)
+
+
+def kept_token(path: Path) -> str:
+    """The user's token; a new one where the file has none, or others may have read it.
+
+    It is kept, so that open pages find a server that was started again.
+
+    Raises:
+        ArgumentError: if the file cannot be written.
+    """
+    try:
+        is_private = os.name != "posix" or not path.stat().st_mode & 0o077
+        if is_private and TOKEN.fullmatch(known := path.read_text(encoding="ascii")):
+            return known
+    except (OSError, UnicodeError):
+        pass  # a new one
+    token = secrets.token_urlsafe(32)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.unlink(missing_ok=True)
+        with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(token)
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot write there ({error.strerror}); set TEXGS_CACHE") from error
+    return token

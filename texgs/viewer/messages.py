@@ -1,0 +1,248 @@
+"""What a page says to its server: typed, and checked before anything uses it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, get_args
+
+from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError
+from texgs.scene.frame import Mode
+from texgs.scene.scene_file import known
+from texgs.viewer.values import flag, number, parse_json, whole, words
+
+LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
+MOST_PIXELS = 4096  # of a side
+FARTHEST = 1000.0  # world units
+MOST_POINTS = 100
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """A camera that looks at a target, as `texgs.core.camera.orbit` has it."""
+
+    target: tuple[float, float, float]  # world units
+    azimuth: float  # degrees
+    polar: float  # degrees above the horizon
+    distance: float  # world units
+    fov_y: float  # degrees
+    width: int  # pixels
+    height: int  # pixels
+
+    def camera(self, scale: float = 1.0) -> Camera:
+        """The camera, with sides of this part of the pixels."""
+        width, height = (max(1, round(scale * side)) for side in (self.width, self.height))
+        return orbit(self.azimuth, self.polar, self.distance, self.fov_y, width, height, self.target)
+
+
+@dataclass(frozen=True)
+class View:
+    """Show a frame."""
+
+    id: int  # comes back with the frame
+    camera: Orbit
+    mode: Mode
+    moving: bool  # another one follows at once: speed counts more than quality
+    before: bool  # the scene as it was opened
+    only: str = ""  # a model that is shown alone and unedited, to be clicked on
+
+
+@dataclass(frozen=True)
+class Edit:
+    """Change one value of a part, or of the scene where the part is empty."""
+
+    part: str  # MODEL or MODEL/SEGMENT
+    key: str  # of a `PartEdit`; "light" or "background" of the scene
+    value: Any  # as in a scene file; None takes the edit back
+    step: int  # edits of one number in a row are one step of the history, such as those of a slider
+
+
+@dataclass(frozen=True)
+class Undo:
+    """Take the latest step back."""
+
+
+@dataclass(frozen=True)
+class Redo:
+    """Make the step again that was taken back last."""
+
+
+@dataclass(frozen=True)
+class Save:
+    """Write the scene file."""
+
+    name: str  # of the file, in the folder for saving
+    replace: bool  # a file that is there already
+
+
+@dataclass(frozen=True)
+class Clicked:
+    """Clicks on a view of a model alone."""
+
+    camera: Orbit
+    points: tuple[
+        tuple[float, float, bool], ...
+    ]  # pixels to the right and down, and whether it is on the object
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Show what clicks select."""
+
+    id: int  # comes back with the mask
+    model: str
+    clicked: Clicked
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Make a segment of what clicks select."""
+
+    part: str  # MODEL/SEGMENT, a new name
+    clicked: Clicked
+
+
+@dataclass(frozen=True)
+class Remove:
+    """Give the surfels of a segment back to its model."""
+
+    part: str  # MODEL/SEGMENT
+
+
+@dataclass(frozen=True)
+class Cancel:
+    """Stop the segment that is being made."""
+
+
+Message = View | Edit | Undo | Redo | Save | Mask | Segment | Remove | Cancel
+Reader = Callable[[Mapping[str, Any]], Message]
+
+
+def parse(text: str) -> Message:
+    """The message that a text holds.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    values = parse_json(text)
+    known(values, None, "message")
+    kind = values.pop("type", None)
+    reader = READERS.get(kind) if isinstance(kind, str) else None
+    if reader is None:
+        raise ArgumentError(f"type: expected one of {', '.join(READERS)}, got {kind!r:.100}")
+    return reader(values)
+
+
+def view_of(values: Mapping[str, Any]) -> View:
+    """The view that plain values describe.
+
+    Raises:
+        ArgumentError: naming the key that is not as it should be.
+    """
+    known(values, ("id", "camera", "mode", "moving", "before", "only"), "view")
+    mode = values.get("mode", "shaded")
+    if mode not in get_args(Mode):
+        raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode!r:.100}")
+    return View(
+        id=whole("id", values.get("id", 0), 0, 2**53),
+        camera=orbit_of(values.get("camera")),
+        mode=mode,
+        moving=flag("moving", values.get("moving", False)),
+        before=flag("before", values.get("before", False)),
+        only=words("only", values.get("only", "")),
+    )
+
+
+def orbit_of(values: Any) -> Orbit:
+    """The camera that plain values describe.
+
+    Raises:
+        ArgumentError: naming the key that is not as it should be.
+    """
+    known(values, ("target", "azimuth", "polar", "distance", "fov_y", "width", "height"), "camera")
+    target = values.get("target")
+    if not isinstance(target, list) or len(target) != 3:
+        raise ArgumentError(f"camera.target: expected three numbers, got {target!r:.100}")
+    x, y, z = (number("camera.target", each, -FARTHEST, FARTHEST) for each in target)
+    return Orbit(
+        target=(x, y, z),
+        azimuth=number("camera.azimuth", values.get("azimuth"), -1e6, 1e6),
+        polar=number("camera.polar", values.get("polar"), -90, 90),
+        distance=number("camera.distance", values.get("distance"), 1e-3, FARTHEST),
+        fov_y=number("camera.fov_y", values.get("fov_y"), 1, 150),
+        width=whole("camera.width", values.get("width"), 1, MOST_PIXELS),
+        height=whole("camera.height", values.get("height"), 1, MOST_PIXELS),
+    )
+
+
+def clicked_of(values: Mapping[str, Any]) -> Clicked:
+    """The clicks in a message.
+
+    Raises:
+        ArgumentError: naming the key that is not as it should be.
+    """
+    camera, points = orbit_of(values.get("camera")), values.get("points")
+    if not isinstance(points, list) or not 1 <= len(points) <= MOST_POINTS:
+        raise ArgumentError(f"points: expected 1 to {MOST_POINTS} of them, got {points!r:.100}")
+    found = []
+    for point in points:
+        if not isinstance(point, list) or len(point) != 3:
+            raise ArgumentError(f"points: expected x, y, and true or false, got {point!r:.100}")
+        x, y = (number("points", each, -MOST_PIXELS, 2 * MOST_PIXELS) for each in point[:2])
+        found.append((x, y, flag("points", point[2])))
+    return Clicked(camera, tuple(found))
+
+
+def _mask(values: Mapping[str, Any]) -> Mask:
+    known(values, ("id", "model", "camera", "points"), "mask")
+    number_of = whole("id", values.get("id", 0), 0, 2**53)
+    return Mask(number_of, words("model", values.get("model")), clicked_of(values))
+
+
+def _segment(values: Mapping[str, Any]) -> Segment:
+    known(values, ("part", "camera", "points"), "segment")
+    return Segment(words("part", values.get("part")), clicked_of(values))
+
+
+def _remove(values: Mapping[str, Any]) -> Remove:
+    known(values, ("part",), "remove")
+    return Remove(words("part", values.get("part")))
+
+
+def _edit(values: Mapping[str, Any]) -> Edit:
+    known(values, ("part", "key", "value", "step"), "edit")
+    return Edit(
+        words("part", values.get("part")),
+        words("key", values.get("key")),
+        values.get("value"),
+        whole("step", values.get("step", 0), 0, 2**53),
+    )
+
+
+def _save(values: Mapping[str, Any]) -> Save:
+    known(values, ("name", "replace"), "save")
+    return Save(words("name", values.get("name")), flag("replace", values.get("replace", False)))
+
+
+def _bare(message: Message) -> Reader:
+    """Reads a message that has no values."""
+
+    def reader(values: Mapping[str, Any]) -> Message:
+        known(values, (), "message")
+        return message
+
+    return reader
+
+
+READERS: dict[str, Reader] = {
+    "view": view_of,
+    "edit": _edit,
+    "undo": _bare(Undo()),
+    "redo": _bare(Redo()),
+    "save": _save,
+    "mask": _mask,
+    "segment": _segment,
+    "remove": _remove,
+    "cancel": _bare(Cancel()),
+}

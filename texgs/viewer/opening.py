@@ -1,0 +1,68 @@
+"""What a viewer is started with: a scene file, a folder of results, or the file of one model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from texgs.core.errors import ArgumentError
+from texgs.core.names import label
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene
+
+SCENES = (".yaml", ".yml")
+OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
+MOST_LISTED = 5
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A scene, and where its edits are saved."""
+
+    scene: Scene
+    title: str
+    folder: Path
+    name: str  # that a scene file gets unless another one is chosen
+
+
+def open_scene(path: Path, folder: Path | None = None) -> Opened:
+    """The scene of a path.
+
+    A scene that a job wrote is saved under another name: the job's files stay as they are recorded.
+
+    Args:
+        path: scene.yaml, a folder with one of these in it or below, or a model file.
+        folder: for saving; default that of the scene or the model.
+
+    Raises:
+        ArgumentError: if there is no scene, several, or a damaged one.
+    """
+    if path.is_dir():
+        path = only_scene(path)
+    if path.suffix in SCENES:
+        name = "edited.yaml" if (path.parent / OF_JOBS).exists() else path.name
+        return Opened(read_scene(path), title_of(path), folder or path.parent, name)
+    if not path.is_file():
+        raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
+    scene = Scene({label(str(path), path.stem): SceneModel(path)})
+    return Opened(scene, title_of(path), folder or path.parent, "scene.yaml")
+
+
+def only_scene(folder: Path) -> Path:
+    """The scene file in a folder or below.
+
+    Raises:
+        ArgumentError: if there is none, or several.
+    """
+    found = sorted(folder.rglob("scene.yaml"))
+    if len(found) != 1:
+        some = ", ".join(str(each.relative_to(folder)) for each in found[:MOST_LISTED])
+        more = ", ..." if len(found) > MOST_LISTED else ""
+        got = f"{len(found)} ({some}{more}); name one of them" if found else "none; texgs compose writes one"
+        raise ArgumentError(f"{folder}: expected one scene.yaml in this folder or below, got {got}")
+    return found[0]
+
+
+def title_of(path: Path) -> str:
+    """Enough of a path to know the scene by."""
+    return "/".join(path.resolve().parts[-4:])

@@ -1,0 +1,116 @@
+"""One page that is connected: what it asks for, and what it is told."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+from collections import deque
+from typing import Any
+
+from aiohttp import web
+
+from texgs.core.errors import TexgsError, first_line
+from texgs.viewer.frames import Frames, Pace
+from texgs.viewer.messages import Mask, View
+from texgs.viewer.segments import Segmenter, alone
+from texgs.viewer.shared_edits import SharedEdits
+
+log = logging.getLogger("texgs.viewer")
+MOST_NOTICES = 8  # that wait for a page which does not listen
+
+
+class Page:
+    """What waits to be sent to a page; of views and scenes only the newest.
+
+    Args:
+        socket: to the page.
+        edits: that all pages share.
+        frames: renders.
+        segmenter: finds what clicks select.
+    """
+
+    def __init__(
+        self, socket: web.WebSocketResponse, edits: SharedEdits, frames: Frames, segmenter: Segmenter
+    ) -> None:
+        self._socket, self._edits, self._frames, self._segmenter = socket, edits, frames, segmenter
+        self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
+        self._scene: dict[str, Any] | None = None
+        self._view: View | None = None
+        self._mask: Mask | None = None
+        self._job: dict[str, Any] | None = None
+        self._pace = Pace()
+        self.answered = 0  # messages, other than views
+        self._wake = asyncio.Event()
+
+    def show(self, view: View) -> None:
+        """Send a frame of this view, in place of one that waits."""
+        self._view = view
+        self._wake.set()
+
+    def show_mask(self, mask: Mask) -> None:
+        """Send what these clicks select, in place of what others do."""
+        self._mask = mask
+        self._wake.set()
+
+    def tell_job(self, part: str, done: float | None) -> None:
+        """Send how far a segment is, in place of what waits; None: it has ended."""
+        self._job = {"type": "job", "part": part, "done": done}
+        self._wake.set()
+
+    def tell_scene(self, message: dict[str, Any]) -> None:
+        """Send what the scene is now, in place of what waits."""
+        self._scene = message
+        self._wake.set()
+
+    def tell(self, text: str, **more: Any) -> None:
+        """Send a notice."""
+        self._notices.append({"type": "notice", "text": text, **more})
+        self._wake.set()
+
+    def tell_error(self, error: Exception) -> None:
+        """Send what went wrong; what is no mistake of the user is logged here with its place as well."""
+        if not isinstance(error, TexgsError):
+            log.error("%s", error, exc_info=error)
+        text = str(error) if isinstance(error, TexgsError) else f"internal error: {first_line(error)}"
+        self.tell(text, level="error")
+
+    async def send(self) -> None:
+        """Send what waits, until the page is gone. One frame is on its way at a time."""
+        while not self._socket.closed:
+            await self._wake.wait()
+            self._wake.clear()
+            while self._notices:
+                await self._socket.send_str(json.dumps(self._notices.popleft()))
+            if self._scene is not None:
+                message, self._scene = self._scene, None
+                await self._socket.send_str(json.dumps({**message, "answered": self.answered}))
+            if self._job is not None:
+                message, self._job = self._job, None
+                await self._socket.send_str(json.dumps(message))
+            if self._mask is not None:
+                mask, self._mask = self._mask, None
+                await self._send_mask(mask)
+            if self._view is not None:
+                view, self._view = self._view, None
+                await self._send_frame(view)
+
+    async def _send_frame(self, view: View) -> None:
+        try:
+            scene = self._edits.original if view.before else self._edits.scene
+            scene = alone(scene, view.only) if view.only else scene
+            frame = await self._frames.frame(view, scene, self._pace)
+        except Exception as error:  # whatever it is, the server goes on
+            self.tell_error(error)
+            self._notices[-1]["frame"] = view.id
+            return
+        await self._socket.send_bytes(frame)
+
+    async def _send_mask(self, mask: Mask) -> None:
+        try:
+            message = await self._segmenter.mask(self._edits.scene, mask)
+        except Exception as error:  # whatever it is, the server goes on
+            self.tell_error(error)
+            self._notices[-1]["mask"] = mask.id
+            return
+        await self._socket.send_str(json.dumps(message))

@@ -1,0 +1,194 @@
+"""Masks and segments from clicks, one after the other in a thread of their own."""
+
+from __future__ import annotations
+
+import asyncio
+import base64
+import io
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, replace
+from typing import Any
+
+import numpy as np
+import torch
+from PIL import Image
+from torch import Tensor
+
+from texgs.core.errors import TexgsError
+from texgs.core.lens import Lens
+from texgs.edit.clicks import Clicks, prompts_at
+from texgs.edit.lift import Lifted, ViewMasks, lift
+from texgs.edit.new_segment import clicked_model
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model import Surfels
+from texgs.models.by_name import mask_model
+from texgs.models.masks import MaskModel
+from texgs.scene.parts import entry_of, split
+from texgs.scene.scene import Scene, SceneModel
+from texgs.viewer.messages import Clicked, Mask, Segment
+from texgs.volume.cameras import icosphere_of
+
+LENS = Lens().square(512)  # of the views that vote, as `texgs segment` has them
+VIEWS = 42
+COLOR = (170, 0, 255, 150)  # over what is masked
+CHOICES = ("mobile_sam", "grabcut")  # the first whose weights are here
+
+
+class Stopped(TexgsError):
+    """Somebody has asked to stop."""
+
+
+class Segmenter:
+    """Finds what clicks select, in one view and in space.
+
+    Args:
+        device: that models are on.
+    """
+
+    def __init__(self, device: torch.device | str = "cpu") -> None:
+        self._device = torch.device(device)
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="segments")
+        self._stop = threading.Event()
+        self._masks: MaskModel | None = None
+        self._opened: tuple[SceneModel, Surfels] | None = None
+
+    async def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
+        """The mask of a view as a message with a PNG picture, which is transparent elsewhere.
+
+        Raises:
+            TexgsError: if a click is beside the model, or there is no such model.
+        """
+        loop = asyncio.get_running_loop()
+        return await loop.run_in_executor(self._thread, self._mask, scene, asked)
+
+    async def lift(self, scene: Scene, asked: Segment, tell: Callable[[float], None]) -> Lifted:
+        """Surfels that masks of many views agree on.
+
+        Args:
+            scene: whose light is in all views.
+            asked: a new name, and the clicks.
+            tell: is called in this thread with the part that is done.
+
+        Raises:
+            Stopped: if `stop` was called.
+            TexgsError: as `lift`.
+        """
+        self._stop.clear()
+        loop = asyncio.get_running_loop()
+
+        def later(done: float) -> None:
+            loop.call_soon_threadsafe(tell, done)
+
+        return await loop.run_in_executor(self._thread, self._lift, scene, asked, later)
+
+    def facts(self, asked: Segment) -> dict[str, Any]:
+        """What a segment comes from, for its file."""
+        name = "" if self._masks is None else self._masks.name
+        points = {
+            key: [[x, y] for x, y, is_on in asked.clicked.points if is_on == sign]
+            for key, sign in (("point", True), ("other", False))
+        }
+        return {"camera": asdict(asked.clicked.camera), **points, "masks": name, "vote": "contribution"}
+
+    def stop(self) -> None:
+        """Stop the segment that is being made, after the view that it is at."""
+        self._stop.set()
+
+    def close(self) -> None:
+        """End the thread."""
+        self.stop()
+        self._thread.shutdown(wait=True, cancel_futures=True)
+
+    def _mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
+        model, clicks = self._model(scene, asked.model), self._clicks(asked.clicked)
+        prompts_at(model, clicks)
+        mask = ViewMasks(model, scene.light, self._mask_model()).mask(clicks)
+        return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
+
+    def _lift(self, scene: Scene, asked: Segment, tell: Callable[[float], None]) -> Lifted:
+        model = self._model(scene, split(scene, asked.part)[0])
+        cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, LENS)]
+        masks = Watched(self._mask_model(), 1 + VIEWS, self._stop, tell)
+        title = f"segment {asked.part}"
+        return lift(model, self._clicks(asked.clicked), cameras, masks, light=scene.light, title=title)
+
+    def _clicks(self, clicked: Clicked) -> Clicks:
+        points = torch.tensor([point[:2] for point in clicked.points], device=self._device)
+        positive = torch.tensor([point[2] for point in clicked.points], device=self._device)
+        return Clicks(clicked.camera.camera().to(self._device), points, positive)
+
+    def _model(self, scene: Scene, name: str) -> Surfels:
+        """A model with its textures, kept for the next click."""
+        entry_of(scene, name)
+        model = scene.models[split(scene, name)[0]]
+        if self._opened is None or self._opened[0].files != model.files:
+            self._opened = (model, clicked_model(scene, name, self._device))
+        return self._opened[1]
+
+    def _mask_model(self) -> MaskModel:
+        """MobileSAM where its weights are, else GrabCut, which has none."""
+        for choice in CHOICES if self._masks is None else ():
+            try:
+                self._masks = mask_model(choice, self._device)
+                break
+            except TexgsError:
+                continue
+        assert self._masks is not None, "GrabCut is always there"
+        return self._masks
+
+
+class Watched:
+    """A mask model that tells how far it is, and stops when that is asked for.
+
+    Args:
+        masks: does the work.
+        views: there are at most.
+        stop: is set to stop.
+        tell: is called with the part that is done.
+    """
+
+    def __init__(
+        self, masks: MaskModel, views: int, stop: threading.Event, tell: Callable[[float], None]
+    ) -> None:
+        self.name = masks.name
+        self._masks, self._views, self._stop, self._tell = masks, views, stop, tell
+        self._done = 0
+
+    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
+        """The object in an image; see `MaskModel`.
+
+        Raises:
+            Stopped: if that was asked for.
+        """
+        if self._stop.is_set():
+            raise Stopped("The segment was not made: it was cancelled.")
+        mask = self._masks(image, points, positive)
+        self._done += 1
+        self._tell(self._done / self._views)
+        return mask
+
+
+def alone(scene: Scene, name: str) -> Scene:
+    """The scene with one of its models, as it is clicked on: with its textures and no other edit.
+
+    Raises:
+        ArgumentError: if there is no such model.
+    """
+    entry_of(scene, name)
+    models = {}
+    for each, entry in scene.models.items():
+        edit = PartEdit(visible=each == name)
+        segments = {key: replace(segment, edit=edit) for key, segment in entry.segments.items()}
+        models[each] = replace(entry, edit=edit, segments=segments)
+    return replace(scene, models=models)
+
+
+def picture_of(mask: Tensor) -> str:
+    """A mask [H, W] bool as the address of a PNG picture."""
+    pixels = np.zeros((*mask.shape, 4), dtype=np.uint8)
+    pixels[mask.cpu().numpy()] = COLOR
+    file = io.BytesIO()
+    Image.fromarray(pixels).save(file, format="PNG")
+    return f"data:image/png;base64,{base64.b64encode(file.getvalue()).decode()}"

@@ -1,0 +1,157 @@
+"""The one scene that all pages edit: steps with names, undo and redo, what is saved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.light import HEADLIGHT
+from texgs.core.names import file_name, part_file
+from texgs.scene.scene import WHITE, Scene
+from texgs.scene.scene_file import known, light_of, write_scene
+from texgs.scene.session import Session
+from texgs.viewer.messages import Edit
+from texgs.viewer.opening import SCENES
+
+
+class SharedEdits:
+    """The history of a session, with a name for each step.
+
+    Args:
+        session: that is edited.
+        folder: that scene files are written to.
+        name: of the scene file that may be replaced without a question.
+    """
+
+    def __init__(self, session: Session, folder: Path, name: str) -> None:
+        self._session, self._folder, self.name = session, folder, name
+        self.original = self._saved = session.scene
+        self._past, self._future = list[str](), list[str]()
+        self._latest: tuple[object, ...] | None = None  # author and number of a step that may go on
+
+    @property
+    def scene(self) -> Scene:
+        """As it is now."""
+        return self._session.scene
+
+    @property
+    def is_saved(self) -> bool:
+        """Whether a file holds the scene as it is now."""
+        return self.scene == self._saved
+
+    def state(self) -> dict[str, Any]:
+        """What pages show of the history, JSON."""
+        return {
+            "past": list(self._past),
+            "future": list(reversed(self._future)),
+            "saved": self.is_saved,
+            "file": self.name,
+        }
+
+    def edit(self, edit: Edit, author: int) -> None:
+        """Make a change; edits with the same number by the same author are one step.
+
+        Raises:
+            ArgumentError: naming what cannot be changed so; the scene is then as it was.
+        """
+        step = (author, edit.step, edit.part, edit.key) if edit.step else None
+        goes_on = step is not None and step == self._latest and self._session.undo()
+        try:
+            self._change(edit)
+        except TexgsError:
+            if goes_on:
+                self._session.redo()
+            raise
+        if goes_on:
+            self._past.pop()
+        self._step(f"{edit.part} {edit.key}".strip())
+        self._latest = step
+
+    def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
+        """Write the file of a new segment, and add it.
+
+        Raises:
+            ArgumentError: if it is there already, or other segments have all of its surfels.
+        """
+        self._session.make_segment(part, mask, self._new_file(part), facts)
+        self._step(f"{part} new")
+
+    def remove_segment(self, part: str) -> None:
+        """Give the surfels of a segment back to its model; its file stays.
+
+        Raises:
+            ArgumentError: if there is no such segment.
+        """
+        self._session.remove_segment(part)
+        self._step(f"{part} removed")
+
+    def undo(self) -> None:
+        """Take the latest step back, if there is one."""
+        self._latest = None
+        if self._session.undo():
+            self._future.append(self._past.pop())
+
+    def redo(self) -> None:
+        """Make again what was taken back last, if there is anything."""
+        self._latest = None
+        if self._session.redo():
+            self._past.append(self._future.pop())
+
+    def path_of(self, name: str) -> Path:
+        """The scene file of a name in the folder for saving.
+
+        Raises:
+            ArgumentError: if it is no plain name of a scene file.
+        """
+        if Path(file_name("save as", name)).suffix not in SCENES:
+            raise ArgumentError(f"save as: expected a name that ends in .yaml, got {name}")
+        return self._folder / name
+
+    def would_replace(self, name: str) -> bool:
+        """Whether saving replaces a file that is neither the opened nor the latest one.
+
+        Raises:
+            ArgumentError: as `path_of`.
+        """
+        return self.path_of(name).exists() and name != self.name
+
+    def save(self, name: str) -> Path:
+        """Write the scene file in one step.
+
+        Raises:
+            ArgumentError: as `path_of`, or if it cannot be written.
+        """
+        path, scene = self.path_of(name), self.scene
+        write_scene(path, scene)
+        self.name, self._saved = name, scene
+        return path
+
+    def _step(self, name: str) -> None:
+        self._past.append(name)
+        self._future.clear()
+        self._latest = None
+
+    def _new_file(self, part: str) -> Path:
+        """A file for a segment that is not there yet: scenes that were saved may name the others."""
+        stem = Path(self.name).stem
+        for number in count(1):
+            file = self._folder / part_file("segment", stem, part, *([str(number)] if number > 1 else []))
+            if not file.exists():
+                break
+        return file
+
+    def _change(self, edit: Edit) -> None:
+        session, value = self._session, edit.value
+        if edit.part:
+            session.reset(edit.part, edit.key) if value is None else session.set(edit.part, edit.key, value)
+            return
+        known({edit.key: value}, ("light", "background"), "the scene")
+        if edit.key == "background":
+            session.set_background(WHITE if value is None else value)
+        else:
+            session.set_light(HEADLIGHT if value is None else light_of(value))

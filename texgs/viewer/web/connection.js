@@ -1,0 +1,43 @@
+// The connection to the server: messages both ways, made anew by itself when it breaks.
+
+const FIRST_DELAY = 500, LONGEST_DELAY = 4000; // milliseconds before another attempt
+
+/** Dispatches "message" (detail: parsed JSON), "frame" (detail: ArrayBuffer), "open" and "lost". */
+export class Connection extends EventTarget {
+  #socket = null;
+  #delay = FIRST_DELAY;
+
+  constructor(address) {
+    super();
+    this.address = address;
+    this.#open();
+  }
+
+  get isOpen() {
+    return this.#socket?.readyState === WebSocket.OPEN;
+  }
+
+  /** Send a message; whether there was a connection to send it by. */
+  send(message) {
+    if (this.isOpen) this.#socket.send(JSON.stringify(message));
+    return this.isOpen;
+  }
+
+  #open() {
+    const socket = this.#socket = new WebSocket(this.address);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.#delay = FIRST_DELAY;
+      this.dispatchEvent(new Event("open"));
+    };
+    socket.onmessage = ({ data }) => {
+      const [name, detail] = typeof data === "string" ? ["message", JSON.parse(data)] : ["frame", data];
+      this.dispatchEvent(new CustomEvent(name, { detail }));
+    };
+    socket.onclose = () => {
+      this.dispatchEvent(new Event("lost"));
+      setTimeout(() => this.#open(), this.#delay);
+      this.#delay = Math.min(2 * this.#delay, LONGEST_DELAY);
+    };
+  }
+}

@@ -1,0 +1,91 @@
+// Native inputs that edit one value: they show what the state has, except while they are being used.
+
+let gestures = 0; // from the first input of a control to its change: one step of the history
+
+/** A step of its own for each use of an input. */
+export function gesture(input, edit) {
+  let step = 0;
+  input.addEventListener("input", () => {
+    step ||= ++gestures;
+    edit(step);
+  });
+  input.addEventListener("change", () => { step = 0; });
+  return { isBusy: () => step !== 0 };
+}
+
+/** An element with properties and children; names with a dash are attributes. */
+export function element(tag, properties = {}, ...children) {
+  const made = document.createElement(tag);
+  for (const [name, value] of Object.entries(properties)) {
+    if (name.includes("-")) made.setAttribute(name, value);
+    else made[name] = value;
+  }
+  made.append(...children);
+  return made;
+}
+
+/** With its first letter in upper case. */
+export function capital(text) {
+  return text[0].toUpperCase() + text.slice(1);
+}
+
+/** #rrggbb of a colour in [0, 1]. */
+export function toHex(color) {
+  const byte = (x) => Math.round(255 * Math.min(1, Math.max(0, x))).toString(16).padStart(2, "0");
+  return `#${color.map(byte).join("")}`;
+}
+
+/** A colour in [0, 1] of #rrggbb. */
+export function fromHex(hex) {
+  return [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16) / 255);
+}
+
+const resetButton = (what, reset) => element(
+  "button", { type: "button", className: "reset", title: `Reset ${what}`, "aria-label": `Reset ${what}`,
+    onclick: reset }, "↺",
+);
+
+/** A slider with a number beside it; `edit(value, step)`, and null to reset. */
+export function slider(label, what, { max, most = 1000, unedited = 1, min = 0, step = 0.01 }, edit) {
+  const range = element("input", { type: "range", "aria-label": capital(what) });
+  const number = element("input", { type: "number", "aria-label": `${capital(what)}, as a number` });
+  Object.assign(range, { min, max, step });
+  Object.assign(number, { min, max: most, step: "any" });
+  const uses = [range, number].map((input) => gesture(input, (step) => {
+    if (input.value === "" || !input.validity.valid) return;
+    const value = Number(input.value);
+    (input === range ? number : range).value = value;
+    edit(value, step);
+  }));
+  const reset = resetButton(what, () => edit(null, 0));
+  const row = element("div", { className: "row" }, element("span", { className: "name" }, label), range, number,
+    reset);
+  const show = (value) => {
+    if (uses.some((use) => use.isBusy())) return;
+    range.value = value;
+    number.value = Number(value.toFixed(3));
+    reset.disabled = value === unedited;
+  };
+  const enable = (enabled) => { range.disabled = number.disabled = !enabled; };
+  return { row, show, enable };
+}
+
+/** A colour with a button that resets it. */
+export function colorInput(label, what, edit) {
+  const input = element("input", { type: "color", "aria-label": capital(what) });
+  const use = gesture(input, (step) => edit(fromHex(input.value), step));
+  const reset = resetButton(what, () => edit(null, 0));
+  const row = element("div", { className: "row" }, element("span", { className: "name" }, label), input, reset);
+  const show = (color, isEdited) => {
+    if (!use.isBusy()) input.value = toHex(color);
+    reset.disabled = !isEdited;
+  };
+  return { row, show };
+}
+
+/** A box to tick. */
+export function tick(label, edit, properties = {}) {
+  const input = element("input", { type: "checkbox", ...properties, onchange: () => edit(input.checked) });
+  const row = element("label", { className: "tick" }, input, label);
+  return { row, show: (value) => { input.checked = value; } };
+}

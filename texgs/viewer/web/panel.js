@@ -1,0 +1,105 @@
+// The inputs of all models and segments, and of the scene's background; and the list of steps.
+
+import { isUnedited } from "./state.js";
+import { capital, colorInput, element, slider, tick } from "./inputs.js";
+
+const FACTORS = { ambient: 3, diffuse: 3, specular: 4, shininess: 4 }; // and where their sliders end
+const OPAQUE = 2;
+
+const button = (text, what, onclick) =>
+  element("button", { type: "button", "aria-label": what, onclick }, text);
+
+export class Panel {
+  #state; #root; #steps; #background; #actions;
+  #structure = ""; // names of all parts that there are inputs for
+  #parts = new Map(); // by part: a function that shows its edit
+
+  /**
+   * @param {State} state
+   * @param {{models: Element, background: Element, steps: Element}} places - for its inputs
+   * @param {{segment?: (model: object) => void, remove?: (part: string) => void}} actions - on segments, where
+   *   these can be made and removed
+   */
+  constructor(state, { models, background, steps }, actions = {}) {
+    this.#state = state;
+    this.#actions = actions;
+    this.#root = models;
+    this.#steps = steps;
+    this.#background = colorInput("Background", "background", (color, step) =>
+      state.edit("", "background", color, step));
+    background.append(this.#background.row);
+    state.addEventListener("change", () => this.show());
+    this.show();
+  }
+
+  /** Show the state as it is. */
+  show() {
+    const { scene } = this.#state;
+    const structure = JSON.stringify(scene.models.map((m) => [m.name, m.can, m.segments.map((s) => s.name)]));
+    if (structure !== this.#structure) this.#build(structure);
+    for (const model of scene.models) {
+      this.#parts.get(model.name)(model.edit, model);
+      for (const each of model.segments) this.#parts.get(`${model.name}/${each.name}`)(each.edit, model);
+    }
+    this.#background.show(scene.background, scene.background.some((x) => x !== 1));
+    this.#showSteps();
+  }
+
+  #build(structure) {
+    this.#structure = structure;
+    this.#parts.clear();
+    this.#root.replaceChildren(...this.#state.scene.models.map((model) => {
+      const box = this.#part(model.name, model.name, model.can);
+      box.append(...model.segments.map((each) => this.#segment(model, each.name)));
+      if (this.#actions.segment && model.can.includes("segments")) {
+        const current = () => this.#state.scene.models.find((each) => each.name === model.name);
+        box.append(button("New segment…", `New segment of ${model.name}`, () => this.#actions.segment(current())));
+      }
+      return box;
+    }));
+  }
+
+  #segment(model, name) {
+    const part = `${model.name}/${name}`, box = this.#part(part, name, model.can);
+    if (this.#actions.remove) box.append(button("Remove", `Remove ${part}`, () => this.#actions.remove(part)));
+    return box;
+  }
+
+  /** The inputs of a model or a segment. */
+  #part(part, name, can) {
+    const edit = (key) => (value, step) => this.#state.edit(part, key, value, step);
+    const legend = element("legend"), box = element("fieldset", { className: "part" }, legend);
+    const shows = [];
+    const add = (parent, key, input, value = (each) => each[key]) => {
+      parent.append(input.row);
+      shows.push((each, model) => input.show(value(each, model), !isUnedited(key, each[key])));
+    };
+    const factor = (key, max) => slider(capital(key), `${key} of ${part}`, { max }, edit(key));
+    if (can.includes("visible")) add(legend, "visible", tick(name, edit("visible"), { title: "Visible" }));
+    else legend.append(name);
+    if (can.includes("palette")) {
+      const color = colorInput("Palette", `palette of ${part}`, edit("palette"));
+      add(box, "palette", color, (each, model) => each.palette ?? model.fitted_palette);
+    }
+    if (can.includes("opacity")) add(box, "opacity", factor("opacity", OPAQUE));
+    const factors = Object.entries(FACTORS).filter(([key]) => can.includes(key));
+    if (factors.length) {
+      const material = element("details", {}, element("summary", {}, "Material"));
+      for (const [key, max] of factors) add(material, key, factor(key, max));
+      box.append(material);
+    }
+    this.#parts.set(part, (each, model) => {
+      box.classList.toggle("hidden-part", !each.visible);
+      for (const show of shows) show(each, model);
+    });
+    return box;
+  }
+
+  #showSteps() {
+    const { past, future } = this.#state;
+    const made = past.map((name) => element("li", {}, name));
+    made.at(-1)?.setAttribute("aria-current", "step");
+    const undone = future.map((name) => element("li", { className: "undone" }, name));
+    this.#steps.replaceChildren(...made, ...undone);
+  }
+}

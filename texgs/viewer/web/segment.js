@@ -1,0 +1,153 @@
+// A new segment: clicks on a model alone, the mask that they select, and the wait until it is found in space.
+
+const get = (id) => document.getElementById(id);
+const STILL = 4; // CSS pixels that a click may move
+const COLORS = { true: "#0a8f2f", false: "#1540d0" }; // of points on the object, and beside it
+
+export class SegmentTool {
+  #page; #model = null; #points = []; #asked = 0; #picture = null; #down = null; #isBusy = false;
+
+  /** @param {object} page - with camera, canvas, connection, notices, renderer, state, and show() */
+  constructor(page) {
+    this.#page = page;
+    const { canvas, connection } = page;
+    canvas.addEventListener("pointerdown", (event) => { this.#down = event; });
+    canvas.addEventListener("click", (event) => this.#click(event));
+    canvas.addEventListener("keydown", (event) => {
+      if (!this.#model) return;
+      if (event.key === "Enter") this.#add(canvas.clientWidth / 2, canvas.clientHeight / 2, !event.shiftKey);
+      if (event.key === "Escape") this.#leave();
+    });
+    new ResizeObserver(() => this.#clear()).observe(canvas);
+    get("segment").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#make();
+    });
+    get("segment-clear").onclick = () => this.#clear();
+    get("segment-cancel").onclick = () => this.#leave();
+    connection.addEventListener("message", ({ detail }) => this.#receive(detail));
+    connection.addEventListener("lost", () => this.#end());
+  }
+
+  /** Whether the camera has to stay: points belong to one view. */
+  get isLocked() {
+    return this.#points.length > 0;
+  }
+
+  /** Begin with a model. */
+  start({ name, segments }) {
+    this.#model = name;
+    const taken = segments.map((each) => each.name);
+    let number = 1;
+    while (taken.includes(`part${number}`)) number += 1;
+    get("segment-name").value = `part${number}`;
+    get("segment").hidden = false;
+    this.#page.show({ only: name, mode: "shaded" });
+    this.#clear();
+    this.#page.canvas.focus();
+  }
+
+  #click(event) {
+    const { clientX, clientY, shiftKey, offsetX, offsetY } = event;
+    const moved = Math.hypot(clientX - this.#down?.clientX, clientY - this.#down?.clientY);
+    if (this.#model && !this.#isBusy && moved <= STILL) this.#add(offsetX, offsetY, !shiftKey);
+  }
+
+  #add(x, y, positive) {
+    if (this.#isBusy) return;
+    if (!positive && !this.isLocked) {
+      this.#page.notices.tell("Click on the object first.", "info");
+      return;
+    }
+    this.#points.push([x, y, positive]);
+    this.#asked += 1;
+    this.#send({ type: "mask", id: this.#asked, model: this.#model });
+    this.#show();
+  }
+
+  #clear() {
+    this.#points = [];
+    this.#picture = null;
+    this.#asked += 1; // masks that are on their way are none of ours
+    this.#show();
+  }
+
+  #make() {
+    if (!this.isLocked || this.#isBusy) return;
+    this.#isBusy = true;
+    this.#send({ type: "segment", part: `${this.#model}/${get("segment-name").value.trim()}` });
+    this.#show();
+  }
+
+  /** Stop what is being made; else stop altogether. */
+  #leave() {
+    if (this.#isBusy) this.#page.connection.send({ type: "cancel" });
+    else this.#end();
+  }
+
+  #end() {
+    if (!this.#model) return;
+    this.#model = null;
+    this.#isBusy = false;
+    get("segment").hidden = true;
+    this.#clear();
+    this.#page.show({ only: "" });
+  }
+
+  /** Points are sent in pixels of the picture. */
+  #send(message) {
+    const { camera, canvas, connection, renderer } = this.#page;
+    const [width, height] = renderer.size();
+    const points = this.#points.map(([x, y, positive]) =>
+      [x * width / canvas.clientWidth, y * height / canvas.clientHeight, positive]);
+    connection.send({ ...message, camera: camera.wire(width, height), points });
+  }
+
+  #receive(message) {
+    if (message.type === "mask" && message.id === this.#asked) {
+      const picture = new Image();
+      picture.onload = () => {
+        if (message.id !== this.#asked) return;
+        this.#picture = picture;
+        this.#show();
+      };
+      picture.src = message.picture;
+      get("segment-by").textContent = `Mask by ${message.by}.`;
+    } else if (message.mask !== undefined && message.mask === this.#asked) {
+      this.#points.pop(); // the notice says what is wrong with it
+      this.#show();
+    } else if (message.type === "job") {
+      get("segment-progress").value = message.done ?? 0;
+      if (message.done === null && this.#isBusy) this.#end();
+    } else if (message.type === "notice" && message.level === "error" && this.#isBusy) {
+      this.#isBusy = false;
+      this.#show();
+    }
+  }
+
+  #show() {
+    get("segment-hint").textContent = this.isLocked
+      ? "Click adds to it, Shift and click takes away from it. The camera stays until you clear the points."
+      : `Turn ${this.#model} as you like, and click on what belongs to the segment.`;
+    get("segment-make").disabled = get("segment-clear").disabled = !this.isLocked || this.#isBusy;
+    get("segment-progress").hidden = !this.#isBusy;
+    this.#draw();
+  }
+
+  #draw() {
+    const { clientWidth, clientHeight } = this.#page.canvas, ratio = window.devicePixelRatio;
+    const overlay = get("overlay"), context = overlay.getContext("2d");
+    overlay.width = Math.round(clientWidth * ratio);
+    overlay.height = Math.round(clientHeight * ratio);
+    if (this.#picture) context.drawImage(this.#picture, 0, 0, overlay.width, overlay.height);
+    context.lineWidth = 2 * ratio;
+    context.strokeStyle = "white";
+    for (const [x, y, positive] of this.#points) {
+      context.fillStyle = COLORS[positive];
+      context.beginPath();
+      context.arc(x * ratio, y * ratio, 6 * ratio, 0, 2 * Math.PI);
+      context.fill();
+      context.stroke();
+    }
+  }
+}

@@ -1,0 +1,53 @@
+// A scene that several pages edit: the server holds it, and what is edited here shows here at once.
+
+import { State, edited } from "./state.js";
+
+export class SharedState extends State {
+  #connection;
+  #sent = 0; // messages, of which the server answers each with the scene
+
+  constructor(scene, connection) {
+    super(scene);
+    this.#connection = connection;
+  }
+
+  /** Begin to count anew: the server does so with each connection. */
+  restart() {
+    this.#sent = 0;
+  }
+
+  /** Take the server's scene, unless it does not know yet what was edited here since. */
+  adopt({ scene, past, future, saved, file, answered }) {
+    if (answered === this.#sent) this.update({ scene, past, future, saved, file });
+  }
+
+  edit(part, key, value, step = 0) {
+    if (this.#send({ type: "edit", part, key, value, step })) {
+      this.update({ scene: edited(this.scene, { part, key, value }) });
+    }
+  }
+
+  undo() {
+    this.#send({ type: "undo" });
+  }
+
+  redo() {
+    this.#send({ type: "redo" });
+  }
+
+  /** Give the surfels of a segment back to its model. */
+  remove(part) {
+    this.#send({ type: "remove", part });
+  }
+
+  /** Write the scene file; asks before another file is replaced. */
+  save(name, replace = false) {
+    this.#send({ type: "save", name, replace });
+  }
+
+  #send(message) {
+    const sent = this.#connection.send(message);
+    if (sent) this.#sent += 1;
+    return sent;
+  }
+}

@@ -1,0 +1,99 @@
+// A scene that is edited: its description, and the history of its edits. It knows no server.
+// Edits are {part, key, value}: part is "TF01" or "TF01/segment", or "" for the light and the background of the
+// scene; value null takes an edit back.
+
+const UNEDITED = {
+  visible: true, palette: null, opacity: 1, ambient: 1, diffuse: 1, specular: 1, shininess: 1,
+};
+const WHITE = [1, 1, 1];
+
+/** Another description, with an edit made. */
+export function edited(scene, { part, key, value }) {
+  if (part === "") return { ...scene, [key]: key === "background" ? value ?? WHITE : value };
+  const change = (each) => ({ ...each, edit: { ...each.edit, [key]: value ?? UNEDITED[key] } });
+  const inModel = (model) => ({
+    ...model,
+    segments: model.segments.map((each) => `${model.name}/${each.name}` === part ? change(each) : each),
+  });
+  return { ...scene, models: scene.models.map((m) => m.name === part ? change(m) : inModel(m)) };
+}
+
+/** The edits that make one description another, as far as it has the same parts. */
+export function difference(from, to) {
+  const edits = [], same = (one, other) => JSON.stringify(one) === JSON.stringify(other);
+  for (const key of ["light", "background"]) {
+    if (!same(from[key], to[key])) edits.push({ part: "", key, value: to[key] });
+  }
+  const parts = partsOf(from);
+  for (const [part, edit] of partsOf(to)) {
+    for (const [key, value] of Object.entries(parts.has(part) ? edit : {})) {
+      if (!same(parts.get(part)[key], value)) edits.push({ part, key, value });
+    }
+  }
+  return edits;
+}
+
+/** Edits by the names of parts. */
+function partsOf(scene) {
+  return new Map(scene.models.flatMap((model) => [
+    [model.name, model.edit],
+    ...model.segments.map((each) => [`${model.name}/${each.name}`, each.edit]),
+  ]));
+}
+
+/** Whether a value of an edit changes nothing. */
+export function isUnedited(key, value) {
+  return value === UNEDITED[key];
+}
+
+/** Dispatches "change" whenever something of it is another. */
+export class State extends EventTarget {
+  #scenes = []; // before each step of `past`, and after each of `future`
+  #undone = [];
+  #latest = null; // part, key and number of a step that may go on
+
+  constructor(scene) {
+    super();
+    this.scene = this.original = scene;
+    this.past = []; // names of steps, oldest first
+    this.future = []; // names of steps that were taken back, the next one first
+    this.saved = true;
+  }
+
+  /** Make an edit; those with the same number in a row are one step, such as those of a slider. */
+  edit(part, key, value, step = 0) {
+    const latest = step ? `${step} ${part} ${key}` : null;
+    if (!latest || latest !== this.#latest) {
+      this.#scenes.push(this.scene);
+      this.past = [...this.past, `${part} ${key}`.trim()];
+    }
+    this.#undone = [];
+    this.#latest = latest;
+    this.update({ scene: edited(this.scene, { part, key, value }), future: [], saved: false });
+  }
+
+  /** Take the latest step back. */
+  undo() {
+    if (!this.past.length) return;
+    this.#latest = null;
+    this.#undone.push(this.scene);
+    const name = this.past.at(-1);
+    const scene = this.#scenes.pop();
+    this.update({ scene, past: this.past.slice(0, -1), future: [name, ...this.future] });
+  }
+
+  /** Make the step again that was taken back last. */
+  redo() {
+    if (!this.future.length) return;
+    this.#latest = null;
+    this.#scenes.push(this.scene);
+    const [name, ...future] = this.future;
+    this.update({ scene: this.#undone.pop(), past: [...this.past, name], future });
+  }
+
+  /** Set some of scene, past, future and saved. */
+  update(values) {
+    Object.assign(this, values);
+    this.dispatchEvent(new Event("change"));
+  }
+}

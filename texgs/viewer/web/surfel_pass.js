@@ -1,0 +1,119 @@
+// Blends surfels in a given order into a picture of floats: all that is on the graphics card for it.
+
+import { COLUMNS } from "./parts.js";
+import { makeProgram, makeTexture } from "./program.js";
+import { SURFEL_FRAGMENT, SURFEL_VERTEX } from "./shaders.js";
+import { LAYERS, WIDTH } from "./surfels.js";
+
+export const NEAR = 0.2; // camera z, world units, as the rasterizer has it
+
+export class SurfelPass {
+  /**
+   * @param {WebGL2RenderingContext} gl
+   * @param {object} joined surfels, see surfels.js.
+   * @param {object} optics `low_pass` of the models, and `step` of their texels.
+   * @throws {Error} where textures of the scene are too large for the card, or no floats can be blended.
+   */
+  constructor(gl, { count, surfels, lookups, texels }, optics) {
+    if (!gl.getExtension("EXT_color_buffer_float")) {
+      throw new Error("The graphics driver draws no floating-point pictures, which this scene needs: update it.");
+    }
+    // Half precision stops adding up faint fragments; where floats cannot be blended it is what there is.
+    this._format = gl.getExtension("EXT_float_blend") ? gl.RGBA32F : gl.RGBA16F;
+    this._gl = gl;
+    this._optics = optics;
+    this._shaders = makeProgram(gl, SURFEL_VERTEX, SURFEL_FRAGMENT);
+    const height = lookups.length / (4 * WIDTH);
+    const isSmall = texels instanceof Int8Array;
+    const ofTexels = [isSmall ? gl.RGB8I : gl.RGB16I, gl.RGB_INTEGER, isSmall ? gl.BYTE : gl.SHORT];
+    const floats = [gl.RGBA32F, gl.RGBA, gl.FLOAT];
+    const rows = 1 + lookups.reduce((most, row, k) => (k % 4 === 3 && row > most ? row : most), 0);
+    this._textures = {
+      surfels: makeTexture(gl, floats, [WIDTH, height, LAYERS.length], surfels),
+      lookups: makeTexture(gl, [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT], [WIDTH, height], lookups),
+      texels: makeTexture(gl, ofTexels, [WIDTH, texels.length / (3 * WIDTH)], texels),
+      parts: makeTexture(gl, floats, [COLUMNS, rows], null),
+    };
+    this._target = gl.createFramebuffer();
+    this._makeInstances(count);
+  }
+
+  /**
+   * Blends far to near.
+   *
+   * @param {object} view viewmat [12], focal and size [2].
+   * @param {object} look `mode` (a number), and `light`, a direction [3] or null for a headlight.
+   * @param {Float32Array} table of parts.
+   * @param {Uint32Array} order of the surfels.
+   * @returns {object} the picture, a texture whose first row is on top: premultiplied colour and alpha.
+   */
+  blend(view, { mode, light }, table, order) {
+    const gl = this._gl;
+    const { program, uniforms } = this._shaders;
+    this._resize(view.size);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
+    gl.viewport(0, 0, ...view.size);
+    gl.clearBufferfv(gl.COLOR, 0, [0, 0, 0, 0]);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    gl.useProgram(program);
+    Object.entries(this._textures).forEach(([name, texture], unit) => bind(gl, unit, texture, uniforms[name]));
+    // The parts were bound last.
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, COLUMNS, table.length / (4 * COLUMNS), gl.RGBA, gl.FLOAT, table);
+    setView(gl, uniforms, view);
+    gl.uniform1i(uniforms.headlight, light ? 0 : 1);
+    gl.uniform3fv(uniforms.light, light ?? [0, 0, 1]);
+    gl.uniform1i(uniforms.look, mode);
+    gl.uniform1f(uniforms.low_pass, this._optics.low_pass);
+    gl.uniform1f(uniforms.near, NEAR);
+    gl.uniform1f(uniforms.texel_step, this._optics.step);
+    gl.bindVertexArray(this._vertices);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this._indices);
+    gl.bufferSubData(gl.ARRAY_BUFFER, 0, order);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, order.length);
+    gl.bindVertexArray(null);
+    gl.disable(gl.BLEND);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    return this._picture;
+  }
+
+  /** A quad for each surfel, of which only its number comes from a buffer. */
+  _makeInstances(count) {
+    const gl = this._gl;
+    const place = gl.getAttribLocation(this._shaders.program, "surfel");
+    this._vertices = gl.createVertexArray();
+    this._indices = gl.createBuffer();
+    gl.bindVertexArray(this._vertices);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this._indices);
+    gl.bufferData(gl.ARRAY_BUFFER, 4 * count, gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(place);
+    gl.vertexAttribIPointer(place, 1, gl.UNSIGNED_INT, 0, 0);
+    gl.vertexAttribDivisor(place, 1);
+  }
+
+  _resize(size) {
+    const gl = this._gl;
+    if (this._picture && this._size.every((side, k) => side === size[k])) return;
+    if (this._picture) gl.deleteTexture(this._picture.texture);
+    const type = this._format === gl.RGBA32F ? gl.FLOAT : gl.HALF_FLOAT;
+    this._size = [...size];
+    this._picture = makeTexture(gl, [this._format, gl.RGBA, type], size, null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this._picture.texture, 0);
+  }
+}
+
+/** Lets a sampler read a texture. */
+export function bind(gl, unit, { texture, target }, uniform) {
+  gl.activeTexture(gl.TEXTURE0 + unit);
+  gl.bindTexture(target, texture);
+  gl.uniform1i(uniform, unit);
+}
+
+function setView(gl, uniforms, { viewmat, focal, size }) {
+  const [a, b, c, x, d, e, f, y, g, h, i, z] = viewmat;
+  gl.uniformMatrix3fv(uniforms.rotation, true, [a, b, c, d, e, f, g, h, i]);
+  gl.uniform3f(uniforms.translation, x, y, z);
+  gl.uniform2fv(uniforms.focal, focal);
+  gl.uniform2fv(uniforms.size, size);
+}

@@ -1,0 +1,183 @@
+// Draws a scene of surfels by WebGL2: sorted in every frame, blended far to near into floats, then shown.
+
+import { direction } from "./camera.js";
+import { COLUMNS, firstRows, partTable } from "./parts.js";
+import { makeProgram } from "./program.js";
+import { PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
+import { DepthOrder } from "./sort.js";
+import { NEAR, SurfelPass, bind } from "./surfel_pass.js";
+import { joinSurfels } from "./surfels.js";
+import { unpack } from "./tensors.js";
+
+// Those of texgs/scene/frame.py but for depth.
+const MODES = ["shaded", "unshaded", "normal", "alpha", "ambient", "diffuse", "specular", "shininess"];
+const OVER_BLACK = MODES.slice(3);
+const MOST_PIXELS = 4096; // of a side, as `texgs view` has it
+const SLOW = 40; // milliseconds from frame to frame above which those of a moving scene have half the resolution
+const MISSING = "This browser has no WebGL2, which this scene needs: switch hardware acceleration on, or use another one.";
+const CONTEXT = { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" };
+
+export class WebglRenderer {
+  /**
+   * @param {HTMLCanvasElement} canvas to draw on; its size follows that on the page.
+   * @param {function(string)} notice tells the user what went wrong, "" that it is over.
+   * @throws {Error} where there is no WebGL2.
+   */
+  constructor(canvas, notice) {
+    this.modes = MODES;
+    this._canvas = canvas;
+    this._notice = notice;
+    const gl = canvas.getContext("webgl2", CONTEXT);
+    if (!gl) throw new Error(MISSING);
+    this._gl = gl;
+    this._listeners = new AbortController();
+    const listen = { signal: this._listeners.signal };
+    canvas.addEventListener("webglcontextlost", (event) => {
+      event.preventDefault(); // asks for another context
+      notice("The graphics driver has taken the picture back; it comes again by itself.");
+    }, listen);
+    canvas.addEventListener("webglcontextrestored", () => {
+      this._upload();
+      notice("");
+      this._ask();
+    }, listen);
+  }
+
+  /**
+   * Takes the surfels of a scene.
+   *
+   * @param {string} packed their tensors, see tensors.js.
+   * @param {object} scene its description; models and segments may not change later, their edits may.
+   */
+  async open(packed, scene) {
+    const { tensors, metadata } = await unpack(packed);
+    this._original = scene;
+    this._optics = JSON.parse(metadata.optics);
+    this._surfels = joinSurfels(tensors, this._optics.models, firstRows(scene.models));
+    this._order = new DepthOrder(this._surfels.count);
+    this._upload();
+  }
+
+  /** Size of the picture in pixels of the screen. */
+  size() {
+    const { clientWidth, clientHeight } = this._canvas;
+    const ratio = Math.min(devicePixelRatio, MOST_PIXELS / Math.max(clientWidth, clientHeight, 1));
+    return [clientWidth, clientHeight].map((side) => Math.max(1, Math.round(ratio * side)));
+  }
+
+  /**
+   * Asks for a frame; of several, the newest wins.
+   *
+   * @param {OrbitCamera} camera
+   * @param {object} scene description with its edits, light and background.
+   * @param {object} how `mode`; whether to show the scene as it was `before`; whether something is `moving`: then
+   *   slow frames are coarser.
+   */
+  draw(camera, scene, { mode = "shaded", moving = false, before = false } = {}) {
+    this._wanted = { view: this._view(camera), scene: before ? this._original : scene, mode, moving };
+    this._ask();
+  }
+
+  /** The same picture as a canvas of its own. */
+  still(camera, scene, { mode, before }) {
+    const view = this._view(camera);
+    const { width, height } = view;
+    const pixels = this.pixels(view, before ? this._original : scene, mode);
+    const canvas = Object.assign(document.createElement("canvas"), { width, height });
+    canvas.getContext("2d").putImageData(new ImageData(pixels, width, height), 0, 0);
+    return canvas;
+  }
+
+  /**
+   * Draws now.
+   *
+   * @param {object} view viewmat [3, 4] world to camera (OpenCV axes), fov_y in degrees, width and height.
+   * @returns {Uint8ClampedArray} the picture [H, W, 4], first row on top.
+   */
+  pixels(view, scene, mode = "shaded") {
+    this._frame(view, scene, mode);
+    const gl = this._gl;
+    const { width, height } = view;
+    const upside = new Uint8Array(4 * width * height);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.UNSIGNED_BYTE, upside);
+    const picture = new Uint8ClampedArray(upside.length);
+    for (let y = 0; y < height; y++) {
+      picture.set(upside.subarray(4 * width * (height - 1 - y), 4 * width * (height - y)), 4 * width * y);
+    }
+    return picture;
+  }
+
+  /** Gives the graphics memory back. */
+  dispose() {
+    this._listeners.abort();
+    cancelAnimationFrame(this._request);
+    this._gl.getExtension("WEBGL_lose_context")?.loseContext();
+  }
+
+  // ---- Frames ----
+
+  _view(camera) {
+    const [width, height] = this.size();
+    return { viewmat: camera.viewmat(), fov_y: camera.fov_y, width, height };
+  }
+
+  _ask() {
+    if (this._request || !this._wanted || this._gl.isContextLost()) return;
+    this._request = requestAnimationFrame((time) => {
+      this._request = 0;
+      const { view, scene, mode, moving } = this._wanted;
+      this._pace(time, moving);
+      const share = moving && this._isSlow ? 0.5 : 1;
+      const [width, height] = [view.width, view.height].map((side) => Math.ceil(share * side));
+      this._frame({ ...view, width, height }, scene, mode);
+    });
+  }
+
+  /** Notes whether the frame after one at this time comes late. It stays noted until nothing moves. */
+  _pace(time, moving) {
+    if (!moving) this._isSlow = false;
+    else requestAnimationFrame((next) => { this._isSlow ||= next - time > SLOW; });
+  }
+
+  _frame(camera, scene, mode) {
+    const gl = this._gl;
+    const { width, height } = camera;
+    if (this._canvas.width !== width) this._canvas.width = width;
+    if (this._canvas.height !== height) this._canvas.height = height;
+    const view = viewOf(camera);
+    const table = partTable(scene.models, this._optics.models);
+    const light = scene.light && direction(scene.light.azimuth, scene.light.polar);
+    const picture = this._pass.blend(view, { mode: MODES.indexOf(mode), light }, table, this._sort(view, table));
+    const { program, uniforms } = this._present;
+    gl.useProgram(program);
+    bind(gl, 0, picture, uniforms.picture);
+    gl.uniform3fv(uniforms.background, OVER_BLACK.includes(mode) ? [0, 0, 0] : scene.background);
+    gl.drawArrays(gl.TRIANGLES, 0, 3);
+  }
+
+  /** Surfels beyond the near plane whose part is visible, far to near, by depths rounded as the rasterizer's. */
+  _sort({ viewmat }, table) {
+    const { count, surfels, lookups } = this._surfels;
+    const [x, y, z, t] = viewmat.slice(8);
+    const order = this._order;
+    const round = Math.fround;
+    order.clear();
+    for (let i = 0, k = 0; i < count; i++, k += 4) {
+      const sum = round(y * surfels[k + 1] + round(z * surfels[k + 2]));
+      const depth = round(round(x * surfels[k] + sum) + t);
+      if (depth > NEAR && table[4 * COLUMNS * lookups[k + 3] + 3] > 0) order.add(i, depth);
+    }
+    return order.farToNear();
+  }
+
+  _upload() {
+    this._pass = new SurfelPass(this._gl, this._surfels, this._optics);
+    this._present = makeProgram(this._gl, PRESENT_VERTEX, PRESENT_FRAGMENT);
+  }
+}
+
+/** A camera as single-precision numbers: viewmat [12], focal length and size in pixels. */
+function viewOf({ viewmat, fov_y: fovY, width, height }) {
+  const focal = (0.5 * height) / Math.tan((0.5 * fovY * Math.PI) / 180);
+  return { viewmat: Float32Array.from(viewmat.flat()), focal: [focal, focal], size: [width, height] };
+}
