@@ -71,6 +71,13 @@ def test_the_sdist_holds_the_workflow(sdist):
     assert {f"workflow/profiles/{name}/profile.yaml" for name in ("local", "slurm")} <= names
 
 
+def test_the_viewer_brings_its_page(texgs):
+    (page,) = texgs.parents[1].rglob("viewer/web/page.html")
+    assert {path.name for path in page.parent.iterdir()} == {
+        path.name for path in (ROOT / "texgs" / "viewer" / "web").iterdir()
+    }
+
+
 def test_the_doctor_finds_what_it_needs(texgs, project):
     said = run(texgs, "doctor", cwd=project)
     assert str(texgs.parents[1]) in said

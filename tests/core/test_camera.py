@@ -89,3 +89,12 @@ def test_mistakes_are_named():
         Camera(torch.eye(4), torch.eye(3), 8, 0)
     with pytest.raises(ShapeError, match=r"viewmat: expected \[4, 4\], got \[3, 4\]"):
         Camera(torch.eye(4)[:3], torch.eye(3), 8, 8)
+
+
+def test_an_orbit_around_a_target_is_one_around_the_origin_moved():
+    target = torch.tensor([0.3, -1.2, 2.0])
+    still, moved = (orbit(40, 25, 2.5, 30, 64, 48, place) for place in ((0, 0, 0), target.tolist()))
+    points = torch.randn(20, 3, generator=torch.Generator().manual_seed(0)) * 0.3
+    for one, other in zip(still.project(points), moved.project(points + target), strict=True):
+        torch.testing.assert_close(one, other, atol=1e-4, rtol=1e-5)  # pixels and lengths, of float32
+    assert still.viewmat.equal(orbit(40, 25, 2.5, 30, 64, 48).viewmat)

@@ -75,6 +75,14 @@ def test_each_change_is_undone_and_made_again(session, tmp_path):
     assert not session.redo(), "another way was taken"
 
 
+def test_an_earlier_scene_is_shown_as_it_was(session, tmp_path):
+    before, scene = session.frame(CAMERA), session.scene
+    session.set("left", "palette", (0.9, 0.1, 0.2))
+    session.add_segment("left/shell", half(tmp_path))
+    assert not np.array_equal(session.frame(CAMERA), before)
+    assert np.array_equal(session.frame(CAMERA, scene=scene), before)
+
+
 def test_a_new_segment_looks_as_its_model_does(session, tmp_path):
     session.set("left", "palette", (0.9, 0.1, 0.2))
     before = session.frame(CAMERA)

@@ -66,9 +66,9 @@ def served(scene_file, port=0, **environment):
 
 
 @contextmanager
-def opened(chromium, address):
+def opened(chromium, address, ratio=1):
     """A page at a known camera, whose first whole frame is there. It must log no error."""
-    page = chromium.new_page(viewport={"width": 800, "height": 500})
+    page = chromium.new_page(viewport={"width": 800, "height": 500}, device_scale_factor=ratio)
     page.set_default_timeout(WAIT)
     errors = []
     page.on("pageerror", lambda error: errors.append(str(error)))
@@ -173,11 +173,39 @@ def test_comparing_shows_the_scene_as_it_was_opened(chromium, scene_file):
         assert still(page) == first
 
 
+def drag(page, what, start, end):
+    """Drag on an element between two places, parts of its width and height."""
+    what.scroll_into_view_if_needed()
+    box = what.bounding_box()
+    (x, y), (to_x, to_y) = (
+        (box["x"] + u * box["width"], box["y"] + v * box["height"]) for u, v in (start, end)
+    )
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(to_x, to_y, steps=20)
+    page.mouse.up()
+
+
+def test_a_movement_is_one_step(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        slider = page.get_by_role("slider", name="Opacity of TF01")
+        drag(page, slider, (0.5, 0.5), (0.05, 0.5))
+        expect(page.get_by_role("listitem")).to_have_text(["TF01 opacity"])
+        assert float(slider.input_value()) < 0.3
+        drag(page, page.locator(".ball"), (0.5, 0.5), (0.9, 0.5))
+        expect(page.get_by_role("listitem")).to_have_text(["TF01 opacity", "light"])
+        # the right rim of the ball is to the right of a camera at azimuth 40
+        azimuth = page.get_by_role("spinbutton", name="Azimuth of the light, degrees, as a number")
+        assert 90 < float(azimuth.input_value()) < 135
+        save_as(page, "moved.yaml")
+        assert still(page) == rendered(scene_file.parent / "moved.yaml", page)
+
+
 def test_a_click_makes_a_segment(chromium, tmp_path):
     file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
     scene_file = write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))
     weights = {"TEXGS_WEIGHTS": str(tmp_path)}  # GrabCut, wherever this runs
-    with served(scene_file, **weights) as (_, address), opened(chromium, address) as page:
+    with served(scene_file, **weights) as (_, address), opened(chromium, address, ratio=2) as page:
         page.get_by_role("button", name="New segment of balls").click()
         box = page.locator("#picture").bounding_box()
         place = orbit(

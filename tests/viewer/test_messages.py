@@ -8,7 +8,20 @@ from hypothesis import strategies as st
 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.viewer.messages import Edit, Redo, Save, Undo, View, parse
+from texgs.viewer.messages import (
+    READERS,
+    Cancel,
+    Clicked,
+    Edit,
+    Mask,
+    Redo,
+    Remove,
+    Save,
+    Segment,
+    Undo,
+    View,
+    parse,
+)
 
 CAMERA = {
     "target": [0, 0, 0],
@@ -31,6 +44,12 @@ def test_messages_are_read():
     assert parse('{"type": "undo"}') == Undo()
     assert parse('{"type": "redo"}') == Redo()
     assert parse('{"type": "save", "name": "a.yaml"}') == Save("a.yaml", False)
+    assert parse('{"type": "cancel"}') == Cancel()
+    assert parse('{"type": "remove", "part": "TF01/a"}') == Remove("TF01/a")
+    clicks = {"camera": CAMERA, "points": [[1, 2.5, True], [3, 4, False]]}
+    clicked = Clicked(view.camera, ((1, 2.5, True), (3, 4, False)))
+    assert parse(json.dumps({"type": "mask", "id": 4, "model": "TF01", **clicks})) == Mask(4, "TF01", clicked)
+    assert parse(json.dumps({"type": "segment", "part": "TF01/a", **clicks})) == Segment("TF01/a", clicked)
 
 
 def test_a_camera_is_that_of_the_renderer():
@@ -64,6 +83,8 @@ def test_half_of_a_camera_sees_the_same():
         ({"camera": {**CAMERA, "width": 9000}}, "camera.width: expected a whole number from 1 to 4096"),
         ({"camera": {**CAMERA, "target": [0, 0]}}, "camera.target: expected three numbers, got [0, 0]"),
         ({"camera": {**CAMERA, "distance": "3"}}, "camera.distance: expected a number from 0.001 to 1000"),
+        ({"only": None}, "only: expected a text, got None"),
+        ({"type": "undo"}, "message: no such key 'id'"),
     ],
 )
 def test_what_is_wrong_is_named(change, message):
@@ -85,11 +106,12 @@ VALUES = st.recursive(
 )
 
 
-KEYS = ("id", "camera", "mode", "moving", "before", "part", "key", "value", "step", "name", "replace")
+KEYS = ("id", "camera", "mode", "moving", "before", "only", "part", "key", "value", "step", "name", "replace",
+        "model", "points")  # fmt: skip
 
 
 @given(
-    st.sampled_from(["view", "edit", "undo", "redo", "save"]),
+    st.sampled_from(list(READERS)),
     st.dictionaries(st.sampled_from(KEYS), VALUES),
 )
 def test_nothing_else_is_raised(kind, values):
@@ -97,3 +119,19 @@ def test_nothing_else_is_raised(kind, values):
         parse(json.dumps({"type": kind, **values}))
     except ArgumentError as error:
         assert len(str(error)) < 2100  # noqa: PT017  one sentence, of bounded length
+
+
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        (None, "points: expected 1 to 100 of them, got None"),
+        ([[1, 2, True]] * 101, "points: expected 1 to 100 of them"),
+        ([[1, 2]], "points: expected x, y, and true or false, got [1, 2]"),
+        ([[1, "2", True]], "points: expected a number from -4096 to 8192, got '2'"),
+        ([[1, 2, 1]], "points: expected true or false, got 1"),
+    ],
+)
+def test_what_is_wrong_with_clicks_is_named(points, message):
+    with pytest.raises(ArgumentError) as error:
+        parse(json.dumps({"type": "mask", "model": "TF01", "camera": CAMERA, "points": points}))
+    assert str(error.value).startswith(message)

@@ -20,13 +20,14 @@ from texgs.viewer.opening import open_scene
 def test_a_scene_is_saved_in_its_place(scene_file, tmp_path):
     opened = open_scene(scene_file)
     assert list(opened.scene.models) == ["TF01", "TF02"]
-    assert (opened.folder, opened.name) == (tmp_path, "scene.yaml")
+    assert (opened.folder, opened.name, opened.file) == (tmp_path, "scene.yaml", scene_file)
     assert open_scene(scene_file, tmp_path / "mine").folder == tmp_path / "mine"
 
 
 def test_a_job_keeps_its_scene(scene_file, tmp_path):
     (tmp_path / "metrics.json").write_text("{}")
-    assert open_scene(scene_file).name == "edited.yaml"
+    opened = open_scene(scene_file)
+    assert (opened.name, opened.file) == ("edited.yaml", None)
 
 
 def test_a_folder_with_one_scene(scene_file, tmp_path):

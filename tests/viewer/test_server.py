@@ -324,14 +324,30 @@ def test_scenes_are_saved_in_their_folder_only(scene_file):
         assert news["saved"]
         assert news["file"] == "new.yaml"
         await browser.send(type="save", name="scene.yaml")
-        assert (await browser.next("notice"))["level"] == "question", "it is another file by now"
-        assert read_scene(scene_file).models["TF02"].edit.visible
-        await browser.send(type="save", name="scene.yaml", replace=True)
-        assert (await browser.next("notice"))["level"] == "info"
-        assert not read_scene(scene_file).models["TF02"].edit.visible
+        assert (await browser.next("notice"))["level"] == "info", "it is what was opened"
 
     with_page(scene_file, work)
-    assert not read_scene(scene_file.parent / "new.yaml").models["TF02"].edit.visible
+    for name in ("scene.yaml", "new.yaml"):
+        assert not read_scene(scene_file.parent / name).models["TF02"].edit.visible
+
+
+def test_other_files_are_replaced_after_a_question_only(scene_file):
+    (scene_file.parent / "metrics.json").write_text("{}")  # a job wrote the scene
+    (earlier := scene_file.parent / "edited.yaml").write_text(scene_file.read_text())
+
+    async def work(browser, client):
+        await browser.send(type="edit", part="TF02", key="visible", value=False)
+        for name in ("edited.yaml", "scene.yaml"):
+            await browser.send(type="save", name=name)
+            notice = await browser.next("notice")
+            assert (notice["level"], notice["name"]) == ("question", name)
+        assert read_scene(earlier).models["TF02"].edit.visible
+        await browser.send(type="save", name="edited.yaml", replace=True)
+        assert (await browser.next("notice"))["level"] == "info"
+
+    with_page(scene_file, work)
+    assert not read_scene(earlier).models["TF02"].edit.visible
+    assert read_scene(scene_file).models["TF02"].edit.visible
 
 
 def test_a_thousand_malformed_messages(scene_file, caplog):

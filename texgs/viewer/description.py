@@ -28,13 +28,16 @@ MARGIN = 1.1  # of the first view around the bounds
 LIT = get_args(Look)[2:]  # factors of a material
 
 
-def describe(name: str, scene: Scene, composed: Composed) -> dict[str, Any]:
+def describe(
+    name: str, scene: Scene, composed: Composed, bounds: tuple[list[float], float] | None = None
+) -> dict[str, Any]:
     """A scene as a page needs it.
 
     Args:
         name: of the scene, to show.
         scene: with its edits.
         composed: its models.
+        bounds: of these, as `bounds_of` has them; by default they are computed, which takes a while.
     """
     kind = kind_of(next(iter(scene.models.values())).file)
     segments = ["segments"] if "segments" in kind.can else []
@@ -46,7 +49,7 @@ def describe(name: str, scene: Scene, composed: Composed) -> dict[str, Any]:
         )
         for (model, entry), (palette, has) in zip(scene.models.items(), palettes, strict=True)
     ]
-    center, radius = bounds_of(composed)
+    center, radius = bounds_of(composed) if bounds is None else bounds
     distance = MARGIN * radius / sin(radians(LENS.fov_y / 2))
     return {
         "name": name,

@@ -43,7 +43,7 @@ def guard(token: str, host: str) -> Middleware:
 
     @web.middleware
     async def middleware(request: web.Request, handler: Handler) -> web.StreamResponse:
-        given = request.path.split("/")[1]
+        given = request.path.lstrip("/").partition("/")[0]
         name = request.headers.get("Host", "")
         if not hmac.compare_digest(given.encode("utf-8", "replace"), token.encode()):
             raise web.HTTPForbidden(text="Wrong token: open the address that texgs view printed.")

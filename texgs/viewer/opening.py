@@ -23,6 +23,7 @@ class Opened:
     title: str
     folder: Path
     name: str  # that a scene file gets unless another one is chosen
+    file: Path | None = None  # of the scene, where edits may be written to it
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
@@ -40,8 +41,9 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     if path.is_dir():
         path = only_scene(path)
     if path.suffix in SCENES:
-        name = "edited.yaml" if (path.parent / OF_JOBS).exists() else path.name
-        return Opened(read_scene(path), title_of(path), folder or path.parent, name)
+        of_job = (path.parent / OF_JOBS).exists()
+        name, file = ("edited.yaml", None) if of_job else (path.name, path)
+        return Opened(read_scene(path), title_of(path), folder or path.parent, name, file)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
     scene = Scene({label(str(path), path.stem): SceneModel(path)})

@@ -13,7 +13,7 @@ from aiohttp import web
 from texgs.core.errors import TexgsError, first_line
 from texgs.viewer.frames import Frames, Pace
 from texgs.viewer.messages import Mask, View
-from texgs.viewer.segments import Segmenter, alone
+from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
 
 log = logging.getLogger("texgs.viewer")
@@ -40,7 +40,7 @@ class Page:
         self._mask: Mask | None = None
         self._job: dict[str, Any] | None = None
         self._pace = Pace()
-        self.answered = 0  # messages, other than views
+        self.answered = 0  # messages that change the scene
         self._wake = asyncio.Event()
 
     def show(self, view: View) -> None:
@@ -97,9 +97,7 @@ class Page:
 
     async def _send_frame(self, view: View) -> None:
         try:
-            scene = self._edits.original if view.before else self._edits.scene
-            scene = alone(scene, view.only) if view.only else scene
-            frame = await self._frames.frame(view, scene, self._pace)
+            frame = await self._frames.frame(view, self._edits.shown(view), self._pace)
         except Exception as error:  # whatever it is, the server goes on
             self.tell_error(error)
             self._notices[-1]["frame"] = view.id

@@ -17,7 +17,7 @@ from texgs.core.names import require_name
 from texgs.scene.parts import require_new, split
 from texgs.scene.scene_file import known
 from texgs.scene.session import Session
-from texgs.viewer.description import describe
+from texgs.viewer.description import bounds_of, describe
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
 from texgs.viewer.messages import (
@@ -45,6 +45,7 @@ Change = Edit | Undo | Redo | Save | Remove
 WEB = Path(__file__).parent / "web"
 SERVED = (".js", ".css", ".svg")
 MOST_PAGES = 16
+PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
 
 
@@ -62,7 +63,8 @@ class Server:
     def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
         session = Session(opened.scene, device)
         self._title, self._composed = opened.title, session.composition
-        self.edits = SharedEdits(session, opened.folder, opened.name)
+        self._bounds = bounds_of(self._composed)
+        self.edits = SharedEdits(session, opened)
         self.frames = Frames(session)
         self.segmenter = Segmenter(device)
         self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
@@ -108,8 +110,7 @@ class Server:
             values = parse_json(request.query.get("view", ""))
             known(values, None, "view")
             view = view_of(values)
-            scene = self.edits.original if view.before else self.edits.scene
-            png = await self.frames.still(view, scene)
+            png = await self.frames.still(view, self.edits.shown(view))
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
         return web.Response(
@@ -122,7 +123,9 @@ class Server:
         """One page: what it asks for is done until it is gone."""
         if len(self._pages) >= MOST_PAGES:
             raise web.HTTPServiceUnavailable(text=f"expected at most {MOST_PAGES} pages; close one")
-        socket = web.WebSocketResponse(max_msg_size=LARGEST, heartbeat=HEARTBEAT, compress=False)
+        socket = web.WebSocketResponse(
+            max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
+        )
         await socket.prepare(request)
         page = Page(socket, self.edits, self.frames, self.segmenter)
         self._count += 1
@@ -162,9 +165,11 @@ class Server:
         elif isinstance(message, Cancel):
             self.segmenter.stop()
         else:
-            page.answered += 1
-            async with self._changing:
-                await self._change(message, page, number)
+            try:
+                async with self._changing:
+                    await self._change(message, page, number)
+            finally:
+                page.answered += 1
             self._tell_all()
 
     async def _change(self, message: Change, page: Page, number: int) -> None:
@@ -222,14 +227,14 @@ class Server:
 
     def scene_message(self) -> dict[str, Any]:
         """The scene and its history, for all pages."""
-        scene = describe(self._title, self.edits.scene, self._composed)
+        scene = describe(self._title, self.edits.scene, self._composed, self._bounds)
         return {"type": "scene", "run": self._run, "scene": scene, **self.edits.state()}
 
     # ---- End ----------------------------------------------------------------
 
     async def _say_goodbye(self, app: web.Application) -> None:
-        for socket in list(self._pages.values()):
-            await socket.close(code=WSCloseCode.GOING_AWAY, message=b"the server ends")
+        sockets = list(self._pages.values())
+        await asyncio.gather(*(each.close(code=WSCloseCode.GOING_AWAY) for each in sockets))
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:
         yield

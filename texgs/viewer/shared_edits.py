@@ -15,8 +15,9 @@ from texgs.core.names import file_name, part_file
 from texgs.scene.scene import WHITE, Scene
 from texgs.scene.scene_file import known, light_of, write_scene
 from texgs.scene.session import Session
-from texgs.viewer.messages import Edit
-from texgs.viewer.opening import SCENES
+from texgs.viewer.messages import Edit, View
+from texgs.viewer.opening import SCENES, Opened
+from texgs.viewer.segments import alone
 
 
 class SharedEdits:
@@ -24,13 +25,13 @@ class SharedEdits:
 
     Args:
         session: that is edited.
-        folder: that scene files are written to.
-        name: of the scene file that may be replaced without a question.
+        opened: what it began with, and where scene files are written to.
     """
 
-    def __init__(self, session: Session, folder: Path, name: str) -> None:
-        self._session, self._folder, self.name = session, folder, name
-        self.original = self._saved = session.scene
+    def __init__(self, session: Session, opened: Opened) -> None:
+        self._session, self._folder, self.name = session, opened.folder, opened.name
+        self._own = {file.resolve() for file in (opened.file,) if file}  # replaced without a question
+        self._original = self._saved = session.scene
         self._past, self._future = list[str](), list[str]()
         self._latest: tuple[object, ...] | None = None  # author and number of a step that may go on
 
@@ -38,6 +39,15 @@ class SharedEdits:
     def scene(self) -> Scene:
         """As it is now."""
         return self._session.scene
+
+    def shown(self, view: View) -> Scene:
+        """What a view shows.
+
+        Raises:
+            ArgumentError: if there is no such model.
+        """
+        scene = self._original if view.before else self.scene
+        return alone(scene, view.only) if view.only else scene
 
     @property
     def is_saved(self) -> bool:
@@ -113,12 +123,13 @@ class SharedEdits:
         return self._folder / name
 
     def would_replace(self, name: str) -> bool:
-        """Whether saving replaces a file that is neither the opened nor the latest one.
+        """Whether saving replaces a file that is neither the opened one nor was saved before.
 
         Raises:
             ArgumentError: as `path_of`.
         """
-        return self.path_of(name).exists() and name != self.name
+        path = self.path_of(name)
+        return path.exists() and path.resolve() not in self._own
 
     def save(self, name: str) -> Path:
         """Write the scene file in one step.
@@ -129,6 +140,7 @@ class SharedEdits:
         path, scene = self.path_of(name), self.scene
         write_scene(path, scene)
         self.name, self._saved = name, scene
+        self._own.add(path.resolve())
         return path
 
     def _step(self, name: str) -> None:

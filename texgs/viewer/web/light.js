@@ -31,6 +31,7 @@ export class LightControl {
     const about = element("div", {}, this.#headlight.row,
       element("p", { className: "hint" }, "It moves with the camera. Drag on the ball to fix the light."));
     root.append(element("div", { className: "light" }, this.#canvas, about), this.#azimuth.row, this.#polar.row);
+    root.hidden = !state.scene.models.some((model) => model.can.includes("diffuse")); // nothing shows the light
     this.#listen();
     state.addEventListener("change", () => this.show());
     this.show();

@@ -95,7 +95,7 @@ class Page {
 
   /** Show what the server has now. One that was started again knows nothing of edits before. */
   adopt(message) {
-    get("title").textContent = message.scene.name;
+    get("title").textContent = get("title").title = message.scene.name;
     const lost = this.run && this.run !== message.run ? difference(message.scene, this.state.scene) : [];
     this.run = message.run;
     this.state.adopt(message);

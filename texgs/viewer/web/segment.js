@@ -15,7 +15,7 @@ export class SegmentTool {
     canvas.addEventListener("click", (event) => this.#click(event));
     canvas.addEventListener("keydown", (event) => {
       if (!this.#model) return;
-      if (event.key === "Enter") this.#add(canvas.clientWidth / 2, canvas.clientHeight / 2, !event.shiftKey);
+      if (event.key === "Enter") this.#add(canvas.clientWidth / 2, canvas.clientHeight / 2, event.shiftKey);
       if (event.key === "Escape") this.#leave();
     });
     new ResizeObserver(() => this.#clear()).observe(canvas);
@@ -50,11 +50,12 @@ export class SegmentTool {
   #click(event) {
     const { clientX, clientY, shiftKey, offsetX, offsetY } = event;
     const moved = Math.hypot(clientX - this.#down?.clientX, clientY - this.#down?.clientY);
-    if (this.#model && !this.#isBusy && moved <= STILL) this.#add(offsetX, offsetY, !shiftKey);
+    if (this.#model && !this.#isBusy && moved <= STILL) this.#add(offsetX, offsetY, shiftKey);
   }
 
-  #add(x, y, positive) {
+  #add(x, y, hasShift) {
     if (this.#isBusy) return;
+    const positive = !hasShift && !get("segment-negative").checked;
     if (!positive && !this.isLocked) {
       this.#page.notices.tell("Click on the object first.", "info");
       return;
@@ -67,6 +68,7 @@ export class SegmentTool {
 
   #clear() {
     this.#points = [];
+    get("segment-negative").checked = false;
     this.#picture = null;
     this.#asked += 1; // masks that are on their way are none of ours
     this.#show();
@@ -127,7 +129,7 @@ export class SegmentTool {
 
   #show() {
     get("segment-hint").textContent = this.isLocked
-      ? "Click adds to it, Shift and click takes away from it. The camera stays until you clear the points."
+      ? "Clicks add to it, with Shift they take away. The camera stays until you clear the points."
       : `Turn ${this.#model} as you like, and click on what belongs to the segment.`;
     get("segment-make").disabled = get("segment-clear").disabled = !this.isLocked || this.#isBusy;
     get("segment-progress").hidden = !this.#isBusy;
