@@ -12,7 +12,7 @@ from texgs.config.stage import for_tf
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.core.checksum import Checksums
-from texgs.report.results import Comparison, EditResult, FitResult, PseResult, plain
+from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
 from texgs.track import PARENT
 
 GOLD = ("edit=gold", "edit.text.size=64,128")
@@ -78,3 +78,13 @@ def test_the_workflow_says_which_run_a_job_is_inside_of(tmp_path, monkeypatch):
     told = {output.as_posix(): {"parent": "abc", "swept": {"fit.seed": "1"}}}
     (tmp_path / "runs.json").write_text(json.dumps(told))
     assert of_workflow(output) == (Tracking("sqlite:///x.db", "texgs", "abc"), {"fit.seed": "1"})
+
+
+def test_pictures_of_a_gallery_have_a_metric_each():
+    shown = [Shown("polar", "error", "0°", psnr=30.0), Shown("polar", "error", "30°", psnr=20.0)]
+    result = GalleryResult("relight", [Shown("polar", "as fitted", "0°"), *shown])
+    assert scalars(plain(result)) == {
+        "shown_psnr/polar/error/0°": 30.0,
+        "shown_psnr/polar/error/30°": 20.0,
+        "shown_psnr": 25.0,
+    }

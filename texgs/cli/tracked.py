@@ -115,11 +115,18 @@ def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
 
 
 def rows(key: str, listed: list[dict[str, Any]]) -> dict[str, float]:
-    """The numbers of rows with titles, such as `pse_psnr/other colours`, and the mean of each column."""
-    found: dict[str, float] = {}
-    for column in dict.fromkeys(name for row in listed for name in row if name != "title"):
-        values = {row["title"]: row[column] for row in listed if isinstance(row.get(column), int | float)}
-        found |= {f"{key}_{column}/{title}": float(value) for title, value in values.items()}
+    """The numbers of rows with names, such as `pse_psnr/other colours`, and the mean of each column.
+
+    All texts of a row together are its name.
+    """
+    single: dict[str, float] = {}
+    for column in dict.fromkeys(name for row in listed for name in row):
+        values = {
+            "/".join(text for text in row.values() if isinstance(text, str)): float(row[column])
+            for row in listed
+            if isinstance(row.get(column), int | float)
+        }
+        single |= {f"{key}_{column}/{name}": value for name, value in values.items()}
         if values:
-            found[f"{key}_{column}"] = fmean(values.values())
-    return found
+            single[f"{key}_{column}"] = fmean(values.values())
+    return single
