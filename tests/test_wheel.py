@@ -98,6 +98,7 @@ def test_the_demo_from_the_volume_to_the_report(texgs, project):
     words = ["run", "experiment=demo", *TINY.split(), *SHORT.split()]
     said = run(texgs, *words, cwd=project, OMP_NUM_THREADS="1")
     assert "Done: results/report.html" in said
+    assert "texgs view results/orbital/scene/demo/compose/scene.yaml" in said
     assert (project / "results" / "report.html").stat().st_size > 10_000
     again = run(texgs, *words, cwd=project)
     assert "Done" not in again, "a second time there is nothing to do"
