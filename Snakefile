@@ -44,7 +44,9 @@ onsuccess:
     report = f"{RESULTS}/report.html"
     print("Done:", report if report in made else "what was asked for")
     for scene in sorted(file for file in made if file.endswith("/compose/scene.yaml"))[:1]:
-        print("View:", shlex.quote(str(Path(sys.executable).with_name("texgs"))), "view", shlex.quote(scene))
+        print(
+            "View:", shlex.quote(str(Path(sys.executable).with_name("texgs"))), "view", shlex.quote(scene)
+        )
     if (PLAN.tracking or "").startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")
 
