@@ -43,10 +43,10 @@ onsuccess:
     made = finish("FINISHED")
     report = f"{RESULTS}/report.html"
     print("Done:", report if report in made else "what was asked for")
-    for scene in sorted(file for file in made if file.endswith("/compose/scene.yaml"))[:1]:
-        print(
-            "View:", shlex.quote(str(Path(sys.executable).with_name("texgs"))), "view", shlex.quote(scene)
-        )
+    scenes = [Path(file).with_name("scene.yaml") for file in PLAN.done("compose") if file in made]
+    if scenes:
+        program = Path(sys.executable).with_name("texgs")
+        print("View:", shlex.join([str(program), "view", str(scenes[0])]))
     if (PLAN.tracking or "").startswith("sqlite"):
         print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {PLAN.tracking}")
 
