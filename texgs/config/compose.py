@@ -1,7 +1,6 @@
 """Compose conf/ and overrides into one checked configuration; a mistake is a sentence that names the key."""
 
 import copy
-import pickle
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +17,7 @@ from texgs.config.check import check, check_below
 from texgs.config.composition import Places, Words, composition, schema
 from texgs.config.project import folders
 from texgs.config.slips import sentence
+from texgs.config.typed import Written
 from texgs.core.errors import ConfigError
 
 ALONE = ("fit", "edit")  # groups that depend on no other one but the experiment
@@ -87,7 +87,7 @@ def configuration(made: dict[str, Any]) -> DictConfig:
     nodes: dict[str, Any] = {}
     for key in map(str, schema()):
         part = {key: made[key]} if key in tables else plain
-        node = _checked(pickle.dumps(part))._get_node(key)
+        node = _checked(Written.of(part))._get_node(key)
         nodes[key] = copy.deepcopy(node) if "${" in str(made.get(key)) else node
     config = together(nodes)
     with read_write(config):
@@ -96,12 +96,11 @@ def configuration(made: dict[str, Any]) -> DictConfig:
 
 
 @lru_cache(maxsize=1024)
-def _checked(part: bytes) -> DictConfig:
-    """The schema with the values of some keys at its top, pickled, that are checked."""
-    values = pickle.loads(part)
-    OmegaConf.to_container(OmegaConf.create(values), throw_on_missing=True)
-    config = cast(DictConfig, OmegaConf.merge(schema(), values))  # refuses keys added by +key=value
-    for key in values:
+def _checked(part: Written) -> DictConfig:
+    """The schema with the values of some keys at its top, which are checked."""
+    OmegaConf.to_container(OmegaConf.create(part.values), throw_on_missing=True)
+    config = cast(DictConfig, OmegaConf.merge(schema(), part.values))  # refuses keys added by +key=value
+    for key in part.values:
         check_below(key, config)
     return config
 
