@@ -5,13 +5,14 @@ from contextlib import contextmanager
 
 import pytest
 
+MISSING = "needs Playwright: pip install '.[browser]'"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 
 
 def found():
     """The path of a Chromium; skips the test that asks where it or Playwright is missing."""
-    pytest.importorskip("playwright.sync_api", reason="needs Playwright: pip install '.[browser]'")
+    pytest.importorskip("playwright.sync_api", reason=MISSING)
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
     if path is None:
         pytest.skip(f"needs a browser on the PATH: {', '.join(BROWSERS)}")

@@ -3,7 +3,6 @@
 import io
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -15,18 +14,15 @@ import torch
 from PIL import Image
 
 from tests.edit.lift_scenes import two_balls
+from tests.viewer.browser import MISSING, browser
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 
-try:
-    from playwright.sync_api import expect, sync_playwright
-except ImportError:
-    pytest.skip("playwright is not installed: pip install 'texgs[browser]'", allow_module_level=True)
+expect = pytest.importorskip("playwright.sync_api", reason=MISSING).expect
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
 LINK = "#" + "&".join(f"{key}={value}" for key, value in PLACE.items()) + "&target=0,0,0"
 WAIT = 60_000  # milliseconds, on a busy machine
@@ -35,12 +31,8 @@ JPEG = 1.5  # levels of 255: what quality 95 costs on average
 
 @pytest.fixture(scope="module")
 def chromium():
-    if CHROMIUM is None:
-        pytest.skip("there is no Chromium on the PATH: apt-get install chromium")
-    with sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM)
-        yield browser
-        browser.close()
+    with browser() as launched:
+        yield launched
 
 
 @contextmanager

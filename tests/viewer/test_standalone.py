@@ -29,7 +29,7 @@ from texgs.viewer.modules import web_file
 HOSTILE = "</script><b>&'\""
 LEVELS = 3  # of 255, see test_webgl.py
 SIZE = {"width": 900, "height": 400}  # of the window; a part of it is the picture
-REST = int(re.search(r"const REST = (\d+);", web_file("standalone.js"))[1])  # milliseconds
+REST = int(re.search(r"const REST = (\d+);", web_file("scene_page.js"))[1])  # milliseconds
 
 
 @pytest.fixture(scope="module")

@@ -89,3 +89,10 @@ export function tick(label, edit, properties = {}) {
   const row = element("label", { className: "tick" }, input, label);
   return { row, show: (value) => { input.checked = value; } };
 }
+
+/** Save a file on the computer of the browser. */
+export function download(blob, name) {
+  const link = element("a", { href: URL.createObjectURL(blob), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
