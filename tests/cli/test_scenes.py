@@ -9,21 +9,16 @@ import yaml
 from PIL import Image
 
 from tests.fields.surfels.test_composition import ball
+from tests.scene.balls import write_balls
 from texgs.cli.main import main
-from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.texture_file import write_texture
-from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.scene_file import read_scene
 
 
 @pytest.fixture
 def scene(tmp_path):
     """scene.yaml with two models."""
-    models = {}
-    for index, name in enumerate(("TF01", "TF02")):
-        path = write_model(tmp_path / f"{name}.safetensors", ball(index + 1))
-        models[name] = SceneModel(path)
-    return write_scene(tmp_path / "scene.yaml", Scene(models))
+    return write_balls(tmp_path)
 
 
 def render(scene, output, *words):
