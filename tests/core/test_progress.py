@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core import progress as module
-from texgs.core.progress import progress
+from texgs.core.progress import progress, watched
 
 
 class Terminal(io.StringIO):
@@ -88,7 +88,7 @@ def test_terminal_shows_a_bar(monkeypatch):
 def test_tqdm_is_not_imported_for_a_log_file():
     code = (
         "import sys\n"
-        "from texgs.core.progress import progress\n"
+        "from texgs.core.progress import progress, watched\n"
         "list(progress(range(3), title='a', unit='b'))\n"
         "sys.exit('tqdm' in sys.modules)"
     )
@@ -96,3 +96,18 @@ def test_tqdm_is_not_imported_for_a_log_file():
     root = Path(__file__).parents[2]
     child = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
     assert child.stderr.startswith("a: 3 of 3 b, ")
+
+
+def test_a_watch_is_told_of_each_item_and_may_end_the_loop():
+    told, seen = [], []
+
+    def watch(title, done, total):
+        told.append((title, done, total))
+        if done == 2:
+            raise RuntimeError("enough")
+
+    with watched(watch), pytest.raises(RuntimeError, match="enough"):
+        seen.extend(progress("abc", title="letters", unit="letter"))
+    assert told == [("letters", 1, 3), ("letters", 2, 3)]
+    assert list(progress("abc", title="letters", unit="letter")) == ["a", "b", "c"]
+    assert len(told) == 2

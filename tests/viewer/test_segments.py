@@ -22,7 +22,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment
 from texgs.viewer.messages import Orbit
-from texgs.viewer.segments import LENS, Stopped, Watched, alone
+from texgs.viewer.segments import LENS, alone
 from texgs.volume.cameras import icosphere_of
 
 FRONT = Orbit((0.0, 0.0, 0.0), -90, 0, 4.0, 22.0, 120, 120)  # on +z
@@ -179,7 +179,7 @@ def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(balls, monkeypatc
         await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
         await asyncio.to_thread(masks.reached.wait, 30)
         await browser.send(type="segment", part="balls/other", **clicked((RED, True)))
-        assert "another one is being made" in (await browser.next("notice"))["text"]
+        assert "a job is at work already" in (await browser.next("notice"))["text"]
         await browser.send(type="edit", part="balls", key="opacity", value=0.5)
         while not (await browser.next("scene"))["past"]:
             pass  # edits go on meanwhile
@@ -194,18 +194,6 @@ def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(balls, monkeypatc
     with_page(balls[0], work)
     assert masks.calls == 2
     assert not list(balls[0].parent.glob("scene-*"))
-
-
-def test_a_watched_mask_model_tells_how_far_it_is():
-    told, stop = [], threading.Event()
-    watched = Watched(GrabCut(), 4, stop, told.append)
-    image = torch.rand(20, 20, 3)
-    for _ in range(2):
-        watched(image, torch.tensor([[5.0, 5.0]]), torch.tensor([True]))
-    assert told == [0.25, 0.5]
-    stop.set()
-    with pytest.raises(Stopped, match="cancelled"):
-        watched(image, torch.tensor([[5.0, 5.0]]), torch.tensor([True]))
 
 
 def test_a_model_alone_has_no_edits(balls):

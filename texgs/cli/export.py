@@ -1,25 +1,18 @@
 """Export a scene or a model: Gaussians, points or a mesh, a compact model file, or a page for a browser."""
 
 import argparse
-from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from texgs.config.fields import Kind
-    from texgs.core.camera import Camera
-    from texgs.fields.field import Field, Look
-    from texgs.fields.surfels.model import Surfels
-    from texgs.raster import Render
     from texgs.scene.scene import Scene, SceneModel
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact", "html")
 SCENES = (".yaml", ".yml")
 ENDINGS = {"compact": ".texgs", "html": ".html"}  # of kinds that are not .ply
 DEFAULTS = {".ply": "3dgs", **{ending: kind for kind, ending in ENDINGS.items()}}
-OF_MODELS = ("release", "compact")  # need what surfels of different models do not share
+NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # arguments that `Export` has, too
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -51,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
+    from texgs.scene.export_file import Export, export_model, export_scene
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
@@ -58,29 +52,14 @@ def run(arguments: argparse.Namespace) -> int:
     if kind == "html":
         print(of_page(arguments, scene))
         return 0
+    numbers = {name: getattr(arguments, name) for name in NUMBERS}
+    export = Export(kind, **numbers)
     if scene is not None and arguments.model is None:
-        print(of_scene(arguments, scene, kind))
+        print(export_scene(arguments.to, scene, export))
         return 0
     field = open_field(arguments.source) if scene is None else chosen(scene, arguments.model).open()[0]
-    print(of_model(arguments, field.to(arguments.device), kind))
+    print(export_model(arguments.to, field, export))
     return 0
-
-
-def require_export(field: "Kind[Any]", kind: str) -> None:
-    """Require of a kind of field that it can be exported as something.
-
-    Raises:
-        ArgumentError: naming what it can be exported as.
-    """
-    from texgs.config.fields import kinds
-    from texgs.core.errors import ArgumentError
-
-    if kind not in field.exports:
-        able = " or ".join(name for name, other in kinds().items() if kind in other.exports)
-        raise ArgumentError(
-            f"--kind {kind}: expected {able}, got {field.name}, which can be exported as "
-            f"{' or '.join(field.exports) or 'nothing'}"
-        )
 
 
 def chosen(scene: "Scene", name: str) -> "SceneModel":
@@ -103,6 +82,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
         ArgumentError: if the ending of the file is of another kind, or a scene has no such thing.
     """
     from texgs.core.errors import ArgumentError
+    from texgs.scene.export_file import OF_MODELS
 
     ending = arguments.to.suffix
     kind: str | None = arguments.kind or DEFAULTS.get(ending)
@@ -125,6 +105,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
 def of_page(arguments: argparse.Namespace, scene: "Scene | None") -> Path:
     """Export a scene, one model of it or a model file as a web page."""
     from texgs.fields import files
+    from texgs.scene.export_file import require_export
     from texgs.scene.scene import Scene, SceneModel
     from texgs.viewer.standalone import write_page
 
@@ -136,79 +117,3 @@ def of_page(arguments: argparse.Namespace, scene: "Scene | None") -> Path:
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
     return write_page(arguments.to, scene, arguments.to.stem)
-
-
-def of_scene(arguments: argparse.Namespace, scene: "Scene", kind: str) -> Path:
-    """Export the visible models of a scene as one."""
-    from texgs.fields import files
-    from texgs.fields.gaussians.composition import JoinedGaussians
-    from texgs.fields.gaussians.ply import write_ply
-    from texgs.fields.surfels.composition import Composition
-    from texgs.scene.export import joined
-
-    composed, edits = scene.open(arguments.device), scene.edits
-    field = files.kind_of(next(iter(scene.models.values())).file)
-    require_export(field, kind)
-    if kind == "mesh":
-        look: Look = "unshaded" if "unlit" in field.can else "shaded"
-        return write_fused(arguments, partial(composed.render, edits=edits, look=look), field.depth)
-    if isinstance(composed, JoinedGaussians):
-        return write_ply(arguments.to, composed.edited(edits))
-    return of_surfels(arguments, joined(cast(Composition, composed).parts, edits), kind)
-
-
-def of_model(arguments: argparse.Namespace, model: "Field", kind: str) -> Path:
-    """Export one model with all that the file can hold of it."""
-    from texgs.config.fields import kinds
-    from texgs.fields.gaussians.model import Gaussians
-    from texgs.fields.gaussians.ply import write_ply
-    from texgs.fields.surfels.composition import Composition
-    from texgs.fields.surfels.model import Surfels
-
-    field = kinds()[model.kind]
-    require_export(field, kind)
-    if kind == "mesh":
-        if isinstance(model, Surfels) and model.stage != "surfels":
-            return write_fused(arguments, partial(Composition([model]).render, look="unshaded"), field.depth)
-        return write_fused(arguments, model.render, field.depth)
-    if isinstance(model, Gaussians):
-        return write_ply(arguments.to, model)
-    return of_surfels(arguments, cast(Surfels, model), kind)
-
-
-def of_surfels(arguments: argparse.Namespace, model: "Surfels", kind: str) -> Path:
-    """Export surfels as they are, without rendering them."""
-    from texgs.fields.surfels.compact import seen_surfels, write_compact
-    from texgs.fields.surfels.ply import write_ply
-    from texgs.scene.export import write_points
-
-    if kind == "compact":
-        seen = seen_surfels(model, cameras(arguments)) if arguments.drop_unseen else None
-        return write_compact(arguments.to, model, seen)
-    if kind == "points":
-        return write_points(arguments.to, model, arguments.opacity)
-    return write_ply(arguments.to, model, kind)
-
-
-def write_fused(arguments: argparse.Namespace, render: "Callable[..., Render]", depth: str) -> Path:
-    """Write the mesh of what `render` shows, with the depth of that name."""
-    import torch
-
-    from texgs.scene.mesh import fuse, write_mesh
-
-    black = torch.zeros(3, device=arguments.device)
-    placed = [camera.to(arguments.device) for camera in cameras(arguments)]
-    mesh = fuse(lambda camera: render(camera, background=black, outputs=(depth,)), placed, arguments.voxel)
-    return write_mesh(arguments.to, mesh)
-
-
-def cameras(arguments: argparse.Namespace) -> "list[Camera]":
-    """As far from the scene as the paper's training views.
-
-    Raises:
-        ArgumentError: if no icosphere has so many views.
-    """
-    from texgs.core.lens import Lens
-    from texgs.volume.cameras import icosphere_of
-
-    return icosphere_of(arguments.views, Lens().square(arguments.size), "--views")

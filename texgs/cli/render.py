@@ -27,7 +27,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--mode",
         default="shaded",
-        help="shaded, unshaded, normal, depth, alpha, ambient, diffuse, specular or shininess (%(default)s)",
+        help="shaded, unshaded, normal, depth, alpha, texture, discs, or a factor of the material: ambient, "
+        "diffuse, specular or shininess (%(default)s)",
     )
     parser.add_argument("--path", choices=PATHS, default="view", help="camera or light path (%(default)s)")
     parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light 61")

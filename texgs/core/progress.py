@@ -1,14 +1,34 @@
 """Progress of a long loop: a bar on a terminal, a plain line now and then in a log file."""
 
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from operator import length_hint
 from time import monotonic
 from typing import TypeVar
 
 T = TypeVar("T")
 
+Watch = Callable[[str, int, int | None], None]
+
 SECONDS_BETWEEN_LINES = 5.0
+_watch: ContextVar[Watch | None] = ContextVar("watch", default=None)
+
+
+@contextmanager
+def watched(watch: Watch) -> Iterator[None]:
+    """Tell a function about each item that a loop of this thread has done within the block.
+
+    Args:
+        watch: is called with the title of the loop, the number of items done and their total, where that is
+            known. What it raises ends the loop.
+    """
+    before = _watch.set(watch)
+    try:
+        yield
+    finally:
+        _watch.reset(before)
 
 
 def progress(iterable: Iterable[T], total: int | None = None, *, title: str, unit: str) -> Iterator[T]:
@@ -33,12 +53,20 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
     """
     if total is None:
         total = length_hint(iterable) or None
+    watch = _watch.get()
+    for done, item in enumerate(_shown(iterable, total, title, unit), start=1):
+        yield item
+        if watch is not None:
+            watch(title, done, total)
+
+
+def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterable[T]:
+    """The items, in a bar or with plain lines."""
     if not sys.stderr.isatty():
-        yield from _lines(iterable, total, title, unit)
-        return
+        return _lines(iterable, total, title, unit)
     from tqdm import tqdm
 
-    yield from tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
+    return tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
 
 
 def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterator[T]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -49,6 +49,7 @@ def stylize(
     clip: FeatureTerm | None = None,
     surfels: Tensor | None = None,
     title: str = "style",
+    show: Callable[[Callable[[], Surfels]], None] | None = None,
 ) -> Stylized:
     """Give a model the style of a picture (the paper's section Image-Driven NPSE).
 
@@ -66,6 +67,7 @@ def stylize(
         clip: a differentiable loss [] of an image [H, W, 3] in [0, 1], for a `lambda_s` below 1.
         surfels: [N] bool, the ones to change; by default all. Texels and colours of others stay, bit for bit.
         title: of the progress bar.
+        show: is called after each iteration with a function that makes the model as it is then.
 
     Raises:
         ArgumentError, ShapeError: if the model has no texture, there is no view, or a term is missing.
@@ -82,6 +84,8 @@ def stylize(
         terms = steps.step(camera, lights[index], iteration, watch)
         for name, value in terms.items():
             losses[name].append(value)
+        if show is not None:
+            show(steps.result)
     return Stylized(steps.result(), History(dict(losses), dict(watch.seconds)))
 
 

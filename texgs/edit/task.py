@@ -23,6 +23,10 @@ from texgs.volume.view_set import View, read_views
 Settings = TypeVar("Settings")
 
 
+def ignore(name: str, model: Callable[[], Surfels]) -> None:
+    """Show nobody."""
+
+
 @dataclass(frozen=True, eq=False)
 class Task(Generic[Settings]):
     """One edit of one scene."""
@@ -37,6 +41,7 @@ class Task(Generic[Settings]):
     lens: Lens  # of the views, but for the size of images
     title: str  # of progress bars
     followed: Mapping[str, str] = field(default_factory=dict)  # by model, where not as settings say
+    show: Callable[[str, Callable[[], Surfels]], None] = ignore  # is offered parts on their way
 
     def settings_for(self, model: str) -> Settings:
         """Settings with the picture or the instruction that a model follows."""

@@ -14,7 +14,7 @@ from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 
 Role = Literal["geometry", "appearance"]
-Look = Literal["shaded", "unshaded", "ambient", "diffuse", "specular", "shininess"]
+Look = Literal["shaded", "unshaded", "texture", "discs", "ambient", "diffuse", "specular", "shininess"]
 
 
 class Field(Protocol):

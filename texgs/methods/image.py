@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.clip import BACKBONES
@@ -105,6 +106,7 @@ def stylist(
             clip=clip,
             surfels=surfels,
             title=f"{task.title} {task.edit.name}, {name}",
+            show=partial(task.show, name),
         )
         losses[name] = result.history.losses
         seconds[name] = {"all": time.monotonic() - start, **result.history.seconds}

@@ -16,9 +16,20 @@ from texgs.core.memory import require_memory
 from texgs.fields.field import Composed, Look
 from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
+from texgs.raster.shading import MATERIAL
 
 Mode = Literal[
-    "shaded", "unshaded", "normal", "depth", "alpha", "ambient", "diffuse", "specular", "shininess"
+    "shaded",
+    "unshaded",
+    "normal",
+    "depth",
+    "alpha",
+    "texture",
+    "discs",
+    "ambient",
+    "diffuse",
+    "specular",
+    "shininess",
 ]
 SHININESS = 100.0  # shown as white
 BYTES = 64  # of memory for a pixel: the images of the rasterizer, over a background, clamped and rounded
@@ -35,8 +46,9 @@ def frame(
     """One frame [H, W, 3], uint8.
 
     Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
-    frame, both over the background; alpha is white where opaque; factors of the material are grey over black,
-    shininess divided by 100.
+    frame, both over the background; alpha is white where opaque; texels are around grey; discs are surfels of
+    one standard deviation, as if opaque; factors of the material are grey over black, shininess divided by
+    100.
 
     Args:
         scene: to show.
@@ -58,9 +70,8 @@ def frame(
     behind = torch.tensor(background, device=scene.device)
     look: Look = mode if mode in get_args(Look) else "shaded"  # type: ignore[assignment]
     outputs = {"normal": ("normal",), "depth": ("depth",)}.get(mode, ())
-    is_factor = mode in get_args(Look)[2:]
     render = scene.render(
-        camera, light, edits, look=look, background=None if is_factor else behind, outputs=outputs
+        camera, light, edits, look=look, background=None if mode in MATERIAL else behind, outputs=outputs
     )
     shown = pixels(render, mode, behind)
     return shown.clamp(0, 1).mul(255).round().to(torch.uint8).cpu().numpy()

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 
 Entry = SceneModel | SceneSegment
+
+
+def part_names(scene: Scene) -> list[str]:
+    """All parts: models, and segments of these."""
+    segments = [f"{model}/{name}" for model, entry in scene.models.items() for name in entry.segments]
+    return [*scene.models, *segments]
 
 
 def split(scene: Scene, part: str) -> tuple[str, str | None]:
@@ -60,6 +68,21 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
     if not isinstance(entry, SceneModel):
         raise ArgumentError(f"expected a segment to remove, got the model {part}")
     return replace(scene, models={**scene.models, model: entry})
+
+
+def with_textures(scene: Scene, files: Mapping[str, Path | None]) -> Scene:
+    """The scene with other texture files for some of its parts.
+
+    Args:
+        scene: to change.
+        files: by part; None stands for the texels that a part was fitted with.
+
+    Raises:
+        ArgumentError: if there is no such part.
+    """
+    for part, file in files.items():
+        scene = replaced(scene, part, replace(entry_of(scene, part), texture=file))
+    return scene
 
 
 def place_of(part: str) -> str:

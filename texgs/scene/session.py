@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.scene.frame import Mode, frame
-from texgs.scene.parts import entry_of, place_of, replaced, require_new, split
+from texgs.scene.parts import entry_of, place_of, replaced, require_new, split, with_textures
 from texgs.scene.pick import Picked, pick
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
@@ -90,7 +90,15 @@ class Session:
         Raises:
             ArgumentError, ShapeError: if there is no such part, or the file is not one of its model.
         """
-        self._push_read(part, replace(entry_of(self.scene, part), texture=file))
+        self.set_textures({part: file})
+
+    def set_textures(self, files: Mapping[str, Path | None]) -> None:
+        """Give several parts other texels in one step; see `set_texture`.
+
+        Raises:
+            ArgumentError, ShapeError: as `set_texture`; no part has another texture then.
+        """
+        self._push_read(with_textures(self.scene, files), {split(self.scene, part)[0] for part in files})
 
     def set_file(self, part: str, file: Path) -> None:
         """Put another file in the place of a model or a segment.
@@ -98,7 +106,8 @@ class Session:
         Raises:
             ArgumentError, ShapeError: if there is no such part, or the file is not one for it.
         """
-        self._push_read(part, replace(entry_of(self.scene, part), file=file))
+        scene = replaced(self.scene, part, replace(entry_of(self.scene, part), file=file))
+        self._push_read(scene, {split(self.scene, part)[0]})
 
     def set_light(self, light: Light = HEADLIGHT) -> None:
         """Let another light shine on the scene."""
@@ -126,7 +135,7 @@ class Session:
         entry = self.scene.models[model]
         require_name(name, place_of(part))
         before = entry.segments.get(str(name), SceneSegment(file, entry.edit, entry.texture))
-        self._push_read(part, replace(before, file=file))
+        self._push_read(replaced(self.scene, part, replace(before, file=file)), {model})
 
     def make_segment(self, part: str, mask: Tensor, file: Path, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it.
@@ -167,6 +176,25 @@ class Session:
             ArgumentError: if there is no such segment.
         """
         self._push(replaced(self.scene, part, None))
+
+    def rename_segment(self, part: str, name: str) -> None:
+        """Give a segment another name; it keeps its place among those of its model.
+
+        Raises:
+            ArgumentError: if there is no such segment, or it cannot have the name.
+        """
+        model, segment = split(self.scene, part)
+        if segment is None:
+            raise ArgumentError(f"expected a segment to rename, got the model {part}")
+        entry_of(self.scene, part)
+        require_name(name, place_of(part))
+        if name == segment:
+            return
+        require_new(self.scene, f"{model}/{name}")
+        entry = self.scene.models[model]
+        names = {each: name if each == segment else each for each in entry.segments}
+        renamed = replace(entry, segments={names[each]: value for each, value in entry.segments.items()})
+        self._push(replaced(self.scene, model, renamed))
 
     def undo(self) -> bool:
         """Take the latest change back; whether there was one."""
@@ -229,14 +257,13 @@ class Session:
 
     # ---- History ------------------------------------------------------------
 
-    def _push_read(self, part: str, entry: Any) -> None:
-        """Add a change that brings a file, which is read first."""
-        scene = replaced(self.scene, part, entry)
-        model, _ = split(self.scene, part)
-        try:
-            scene.models[model].open()
-        except TexgsError as error:
-            raise type(error)(f"models.{model}: {error}") from error
+    def _push_read(self, scene: Scene, models: Iterable[str]) -> None:
+        """Add a scene of which models have other files, which are read first."""
+        for model in models:
+            try:
+                scene.models[model].open()
+            except TexgsError as error:
+                raise type(error)(f"models.{model}: {error}") from error
         self._push(scene)
 
     def _push(self, scene: Scene) -> None:

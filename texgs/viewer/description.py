@@ -13,11 +13,12 @@ from torch import Tensor
 from texgs.config.fields import Kind
 from texgs.core.lens import Lens
 from texgs.core.light import Light
-from texgs.fields.field import Composed, Look
+from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.gaussians.composition import JoinedGaussians
 from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
+from texgs.raster.shading import MATERIAL
 from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel
 
@@ -25,7 +26,6 @@ LENS = Lens()
 HOME = {"azimuth": 30.0, "polar": 20.0}  # degrees, as `texgs render` has them
 STRAYS = 0.01  # part of the primitives, far from all others, that bounds leave out
 MARGIN = 1.1  # of the first view around the bounds
-LIT = get_args(Look)[2:]  # factors of a material
 
 
 def describe(
@@ -44,9 +44,7 @@ def describe(
     keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
     palettes = zip(composed.palettes, has_palette(composed), strict=True)
     models = [
-        describe_model(
-            model, entry, kind.name, palette, [k for k in keys if has or k != "palette"] + segments
-        )
+        describe_model(model, entry, kind.name, palette, [*abilities(keys, has), *segments])
         for (model, entry), (palette, has) in zip(scene.models.items(), palettes, strict=True)
     ]
     center, radius = bounds_of(composed) if bounds is None else bounds
@@ -79,6 +77,11 @@ def describe_model(
     }
 
 
+def abilities(keys: list[str], has_palette: bool) -> list[str]:
+    """What can be edited of a model; only one with a palette has a texture, which can get a new look."""
+    return [*keys, "look"] if has_palette else [key for key in keys if key != "palette"]
+
+
 def describe_light(light: Light) -> dict[str, float] | None:
     """Angles of a directional light, degrees; None for the headlight."""
     return None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar}
@@ -86,7 +89,8 @@ def describe_light(light: Light) -> dict[str, float] | None:
 
 def modes_of(kind: Kind[Any]) -> list[str]:
     """What frames of a kind of field can show."""
-    needs = {"unshaded": "unlit", "normal": "normals", **dict.fromkeys(LIT, "relight")}
+    needs = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
+    needs |= dict.fromkeys(MATERIAL, "relight")
     return [mode for mode in get_args(Mode) if mode not in needs or needs[mode] in kind.can]
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+import torch
 from PIL import Image
 
 from texgs.scene.scene import Scene
@@ -48,7 +49,8 @@ class Frames:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="render")
+        threads = torch.get_num_threads()
+        self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))
 
     async def frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
         """A header and a JPEG picture, see `packed`.

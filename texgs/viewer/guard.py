@@ -49,7 +49,8 @@ def guard(token: str, host: str) -> Middleware:
             raise web.HTTPForbidden(text="Wrong token: open the address that texgs view printed.")
         if not is_own_host(name, host):
             raise web.HTTPForbidden(text="Wrong host: open the address that texgs view printed.")
-        if not is_own_origin(request.headers.get("Origin"), name, is_socket(request)):
+        needs_origin = is_socket(request) or request.method != "GET"
+        if not is_own_origin(request.headers.get("Origin"), name, needs_origin):
             raise web.HTTPForbidden(text="Wrong origin: open the address that texgs view printed.")
         response = await handler(request)
         if not response.prepared:

@@ -16,6 +16,7 @@ LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
 MOST_PIXELS = 4096  # of a side
 FARTHEST = 1000.0  # world units
 MOST_POINTS = 100
+MOST_PARTS = 1000
 
 
 @dataclass(frozen=True)
@@ -104,6 +105,32 @@ class Segment:
 
 
 @dataclass(frozen=True)
+class Look:
+    """Give parts a new look, by a picture or by an instruction."""
+
+    parts: tuple[str, ...]  # none: all models
+    style: str  # name of a picture; "" with an instruction
+    instruction: str  # "" with a picture
+    is_preview: bool  # show what it would be like, and change nothing
+
+
+@dataclass(frozen=True)
+class Export:
+    """Write a file for the page to save."""
+
+    kind: str  # mp4 or gif, a turntable; html; or as `texgs.scene.export_file.Export` has it
+    view: View  # that a turntable begins with
+
+
+@dataclass(frozen=True)
+class Rename:
+    """Give a segment another name."""
+
+    part: str  # MODEL/SEGMENT
+    name: str  # of the segment
+
+
+@dataclass(frozen=True)
 class Remove:
     """Give the surfels of a segment back to its model."""
 
@@ -112,10 +139,10 @@ class Remove:
 
 @dataclass(frozen=True)
 class Cancel:
-    """Stop the segment that is being made."""
+    """Stop the job that is at work, and show no preview any more."""
 
 
-Message = View | Edit | Undo | Redo | Save | Mask | Segment | Remove | Cancel
+Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Export | Rename | Remove | Cancel
 Reader = Callable[[Mapping[str, Any]], Message]
 
 
@@ -205,6 +232,31 @@ def _segment(values: Mapping[str, Any]) -> Segment:
     return Segment(words("part", values.get("part")), clicked_of(values))
 
 
+def _look(values: Mapping[str, Any]) -> Look:
+    known(values, ("parts", "style", "instruction", "preview"), "look")
+    parts = values.get("parts", [])
+    if not isinstance(parts, list) or len(parts) > MOST_PARTS:
+        raise ArgumentError(f"parts: expected a list of at most {MOST_PARTS}, got {parts!r:.100}")
+    return Look(
+        tuple(words("parts", each) for each in parts),
+        words("style", values.get("style", "")),
+        words("instruction", values.get("instruction", "")),
+        flag("preview", values.get("preview", False)),
+    )
+
+
+def _export(values: Mapping[str, Any]) -> Export:
+    known(values, ("kind", "view"), "export")
+    view = values.get("view")
+    known(view, None, "view")
+    return Export(words("kind", values.get("kind")), view_of(view))  # type: ignore[arg-type]
+
+
+def _rename(values: Mapping[str, Any]) -> Rename:
+    known(values, ("part", "name"), "rename")
+    return Rename(words("part", values.get("part")), words("name", values.get("name")))
+
+
 def _remove(values: Mapping[str, Any]) -> Remove:
     known(values, ("part",), "remove")
     return Remove(words("part", values.get("part")))
@@ -243,6 +295,9 @@ READERS: dict[str, Reader] = {
     "save": _save,
     "mask": _mask,
     "segment": _segment,
+    "look": _look,
+    "export": _export,
+    "rename": _rename,
     "remove": _remove,
     "cancel": _bare(Cancel()),
 }

@@ -6,11 +6,14 @@ import asyncio
 import json
 import logging
 from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from aiohttp import web
 
 from texgs.core.errors import TexgsError, first_line
+from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
 from texgs.viewer.messages import Mask, View
 from texgs.viewer.segments import Segmenter
@@ -35,10 +38,10 @@ class Page:
     ) -> None:
         self._socket, self._edits, self._frames, self._segmenter = socket, edits, frames, segmenter
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
-        self._scene: dict[str, Any] | None = None
+        self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
         self._mask: Mask | None = None
-        self._job: dict[str, Any] | None = None
+        self._trial: dict[str, Path | None] = {}
         self._pace = Pace()
         self.answered = 0  # messages that change the scene
         self._wake = asyncio.Event()
@@ -53,15 +56,18 @@ class Page:
         self._mask = mask
         self._wake.set()
 
-    def tell_job(self, part: str, done: float | None) -> None:
-        """Send how far a segment is, in place of what waits; None: it has ended."""
-        self._job = {"type": "job", "part": part, "done": done}
-        self._wake.set()
+    def tell_job(self, title: str, done: float | None, failed: bool = False) -> None:
+        """Send how far a job is, in place of what waits; None: it has ended, and may have failed."""
+        self._tell_newest({"type": "job", "title": title, "done": done, "failed": failed})
 
     def tell_scene(self, message: dict[str, Any]) -> None:
         """Send what the scene is now, in place of what waits."""
-        self._scene = message
-        self._wake.set()
+        self._tell_newest(message)
+
+    def try_on(self, textures: Mapping[str, Path | None] | None) -> None:
+        """Show parts with other textures on this page alone, beside those before; None: as all pages do."""
+        self._trial = {} if textures is None else {**self._trial, **textures}
+        self._tell_newest({"type": "trial", "parts": list(self._trial)})
 
     def tell(self, text: str, **more: Any) -> None:
         """Send a notice."""
@@ -82,12 +88,9 @@ class Page:
             self._wake.clear()
             while self._notices:
                 await self._socket.send_str(json.dumps(self._notices.popleft()))
-            if self._scene is not None:
-                message, self._scene = self._scene, None
+            news, self._news = self._news, {}
+            for message in news.values():
                 await self._socket.send_str(json.dumps({**message, "answered": self.answered}))
-            if self._job is not None:
-                message, self._job = self._job, None
-                await self._socket.send_str(json.dumps(message))
             if self._mask is not None:
                 mask, self._mask = self._mask, None
                 await self._send_mask(mask)
@@ -95,9 +98,22 @@ class Page:
                 view, self._view = self._view, None
                 await self._send_frame(view)
 
+    def shown(self, view: View) -> Scene:
+        """What a view shows on this page.
+
+        Raises:
+            ArgumentError: if there is no such model.
+        """
+        return self._edits.shown(view, self._trial)
+
+    def _tell_newest(self, message: dict[str, Any]) -> None:
+        self._news.pop(message["type"], None)  # the new one goes behind what others wait
+        self._news[message["type"]] = message
+        self._wake.set()
+
     async def _send_frame(self, view: View) -> None:
         try:
-            frame = await self._frames.frame(view, self._edits.shown(view), self._pace)
+            frame = await self._frames.frame(view, self.shown(view), self._pace)
         except Exception as error:  # whatever it is, the server goes on
             self.tell_error(error)
             self._notices[-1]["frame"] = view.id

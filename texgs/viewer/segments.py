@@ -1,14 +1,11 @@
-"""Masks and segments from clicks, one after the other in a thread of their own."""
+"""Masks and segments from clicks."""
 
 from __future__ import annotations
 
-import asyncio
 import base64
 import io
-import threading
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -27,6 +24,7 @@ from texgs.models.by_name import mask_model
 from texgs.models.masks import MaskModel
 from texgs.scene.parts import entry_of, split
 from texgs.scene.scene import Scene, SceneModel
+from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.messages import Clicked, Mask, Segment
 from texgs.volume.cameras import icosphere_of
 
@@ -36,21 +34,16 @@ COLOR = (170, 0, 255, 150)  # over what is masked
 CHOICES = ("mobile_sam", "grabcut")  # the first whose weights are here
 
 
-class Stopped(TexgsError):
-    """Somebody has asked to stop."""
-
-
 class Segmenter:
     """Finds what clicks select, in one view and in space.
 
     Args:
+        jobs: where that is done.
         device: that models are on.
     """
 
-    def __init__(self, device: torch.device | str = "cpu") -> None:
-        self._device = torch.device(device)
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="segments")
-        self._stop = threading.Event()
+    def __init__(self, jobs: Jobs, device: torch.device | str = "cpu") -> None:
+        self._jobs, self._device = jobs, torch.device(device)
         self._masks: MaskModel | None = None
         self._opened: tuple[SceneModel, Surfels] | None = None
 
@@ -60,28 +53,21 @@ class Segmenter:
         Raises:
             TexgsError: if a click is beside the model, or there is no such model.
         """
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, self._mask, scene, asked)
+        return await self._jobs.run(partial(self._mask, scene, asked), Watch())
 
-    async def lift(self, scene: Scene, asked: Segment, tell: Callable[[float], None]) -> Lifted:
+    async def lift(self, scene: Scene, asked: Segment, watch: Watch) -> Lifted:
         """Surfels that masks of many views agree on.
 
         Args:
             scene: whose light is in all views.
             asked: a new name, and the clicks.
-            tell: is called in this thread with the part that is done.
+            watch: of the job.
 
         Raises:
-            Stopped: if `stop` was called.
+            Stopped: if it had to stop.
             TexgsError: as `lift`.
         """
-        self._stop.clear()
-        loop = asyncio.get_running_loop()
-
-        def later(done: float) -> None:
-            loop.call_soon_threadsafe(tell, done)
-
-        return await loop.run_in_executor(self._thread, self._lift, scene, asked, later)
+        return await self._jobs.run(partial(self._lift, scene, asked), watch)
 
     def facts(self, asked: Segment) -> dict[str, Any]:
         """What a segment comes from, for its file."""
@@ -92,27 +78,17 @@ class Segmenter:
         }
         return {"camera": asdict(asked.clicked.camera), **points, "masks": name, "vote": "contribution"}
 
-    def stop(self) -> None:
-        """Stop the segment that is being made, after the view that it is at."""
-        self._stop.set()
-
-    def close(self) -> None:
-        """End the thread."""
-        self.stop()
-        self._thread.shutdown(wait=True, cancel_futures=True)
-
     def _mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
         model, clicks = self._model(scene, asked.model), self._clicks(asked.clicked)
         prompts_at(model, clicks)
         mask = ViewMasks(model, scene.light, self._mask_model()).mask(clicks)
         return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
 
-    def _lift(self, scene: Scene, asked: Segment, tell: Callable[[float], None]) -> Lifted:
+    def _lift(self, scene: Scene, asked: Segment) -> Lifted:
         model = self._model(scene, split(scene, asked.part)[0])
         cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, LENS)]
-        masks = Watched(self._mask_model(), 1 + VIEWS, self._stop, tell)
-        title = f"segment {asked.part}"
-        return lift(model, self._clicks(asked.clicked), cameras, masks, light=scene.light, title=title)
+        clicks, masks, title = self._clicks(asked.clicked), self._mask_model(), f"segment {asked.part}"
+        return lift(model, clicks, cameras, masks, light=scene.light, title=title)
 
     def _clicks(self, clicked: Clicked) -> Clicks:
         points = torch.tensor([point[:2] for point in clicked.points], device=self._device)
@@ -137,37 +113,6 @@ class Segmenter:
                 continue
         assert self._masks is not None, "GrabCut is always there"
         return self._masks
-
-
-class Watched:
-    """A mask model that tells how far it is, and stops when that is asked for.
-
-    Args:
-        masks: does the work.
-        views: there are at most.
-        stop: is set to stop.
-        tell: is called with the part that is done.
-    """
-
-    def __init__(
-        self, masks: MaskModel, views: int, stop: threading.Event, tell: Callable[[float], None]
-    ) -> None:
-        self.name = masks.name
-        self._masks, self._views, self._stop, self._tell = masks, views, stop, tell
-        self._done = 0
-
-    def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """The object in an image; see `MaskModel`.
-
-        Raises:
-            Stopped: if that was asked for.
-        """
-        if self._stop.is_set():
-            raise Stopped("The segment was not made: it was cancelled.")
-        mask = self._masks(image, points, positive)
-        self._done += 1
-        self._tell(self._done / self._views)
-        return mask
 
 
 def alone(scene: Scene, name: str) -> Scene:

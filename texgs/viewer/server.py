@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import AsyncIterator
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +12,26 @@ import torch
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.names import require_name
-from texgs.scene.parts import require_new, split
+from texgs.edit.pictures import PICTURES
+from texgs.fields.files import kind_of
+from texgs.models.filters.vocabulary import WORDS
 from texgs.scene.scene_file import known
 from texgs.scene.session import Session
 from texgs.viewer.description import bounds_of, describe
+from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
 from texgs.viewer.messages import (
     LARGEST,
     Cancel,
     Edit,
+    Export,
+    Look,
     Mask,
     Message,
     Redo,
     Remove,
+    Rename,
     Save,
     Segment,
     Undo,
@@ -37,11 +41,13 @@ from texgs.viewer.messages import (
 )
 from texgs.viewer.opening import Opened
 from texgs.viewer.page import Page
-from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
+from texgs.viewer.styles import LARGEST as LARGEST_FILE
+from texgs.viewer.styles import thumbnail
 from texgs.viewer.values import parse_json
+from texgs.viewer.work import Work
 
-Change = Edit | Undo | Redo | Save | Remove
+Change = Edit | Undo | Redo | Save | Rename | Remove
 WEB = Path(__file__).parent / "web"
 SERVED = (".js", ".css", ".svg")
 MOST_PAGES = 16
@@ -64,12 +70,12 @@ class Server:
         session = Session(opened.scene, device)
         self._title, self._composed = opened.title, session.composition
         self._bounds = bounds_of(self._composed)
+        kind = kind_of(next(iter(opened.scene.models.values())).file)
+        self._choices = {"styles": list(PICTURES), "words": list(WORDS), "exports": exports_of(kind)}
         self.edits = SharedEdits(session, opened)
         self.frames = Frames(session)
-        self.segmenter = Segmenter(device)
         self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
-        self._job: asyncio.Task[None] | None = None
-        self._at_work: Page | None = None  # that the job is for
+        self.work = Work(session, self.edits, self._changing, self._tell_all, device)
         self._pages: dict[Page, web.WebSocketResponse] = {}
         self._count = 0  # of pages so far
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
@@ -81,10 +87,13 @@ class Server:
             token: first part of every path.
             host: that it listens on.
         """
-        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST)
+        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_FILE)
         app.router.add_get(f"/{token}/", self.page)
         app.router.add_get(f"/{token}/socket", self.socket)
         app.router.add_get(f"/{token}/still.png", self.still)
+        app.router.add_get(f"/{token}/styles/{{name}}.jpg", self.style)
+        app.router.add_get(f"/{token}/files/{{name}}", self.file)
+        app.router.add_post(f"/{token}/styles", self.new_style)
         app.router.add_get(f"/{token}/{{name}}", self.module)
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
@@ -119,6 +128,30 @@ class Server:
             headers={"Content-Disposition": f'attachment; filename="{Path(self.edits.name).stem}.png"'},
         )
 
+    async def style(self, request: web.Request) -> web.StreamResponse:
+        """A small view of a picture that texgs paints."""
+        try:
+            picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
+        except TexgsError as error:
+            raise web.HTTPNotFound(text=str(error)) from error
+        return web.Response(body=picture, content_type="image/jpeg")
+
+    async def new_style(self, request: web.Request) -> web.StreamResponse:
+        """Take in a picture of the page's user; the name that it has from then on."""
+        content = await request.read()
+        try:
+            name = await asyncio.to_thread(self.work.styles.add, request.query.get("name", ""), content)
+        except TexgsError as error:
+            raise web.HTTPBadRequest(text=str(error)) from error
+        return web.Response(text=name)
+
+    async def file(self, request: web.Request) -> web.StreamResponse:
+        """A file that was written for a page."""
+        path = self.work.downloads.file(request.match_info["name"])
+        if path is None:
+            raise web.HTTPNotFound
+        return web.FileResponse(path)
+
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """One page: what it asks for is done until it is gone."""
         if len(self._pages) >= MOST_PAGES:
@@ -127,7 +160,7 @@ class Server:
             max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
         await socket.prepare(request)
-        page = Page(socket, self.edits, self.frames, self.segmenter)
+        page = Page(socket, self.edits, self.frames, self.work.segmenter)
         self._count += 1
         number = self._count
         self._pages[page] = socket
@@ -137,8 +170,7 @@ class Server:
             await self._listen(socket, page, number)
         finally:
             del self._pages[page]
-            if self._at_work is page:
-                self.segmenter.stop()
+            self.work.stop(page)
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
         return socket
@@ -161,9 +193,14 @@ class Server:
         elif isinstance(message, Mask):
             page.show_mask(message)
         elif isinstance(message, Segment):
-            self._begin(message, page)
+            self.work.begin_segment(message, page)
+        elif isinstance(message, Look):
+            self.work.begin_look(message, page)
+        elif isinstance(message, Export):
+            self.work.begin_export(message, page)
         elif isinstance(message, Cancel):
-            self.segmenter.stop()
+            self.work.stop(page)
+            page.try_on(None)
         else:
             try:
                 async with self._changing:
@@ -177,6 +214,8 @@ class Server:
             await self._save(message, page)
         elif isinstance(message, Edit):
             self.edits.edit(message, number)
+        elif isinstance(message, Rename):
+            self.edits.rename_segment(message.part, message.name)
         elif isinstance(message, Remove):
             self.edits.remove_segment(message.part)
         elif isinstance(message, Undo):
@@ -189,34 +228,6 @@ class Server:
         for each in self._pages:
             each.tell_scene(news)
 
-    def _begin(self, asked: Segment, page: Page) -> None:
-        """Begin to make a segment.
-
-        Raises:
-            ArgumentError: if another one is being made, or it cannot have this name.
-        """
-        if self._job is not None and not self._job.done():
-            raise ArgumentError("segment: another one is being made; wait for it, or cancel it")
-        require_new(self.edits.scene, asked.part)
-        require_name(split(self.edits.scene, asked.part)[1], "segment")
-        self._at_work = page
-        self._job = asyncio.create_task(self._make_segment(asked, page))
-
-    async def _make_segment(self, asked: Segment, page: Page) -> None:
-        page.tell_job(asked.part, 0.0)
-        try:
-            tell = partial(page.tell_job, asked.part)
-            lifted = await self.segmenter.lift(self.edits.scene, asked, tell)
-            facts = self.segmenter.facts(asked)
-            async with self._changing:
-                await asyncio.to_thread(self.edits.make_segment, asked.part, lifted.mask, facts)
-            page.tell(f"{asked.part}: {lifted.basis}", level="info")
-        except Exception as error:  # whatever it is, the server goes on
-            page.tell_error(error)
-        page.tell_job(asked.part, None)
-        self._at_work = None
-        self._tell_all()
-
     async def _save(self, message: Save, page: Page) -> None:
         """Save the scene; where that would replace another file, the page is asked first."""
         if not message.replace and self.edits.would_replace(message.name):
@@ -228,7 +239,8 @@ class Server:
     def scene_message(self) -> dict[str, Any]:
         """The scene and its history, for all pages."""
         scene = describe(self._title, self.edits.scene, self._composed, self._bounds)
-        return {"type": "scene", "run": self._run, "scene": scene, **self.edits.state()}
+        facts = {"run": self._run, "choices": self._choices}
+        return {"type": "scene", "scene": scene, **facts, **self.edits.state()}
 
     # ---- End ----------------------------------------------------------------
 
@@ -238,5 +250,5 @@ class Server:
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:
         yield
-        self.segmenter.close()
+        self.work.close()
         self.frames.close()

@@ -12,6 +12,7 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import HEADLIGHT
 from texgs.core.names import file_name, part_file
+from texgs.scene.parts import part_names, with_textures
 from texgs.scene.scene import WHITE, Scene
 from texgs.scene.scene_file import known, light_of, write_scene
 from texgs.scene.session import Session
@@ -40,14 +41,22 @@ class SharedEdits:
         """As it is now."""
         return self._session.scene
 
-    def shown(self, view: View) -> Scene:
+    def shown(self, view: View, trial: Mapping[str, Path | None] | None = None) -> Scene:
         """What a view shows.
+
+        Args:
+            view: of the scene, as it was opened, or of one model alone.
+            trial: textures that parts have in the scene as it is now, as far as there are such parts.
 
         Raises:
             ArgumentError: if there is no such model.
         """
-        scene = self._original if view.before else self.scene
-        return alone(scene, view.only) if view.only else scene
+        if view.only:
+            return alone(self.scene, view.only)
+        if view.before:
+            return self._original
+        names, textures = part_names(self.scene), trial or {}
+        return with_textures(self.scene, {part: textures[part] for part in names if part in textures})
 
     @property
     def is_saved(self) -> bool:
@@ -90,6 +99,24 @@ class SharedEdits:
         """
         self._session.make_segment(part, mask, self._new_file(part), facts)
         self._step(f"{part} new")
+
+    def give_textures(self, textures: Mapping[str, Path | None], look: str) -> None:
+        """Give parts the textures of a new look.
+
+        Raises:
+            ArgumentError, ShapeError: if there is no such part any more, or a texture is none of it.
+        """
+        self._session.set_textures(textures)
+        self._step(f"{', '.join(textures)} {look}")
+
+    def rename_segment(self, part: str, name: str) -> None:
+        """Give a segment another name.
+
+        Raises:
+            ArgumentError: if there is no such segment, or it cannot have the name.
+        """
+        self._session.rename_segment(part, name)
+        self._step(f"{part} renamed to {name}")
 
     def remove_segment(self, part: str) -> None:
         """Give the surfels of a segment back to its model; its file stays.
@@ -148,14 +175,17 @@ class SharedEdits:
         self._future.clear()
         self._latest = None
 
+    def new_folder(self, kind: str) -> Path:
+        """A folder for the files of a new look that is not there yet."""
+        stem = Path(self.name).stem
+        folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
+        return next(folder for folder in folders if not folder.exists())
+
     def _new_file(self, part: str) -> Path:
         """A file for a segment that is not there yet: scenes that were saved may name the others."""
         stem = Path(self.name).stem
-        for number in count(1):
-            file = self._folder / part_file("segment", stem, part, *([str(number)] if number > 1 else []))
-            if not file.exists():
-                break
-        return file
+        names = (part_file("segment", stem, part, *([str(n)] if n > 1 else [])) for n in count(1))
+        return next(file for name in names if not (file := self._folder / name).exists())
 
     def _change(self, edit: Edit) -> None:
         session, value = self._session, edit.value

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
+from math import log, sqrt
 from typing import get_args
 
 import torch
@@ -20,6 +21,9 @@ from texgs.fields.surfels.segment import labels_of
 from texgs.fields.surfels.shading import light_direction, material, viewer
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL, blinn_phong_texture
+
+DISC = 1e6  # opacity that makes a surfel a disc with a sharp rim
+NARROW = 1 / sqrt(2 * log(DISC / 0.5))  # scale at which this disc has a radius of one standard deviation
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +105,16 @@ class Part:
         colors, (a, d, s, b) = self.colored(edits), self.factors(edits)
         if look == "unshaded":
             return colors, torch.ones_like(self.opacities)
-        if look != "shaded":
+        if look == "texture":
+            return torch.full_like(colors, 0.5), torch.ones_like(self.opacities)
+        if look in MATERIAL:
             value = (a, d, s, b)[MATERIAL.index(look)].expand(n)
             return value[:, None].expand(n, 3), torch.zeros_like(self.opacities)
         seen_from, direction = viewer(camera, shading), light_direction(light, camera)
         base, gain = blinn_phong_texture(
             colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=shading.facing
         )
-        return base.clamp(0, 1), gain
+        return base.clamp(0, 1), torch.zeros_like(gain) if look == "discs" else gain
 
     def opacity(self, edits: Sequence[PartEdit]) -> Tensor:
         """Opacities [N] with the edits' factors; 0 where surfels are hidden, so that nothing is drawn."""
@@ -183,7 +189,8 @@ class Composition:
             light: shines on all models.
             edits: one for each model, and behind it one for each of its segments; by default nothing is
                 changed.
-            look: what colour shows: with light, without, or one factor of the material.
+            look: what colour shows: with light; without; texels alone, around grey; surfels as opaque discs
+                of one standard deviation, with light and without texels; or one factor of the material.
             background: [3]; white by default, for a factor black.
             outputs: of the rasterizer.
 
@@ -196,12 +203,15 @@ class Composition:
         looks = [part.look(own, camera, light, look) for part, own in pairs]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
         if background is None:
-            background = self.means.new_full((3,), float(look in ("shaded", "unshaded")))
+            background = self.means.new_full((3,), float(look not in MATERIAL))
+        scales, opacities = self.scales, torch.cat([part.opacity(own) for part, own in pairs])
+        if look == "discs":
+            scales, opacities = NARROW * scales, torch.where(opacities > 0, DISC, 0.0)
         return rasterize(
             self.means,
             self.quats,
-            self.scales,
-            torch.cat([part.opacity(own) for part, own in pairs]),
+            scales,
+            opacities,
             camera.viewmat,
             camera.K,
             camera.width,

@@ -90,9 +90,26 @@ export function tick(label, edit, properties = {}) {
   return { row, show: (value) => { input.checked = value; } };
 }
 
+/** Ask for a text in a dialog that has one input; null where none was given. */
+export function ask(dialog, text) {
+  const input = dialog.querySelector("input");
+  input.value = text;
+  dialog.returnValue = "";
+  dialog.showModal();
+  input.select();
+  return new Promise((resolve) => {
+    dialog.onclose = () => resolve(dialog.returnValue ? input.value.trim() : null);
+  });
+}
+
+/** Save what is at an address on the computer of the browser. */
+export function save(href, name) {
+  element("a", { href, download: name }).click();
+}
+
 /** Save a file on the computer of the browser. */
 export function download(blob, name) {
-  const link = element("a", { href: URL.createObjectURL(blob), download: name });
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  const address = URL.createObjectURL(blob);
+  save(address, name);
+  setTimeout(() => URL.revokeObjectURL(address), 1000);
 }

@@ -1,6 +1,9 @@
 // The page of `texgs view`: a camera, the shared state of the scene, and the server's renderer.
 
 import { Connection } from "./connection.js";
+import { ask, save } from "./inputs.js";
+import { Job } from "./job.js";
+import { LookTool } from "./look.js";
 import { Notices } from "./notices.js";
 import { Panel } from "./panel.js";
 import { Remote } from "./remote.js";
@@ -13,7 +16,7 @@ import { Toolbar } from "./toolbar.js";
 const get = (id) => document.getElementById(id);
 
 class Page extends ScenePage {
-  constructor(scene, connection, notices) {
+  constructor({ scene, choices }, connection, notices) {
     const renderer = new Remote(get("picture"), (text, level) => notices.tell(text, level));
     renderer.onframe = ({ ms, width, height }) => {
       get("pace").textContent = `${width} × ${height}, ${Math.round(ms)} ms`;
@@ -22,12 +25,40 @@ class Page extends ScenePage {
     super(new SharedState(scene, connection), renderer, () => this.segments.isLocked);
     this.connection = connection;
     this.notices = notices;
+    this.job = new Job(connection);
     this.segments = new SegmentTool(this);
+    this.looks = new LookTool(this, choices);
     this.panel = new Panel(this.state,
       { models: get("models"), background: get("background"), steps: get("steps") },
-      { segment: (model) => this.segments.start(model), remove: (part) => this.state.remove(part) });
-    this.toolbar = new Toolbar(this);
+      { segment: (model) => this.#segment(model), look: (part) => this.#look(part),
+        rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
+    this.toolbar = new Toolbar(this, choices);
+    get("look-start").onclick = () => this.#look();
+    get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();
+  }
+
+  #segment(model) {
+    if (!this.#mayBegin()) return;
+    this.looks.leave();
+    this.segments.start(model);
+  }
+
+  #look(part) {
+    if (!this.#mayBegin()) return;
+    this.segments.leave();
+    this.looks.start(part);
+  }
+
+  /** Whether nothing is being made. */
+  #mayBegin() {
+    if (this.job.isAtWork) this.notices.tell("Something is being made: wait for it, or cancel it.", "info");
+    return !this.job.isAtWork;
+  }
+
+  async #rename(part) {
+    const [, name] = part.match(/([^/]*)$/), given = await ask(get("rename-dialog"), name);
+    if (given !== null && given !== name) this.state.rename(part, given);
   }
 
   /** Show what the server has now. One that was started again knows nothing of edits before. */
@@ -48,10 +79,13 @@ const connection = new Connection(new URL("socket", location.href.replace(/^http
 let page = null;
 connection.addEventListener("message", ({ detail }) => {
   if (detail.type === "scene") {
-    page ??= new Page(detail.scene, connection, notices);
+    page ??= new Page(detail, connection, notices);
     page.adopt(detail);
   } else if (detail.level === "question") {
     page.toolbar.askToReplace(detail);
+  } else if (detail.level === "file") {
+    notices.tell(detail.text, "info");
+    save(`files/${encodeURIComponent(detail.name)}`, detail.name);
   } else if (detail.type === "notice") {
     notices.tell(detail.text, detail.level);
   }

@@ -17,8 +17,8 @@ export class Panel {
   /**
    * @param {State} state
    * @param {{models: Element, background: Element, steps: Element}} places - for its inputs
-   * @param {{segment?: (model: object) => void, remove?: (part: string) => void}} actions - on segments, where
-   *   these can be made and removed
+   * @param {{segment?: (model: object) => void, look?: (part: string) => void, rename?: (part: string) => void,
+   *   remove?: (part: string) => void}} actions - what else can be done to a part, where a server does it
    */
   constructor(state, { models, background, steps }, actions = {}) {
     this.#state = state;
@@ -49,11 +49,11 @@ export class Panel {
     this.#structure = structure;
     this.#parts.clear();
     this.#root.replaceChildren(...this.#state.scene.models.map((model) => {
-      const box = this.#part(model.name, model.name, model.can);
-      box.append(...model.segments.map((each) => this.#segment(model, each.name)));
-      if (this.#actions.segment && model.can.includes("segments")) {
+      const { segment } = this.#actions, box = this.#part(model.name, model.name, model.can);
+      box.append(...model.segments.map((each) => this.#segment(model, each.name)), ...this.#look(model, model.name));
+      if (segment && model.can.includes("segments")) {
         const current = () => this.#state.scene.models.find((each) => each.name === model.name);
-        box.append(button("New segment…", `New segment of ${model.name}`, () => this.#actions.segment(current())));
+        box.append(button("New segment…", `New segment of ${model.name}`, () => segment(current())));
       }
       return box;
     }));
@@ -61,8 +61,18 @@ export class Panel {
 
   #segment(model, name) {
     const part = `${model.name}/${name}`, box = this.#part(part, name, model.can);
-    if (this.#actions.remove) box.append(button("Remove", `Remove ${part}`, () => this.#actions.remove(part)));
+    const { rename, remove } = this.#actions;
+    box.append(...this.#look(model, part));
+    if (rename) box.append(button("Rename…", `Rename ${part}`, () => rename(part)));
+    if (remove) box.append(button("Remove", `Remove ${part}`, () => remove(part)));
     return box;
+  }
+
+  /** A button for a new look of a part, where it can have one. */
+  #look(model, part) {
+    const { look } = this.#actions;
+    if (!look || !model.can.includes("look")) return [];
+    return [button("New look…", `New look of ${part}`, () => look(part))];
   }
 
   /** The inputs of a model or a segment. */

@@ -8,6 +8,7 @@ import { LightControl } from "./light.js";
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
 const NAMES = {
   shaded: "Shaded", unshaded: "Without light", normal: "Normals", depth: "Depth", alpha: "Opacity",
+  texture: "Texture alone", discs: "Surfels as discs",
   ambient: "Ambient factor", diffuse: "Diffuse factor", specular: "Specular factor", shininess: "Shininess",
 };
 const get = (id) => document.getElementById(id);

@@ -5,18 +5,18 @@ const STILL = 4; // CSS pixels that a click may move
 const COLORS = { true: "#0a8f2f", false: "#1540d0" }; // of points on the object, and beside it
 
 export class SegmentTool {
-  #page; #model = null; #points = []; #asked = 0; #picture = null; #down = null; #isBusy = false;
+  #page; #model = null; #points = []; #asked = 0; #picture = null; #down = null;
 
   /** @param {object} page - with camera, canvas, connection, notices, renderer, state, and show() */
   constructor(page) {
     this.#page = page;
-    const { canvas, connection } = page;
+    const { canvas, connection, job } = page;
     canvas.addEventListener("pointerdown", (event) => { this.#down = event; });
     canvas.addEventListener("click", (event) => this.#click(event));
     canvas.addEventListener("keydown", (event) => {
       if (!this.#model) return;
       if (event.key === "Enter") this.#add(canvas.clientWidth / 2, canvas.clientHeight / 2, event.shiftKey);
-      if (event.key === "Escape") this.#leave();
+      if (event.key === "Escape") this.leave();
     });
     new ResizeObserver(() => this.#clear()).observe(canvas);
     get("segment").addEventListener("submit", (event) => {
@@ -24,9 +24,11 @@ export class SegmentTool {
       this.#make();
     });
     get("segment-clear").onclick = () => this.#clear();
-    get("segment-cancel").onclick = () => this.#leave();
+    get("segment-cancel").onclick = () => this.leave();
     connection.addEventListener("message", ({ detail }) => this.#receive(detail));
     connection.addEventListener("lost", () => this.#end());
+    job.addEventListener("begin", () => this.#show());
+    job.addEventListener("end", ({ detail }) => detail.hasFailed ? this.#show() : this.#end());
   }
 
   /** Whether the camera has to stay: points belong to one view. */
@@ -50,11 +52,11 @@ export class SegmentTool {
   #click(event) {
     const { clientX, clientY, shiftKey, offsetX, offsetY } = event;
     const moved = Math.hypot(clientX - this.#down?.clientX, clientY - this.#down?.clientY);
-    if (this.#model && !this.#isBusy && moved <= STILL) this.#add(offsetX, offsetY, shiftKey);
+    if (this.#model && !this.#page.job.isAtWork && moved <= STILL) this.#add(offsetX, offsetY, shiftKey);
   }
 
   #add(x, y, hasShift) {
-    if (this.#isBusy) return;
+    if (this.#page.job.isAtWork) return;
     const positive = !hasShift && !get("segment-negative").checked;
     if (!positive && !this.isLocked) {
       this.#page.notices.tell("Click on the object first.", "info");
@@ -62,7 +64,7 @@ export class SegmentTool {
     }
     this.#points.push([x, y, positive]);
     this.#asked += 1;
-    this.#send({ type: "mask", id: this.#asked, model: this.#model });
+    this.#page.connection.send({ type: "mask", id: this.#asked, model: this.#model, ...this.#clicked() });
     this.#show();
   }
 
@@ -75,34 +77,30 @@ export class SegmentTool {
   }
 
   #make() {
-    if (!this.isLocked || this.#isBusy) return;
-    this.#isBusy = true;
-    this.#send({ type: "segment", part: `${this.#model}/${get("segment-name").value.trim()}` });
-    this.#show();
+    const part = `${this.#model}/${get("segment-name").value.trim()}`;
+    if (this.isLocked) this.#page.job.begin({ type: "segment", part, ...this.#clicked() });
   }
 
-  /** Stop what is being made; else stop altogether. */
-  #leave() {
-    if (this.#isBusy) this.#page.connection.send({ type: "cancel" });
-    else this.#end();
+  /** Stop. */
+  leave() {
+    if (this.#page.job.isAtWork) this.#page.job.cancel();
+    this.#end();
   }
 
   #end() {
     if (!this.#model) return;
     this.#model = null;
-    this.#isBusy = false;
     get("segment").hidden = true;
     this.#clear();
     this.#page.show({ only: "" });
   }
 
-  /** Points are sent in pixels of the picture. */
-  #send(message) {
-    const { camera, canvas, connection, renderer } = this.#page;
-    const [width, height] = renderer.size();
+  /** The clicks, in pixels of the picture. */
+  #clicked() {
+    const { camera, canvas, renderer } = this.#page, [width, height] = renderer.size();
     const points = this.#points.map(([x, y, positive]) =>
       [x * width / canvas.clientWidth, y * height / canvas.clientHeight, positive]);
-    connection.send({ ...message, camera: camera.wire(width, height), points });
+    return { camera: camera.wire(width, height), points };
   }
 
   #receive(message) {
@@ -118,12 +116,6 @@ export class SegmentTool {
     } else if (message.mask !== undefined && message.mask === this.#asked) {
       this.#points.pop(); // the notice says what is wrong with it
       this.#show();
-    } else if (message.type === "job") {
-      get("segment-progress").value = message.done ?? 0;
-      if (message.done === null && this.#isBusy) this.#end();
-    } else if (message.type === "notice" && message.level === "error" && this.#isBusy) {
-      this.#isBusy = false;
-      this.#show();
     }
   }
 
@@ -131,8 +123,7 @@ export class SegmentTool {
     get("segment-hint").textContent = this.isLocked
       ? "Clicks add to it, with Shift they take away. The camera stays until you clear the points."
       : `Turn ${this.#model} as you like, and click on what belongs to the segment.`;
-    get("segment-make").disabled = get("segment-clear").disabled = !this.isLocked || this.#isBusy;
-    get("segment-progress").hidden = !this.#isBusy;
+    get("segment-make").disabled = get("segment-clear").disabled = !this.isLocked || this.#page.job.isAtWork;
     this.#draw();
   }
 

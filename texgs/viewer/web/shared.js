@@ -35,6 +35,11 @@ export class SharedState extends State {
     this.#send({ type: "redo" });
   }
 
+  /** Give a segment another name. */
+  rename(part, name) {
+    this.#send({ type: "rename", part, name });
+  }
+
   /** Give the surfels of a segment back to its model. */
   remove(part) {
     this.#send({ type: "remove", part });

@@ -1,19 +1,31 @@
 // Picture and saving, beside the history.
 
 import { EditHistory } from "./history.js";
-import { download } from "./inputs.js";
+import { ask, download } from "./inputs.js";
 
+const EXPORTS = {
+  mp4: "Turntable, MP4", gif: "Turntable, GIF", html: "Web page", "3dgs": "3D Gaussians, PLY",
+  "2dgs": "2D Gaussians, PLY", points: "Points, PLY", mesh: "Mesh, PLY",
+};
 const get = (id) => document.getElementById(id);
 
 export class Toolbar {
   #page;
 
-  constructor(page) {
+  /**
+   * @param {object} page - with camera, job, notices, renderer, shown and state
+   * @param {{exports: string[]}} choices - what the server can write the scene as
+   */
+  constructor(page, { exports }) {
     this.#page = page;
     new EditHistory(page, { s: () => this.#askForName() });
     get("still").onclick = () => this.#still();
+    get("export").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
+    get("export").addEventListener("change", ({ target }) => {
+      this.#export(target.value);
+      target.value = "";
+    });
     get("save").onclick = () => this.#askForName();
-    get("save-dialog").addEventListener("close", () => this.#saveAsNamed());
     window.addEventListener("beforeunload", (event) => {
       if (!page.state.saved) event.preventDefault();
     });
@@ -39,21 +51,26 @@ export class Toolbar {
     dialog.showModal();
   }
 
-  #askForName() {
-    get("save-name").value = this.#page.state.file;
-    get("save-dialog").returnValue = "";
-    get("save-dialog").showModal();
-    get("save-name").select();
+  async #askForName() {
+    const name = await ask(get("save-dialog"), this.#page.state.file);
+    if (name !== null) this.#page.state.save(name);
   }
 
-  #saveAsNamed() {
-    if (get("save-dialog").returnValue === "save") this.#page.state.save(get("save-name").value);
+  #export(kind) {
+    const { job, notices } = this.#page;
+    const begun = job.begin({ type: "export", kind, view: this.#view() });
+    if (!begun) notices.tell("Something is being made: wait for it, or cancel it.", "info");
+  }
+
+  /** What is shown, as the server has it. */
+  #view() {
+    const { camera, renderer, shown } = this.#page;
+    return { camera: camera.wire(...renderer.size()), ...shown };
   }
 
   /** Save a picture of the view, in the pixels of the screen. */
   async #still() {
-    const { camera, renderer, shown, notices, state } = this.#page;
-    const view = JSON.stringify({ camera: camera.wire(...renderer.size()), ...shown });
+    const { notices, state } = this.#page, view = JSON.stringify(this.#view());
     try {
       const answer = await fetch(`still.png?${new URLSearchParams({ view })}`);
       if (!answer.ok) throw new Error(await answer.text());

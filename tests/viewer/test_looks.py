@@ -1,0 +1,176 @@
+"""New looks on a page: previews, textures that are kept, what is refused, and how one is cancelled."""
+
+import asyncio
+import threading
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from tests.viewer.test_messages import VIEW
+from tests.viewer.test_segments import FRONT, ended
+from tests.viewer.test_server import TOKEN, origin, page, with_page
+from texgs.core.lens import Lens
+from texgs.scene.scene_file import read_scene
+
+SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
+
+
+@pytest.fixture(autouse=True)
+def quick(monkeypatch, tmp_path_factory):
+    """Few and small views and no weights, wherever the tests run."""
+    monkeypatch.setattr("texgs.viewer.looks.VIEWS", 12)
+    monkeypatch.setattr("texgs.viewer.looks.LENS", Lens().square(96))
+    monkeypatch.setenv("TEXGS_WEIGHTS", str(tmp_path_factory.mktemp("none")))
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path_factory.mktemp("cache")))
+    monkeypatch.setattr("texgs.viewer.looks.available", lambda name: False)
+
+
+async def picture(browser, **view):
+    await browser.send(**{**SHOT, **view, "type": "view", "moving": False})
+    return (await browser.next("frame"))[1]
+
+
+def look(**values):
+    return {"type": "look", "parts": [], "style": "", "instruction": "", "preview": False, **values}
+
+
+def test_a_preview_shows_on_its_page_alone_and_changes_nothing(scene_file):
+    async def work(browser, client):
+        async with page(client) as other:
+            await other.next("scene")
+            before = await picture(browser)
+            await browser.send(**look(style="glass", preview=True))
+            assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
+            await ended(browser)
+            assert np.abs(await picture(browser) - before).mean() > 3
+            assert (await picture(browser, before=True) == before).all()
+            assert (await picture(other) == before).all()
+            assert client.server_side.edits.state()["past"] == []
+            await browser.send(type="cancel")
+            assert (await browser.next("trial"))["parts"] == []
+            assert (await picture(browser) == before).all()
+
+    with_page(scene_file, work)
+    assert sorted(path.name for path in scene_file.parent.iterdir() if path.is_dir()) == []
+
+
+def test_a_look_is_one_step_and_written_beside_the_scene(scene_file):
+    async def work(browser, client):
+        before = await picture(browser)
+        await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
+        news = await browser.next("notice")
+        assert news["level"] == "info"
+        assert "turn it into gold: procedural filters" in news["text"]
+        while (news := await browser.next("scene"))["past"] != ["TF01 turn it into gold"]:
+            pass
+        after = await picture(browser)
+        assert np.abs(after - before).mean() > 1
+        await browser.send(type="save", name="gold.yaml")
+        await browser.next("notice")
+        await browser.send(type="undo")
+        assert (await picture(browser) == before).all()
+        await browser.send(type="redo")
+        assert (await picture(browser) == after).all()
+
+    with_page(scene_file, work)
+    models = read_scene(scene_file.parent / "gold.yaml").models
+    assert models["TF01"].texture.parent.name == "scene-text-1"
+    assert models["TF02"].texture is None
+
+
+def test_textures_on_their_way_are_shown(scene_file, monkeypatch):
+    monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
+
+    async def work(browser, client):
+        await browser.send(**look(parts=["TF02"], style="dots"))
+        assert (await browser.next("trial"))["parts"] == ["TF02"]
+        await ended(browser)
+        assert client.server_side.edits.state()["past"] == ["TF02 dots"]
+
+    with_page(scene_file, work)
+
+
+def test_a_picture_of_the_user_is_taken_in(scene_file, tmp_path):
+    Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)).save(
+        tmp_path / "noise.png"
+    )
+
+    async def work(browser, client):
+        path, headers = f"/{TOKEN}/styles", origin(client)
+        content = (tmp_path / "noise.png").read_bytes()
+        async with client.post(path, params={"name": "noise.png"}, data=content, headers=headers) as answer:
+            name = await answer.text()
+        assert name == "1 noise.png"
+        await browser.send(**look(style=name, preview=True))
+        assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
+        for bad, message in (("../x.png", "expected a name that a file can have"), ("x.png", "x.png: ")):
+            async with client.post(path, params={"name": bad}, data=b"no", headers=headers) as answer:
+                assert answer.status == 400
+                text = await answer.text()
+                assert message in text
+                assert str(tmp_path) not in text
+        async with client.post(path, params={"name": "a.png"}, data=content) as answer:
+            assert answer.status == 403
+        async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
+            assert answer.status == 413
+        async with client.get(f"{path}/dots.jpg") as answer:
+            assert answer.content_type == "image/jpeg"
+        async with client.get(f"{path}/other.jpg") as answer:
+            assert answer.status == 404
+
+    with_page(scene_file, work)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({}, "look: expected a picture or an instruction, got both or none"),
+        ({"style": "dots", "instruction": "gold"}, "look: expected a picture or an instruction"),
+        ({"style": "nothing"}, "style: expected one of strokes"),
+        ({"style": "/etc/passwd"}, "style: expected one of strokes"),
+        ({"instruction": "make it a cathedral"}, "instruction: expected one of"),
+        ({"style": "dots", "parts": ["TF09"]}, "expected a model of the scene (TF01, TF02), got TF09"),
+        ({"style": "dots", "parts": "TF01"}, "parts: expected a list"),
+    ],
+)
+def test_what_cannot_be_is_told_before_a_job_begins(scene_file, values, message):
+    async def work(browser, _):
+        await browser.send(**look(**values))
+        assert message in (await browser.next("notice"))["text"]
+
+    with_page(scene_file, work)
+
+
+def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
+    reached, go_on = threading.Event(), threading.Event()
+
+    def wait(self, part, model):
+        reached.set()
+        go_on.wait(30)
+
+    monkeypatch.setattr("texgs.viewer.looks.Offered.__call__", wait)
+
+    async def work(browser, _):
+        await browser.send(**look(parts=["TF01"], style="dots"))
+        await asyncio.to_thread(reached.wait, 30)
+        await browser.send(type="edit", part="TF01", key="opacity", value=0.5)
+        while not (await browser.next("scene"))["past"]:
+            pass  # edits go on meanwhile
+        await browser.send(type="cancel")
+        await browser.next("trial")
+        go_on.set()
+        assert "it was cancelled" in (await browser.next("notice"))["text"]
+        await ended(browser)
+
+    with_page(scene_file, work)
+    assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
+
+
+def test_a_segment_gets_another_name(scene_file):
+    async def work(browser, client):
+        await browser.send(type="rename", part="TF01", name="x")
+        assert "expected a segment to rename, got the model TF01" in (await browser.next("notice"))["text"]
+
+    with_page(scene_file, work)

@@ -1,0 +1,94 @@
+"""Files of a scene that a page saves: turntables, and what `texgs export` writes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from texgs.config.fields import Kind
+from texgs.core.errors import ArgumentError
+from texgs.core.movie import write_frames
+from texgs.core.progress import progress
+from texgs.fields.files import kind_of
+from texgs.scene import export_file
+from texgs.scene.scene import Scene
+from texgs.scene.session import Session
+from texgs.viewer.jobs import Jobs, Watch
+from texgs.viewer.messages import Export, View
+from texgs.viewer.standalone import write_page
+
+FILMS = ("mp4", "gif")
+FRAMES = 72  # of a turntable, as `texgs render` has it
+
+
+class Downloads:
+    """Writes files into a folder of its own, which is removed in the end.
+
+    Args:
+        jobs: where that is done.
+        session: renders.
+    """
+
+    def __init__(self, jobs: Jobs, session: Session) -> None:
+        self._jobs, self._session = jobs, session
+        self._folder = TemporaryDirectory(prefix="texgs-files-")
+
+    async def write(self, scene: Scene, asked: Export, name: str, watch: Watch) -> Path:
+        """The file.
+
+        Args:
+            scene: as it is shown.
+            asked: what to write.
+            name: of the file, without its ending.
+            watch: of the job.
+
+        Raises:
+            Stopped: if it had to stop.
+            TexgsError: if the scene cannot be written so.
+        """
+        return await self._jobs.run(partial(self._write, scene, asked, name), watch)
+
+    def file(self, name: str) -> Path | None:
+        """A file that was written, if there is one of this name."""
+        return next((path for path in Path(self._folder.name).iterdir() if path.name == name), None)
+
+    def close(self) -> None:
+        """Remove all files."""
+        self._folder.cleanup()
+
+    def _write(self, scene: Scene, asked: Export, name: str) -> Path:
+        require_kind(scene, asked.kind)
+        ending = asked.kind if asked.kind in (*FILMS, "html") else "ply"
+        path = Path(self._folder.name, f"{name}.{ending}")
+        if asked.kind in FILMS:
+            return write_frames(path, self._turntable(scene, asked.view))
+        if asked.kind == "html":
+            return write_page(path, scene, name)
+        return export_file.export_scene(path, scene, export_file.Export(asked.kind))
+
+    def _turntable(self, scene: Scene, view: View) -> Iterator[np.ndarray]:
+        """Frames of a turn around what the camera looks at, from where it is."""
+        for index in progress(range(FRAMES), title="turntable", unit="frame"):
+            place = replace(view.camera, azimuth=view.camera.azimuth + 360 * index / FRAMES)
+            yield self._session.frame(place.camera(), view.mode, scene)
+
+
+def exports_of(kind: Kind[object]) -> list[str]:
+    """What scenes of a kind of field can be written as."""
+    return [*FILMS, *(export for export in kind.exports if export not in export_file.OF_MODELS)]
+
+
+def require_kind(scene: Scene, kind: str) -> None:
+    """Require that a scene can be written as something.
+
+    Raises:
+        ArgumentError: naming what it can be written as.
+    """
+    able = exports_of(kind_of(next(iter(scene.models.values())).file))
+    if kind not in able:
+        raise ArgumentError(f"export: expected one of {', '.join(able)}, got {kind!r:.100}")

@@ -1,0 +1,154 @@
+"""New looks for parts of a scene, from a picture or an instruction: the methods `image` and `text`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from shutil import rmtree
+from tempfile import TemporaryDirectory
+from time import monotonic
+from typing import Any
+
+import torch
+
+from texgs.config.edit import Edit
+from texgs.config.methods import method_of
+from texgs.config.typed import typed
+from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
+from texgs.core.names import part_file
+from texgs.edit.task import EditedScene, Task
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texture_file import write_texture
+from texgs.models.weights import available
+from texgs.scene.scene import Scene
+from texgs.viewer.jobs import Jobs, Watch
+from texgs.viewer.messages import Look
+from texgs.viewer.styles import Styles
+from texgs.volume.cameras import icosphere_of
+from texgs.volume.view_set import View
+
+LENS = Lens().square(400)  # of the views that parts learn from
+VIEWS = 92
+BETWEEN = 2.0  # seconds between textures on their way that are shown
+# The first is taken whose weights are on this machine.
+FULL = ("default", "patches")  # recipes for pictures
+GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
+
+
+class Around(Task[Any]):
+    """An edit that learns from new views around the scene, under its light: training views are not needed."""
+
+    def training_views(self, model: str) -> Sequence[View]:
+        """Cameras on a sphere; there are no images."""
+        return [View(camera, Path(), self.scene.light) for camera in icosphere_of(VIEWS, LENS)]
+
+
+class Looks:
+    """Gives parts of a scene new textures.
+
+    Args:
+        jobs: where that is done.
+        styles: pictures to choose from.
+        device: that works.
+    """
+
+    def __init__(self, jobs: Jobs, styles: Styles, device: torch.device | str = "cpu") -> None:
+        self._jobs, self._styles, self._device = jobs, styles, torch.device(device)
+        self._folder = TemporaryDirectory(prefix="texgs-looks-")
+        self._shown = 0  # textures on their way so far
+
+    def edit_of(self, asked: Look) -> Any:
+        """The edit, as conf/edit has it, with a recipe whose weights are on this machine.
+
+        Raises:
+            ArgumentError: if there is no such picture, or the instruction is none that can be followed.
+        """
+        if bool(asked.style) == bool(asked.instruction):
+            raise ArgumentError("look: expected a picture or an instruction, got both or none")
+        if asked.style:
+            style = self._styles.source(asked.style)
+            recipes = ("preview",) if asked.is_preview else FULL
+            choices = [{"image": {"style": style, "recipe": recipe}} for recipe in recipes]
+        else:
+            said = asked.instruction
+            choices = [{"text": {"instruction": said, "guidance": guidance}} for guidance in GUIDANCE]
+        *others, last = (self._typed(asked, choice) for choice in choices)
+        edit = next((each for each in others if has_weights(each)), last)
+        method_of(edit).check(method_of(edit).of(edit))
+        return edit
+
+    async def make(
+        self,
+        scene: Scene,
+        edit: Any,
+        output: Path,
+        watch: Watch,
+        show: Callable[[str, Path], None],
+    ) -> EditedScene:
+        """The scene with new textures, written to a folder, which must not be there; what it showed is gone.
+
+        Args:
+            scene: as it is before.
+            edit: see `edit_of`.
+            output: folder.
+            watch: of the job.
+            show: is called in the job's thread with a part and the file of its texture on its way.
+
+        Raises:
+            Stopped: if it had to stop; the folder is not there then.
+            TexgsError: if a part cannot have a look.
+        """
+        return await self._jobs.run(partial(self._make, scene, edit, output, show), watch)
+
+    def trial_folder(self) -> Path:
+        """A folder for a preview, removed in the end."""
+        self._shown += 1
+        return Path(self._folder.name, f"{self._shown}")
+
+    def close(self) -> None:
+        """Remove what was not kept."""
+        self._folder.cleanup()
+
+    def _typed(self, asked: Look, choice: dict[str, Any]) -> Any:
+        (method,) = choice
+        return typed(Edit, {"name": method, "method": method, "parts": list(asked.parts), **choice})
+
+    def _make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
+        method = method_of(edit)
+        settings, offered = method.of(edit), Offered(show, self.trial_folder)
+        task = Around(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=offered)
+        output.mkdir(parents=True)
+        try:
+            return method.run(task)
+        except BaseException:
+            rmtree(output)
+            with suppress(OSError):  # others may be in it
+                output.parent.rmdir()
+            raise
+
+
+class Offered:
+    """Parts on their way, of which some are written and shown.
+
+    Args:
+        show: is called with a part and the file of its texture.
+        folder: makes a place for one file.
+    """
+
+    def __init__(self, show: Callable[[str, Path], None], folder: Callable[[], Path]) -> None:
+        self._show, self._folder, self._latest = show, folder, monotonic()
+
+    def __call__(self, part: str, model: Callable[[], Surfels]) -> None:
+        """Show a part, unless one was shown a moment ago."""
+        if monotonic() - self._latest < BETWEEN:
+            return
+        self._show(part, write_texture(self._folder() / part_file("look", part), model()))
+        self._latest = monotonic()
+
+
+def has_weights(edit: Any) -> bool:
+    """Whether all that an edit needs is on this machine."""
+    return all(map(available, method_of(edit).weights(method_of(edit).of(edit))))

@@ -1,0 +1,41 @@
+// What the server makes for this page and takes a while: how far it is, and a button to stop it.
+
+const get = (id) => document.getElementById(id);
+
+/** Dispatches "begin" and "end"; detail.hasFailed says whether nothing came of it. */
+export class Job extends EventTarget {
+  isAtWork = false;
+  #connection;
+
+  constructor(connection) {
+    super();
+    this.#connection = connection;
+    get("job-cancel").onclick = () => this.cancel();
+    connection.addEventListener("message", ({ detail }) => {
+      if (detail.type === "job") this.#show(detail);
+    });
+    connection.addEventListener("lost", () => this.#show({ done: null, failed: true }));
+  }
+
+  /** Ask for something; whether there was a connection to ask by. */
+  begin(message) {
+    return !this.isAtWork && this.#connection.send(message);
+  }
+
+  /** Stop what is being made, and take a preview off. */
+  cancel() {
+    this.#connection.send({ type: "cancel" });
+  }
+
+  #show({ title, done, failed = false }) {
+    const wasAtWork = this.isAtWork;
+    this.isAtWork = done !== null;
+    get("job").hidden = !this.isAtWork;
+    if (this.isAtWork) {
+      get("job-progress").value = done;
+      get("job-title").textContent = title;
+    }
+    if (wasAtWork === this.isAtWork) return;
+    this.dispatchEvent(new CustomEvent(this.isAtWork ? "begin" : "end", { detail: { hasFailed: failed } }));
+  }
+}

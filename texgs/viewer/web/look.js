@@ -1,0 +1,127 @@
+// A new look: a picture or words for a part of the scene or all of it, shown as a preview and while it is made.
+
+import { element } from "./inputs.js";
+
+const get = (id) => document.getElementById(id);
+const ALL = ""; // parts
+
+export class LookTool {
+  #page;
+  #isTried = false; // whether the page shows a preview, or a look on its way
+
+  /**
+   * @param {object} page - with connection, job, notices, state, and draw()
+   * @param {{styles: string[], words: string[]}} choices - pictures and words that the server knows
+   */
+  constructor(page, { styles, words }) {
+    this.#page = page;
+    get("look-known").append(...words.map((word) => new Option(word)));
+    for (const name of styles) this.#addStyle(name, `styles/${name}.jpg`);
+    get("look-words").addEventListener("input", () => this.#choose(null));
+    get("look-file").addEventListener("change", ({ target }) => this.#send(target.files));
+    get("look").addEventListener("submit", (event) => {
+      event.preventDefault();
+      this.#make(false);
+    });
+    get("look-preview").onclick = () => this.#make(true);
+    get("look-close").onclick = () => this.leave();
+    get("look").addEventListener("keydown", ({ key }) => { if (key === "Escape") this.leave(); });
+    this.#takeDrops();
+    const { connection, job, state } = page;
+    connection.addEventListener("message", ({ detail }) => {
+      if (detail.type === "trial") this.#try(detail.parts);
+    });
+    for (const event of ["begin", "end"]) job.addEventListener(event, () => this.#show());
+    state.addEventListener("change", () => this.#showParts());
+    this.#showParts();
+  }
+
+  /** Begin with a part; with all by default. */
+  start(part = ALL) {
+    get("look").hidden = false;
+    get("look-part").value = part;
+    get("look-styles").querySelector("input").focus();
+    this.#show();
+  }
+
+  /** Take the preview off, and close. */
+  leave() {
+    if (get("look").hidden) return;
+    if (this.#isTried || this.#page.job.isAtWork) this.#page.job.cancel();
+    get("look").hidden = true;
+  }
+
+  get #style() {
+    return get("look").querySelector("input[name=style]:checked")?.value ?? "";
+  }
+
+  #addStyle(name, address, title = name) {
+    const input = element("input", { type: "radio", name: "style", value: name });
+    input.addEventListener("change", () => this.#choose(input));
+    const picture = element("img", { src: address, alt: "", width: 56, height: 56 });
+    get("look-styles").append(element("label", { className: "style", title }, input, picture, title));
+    return input;
+  }
+
+  /** Follow this picture; null: words. */
+  #choose(style) {
+    for (const each of get("look-styles").querySelectorAll("input")) each.checked = each === style;
+    if (style) get("look-words").value = "";
+    this.#show();
+  }
+
+  /** Give the server a picture file. */
+  async #send([file]) {
+    if (!file) return;
+    try {
+      const address = `styles?${new URLSearchParams({ name: file.name })}`;
+      const answer = await fetch(address, { method: "POST", body: file });
+      if (!answer.ok) throw new Error(await answer.text());
+      this.#choose(this.#addStyle(await answer.text(), URL.createObjectURL(file), file.name));
+    } catch (error) {
+      this.#page.notices.tell(`${file.name} cannot be used: ${error.message}`, "error");
+    }
+    get("look-file").value = "";
+  }
+
+  #takeDrops() {
+    document.addEventListener("dragover", (event) => event.preventDefault());
+    document.addEventListener("drop", (event) => {
+      event.preventDefault();
+      if (!event.dataTransfer.files.length || this.#page.job.isAtWork) return;
+      if (get("look").hidden) this.start();
+      this.#send(event.dataTransfer.files);
+    });
+  }
+
+  #make(preview) {
+    const part = get("look-part").value, instruction = get("look-words").value.trim();
+    const parts = part === ALL ? [] : [part];
+    this.#page.job.begin({ type: "look", parts, style: this.#style, instruction, preview });
+  }
+
+  #try(parts) {
+    this.#isTried = parts.length > 0;
+    this.#page.draw();
+    this.#show();
+  }
+
+  /** Offer the parts that can have a look. */
+  #showParts() {
+    const { models } = this.#page.state.scene, select = get("look-part"), { value } = select;
+    const able = models.filter((model) => model.can.includes("look"));
+    const parts = able.flatMap(({ name, segments }) => [name, ...segments.map((each) => `${name}/${each.name}`)]);
+    const all = able.length === models.length ? [new Option("the whole scene", ALL)] : [];
+    select.replaceChildren(...all, ...parts.map((part) => new Option(part)));
+    if ([...select.options].some((option) => option.value === value)) select.value = value;
+  }
+
+  #show() {
+    const { isAtWork } = this.#page.job, hasWords = get("look-words").value.trim() !== "";
+    const isReady = (hasWords || this.#style) && !isAtWork;
+    get("look-make").disabled = !isReady;
+    get("look-preview").disabled = !isReady || hasWords;
+    for (const each of get("look").querySelectorAll("input, select")) each.disabled = isAtWork;
+    get("look-note").textContent = this.#isTried && !isAtWork ? "A preview: nothing has changed yet." : "";
+  }
+}

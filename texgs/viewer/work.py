@@ -1,0 +1,160 @@
+"""What pages ask for that takes a while, one thing at a time: segments, new looks, files."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import Path
+from shutil import rmtree
+from typing import Any
+
+import torch
+
+from texgs.core.errors import ArgumentError
+from texgs.core.names import require_name
+from texgs.scene.parts import entry_of, require_new, split
+from texgs.scene.scene import Scene
+from texgs.scene.session import Session
+from texgs.viewer.downloads import Downloads, require_kind
+from texgs.viewer.jobs import Jobs, Watch
+from texgs.viewer.looks import Looks
+from texgs.viewer.messages import Export, Look, Segment
+from texgs.viewer.page import Page
+from texgs.viewer.segments import Segmenter
+from texgs.viewer.shared_edits import SharedEdits
+from texgs.viewer.styles import Styles
+
+
+class Work:
+    """Does one job at a time.
+
+    Args:
+        session: that is edited.
+        edits: that jobs add to.
+        changing: is held while the scene changes.
+        changed: is called when it has.
+        device: that works.
+    """
+
+    def __init__(
+        self,
+        session: Session,
+        edits: SharedEdits,
+        changing: asyncio.Lock,
+        changed: Callable[[], None],
+        device: torch.device | str,
+    ) -> None:
+        self._edits, self._changing, self._changed = edits, changing, changed
+        self._jobs, self.styles = Jobs(), Styles()
+        self.segmenter = Segmenter(self._jobs, device)
+        self._looks = Looks(self._jobs, self.styles, device)
+        self.downloads = Downloads(self._jobs, session)
+        self._task: asyncio.Task[None] | None = None
+        self._page: Page | None = None  # that it is for
+        self._stop = threading.Event()
+
+    def begin_segment(self, asked: Segment, page: Page) -> None:
+        """Begin to make a segment.
+
+        Raises:
+            ArgumentError: if a job is at work, or the segment cannot have this name.
+        """
+        require_new(self._edits.scene, asked.part)
+        require_name(split(self._edits.scene, asked.part)[1], "segment")
+        self._begin(page, partial(self._segment, asked, page))
+
+    def begin_look(self, asked: Look, page: Page) -> None:
+        """Begin to make a new look, or a preview of one.
+
+        Raises:
+            ArgumentError: if a job is at work, there is no such part or picture, or the instruction is none
+                that can be followed.
+        """
+        for part in asked.parts:
+            entry_of(self._edits.scene, part)
+        self._begin(page, partial(self._look, asked, self._looks.edit_of(asked), page))
+
+    def begin_export(self, asked: Export, page: Page) -> None:
+        """Begin to write a file.
+
+        Raises:
+            ArgumentError: if a job is at work, or there is no such kind of file.
+        """
+        require_kind(self._edits.scene, asked.kind)
+        self._begin(page, partial(self._export, asked, page))
+
+    def stop(self, page: Page | None = None) -> None:
+        """Stop the job that is at work, if there is one, and it is for this page or whichever."""
+        if page is None or page is self._page:
+            self._stop.set()
+
+    def close(self) -> None:
+        """Stop, and end the thread."""
+        self.stop()
+        self._jobs.close()
+        self._looks.close()
+        self.downloads.close()
+        self.styles.close()
+
+    def _begin(self, page: Page, job: Callable[[Watch], Awaitable[None]]) -> None:
+        if self._task is not None and not self._task.done():
+            raise ArgumentError("a job is at work already: wait for it, or cancel it")
+        self._page, self._stop = page, threading.Event()
+        self._task = asyncio.create_task(self._work(page, job, Watch(page.tell_job, self._stop)))
+
+    async def _work(self, page: Page, job: Callable[[Watch], Awaitable[None]], watch: Watch) -> None:
+        page.tell_job("", 0.0)
+        failed = False
+        try:
+            await job(watch)
+        except Exception as error:  # whatever it is, the server goes on
+            page.tell_error(error)
+            failed = True
+        self._page = None
+        self._changed()
+        page.tell_job("", None, failed)
+
+    async def _segment(self, asked: Segment, page: Page, watch: Watch) -> None:
+        lifted = await self.segmenter.lift(self._edits.scene, asked, watch)
+        facts = self.segmenter.facts(asked)
+        async with self._changing:
+            await asyncio.to_thread(self._edits.make_segment, asked.part, lifted.mask, facts)
+        page.tell(f"{asked.part}: {lifted.basis}", level="info")
+
+    async def _look(self, asked: Look, edit: Any, page: Page, watch: Watch) -> None:
+        """Textures on their way show on the page that asked; those of a preview stay until others come."""
+        scene, loop = self._edits.scene, asyncio.get_running_loop()
+        name = asked.style or asked.instruction
+        output = self._looks.trial_folder() if asked.is_preview else self._edits.new_folder(edit.name)
+
+        def show(part: str, file: Path) -> None:
+            loop.call_soon_threadsafe(page.try_on, {part: file})
+
+        try:
+            edited = await self._looks.make(scene, edit, output, watch, show)
+            textures = textures_of(edited.scene, asked.parts)
+            if asked.is_preview:
+                page.try_on(textures)
+                return
+            try:
+                async with self._changing:
+                    await asyncio.to_thread(self._edits.give_textures, textures, name)
+            except Exception:
+                rmtree(output)
+                raise
+        finally:
+            if not asked.is_preview:
+                page.try_on(None)
+        page.tell(f"{name}: {edited.how}, {edited.seconds:.0f} s, written to {output}", level="info")
+
+    async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
+        scene, name = page.shown(asked.view), Path(self._edits.name).stem
+        path = await self.downloads.write(scene, asked, name, watch)
+        page.tell(f"{path.name}: {path.stat().st_size / 2**20:.1f} MiB", level="file", name=path.name)
+
+
+def textures_of(scene: Scene, parts: tuple[str, ...]) -> dict[str, Path | None]:
+    """Texture files of parts of a scene; of all models where none is named."""
+    return {part: entry_of(scene, part).texture for part in parts or scene.models}
