@@ -144,7 +144,7 @@ def edited(description: dict[str, Any], edits: list[PartEdit], light: Light) -> 
 
 def sizes(scene: Scene, folder: Path) -> dict[str, Any]:
     """Bytes of the page and of the compact files of its models."""
-    page = write_page(folder / "scene.html", scene, "scene").stat().st_size
+    page = write_page(folder / "scene.html", scene, "scene").path.stat().st_size
     files = [
         write_compact(folder / f"{i}.texgs", m.surfels()[0]) for i, m in enumerate(scene.models.values())
     ]

@@ -97,6 +97,19 @@ def test_what_settings_name_counts(monkeypatch, changed, stages):
     code.code_digest.cache_clear()
 
 
+def test_texts_beside_a_module_that_reads_some_count(tree, tmp_path):
+    edit, _ = tree
+    (tmp_path / "texgs/core/web").mkdir()
+    page = tmp_path / "texgs/core/web/page.js"
+    page.write_text("let x = 1;")
+    before = edit("texgs/core/deep.py", "LIMIT = 3", "from importlib.resources import files\nLIMIT = 3")
+    page.write_text("let x = 2;")
+    after = edit("texgs/core/deep.py", "LIMIT = 3", "LIMIT = 3")
+    assert after != before
+    page.with_suffix(".png").write_text("no text")
+    assert edit("texgs/core/deep.py", "LIMIT = 3", "LIMIT = 3") == after
+
+
 def test_help_texts_do_not_count_and_defaults_do(tree):
     edit, _ = tree
     before = edit(

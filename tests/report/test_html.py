@@ -1,7 +1,9 @@
 import base64
 import io
+import json
 import re
 from html.parser import HTMLParser
+from urllib.parse import unquote
 
 import pytest
 from PIL import Image
@@ -16,6 +18,7 @@ from texgs.report.results import (
     EditResult,
     FitResult,
     GalleryResult,
+    PageResult,
     PseResult,
     SheetResult,
     TimingResult,
@@ -97,7 +100,7 @@ def test_sections_are_in_the_papers_order_and_every_link_leads_somewhere(tmp_pat
     found = page(tmp_path, paths)
     keys = [key for key in found.ids if key in SECTIONS]
     assert keys == [key for key in SECTIONS if key in keys]
-    assert set(keys) == set(SECTIONS) - {"ablations", "sizes"}, "these have nothing to show"
+    assert set(keys) == set(SECTIONS) - {"scenes", "ablations", "sizes"}, "these have nothing to show"
     assert len(found.ids) == len(set(found.ids))
     assert {link for link in found.links if not link.startswith("#")} == set()
     assert {link[1:] for link in found.links} <= set(found.ids)
@@ -163,3 +166,21 @@ def test_what_was_left_out_stands_on_top(tmp_path, paths):
     assert first == "data set wood: no <file>."
     assert second.startswith("1 metrics file: of another version of texgs")
     assert "left-out" not in page(tmp_path, paths).ids
+
+
+def test_a_scene_opens_in_the_report_where_it_is_small_and_elsewhere_by_a_link(tmp_path):
+    """What stands in a page cannot end the script that holds it."""
+    text = "<!doctype html><script>let a = '<\\/script>';</script>"
+    paths = []
+    for name, is_embedded in (("small", True), ("large scene", False)):
+        folder = tmp_path / name
+        folder.mkdir()
+        path = job(folder, "page", PageResult("gold", 9, 1.0, is_embedded), ["poster.png"])
+        path.with_name("scene.html").write_text(text)
+        paths.append(path)
+    report = write_report(tmp_path / "report.html", paths).read_text()
+    ((held),) = re.findall(r'<script type="application/json">(.*?)</script>', report)
+    assert json.loads(held) == text
+    (link,) = re.findall(r'class="open" href="([^"]*)"', report)
+    assert (tmp_path / unquote(link)).read_text() == text
+    assert "texgs page dataset=engine fit=quick edit=gold" in report

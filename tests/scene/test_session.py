@@ -200,3 +200,52 @@ def test_a_new_segment_replaces_the_file_of_another_session(session, tmp_path):
         other = Session(session.scene)
         other.make_segment("left/a", mask, tmp_path / "a", {})
         assert torch.equal(other.scene.models["left"].open()[1][0], mask)
+
+
+def test_several_textures_are_one_step(session, tmp_path):
+    files = {
+        "left": write_texture(tmp_path / "a", ball(1)),
+        "v1.2/right": write_texture(tmp_path / "b", ball(2)),
+    }
+    session.set_textures(files)
+    assert [entry.texture for entry in session.scene.models.values()] == list(files.values())
+    assert session.undo()
+    assert [entry.texture for entry in session.scene.models.values()] == [None, None]
+    with pytest.raises(ArgumentError, match="expected a texture of this model"):
+        session.set_textures(
+            {"left": files["left"], "v1.2/right": write_texture(tmp_path / "c", ball(3, n=9))}
+        )
+    assert session.scene.models["left"].texture is None
+
+
+def test_a_segment_that_is_renamed_keeps_its_place_and_edits(session, tmp_path):
+    session.add_segment("left/shell", half(tmp_path))
+    session.add_segment("left/core", half(tmp_path))
+    session.set("left/shell", "opacity", 0.5)
+    before = session.frame(CAMERA)
+    session.rename_segment("left/shell", "crust")
+    segments = session.scene.models["left"].segments
+    assert list(segments) == ["crust", "core"]
+    assert segments["crust"].edit.opacity == 0.5
+    assert np.array_equal(session.frame(CAMERA), before)
+    session.rename_segment("left/core", "core")
+    assert session.undo()
+    assert list(session.scene.models["left"].segments) == ["shell", "core"]
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "message"),
+    [
+        ("left", "x", "expected a segment to rename, got the model left"),
+        ("left/none", "x", "expected a segment of left"),
+        ("left/shell", "a/b", "expected a name without"),
+        ("left/shell", "core", "left/core: is there already"),
+    ],
+)
+def test_a_name_that_cannot_be_leaves_the_scene(session, tmp_path, part, name, message):
+    session.add_segment("left/shell", half(tmp_path))
+    session.add_segment("left/core", half(tmp_path))
+    before = session.scene
+    with pytest.raises(ArgumentError, match=message):
+        session.rename_segment(part, name)
+    assert session.scene is before

@@ -86,7 +86,7 @@ def rendered(scene_file, page):
 def still(page):
     """What the button writes: bytes of a PNG."""
     with page.expect_download() as download:
-        page.get_by_role("button", name="Picture").click()
+        page.get_by_role("button", name="Picture", exact=True).click()
     with open(download.value.path(), "rb") as file:  # noqa: PTH123
         return file.read()
 
@@ -207,10 +207,15 @@ def test_a_click_makes_a_segment(chromium, tmp_path):
         ).project(torch.tensor([0.3, 0.1, 0.1]))[0]
         page.locator("#picture").click(position={"x": float(place[0]), "y": float(place[1])})
         expect(page.get_by_text("Mask by GrabCut.")).to_be_visible(timeout=WAIT)
-        page.get_by_label("Name", exact=True).fill("blue")
+        page.get_by_role("form", name="New segment").get_by_label("Name").fill("blue")
         page.get_by_role("button", name="Make segment").click()
         page.get_by_role("checkbox", name="blue").uncheck(timeout=WAIT)
         expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible"])
+        page.get_by_role("button", name="Rename balls/blue").click()
+        page.get_by_role("dialog").get_by_label("Name").fill("sea")
+        page.get_by_role("dialog").get_by_role("button", name="Rename").click()
+        expect(page.get_by_role("checkbox", name="sea")).not_to_be_checked(timeout=WAIT)
+        page.get_by_role("button", name="Undo").click()
         reds = shown(page)
         is_blue = (reds[..., 2] - reds[..., 0] > 100).mean()
         assert (reds[..., 0] - reds[..., 2] > 100).mean() > 0.01
@@ -218,6 +223,69 @@ def test_a_click_makes_a_segment(chromium, tmp_path):
         page.get_by_role("button", name="Undo").click()
         page.get_by_role("button", name="Undo").click()
         expect(page.get_by_role("checkbox", name="blue")).to_have_count(0)
+
+
+def test_a_model_gets_the_style_of_a_picture(chromium, scene_file):
+    weights = {"TEXGS_WEIGHTS": str(scene_file.parent)}  # none, wherever this runs
+    with served(scene_file, **weights) as (_, address), opened(chromium, address) as page:
+        first = still(page)
+        page.get_by_role("button", name="New look of TF01").click()
+        make, preview = (
+            page.get_by_role("button", name=name, exact=True) for name in ("Make look", "Preview")
+        )
+        expect(make).to_be_disabled()
+        page.get_by_role("radio", name="dots").check(force=True)  # its picture is what one clicks on
+        before = shown(page)
+        preview.click()
+        expect(page.get_by_text("A preview: nothing has changed yet.")).to_be_visible(timeout=WAIT)
+        assert np.abs(shown(page) - before).mean() > 1
+        assert still(page) == first
+        make.click()
+        expect(page.get_by_role("listitem")).to_have_text(["TF01 dots"], timeout=WAIT)
+        page.get_by_role("button", name="Close", exact=True).click()
+        page.get_by_role("textbox", name="Palette of TF02").fill("#00ff00")
+        save_as(page, "dots.yaml")
+        kept = still(page)
+        page.get_by_role("button", name="Undo").click()
+        page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("button", name="Nothing to undo")).to_be_disabled()
+        assert still(page) == first
+    with served(scene_file.parent / "dots.yaml") as (_, address), opened(chromium, address) as page:
+        assert still(page) == kept
+
+
+def test_a_picture_is_dropped_and_words_are_followed(chromium, scene_file, tmp_path):
+    Image.fromarray(np.zeros((64, 64, 3), np.uint8)).save(tmp_path / "black.png")
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("button", name="New look of the scene").click()
+        page.get_by_label("Another picture").set_input_files(tmp_path / "black.png")
+        expect(page.get_by_role("radio", name="black.png")).to_be_checked(timeout=WAIT)
+        page.get_by_label("or words").fill("turn it into gold")
+        expect(page.get_by_role("radio", name="black.png")).not_to_be_checked()
+        page.get_by_role("button", name="Make look").click()
+        expect(page.get_by_role("listitem")).to_have_text(["TF01, TF02 turn it into gold"], timeout=WAIT)
+        page.get_by_label("Another picture").set_input_files(scene_file)
+        expect(page.get_by_text("scene.yaml cannot be used")).to_be_visible(timeout=WAIT)
+
+
+def test_edits_stand_in_the_link(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        page.get_by_role("checkbox", name="TF02").uncheck()
+        expect(page).to_have_url(re.compile("edits="), timeout=WAIT)
+        link = page.url
+        page.get_by_role("button", name="Undo").click()
+        expect(page).not_to_have_url(re.compile("edits="), timeout=WAIT)
+        page.goto("about:blank")
+        page.goto(link)
+        expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked(timeout=WAIT)
+        expect(page.get_by_role("listitem")).to_have_text(["TF02 visible"])
+
+
+def test_an_export_is_saved(chromium, scene_file):
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        with page.expect_download(timeout=WAIT) as download:
+            page.get_by_label("Export").select_option("3D Gaussians, PLY")
+        assert download.value.suggested_filename == "scene.ply"
 
 
 def test_pages_share_their_edits(chromium, scene_file):

@@ -70,8 +70,8 @@ def test_half_of_a_camera_sees_the_same():
     [
         (
             {"type": "run"},
-            "type: expected one of view, edit, undo, redo, save, mask, segment, look, export, rename, remove, "
-            "cancel, got",
+            "type: expected one of view, edit, undo, redo, save, mask, segment, look, export, rename, "
+            "remove, cancel, got",
         ),
         ({"type": ["view"]}, "type: expected one of view, edit, undo, redo,"),
         ({"mode": "x"}, "mode: expected one of shaded"),

@@ -29,7 +29,10 @@ SMALL = (
 OPTIONS: dict = {"targets": (), "config": ("tracking=none", "dataset=sphere", "fit=demo"), "overrides": SMALL}
 
 FITS = {"surfels", "shading", "texture"}  # all by the rule `phase`
-AFTER_FITS = {"figure", "comparison", "mesh", "compose", "pse", "timing", "edit", "edit_metrics", "gallery"}
+AFTER_FITS = {
+    *("figure", "comparison", "mesh", "compose", "pse", "timing", "page"),
+    *("edit", "edit_metrics", "gallery"),
+}
 TABLES = {"tables", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
 GROUPS = {
@@ -106,8 +109,9 @@ def sources(project):
 def test_every_result_is_there_and_recorded(project):
     results = project.work / "results"
     of_surfels, of_ball, of_sweep = 5 + 3 + 4 + 3, 2 + 3 + 2, 3
+    pages = 4  # of surfels as fitted, and of their three looks
     side_by_side = 2  # comparison and gallery
-    assert len(metrics(project)) == 4 + of_surfels + of_ball + of_sweep + side_by_side
+    assert len(metrics(project)) == 4 + of_surfels + pages + of_ball + of_sweep + side_by_side
     for name in ("fitting", "datasets", "rendering", "model_size", "edits", "looks", "meshes", "sweep-tiny"):
         assert len((results / "tables" / f"{name}.csv").read_text().splitlines()) > 1
         assert f"fitted{{{name}.tex}}" in (results / "tables" / "tables.tex").read_text()

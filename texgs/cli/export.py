@@ -116,4 +116,4 @@ def of_page(arguments: argparse.Namespace, scene: "Scene | None") -> Path:
         scene = replace(scene, models={arguments.model: chosen(scene, arguments.model)})
     for entry in scene.models.values():
         require_export(files.kind_of(entry.file), "html")
-    return write_page(arguments.to, scene, arguments.to.stem)
+    return write_page(arguments.to, scene, arguments.to.stem).path

@@ -32,6 +32,7 @@ STAGE_VERBS = {
     "pse": "edit colours, opacities and lights of a scene beside those of its volume",
     "timing": "measure how long frames of a scene and of its volume take",
     **{method.stage: method.summary for method in methods().values()},
+    "page": "make a page of a scene that shows and edits it in a browser",
     "gallery": "show all looks of a data set side by side",
     "edit_metrics": "measure an edited scene: CLIP, style, consistency, time, size",
 }

@@ -103,7 +103,6 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     from texgs.cli.absent import lacking, left_out, missing_weights
     from texgs.config.compose import compose
     from texgs.config.experiments import apart, selected
-    from texgs.config.methods import NO_METHOD
     from texgs.config.places import edit_folder, fit_folder
     from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
@@ -127,7 +126,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "dataset": sorted({each.dataset.name for each in configs}),
             "views": sorted({each.views.name for each in configs}),
             "fit": sorted({fit_folder(each) for each in configs}),
-            "edit": sorted({edit_folder(each) for each in configs if each.edit.method != NO_METHOD}),
+            "edit": sorted({edit_folder(each) for each in configs}),
             "gallery": sorted({each.gallery.name for each in configs}),
             "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },

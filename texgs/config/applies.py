@@ -6,7 +6,7 @@ from omegaconf import DictConfig
 
 from texgs.config.fields import kinds
 from texgs.config.inputs import with_recipe
-from texgs.config.methods import NO_METHOD
+from texgs.config.methods import NO_METHOD, methods
 from texgs.config.variants import changes
 
 
@@ -40,6 +40,13 @@ def is_compared(config: DictConfig) -> bool:
 def has_scene(config: DictConfig) -> bool:
     """Whether the configuration is of all basic TFs."""
     return is_fit(config) and config.tf is None
+
+
+def has_page(config: DictConfig) -> bool:
+    """Whether the scene or its new look becomes a page: those of sweeps are of interest for their numbers."""
+    is_shown = is_fit(config) or methods()[config.edit.method].is_look
+    able = "html" in kinds()[config.fit.field].exports
+    return bool(config.page.made and config.tf is None and able and is_shown and not changes(config))
 
 
 def has_gallery(config: DictConfig) -> bool:

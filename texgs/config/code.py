@@ -1,7 +1,7 @@
 """Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
 
 Read from the source without importing it, see sources.py. Code that calls the native library has the digest
-of the C++ and CUDA sources in it.
+of the C++ and CUDA sources in it; a module that reads texts of its package has these in it.
 """
 
 import ctypes
@@ -16,6 +16,8 @@ from texgs.config.sources import PACKAGE, Sources, digest
 ROOT = Path(__file__).parents[2]
 NATIVE = "texgs.raster.native"  # the module that calls the native library
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # of native libraries
+READS_TEXTS = b"importlib.resources"  # in modules that do
+TEXTS = (".css", ".html", ".j2", ".js")
 SOURCES = Sources()
 
 
@@ -41,8 +43,15 @@ def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
     path = source(module)
     if path is None:
         return None
-    what, *imported = SOURCES.of(path.read_bytes())
-    return what, tuple(imported)
+    text = path.read_bytes()
+    what, *imported = SOURCES.of(text)
+    return digest(what + texts_beside(path)) if READS_TEXTS in text else what, tuple(imported)
+
+
+def texts_beside(path: Path) -> str:
+    """The texts that are no modules in the folder of a module and below: pages, scripts, templates."""
+    files = sorted(each for each in path.parent.rglob("*") if each.suffix in TEXTS)
+    return "".join(f"{each.name}\n{each.read_text(encoding='utf-8')}" for each in files)
 
 
 @cache

@@ -13,7 +13,7 @@ from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.config.looks import captions, looks_of
-from texgs.config.methods import method_of
+from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.places import edit_folder, folder_of, made
 from texgs.config.variants import NO_SWEEP, fit_variant
 from texgs.core.errors import ConfigError, MissingDataError
@@ -72,6 +72,12 @@ def scene_and_volume(config: DictConfig) -> dict[str, Path]:
 def models_of_scene(config: DictConfig) -> dict[str, Path]:
     """The models that a scene names, as inputs beside it."""
     return {f"model.{name}": path for name, path in all_models(config).items()}
+
+
+def shown_scene(config: DictConfig) -> dict[str, Path]:
+    """The scene of an edit, or the one as fitted, with its models."""
+    place = "compose" if config.edit.method == NO_METHOD else "edit"
+    return {"scene": made(place, config), **models_of_scene(config)}
 
 
 def scene_settings(config: DictConfig) -> dict[str, Any]:

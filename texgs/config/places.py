@@ -35,6 +35,7 @@ PLACES = {
     "compose": Place("{dataset}/scene/{fit}/compose", ("scene.yaml", "scene.png")),
     "pse": Place("{dataset}/scene/{fit}/pse", ("pse.png", "relight.png")),
     "timing": Place("{dataset}/scene/{fit}/timing"),
+    "page": Place("{dataset}/scene/{fit}/pages/{edit}", ("scene.html", "poster.jpg")),
     "gallery": Place("{dataset}/gallery/{gallery}"),
     "edit": Place("{dataset}/scene/{fit}/edits/{edit}", ("scene.yaml", "edit.png")),
     "edit_metrics": Place("{dataset}/scene/{fit}/edit_metrics/{edit}"),

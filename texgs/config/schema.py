@@ -47,6 +47,14 @@ class Metric:
 
 
 @dataclass
+class PageKeys:
+    """Scenes of surfels as pages for a browser."""
+
+    made: bool = key(True, "whether each scene and each new look becomes a page, scene.html")
+    embedded: float = key(4.0, "largest page that the report holds; it leads to others", "MiB", least=0)
+
+
+@dataclass
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
@@ -84,6 +92,7 @@ class Config:
     edits: list[str] = key([], "edits of a whole experiment, files of conf/edit; default the one of `edit`")
     metric: Metric = key(Metric, "what edits are measured with")
     mesh: MeshKeys = key(MeshKeys, "surfaces of fits beside those of their volumes")
+    page: PageKeys = key(PageKeys, "scenes as pages for a browser")
     gallery: GalleryKeys = key(GalleryKeys, "pictures of scenes side by side")
     sweep: Sweep = key(Sweep, "variants of the experiment")
     sweeps: dict[str, str] = field(

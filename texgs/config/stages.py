@@ -2,7 +2,16 @@
 
 from omegaconf import DictConfig
 
-from texgs.config.applies import has_gallery, has_mesh, has_scene, has_volume, is_compared, is_fit, is_fit_of
+from texgs.config.applies import (
+    has_gallery,
+    has_mesh,
+    has_page,
+    has_scene,
+    has_volume,
+    is_compared,
+    is_fit,
+    is_fit_of,
+)
 from texgs.config.fields import Kind, kinds
 from texgs.config.galleries import gallery_inputs, gallery_settings
 from texgs.config.inputs import (
@@ -21,6 +30,7 @@ from texgs.config.inputs import (
     scene_settings,
     scenes_before_and_after,
     seeded,
+    shown_scene,
     view_set,
     view_settings,
     volume_inputs,
@@ -201,6 +211,19 @@ ROWS = (
         applies=has_scene,
     ),
     *map(edit_stage, methods().values()),
+    Stage(
+        "page",
+        "texgs.cli.stages.page",
+        select=lambda config: {
+            "look": config.edit.name,
+            "embedded": config.page.embedded,
+            **fit_label(config),
+        },
+        inputs=shown_scene,
+        place="page",
+        needs=("compose", *EDITS),
+        applies=has_page,
+    ),
     Stage(
         "gallery",
         "texgs.cli.stages.gallery",

@@ -44,7 +44,7 @@ def write_report(
     left_out: Sequence[LeftOut] = (),
     votes: Votes | None = None,
 ) -> Path:
-    """Write a report that needs no other file.
+    """Write a report that needs no other file, but for pages of scenes that are too large for it.
 
     Args:
         path: target, .html.
@@ -65,7 +65,7 @@ def write_report(
     template = files("texgs.report").joinpath("report.html.j2").read_text(encoding="utf-8")
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     text = environment.from_string(template).render(
-        sections=sections(records, left_out, votes),
+        sections=sections(records, left_out, votes, Path(path).resolve().parent),
         left_out=[*left_out, *others(old)],
         jobs=[job(record.facts) for record in records],
         places={record.path: index for index, record in enumerate(records, start=1)},
@@ -79,10 +79,10 @@ def write_report(
 
 
 def sections(
-    records: Sequence[Record[Any]], left_out: Sequence[LeftOut], votes: Votes | None
+    records: Sequence[Record[Any]], left_out: Sequence[LeftOut], votes: Votes | None, folder: Path
 ) -> list[Section]:
-    """The sections that have something to show."""
-    pictures, tables = figures(records), tables_of(records, left_out, votes)
+    """The sections that have something to show; `folder`: of the report."""
+    pictures, tables = figures(records, folder), tables_of(records, left_out, votes)
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     pictures["fitting"] += loss_figures(records)
     pictures["ablations"] += [shown_sweep(records, name) for name in sweeps_of(records)]

@@ -172,6 +172,16 @@ class TimingResult:
 
 
 @dataclass(frozen=True)
+class PageResult:
+    """A scene as a page for a browser."""
+
+    edit: str  # or "none"
+    primitives: int
+    page_mib: float
+    is_embedded: bool  # whether the report holds it
+
+
+@dataclass(frozen=True)
 class EditResult:
     """A scene with a new look or a new part."""
 
@@ -225,6 +235,7 @@ Result = (
     | SceneResult
     | PseResult
     | TimingResult
+    | PageResult
     | EditResult
     | EditMeasures
 )

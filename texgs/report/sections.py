@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import base64
 import io
+import json
+import os
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from PIL import Image
 
+from texgs.config.methods import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
-from texgs.report.results import ComparisonResult, EditResult, FitResult, GalleryResult
+from texgs.report.results import ComparisonResult, EditResult, FitResult, GalleryResult, PageResult
 
 SECTIONS = {
     "data": "Data sets and views",
+    "scenes": "Scenes to open",
     "fitting": "Fitting",
     "pse": "Editing of colour, opacity and light",
     "relight": "Relighting",
@@ -34,10 +40,12 @@ OF_STAGES = {  # sections by the stage that made a figure; edits have theirs by 
     **dict.fromkeys(("volume", "transfer", "views", "sheet"), "data"),
     **dict.fromkeys(("figure", "comparison", "mesh"), "fitting"),
     **dict.fromkeys(("compose", "pse"), "pse"),
+    "page": "scenes",
 }
 OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
 OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
-NARROW = ("scene.png", "transfer.png", "convergence.png")  # side by side where there is room; and styles
+# Side by side where there is room, as pictures of styles are.
+NARROW = ("scene.png", "poster.jpg", "transfer.png", "convergence.png")
 QUALITY, EFFORT = 85, 2  # of pictures in the report; the whole ones are in the folders of their jobs
 UNREPORTED = ("turntable.png",)  # a film: it would be most of the report
 
@@ -52,10 +60,17 @@ class Figure:
     uri: str
     command: str  # that makes it
     is_narrow: bool = False
+    page: str = ""  # that shows the same in a browser, as JSON; or
+    link: str = ""  # the way to its file
 
 
-def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
-    """All pictures of jobs by section, in the order of data sets; those of sweeps have a figure of all."""
+def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:
+    """All pictures of jobs by section, in the order of data sets; those of sweeps have a figure of all.
+
+    Args:
+        records: of the jobs.
+        folder: of the report, which links begin at.
+    """
     found: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
         for name, words in record.facts.get("pictures", {}).items():
@@ -68,9 +83,20 @@ def figures(records: Sequence[Record[Any]]) -> dict[str, list[Figure]]:
                     data_uri(Image.open(picture)),
                     command(record),
                     is_narrow=name in NARROW or name.startswith("style"),
+                    **page(record, folder),
                 )
                 found[section_of(record, name)].append(figure)
     return found
+
+
+def page(record: Record[Any], folder: Path) -> dict[str, str]:
+    """The page of a scene, or the way to it, where a job has made one."""
+    file = record.path.with_name("scene.html")
+    if not isinstance(record.result, PageResult) or not file.is_file():
+        return {}
+    if record.result.is_embedded:
+        return {"page": json.dumps(file.read_text(encoding="utf-8")).replace("</", r"<\/")}
+    return {"link": quote(Path(os.path.relpath(file, folder)).as_posix())}
 
 
 def section_of(record: Record[Any], picture: str) -> str:
@@ -88,8 +114,14 @@ def section_of(record: Record[Any], picture: str) -> str:
 
 def label(record: Record[Any]) -> str:
     """Basic TF, fit and edit of a job, as far as it is of one."""
-    edit = record.result.edit if isinstance(record.result, EditResult) else ""
+    edit = edit_of(record)
     return " ".join(filter(None, (record.tf, record.label, edit)))
+
+
+def edit_of(record: Record[Any]) -> str:
+    """The edit of a job that has made a scene or its page, if it is of one."""
+    edit = record.result.edit if isinstance(record.result, EditResult | PageResult) else ""
+    return "" if edit == NO_METHOD else edit
 
 
 def command(record: Record[Any]) -> str:
@@ -105,7 +137,7 @@ def command(record: Record[Any]) -> str:
     words = {
         "tf": record.tf,
         "fit": next(iter(fits), ""),
-        "edit": result.edit if isinstance(result, EditResult) else "",
+        "edit": edit_of(record),
         "variant": record.variant,
         "fit.seed": record.seed if record.recipe else 0,
         "fits": f"[{','.join(fits)}]" if len(fits) > 1 else "",

@@ -17,7 +17,7 @@ from texgs.core.progress import progress
 from texgs.fields.files import kind_of
 from texgs.scene import export_file
 from texgs.scene.scene import Scene
-from texgs.scene.session import Session
+from texgs.viewer.frames import Frames
 from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.messages import Export, View
 from texgs.viewer.standalone import write_page
@@ -31,11 +31,11 @@ class Downloads:
 
     Args:
         jobs: where that is done.
-        session: renders.
+        frames: renders.
     """
 
-    def __init__(self, jobs: Jobs, session: Session) -> None:
-        self._jobs, self._session = jobs, session
+    def __init__(self, jobs: Jobs, frames: Frames) -> None:
+        self._jobs, self._frames = jobs, frames
         self._folder = TemporaryDirectory(prefix="texgs-files-")
 
     async def write(self, scene: Scene, asked: Export, name: str, watch: Watch) -> Path:
@@ -68,14 +68,14 @@ class Downloads:
         if asked.kind in FILMS:
             return write_frames(path, self._turntable(scene, asked.view))
         if asked.kind == "html":
-            return write_page(path, scene, name)
+            return write_page(path, scene, name).path
         return export_file.export_scene(path, scene, export_file.Export(asked.kind))
 
     def _turntable(self, scene: Scene, view: View) -> Iterator[np.ndarray]:
         """Frames of a turn around what the camera looks at, from where it is."""
         for index in progress(range(FRAMES), title="turntable", unit="frame"):
             place = replace(view.camera, azimuth=view.camera.azimuth + 360 * index / FRAMES)
-            yield self._session.frame(place.camera(), view.mode, scene)
+            yield self._frames.pixels(replace(view, camera=place), scene)
 
 
 def exports_of(kind: Kind[object]) -> list[str]:

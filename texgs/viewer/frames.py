@@ -18,6 +18,7 @@ from PIL import Image
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import View
+from texgs.viewer.origins import Origins
 
 SLOW = 0.030  # seconds of a whole frame above which the ones of a moving camera have half as many rows
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
@@ -45,10 +46,11 @@ class Frames:
 
     Args:
         session: that the scenes belong to; its models are read by the thread.
+        origins: whose views are shown.
     """
 
-    def __init__(self, session: Session) -> None:
-        self._session = session
+    def __init__(self, session: Session, origins: Origins) -> None:
+        self._session, self._origins = session, origins
         threads = torch.get_num_threads()
         self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))
 
@@ -70,21 +72,30 @@ class Frames:
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._still, view, scene)
 
+    def pixels(self, view: View, scene: Scene, scale: float = 1.0) -> np.ndarray:
+        """What a view shows [H, W, 3], uint8, with sides of this part of the pixels.
+
+        Raises:
+            TexgsError: if the scene cannot be rendered.
+        """
+        if view.mode == "truth" or view.mode == "difference":
+            return self._origins.frame(view, scene, scale)
+        return self._session.frame(view.camera.camera(scale), view.mode, scene)
+
     def close(self) -> None:
         """End the thread, once the frame that it renders is there."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
     def _frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
         scale, start = pace.scale(view.moving), time.perf_counter()
-        pixels = self._session.frame(view.camera.camera(scale), view.mode, scene)
+        pixels = self.pixels(view, scene, scale)
         seconds = time.perf_counter() - start
         pace.took(seconds, scale)
         return packed(view, pixels, seconds)
 
     def _still(self, view: View, scene: Scene) -> bytes:
         file = io.BytesIO()
-        pixels = self._session.frame(view.camera.camera(), view.mode, scene)
-        Image.fromarray(pixels).save(file, format="PNG")
+        Image.fromarray(self.pixels(view, scene)).save(file, format="PNG")
         return file.getvalue()
 
 

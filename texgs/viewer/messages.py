@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
@@ -12,6 +12,9 @@ from texgs.scene.frame import Mode
 from texgs.scene.scene_file import known
 from texgs.viewer.values import flag, number, parse_json, whole, words
 
+OfViews = Literal["truth", "difference"]
+OF_VIEWS = get_args(OfViews)  # modes that show the training view nearest to the camera
+MODES = (*get_args(Mode), *OF_VIEWS)
 LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
 MOST_PIXELS = 4096  # of a side
 FARTHEST = 1000.0  # world units
@@ -43,7 +46,7 @@ class View:
 
     id: int  # comes back with the frame
     camera: Orbit
-    mode: Mode
+    mode: Mode | OfViews
     moving: bool  # another one follows at once: speed counts more than quality
     before: bool  # the scene as it was opened
     only: str = ""  # a model that is shown alone and unedited, to be clicked on
@@ -169,8 +172,8 @@ def view_of(values: Mapping[str, Any]) -> View:
     """
     known(values, ("id", "camera", "mode", "moving", "before", "only"), "view")
     mode = values.get("mode", "shaded")
-    if mode not in get_args(Mode):
-        raise ArgumentError(f"mode: expected one of {', '.join(get_args(Mode))}, got {mode!r:.100}")
+    if mode not in MODES:
+        raise ArgumentError(f"mode: expected one of {', '.join(MODES)}, got {mode!r:.100}")
     return View(
         id=whole("id", values.get("id", 0), 0, 2**53),
         camera=orbit_of(values.get("camera")),

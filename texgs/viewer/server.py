@@ -15,6 +15,7 @@ from texgs.core.errors import ArgumentError, TexgsError
 from texgs.edit.pictures import PICTURES
 from texgs.fields.files import kind_of
 from texgs.models.filters.vocabulary import WORDS
+from texgs.scene.scene import Scene
 from texgs.scene.scene_file import known
 from texgs.scene.session import Session
 from texgs.viewer.description import bounds_of, describe
@@ -40,6 +41,7 @@ from texgs.viewer.messages import (
     view_of,
 )
 from texgs.viewer.opening import Opened
+from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import LARGEST as LARGEST_FILE
@@ -73,9 +75,10 @@ class Server:
         kind = kind_of(next(iter(opened.scene.models.values())).file)
         self._choices = {"styles": list(PICTURES), "words": list(WORDS), "exports": exports_of(kind)}
         self.edits = SharedEdits(session, opened)
-        self.frames = Frames(session)
+        self._origins = Origins(opened.scene, session)
+        self.frames = Frames(session, self._origins)
         self._changing = asyncio.Lock()  # a change that reads files takes its time in another thread
-        self.work = Work(session, self.edits, self._changing, self._tell_all, device)
+        self.work = Work(self.frames, self.edits, self._changing, self._tell_all, device)
         self._pages: dict[Page, web.WebSocketResponse] = {}
         self._count = 0  # of pages so far
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
@@ -164,7 +167,7 @@ class Server:
         self._count += 1
         number = self._count
         self._pages[page] = socket
-        page.tell_scene(self.scene_message())
+        page.tell_scene(self.greeting())
         sending = asyncio.create_task(page.send())
         try:
             await self._listen(socket, page, number)
@@ -237,10 +240,22 @@ class Server:
         page.tell(f"Saved as {path}", level="info")
 
     def scene_message(self) -> dict[str, Any]:
-        """The scene and its history, for all pages."""
-        scene = describe(self._title, self.edits.scene, self._composed, self._bounds)
-        facts = {"run": self._run, "choices": self._choices}
-        return {"type": "scene", "scene": scene, **facts, **self.edits.state()}
+        """What changes of the scene, and its history, for all pages."""
+        scene = self._describe(self.edits.scene)
+        changing = {key: scene[key] for key in ("name", "background", "light", "models")}
+        return {"type": "scene", "scene": changing, **self.edits.state()}
+
+    def greeting(self) -> dict[str, Any]:
+        """The same, for a page that knows nothing yet, with what does not change."""
+        whole = self._describe(self.edits.scene)
+        whole["views"] += self._origins.places
+        whole["modes"] += self._origins.modes
+        whole["transfer"] = self._origins.transfer
+        facts = {"run": self._run, "choices": self._choices, "original": self._describe(self.edits.original)}
+        return {**self.scene_message(), "scene": whole, **facts}
+
+    def _describe(self, scene: Scene) -> dict[str, Any]:
+        return describe(self._title, scene, self._composed, self._bounds)
 
     # ---- End ----------------------------------------------------------------
 

@@ -32,7 +32,7 @@ class SharedEdits:
     def __init__(self, session: Session, opened: Opened) -> None:
         self._session, self._folder, self.name = session, opened.folder, opened.name
         self._own = {file.resolve() for file in (opened.file,) if file}  # replaced without a question
-        self._original = self._saved = session.scene
+        self.original = self._saved = session.scene
         self._past, self._future = list[str](), list[str]()
         self._latest: tuple[object, ...] | None = None  # author and number of a step that may go on
 
@@ -54,7 +54,7 @@ class SharedEdits:
         if view.only:
             return alone(self.scene, view.only)
         if view.before:
-            return self._original
+            return self.original
         names, textures = part_names(self.scene), trial or {}
         return with_textures(self.scene, {part: textures[part] for part in names if part in textures})
 

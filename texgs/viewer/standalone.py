@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from base64 import b64encode
+from dataclasses import dataclass
 from hashlib import sha256
 from importlib.resources import files
 from io import BytesIO
@@ -28,7 +29,16 @@ POSTER = 512  # pixels of either side
 QUALITY = 80  # of the poster, a JPEG
 
 
-def write_page(path: str | Path, scene: Scene, name: str) -> Path:
+@dataclass(frozen=True)
+class WrittenPage:
+    """A page, and what is known of it."""
+
+    path: Path
+    surfels: int
+    poster: bytes  # a JPEG of the first view
+
+
+def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
     """Create or replace the page of a scene in one step; the same scene gives the same bytes.
 
     The surfels are rounded as in compact model files. Hidden models are in the page: they can be shown there.
@@ -37,9 +47,6 @@ def write_page(path: str | Path, scene: Scene, name: str) -> Path:
         path: target, .html.
         scene: of surfels.
         name: of the scene, its title.
-
-    Returns:
-        The path.
 
     Raises:
         ArgumentError, ShapeError: if a model is missing, damaged or not one of surfels with shading, the page
@@ -50,7 +57,7 @@ def write_page(path: str | Path, scene: Scene, name: str) -> Path:
         raise ArgumentError(
             f"{path}: expected a scene of surfels, got one of another kind; fit surfels for this"
         )
-    surfels = pack(Path(path), composed)
+    surfels = pack(path, composed)
     if len(surfels) > LARGEST:
         raise ArgumentError(
             f"{path}: expected surfels of at most {LARGEST >> 20} MiB, got {len(surfels) >> 20} MiB for "
@@ -58,7 +65,8 @@ def write_page(path: str | Path, scene: Scene, name: str) -> Path:
         )
     description = describe(name, scene, composed)
     picture = poster(scene, composed, description["views"][0], description["fov_y"])
-    return write_bytes(path, page_of(description, surfels, picture).encode())
+    write_bytes(path, page_of(description, surfels, picture).encode())
+    return WrittenPage(path, len(composed), picture)
 
 
 def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:

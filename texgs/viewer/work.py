@@ -16,8 +16,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import require_name
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.scene.scene import Scene
-from texgs.scene.session import Session
 from texgs.viewer.downloads import Downloads, require_kind
+from texgs.viewer.frames import Frames
 from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.looks import Looks
 from texgs.viewer.messages import Export, Look, Segment
@@ -31,7 +31,7 @@ class Work:
     """Does one job at a time.
 
     Args:
-        session: that is edited.
+        frames: renders.
         edits: that jobs add to.
         changing: is held while the scene changes.
         changed: is called when it has.
@@ -40,7 +40,7 @@ class Work:
 
     def __init__(
         self,
-        session: Session,
+        frames: Frames,
         edits: SharedEdits,
         changing: asyncio.Lock,
         changed: Callable[[], None],
@@ -50,7 +50,7 @@ class Work:
         self._jobs, self.styles = Jobs(), Styles()
         self.segmenter = Segmenter(self._jobs, device)
         self._looks = Looks(self._jobs, self.styles, device)
-        self.downloads = Downloads(self._jobs, session)
+        self.downloads = Downloads(self._jobs, frames)
         self._task: asyncio.Task[None] | None = None
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()

@@ -3,7 +3,7 @@
 
 rule scenes:
     input:
-        PLAN.done("compose", "pse", "timing"),
+        PLAN.done("compose", "pse", "timing", "page"),
 
 
 rule compose:
@@ -50,5 +50,20 @@ rule timing:
     params:
         code=code("timing"),
         words=words("timing"),
+    shell:
+        RUN
+
+
+rule page:
+    input:
+        reads("page"),
+    output:
+        writes("page"),
+    log:
+        log_of("page"),
+    threads: 2
+    params:
+        code=code("page"),
+        words=words("page"),
     shell:
         RUN

@@ -129,6 +129,31 @@ def test_without_light_colours_are_those_of_palette_and_texels():
     assert_close(found.color, found.alpha[..., None] * flat["palette"], atol=1e-5, rtol=0)
 
 
+def test_texels_alone_are_around_grey():
+    model = ball(1, n=3000)
+    even = {**model.parameters, "texels": torch.full_like(model.parameters["texels"], 0.125)}
+    found = Composition([Surfels(even)]).render(CAMERA, SIDE, look="texture", background=torch.zeros(3))
+    assert_close(found.color, 0.625 * found.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
+
+
+def test_discs_are_opaque_within_one_standard_deviation():
+    """A surfel that faces the camera covers a circle, whatever its opacity; one that is hidden nothing."""
+    one = {name: x[:1] for name, x in ball(1, stage="shading").parameters.items()}
+    one |= {
+        "means": torch.zeros(1, 3),
+        "quats": torch.tensor([[1.0, 0, 0, 0]]),
+        "opacities": torch.tensor([-2.0]),
+    }
+    one["scales"] = torch.full((1, 2), 0.3).log()
+    scene, camera = Composition([Surfels(one, ShadingModel())]), orbit(-90, 0, 4, 30, 200, 200)
+    alpha = scene.render(camera, SIDE, look="discs").alpha
+    radius = 0.3 * float(camera.K[0, 0]) / 4
+    assert float(alpha.max()) == pytest.approx(0.99)
+    assert float((alpha > 0.5).sum()) == pytest.approx(torch.pi * radius**2, rel=0.02)
+    hidden = scene.render(camera, SIDE, [PartEdit(visible=False)], look="discs").alpha
+    assert float(hidden.max()) == 0
+
+
 @pytest.mark.parametrize(
     ("models", "edits", "message"),
     [

@@ -12,17 +12,18 @@ import { SegmentTool } from "./segment.js";
 import { SharedState } from "./shared.js";
 import { difference } from "./state.js";
 import { Toolbar } from "./toolbar.js";
+import { TransferPanel } from "./transfer.js";
 
 const get = (id) => document.getElementById(id);
 
 class Page extends ScenePage {
-  constructor({ scene, choices }, connection, notices) {
+  constructor({ scene, original, choices }, connection, notices) {
     const renderer = new Remote(get("picture"), (text, level) => notices.tell(text, level));
     renderer.onframe = ({ ms, width, height }) => {
       get("pace").textContent = `${width} × ${height}, ${Math.round(ms)} ms`;
     };
     renderer.open(connection, scene);
-    super(new SharedState(scene, connection), renderer, () => this.segments.isLocked);
+    super(new SharedState(scene, original, connection), renderer, () => this.segments.isLocked);
     this.connection = connection;
     this.notices = notices;
     this.job = new Job(connection);
@@ -33,9 +34,16 @@ class Page extends ScenePage {
       { segment: (model) => this.#segment(model), look: (part) => this.#look(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
     this.toolbar = new Toolbar(this, choices);
+    get("transfer-section").hidden = !scene.transfer;
+    if (scene.transfer) new TransferPanel(get("transfer"), scene.transfer, (only) => this.#single(only));
     get("look-start").onclick = () => this.#look();
     get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();
+  }
+
+  /** Show one model alone, or all, unless a segment is being made of one. */
+  #single(only) {
+    if (get("segment").hidden) this.show({ only });
   }
 
   #segment(model) {
@@ -64,8 +72,9 @@ class Page extends ScenePage {
   /** Show what the server has now. One that was started again knows nothing of edits before. */
   adopt(message) {
     get("title").textContent = get("title").title = message.scene.name;
-    const lost = this.run && this.run !== message.run ? difference(message.scene, this.state.scene) : [];
-    this.run = message.run;
+    const isAnother = message.run && this.run && message.run !== this.run;
+    const lost = isAnother ? difference(message.scene, this.state.scene) : [];
+    this.run = message.run ?? this.run;
     this.state.adopt(message);
     if (!lost.length) return;
     this.notices.offer("The server was started again, without the edits of this page.", "Make them again", () => {

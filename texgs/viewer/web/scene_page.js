@@ -2,16 +2,33 @@
 
 import { AXES, OrbitCamera } from "./camera.js";
 import { control } from "./controls.js";
-import { capital } from "./inputs.js";
+import { capital, element } from "./inputs.js";
 import { LightControl } from "./light.js";
+import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
 const NAMES = {
   shaded: "Shaded", unshaded: "Without light", normal: "Normals", depth: "Depth", alpha: "Opacity",
   texture: "Texture alone", discs: "Surfels as discs",
+  truth: "Nearest training view", difference: "Difference from that view",
   ambient: "Ambient factor", diffuse: "Diffuse factor", specular: "Specular factor", shininess: "Shininess",
 };
 const get = (id) => document.getElementById(id);
+
+/** Edits in a link; none where there are none, or something else. */
+function editsOf(text) {
+  try {
+    const edits = JSON.parse(text ?? "[]");
+    return Array.isArray(edits) ? edits.filter((each) => typeof each?.part === "string") : [];
+  } catch {
+    return [];
+  }
+}
+
+/** Whether an edit changes a scene. */
+function isDifferent(scene, edit) {
+  return JSON.stringify(edited(scene, edit)) !== JSON.stringify(scene);
+}
 
 export class ScenePage {
   #resting = 0; // timer
@@ -81,20 +98,31 @@ export class ScenePage {
     this.moved();
   }
 
-  /** Go where the link says. */
+  /** Go where the link says, and make its edits, as far as they are not made. */
   follow() {
-    const fragment = location.hash.slice(1), mode = new URLSearchParams(fragment).get("mode");
+    const fragment = location.hash.slice(1), words = new URLSearchParams(fragment), mode = words.get("mode");
     this.camera.goHome(this.canvas.clientWidth, this.canvas.clientHeight);
     this.camera.fromFragment(fragment);
     if (this.renderer.modes.includes(mode)) this.show({ mode });
+    for (const { part, key, value } of editsOf(words.get("edits"))) {
+      if (isDifferent(this.state.scene, { part, key, value })) this.state.edit(part, key, value);
+    }
     this.moved();
+  }
+
+  /** Camera, mode and edits as the link has them. */
+  get #fragment() {
+    const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene);
+    const words = new URLSearchParams();
+    if (mode !== "shaded") words.set("mode", mode);
+    if (edits.length) words.set("edits", JSON.stringify(edits));
+    return [this.camera.toFragment(), words.toString()].filter(Boolean).join("&");
   }
 
   #rest(moving) {
     if (moving) this.renderer.draw(this.camera, this.state.scene, { moving: false, ...this.#shown });
-    const { mode } = this.#shown;
     try {
-      history.replaceState(null, "", `#${this.camera.toFragment()}${mode === "shaded" ? "" : `&mode=${mode}`}`);
+      history.replaceState(null, "", `#${this.#fragment}`);
     } catch {
       // a frame of another page may have no address of its own
     }
@@ -104,8 +132,9 @@ export class ScenePage {
     const mode = get("mode"), view = get("view"), fov = get("fov");
     mode.append(...this.renderer.modes.map((name) => new Option(NAMES[name] ?? name, name)));
     mode.addEventListener("change", () => this.show({ mode: mode.value }));
-    const names = [...this.state.scene.views.map((each) => each.name), ...Object.keys(AXES)];
-    view.append(...names.map((name) => new Option(AXES[name] ? `From ${name}` : capital(name), name)));
+    const [home, ...trained] = this.state.scene.views.map(({ name }) => new Option(capital(name), name));
+    view.append(home, ...Object.keys(AXES).map((name) => new Option(`From ${name}`, name)));
+    if (trained.length) view.append(element("optgroup", { label: "Training views" }, ...trained));
     view.addEventListener("change", () => {
       const { value } = view;
       if (value) this.goTo(value);

@@ -6,8 +6,14 @@ export class SharedState extends State {
   #connection;
   #sent = 0; // messages, of which the server answers each with the scene
 
-  constructor(scene, connection) {
+  /**
+   * @param {object} scene - as it is now
+   * @param {object} original - as it was opened
+   * @param {Connection} connection
+   */
+  constructor(scene, original, connection) {
     super(scene);
+    this.original = original;
     this.#connection = connection;
   }
 
@@ -18,7 +24,7 @@ export class SharedState extends State {
 
   /** Take the server's scene, unless it does not know yet what was edited here since. */
   adopt({ scene, past, future, saved, file, answered }) {
-    if (answered === this.#sent) this.update({ scene, past, future, saved, file });
+    if (answered === this.#sent) this.update({ scene: { ...this.scene, ...scene }, past, future, saved, file });
   }
 
   edit(part, key, value, step = 0) {

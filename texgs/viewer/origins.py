@@ -1,0 +1,188 @@
+"""What the models of a scene were made from, where it lies beside them: views and transfer functions."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import asin, atan, atan2, degrees
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from torch.nn.functional import normalize
+
+from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.io import read_json
+from texgs.core.numbers import is_number
+from texgs.scene.scene import Scene
+from texgs.scene.session import Session
+from texgs.viewer.messages import OF_VIEWS, View
+from texgs.volume.view_set import View as Image
+from texgs.volume.view_set import read_views
+
+log = logging.getLogger("texgs.viewer")
+NEAR = 5  # folders above a model in which its views are looked for
+VIEWS, VOLUME = "views/transforms_train.json", "volume/volume.json"
+BINS = 256  # of a histogram that a page shows, at most
+GAIN = 4.0  # of differences, so that they are seen
+SAME = 1e-3  # by which elements of two cameras may differ
+
+
+def beside(file: Path, name: str) -> Path | None:
+    """The nearest file of this name that goes with a model: relative to its folder or one of those above."""
+    folders = file.resolve().parents[:NEAR]
+    return next((folder / name for folder in folders if (folder / name).is_file()), None)
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What one model was made from."""
+
+    name: str  # of the model
+    file: Path  # of its training views
+
+    @cached_property
+    def images(self) -> list[Image]:
+        """Its training views.
+
+        Raises:
+            ArgumentError: if they are damaged.
+        """
+        return read_views(self.file.parent).train
+
+    @cached_property
+    def transfer(self) -> dict[str, Any] | None:
+        """Opacities [[value, opacity], ...] and mean colour of its transfer function, if they are known."""
+        tf = read_json(self.file).get("tf")
+        if not isinstance(tf, dict) or not is_table(tf.get("opacity"), 2) or not is_table(tf.get("color"), 4):
+            return None
+        color = np.mean([row[1:] for row in tf["color"]], axis=0).clip(0, 1).tolist()
+        return {"model": self.name, "opacity": tf["opacity"], "color": color}
+
+    def nearest(self, camera: Camera) -> Image:
+        """The view whose camera looks at the origin from nearly the same side."""
+        side = normalize(camera.position, dim=0)
+        return max(self.images, key=lambda each: float(side @ normalize(each.camera.position, dim=0)))
+
+
+class Origins:
+    """Views and transfer functions of the models of a scene, as far as they are there.
+
+    Args:
+        scene: as it was opened.
+        session: renders.
+    """
+
+    def __init__(self, scene: Scene, session: Session) -> None:
+        self._session = session
+        self._origins = {each.name: each for each in origins_of(scene)}
+        volumes = (beside(entry.file, VOLUME) for entry in scene.models.values())
+        self._volume = next(filter(None, volumes), None)
+
+    @property
+    def modes(self) -> list[str]:
+        """What else can be shown, where views are there."""
+        return list(OF_VIEWS) if self._origins else []
+
+    def frame(self, view: View, scene: Scene, scale: float) -> np.ndarray:
+        """The training view that is nearest to a camera, or by how much the scene differs from it.
+
+        Args:
+            view: in one of the modes of views; its camera chooses.
+            scene: of which one model is visible.
+            scale: part of the sides of the frame.
+
+        Returns:
+            [H, W, 3] uint8, the view in the middle.
+
+        Raises:
+            ArgumentError: if several models are visible, or there are no views of the one that is.
+        """
+        camera = view.camera.camera(scale)
+        visible = [name for name, entry in scene.models.items() if entry.edit.visible]
+        if len(visible) != 1 or visible[0] not in self._origins:
+            raise ArgumentError(
+                f"views: expected one visible model that has some ({', '.join(self._origins)}), got "
+                f"{', '.join(visible) or 'none'}; they show one transfer function each"
+            )
+        image = self._origins[visible[0]].nearest(camera)
+        truth = over(image, scene.background)
+        if view.mode == "difference":
+            shown = self._session.frame(image.camera, "shaded", replace(scene, light=image.light))
+            truth = (GAIN * np.abs(shown.astype(np.float32) - truth)).clip(0, 255).astype(np.uint8)
+        return fitted(truth, camera.width, camera.height)
+
+    @cached_property
+    def places(self) -> list[dict[str, Any]]:
+        """Training views as a page goes to them, those that look at the origin with +y up."""
+        origin = next(iter(self._origins.values()), None)
+        images = [] if origin is None else origin.images
+        places = [(index, place_of(image.camera)) for index, image in enumerate(images)]
+        return [{"name": f"view {index}", **place} for index, place in places if place]
+
+    @cached_property
+    def transfer(self) -> dict[str, Any] | None:
+        """The histogram of the volume and the transfer functions of models, where both are known."""
+        functions = [tf for each in self._origins.values() if (tf := each.transfer)]
+        summary = read_json(self._volume) if self._volume else {}
+        low, high, counts = (summary.get(key) for key in ("minimum", "maximum", "histogram"))
+        if not functions or not isinstance(counts, list) or not all(map(is_number, (low, high, *counts))):
+            return None
+        merged = [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
+        return {"minimum": low, "maximum": high, "histogram": merged, "functions": functions}
+
+
+def origins_of(scene: Scene) -> list[Origin]:
+    """What is there of the models of a scene; what is damaged is said in the log."""
+    whole = []
+    for name, entry in scene.models.items():
+        if file := beside(entry.file, VIEWS):
+            origin = Origin(name, file)
+            try:
+                whole.append((origin, origin.images, origin.transfer)[0])
+            except TexgsError as error:
+                log.warning("%s", error)
+    return whole
+
+
+def is_table(values: object, columns: int) -> bool:
+    """Whether plain values are rows of so many numbers, at least one."""
+    if not isinstance(values, list) or not values:
+        return False
+    return all(isinstance(row, list) and len(row) == columns and all(map(is_number, row)) for row in values)
+
+
+def over(image: Image, background: tuple[float, float, float]) -> np.ndarray:
+    """The pixels [H, W, 3] of a view over a background, uint8."""
+    pixels = image.load().numpy().astype(np.float32)
+    alpha = pixels[..., 3:] / 255
+    return (alpha * pixels[..., :3] + (1 - alpha) * 255 * np.array(background)).round().astype(np.uint8)
+
+
+def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
+    """A picture [H, W, 3] in the middle of a frame, as large as it can be; its corner's colour around it."""
+    scale = min(width / pixels.shape[1], height / pixels.shape[0])
+    size = [max(1, round(scale * side)) for side in pixels.shape[1::-1]]
+    small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)
+    framed = np.empty((height, width, 3), np.uint8)
+    framed[:] = pixels[0, 0]
+    left, top = (width - size[0]) // 2, (height - size[1]) // 2
+    framed[top : top + size[1], left : left + size[0]] = small
+    return framed
+
+
+def place_of(camera: Camera) -> dict[str, Any] | None:
+    """Where a camera on an orbit around the origin stands; None if it looks elsewhere."""
+    x, y, z = camera.position.tolist()
+    distance = (x * x + y * y + z * z) ** 0.5
+    if not distance:
+        return None
+    azimuth, polar = degrees(atan2(-z, x)), degrees(asin(y / distance))
+    fov_y = degrees(2 * atan(0.5 * camera.height / float(camera.K[1, 1])))
+    again = orbit(azimuth, polar, distance, fov_y, camera.width, camera.height)
+    if not again.viewmat.allclose(camera.viewmat, atol=SAME):
+        return None
+    return {"target": [0.0] * 3, "azimuth": azimuth, "polar": polar, "distance": distance, "fov_y": fov_y}
