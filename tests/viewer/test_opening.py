@@ -79,6 +79,7 @@ def test_a_description_has_all_parts_and_what_they_can_show(tmp_path):
         "diffuse",
         "specular",
         "shininess",
+        "look",
         "segments",
     ]
     assert "palette" not in second["can"], "there is none without a texture"
