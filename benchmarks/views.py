@@ -1,4 +1,4 @@
-"""Volume rendering: the CPU mapper without OpenGL, the same mapper shown by PyVista, and whole view sets."""
+"""Volume rendering: the caster, VTK's without and with OpenGL, and whole view sets."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import subprocess
 import sys
 import tempfile
 from contextlib import redirect_stderr
-from dataclasses import replace
+from functools import partial
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +19,13 @@ from benchmarks.memory import ROOT
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
+from tests.volume.vtk_caster import VtkCaster
 from texgs.core.errors import DeviceError
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.cameras import icosphere
-from texgs.volume.cpu_mapper import CpuMapper
+from texgs.volume.caster import Caster
 from texgs.volume.generate import sphere
 from texgs.volume.grid import Grid
 from texgs.volume.opengl import offscreen_opengl
@@ -60,33 +62,26 @@ def _run(settings: Settings) -> Section:
     grid, look = sphere(size), Appearance()
     shots = icosphere(3, *Lens().square(pixels))[:n_views]
     where = {"volume": size, "size": pixels}
+    mappers: dict[str, Any] = {"texgs": Caster(grid, look), "VTK": VtkCaster(grid, look, settings.threads[-1])}
     cases = [
-        frame(grid, replace(look, step=step), shots[0], settings, where | {"step": step})
-        for step in (0.25, 0.5)
+        Case("frame", where | {"by": name}, {"frame": partial(mapper.render, SHELLS, shots[0], LIGHT)})
+        for name, mapper in mappers.items()
     ]
     try:
         offscreen_opengl()
-        cases.append(peer(grid, look, shots[0], where | {"step": look.step, "by": "PyVista, OpenGL"}))
+        cases.append(peer(grid, look, shots[0], where | {"by": "VTK in PyVista, OpenGL"}))
     except DeviceError as error:
-        section.skip("the same mapper shown by PyVista", str(error))
-    cases.append(view_set(grid, look, shots, settings, where | {"views": n_views}))
+        section.skip("VTK shown by PyVista", str(error))
+    cases.append(view_set(grid, look, shots, where | {"views": n_views}))
     section.measurements = measure(cases, settings.rounds, settings.device, "views")
-    if cases[2].name == "frame":
-        shown = section.find("frame", by="PyVista, OpenGL")
-        section.measurements.append(
-            shown.over(section.find("frame", by="texgs", step=look.step), "time / texgs")
-        )
+    own = section.find("frame", by="texgs")
+    for case in cases[1:-1]:
+        section.measurements.append(section.find("frame", by=case.parameters["by"]).over(own, "time / texgs"))
     if settings.is_quick:
         section.skip(f"a raw volume of {LARGE}^3", "--quick")
     else:
         section.measurements += large_volume()
     return section
-
-
-def frame(grid: Grid, look: Appearance, camera, settings: Settings, where: dict) -> Case:
-    """One frame as premultiplied floats."""
-    mapper = CpuMapper(grid, look, settings.threads[-1])
-    return Case("frame", where | {"by": "texgs"}, {"frame": lambda: mapper.render(SHELLS, camera, LIGHT)})
 
 
 def peer(grid: Grid, look: Appearance, camera, where: dict) -> Case:
@@ -114,14 +109,14 @@ def peer(grid: Grid, look: Appearance, camera, where: dict) -> Case:
     return Case("frame", where, {"frame": show})
 
 
-def view_set(grid: Grid, look: Appearance, shots: list, settings: Settings, where: dict) -> Case:
+def view_set(grid: Grid, look: Appearance, shots: list, where: dict) -> Case:
     """Render views into PNG files, the mapper's preparation included."""
 
     def render() -> None:
         with tempfile.TemporaryDirectory() as folder:
             views = [View(camera, Path(folder, f"{i}.png"), LIGHT) for i, camera in enumerate(shots)]
             with redirect_stderr(StringIO()):  # its progress
-                render_views(CpuMapper(grid, look, settings.threads[-1]), SHELLS, views, "views")
+                render_views(Caster(grid, look), SHELLS, views, "views")
 
     return Case("view set", where, {"view set": render})
 

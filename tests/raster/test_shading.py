@@ -8,6 +8,7 @@ import torch
 from torch.nn.functional import normalize
 
 from tests.raster.threads import with_threads
+from tests.volume.march import shade
 from texgs.core.camera import orbit_direction
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.rotation import quats_to_matrices
@@ -15,7 +16,6 @@ from texgs.raster.reference import shading as definition
 from texgs.raster.shading import blinn_phong, blinn_phong_texture
 from texgs.raster.spherical_harmonics import spherical_harmonics
 from texgs.volume.appearance import Appearance
-from texgs.volume.geometry import shade
 
 CAMERA = torch.tensor([0.5, 1.0, 3.0])
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")

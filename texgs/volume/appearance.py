@@ -1,4 +1,4 @@
-"""How a volume looks besides its transfer function, and the same as objects of VTK for every mapper."""
+"""How a volume looks besides its transfer function, and the same as objects of VTK."""
 
 from __future__ import annotations
 

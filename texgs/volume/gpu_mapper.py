@@ -1,7 +1,7 @@
 """Volume rendering by OpenGL through PyVista, offscreen: fast on a GPU, slow where the driver is software.
 
 VTK's own shading is Phong's, with a viewer nearby, and differs between kinds of light. It is replaced by the
-Blinn-Phong model that `texgs.volume.geometry.shade` defines.
+Blinn-Phong model that `texgs.volume.caster` has.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ vec4 computeLighting(vec4 color, int component, float label)
 
 
 class GpuMapper:
-    """Renders one volume from any camera; arguments as for `CpuMapper`, but for threads.
+    """Renders one volume from any camera; arguments as for `Caster`.
 
     Raises:
         DeviceError: if there is no offscreen OpenGL; found out in a child process, where it may crash.

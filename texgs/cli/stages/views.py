@@ -1,6 +1,5 @@
 """Stage `views`: render the training and test views of one basic TF, and a turntable."""
 
-import os
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
@@ -26,9 +25,7 @@ from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
 from texgs.volume.appearance import Appearance
 from texgs.volume.cameras import icosphere, orbit_path, spiral
-from texgs.volume.cpu_mapper import CpuMapper
-from texgs.volume.geometry import geometry
-from texgs.volume.gpu_mapper import GpuMapper
+from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.render import Mapper, Times, render_views
@@ -78,7 +75,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             )
     turntable(mapper, tf, views, output, title)
     if views.geometry:
-        write_geometry(grid, tf, appearance, shots["test"], output / "geometry", title)
+        write_geometry(Caster(grid, appearance), tf, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
     return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
@@ -90,10 +87,12 @@ def appearance_of(views: ViewKeys) -> Appearance:
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
-    """The CPU's mapper with as many threads as OMP_NUM_THREADS says (Snakemake sets it), or the GPU's."""
+    """What casts rays on the CPU, or OpenGL on a GPU."""
     if kind == "gpu":
+        from texgs.volume.gpu_mapper import GpuMapper  # VTK takes a second
+
         return GpuMapper(grid, appearance)
-    return CpuMapper(grid, appearance, int(os.environ.get("OMP_NUM_THREADS") or os.cpu_count() or 1))
+    return Caster(grid, appearance)
 
 
 def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
@@ -132,17 +131,15 @@ def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Pat
     write_animation(output / "turntable.png", [Image.fromarray(view.load().numpy()) for view in shot])
 
 
-def write_geometry(
-    grid: Grid, tf: TransferFunction, look: Appearance, shot: list[View], folder: Path, title: str
-) -> None:
+def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folder: Path, title: str) -> None:
     """Write depth and normals of views as .npz, the arrays `depth` [H, W] and `normal` [H, W, 3]."""
     for view in progress(shot, title=f"{title}: depth and normals", unit="view"):
         path = folder / f"{view.path.stem}.npz"
         if path.exists():
             continue
-        _, alpha = view.image()
-        depth, normal = geometry(grid, tf, view.camera, look.step, look.opacity_unit, mask=alpha > 0)
-        write = partial(np.savez_compressed, depth=depth.numpy(), normal=normal.numpy().astype(np.float16))
+        seen = caster.cast(tf, view.camera, view.light, ("depth", "normal"))
+        depth, normal = np.asarray(seen.depth), np.asarray(seen.normal, np.float16)
+        write = partial(np.savez_compressed, depth=depth, normal=normal)
         write_atomic(path, write)
 
 

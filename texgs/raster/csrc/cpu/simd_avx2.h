@@ -78,6 +78,7 @@ TEXGS_INLINE vi byte_of(vi a, vi place) {
     const __m256i moved = _mm256_srlv_epi32(a.v, _mm256_slli_epi32(place.v, 3));
     return {_mm256_and_si256(moved, _mm256_set1_epi32(255))};
 }
+TEXGS_INLINE vi gather_bytes(const void* p, vi i) { return {_mm256_i32gather_epi32(static_cast<const int*>(p), i.v, 1)}; }  // words at any byte
 TEXGS_INLINE vi gather(const int32_t* p, vi i) { return {_mm256_i32gather_epi32(p, i.v, 4)}; }
 TEXGS_INLINE vi iota() { return {_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)}; }
 TEXGS_INLINE vf gather(const float* p, vi i) { return _mm256_i32gather_ps(p, i.v, 4); }

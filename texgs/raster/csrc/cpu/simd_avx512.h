@@ -79,6 +79,7 @@ TEXGS_INLINE vi byte_of(vi a, vi place) {
     const __m512i moved = _mm512_srlv_epi32(a.v, _mm512_slli_epi32(place.v, 3));
     return {_mm512_and_si512(moved, _mm512_set1_epi32(255))};
 }
+TEXGS_INLINE vi gather_bytes(const void* p, vi i) { return {_mm512_i32gather_epi32(i.v, p, 1)}; }  // words at any byte
 TEXGS_INLINE vi gather(const int32_t* p, vi i) { return {_mm512_i32gather_epi32(i.v, p, 4)}; }
 TEXGS_INLINE vi iota() { return {_mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)}; }
 TEXGS_INLINE vf gather(const float* p, vi i) { return _mm512_i32gather_ps(i.v, p, 4); }

@@ -98,6 +98,11 @@ TEXGS_INLINE vi operator&(vi a, vi b) { return {a.v & b.v}; }
 TEXGS_INLINE vi operator>>(vi a, int n) { TEXGS_EACH a.v[i] = static_cast<int32_t>(static_cast<uint32_t>(a.v[i]) >> n); return a; }
 TEXGS_INLINE vm is_set(vi a, vi bit) { vm r; TEXGS_EACH r.v[i] = -(a.v[i] >> bit.v[i] & 1); return r; }
 TEXGS_INLINE vi byte_of(vi a, vi place) { TEXGS_EACH a.v[i] = a.v[i] >> 8 * place.v[i] & 255; return a; }
+TEXGS_INLINE vi gather_bytes(const void* p, vi k) {  // words at any byte
+    vi r;
+    TEXGS_EACH { int32_t word; std::memcpy(&word, static_cast<const char*>(p) + k.v[i], 4); r.v[i] = word; }
+    return r;
+}
 TEXGS_INLINE vi gather(const int32_t* p, vi k) { vi r; TEXGS_EACH r.v[i] = p[k.v[i]]; return r; }
 TEXGS_INLINE vi iota() { return {int4{0, 1, 2, 3}}; }
 TEXGS_INLINE vf gather(const float* p, vi k) { vf r; TEXGS_EACH r.v[i] = p[k.v[i]]; return r; }

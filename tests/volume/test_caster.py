@@ -1,4 +1,3 @@
-import os
 import subprocess
 import sys
 
@@ -8,21 +7,22 @@ import torch
 from torch.nn.functional import normalize
 
 from tests.real_data import real_data
+from tests.volume.march import march
 from tests.volume.scenes import SHELLS, ball, constant, lattice, over_white, psnr
+from tests.volume.vtk_caster import VtkCaster
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
-from texgs.core.errors import NativeError
+from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
-from texgs.volume.cpu_mapper import CpuMapper
+from texgs.volume.caster import OUTPUTS, TYPES, Caster, points_of
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
 HEADLIGHT = Light("headlight")
-QUANTUM = 1 / 32767  # of the mapper's numbers
 
 
-def render(grid, tf, camera, light=HEADLIGHT, threads=2, **appearance):
-    return CpuMapper(grid, Appearance(**appearance), threads).render(tf, camera, light)
+def render(grid, tf, camera, light=HEADLIGHT, **appearance):
+    return Caster(grid, Appearance(**appearance)).render(tf, camera, light)
 
 
 def blinn_phong(color, normal, to_viewer, to_light, look):
@@ -42,11 +42,8 @@ def test_alpha_of_a_slab_follows_the_opacity_unit_and_not_the_step(opacity, opac
     x, _, _ = lattice(33, 33, 33)
     camera = orbit(-90, 0, 40, 2.0, 9, 9)
     picture = render(Grid(x), constant(opacity), camera, step=step, opacity_unit=opacity_unit)
-    of_a_sample = 1 - (1 - opacity) ** (step / 32 / opacity_unit)
     least, most = (1 - (1 - opacity) ** (length / opacity_unit) for length in (1, 1 + step / 32))
-    # Opacities of samples and transmittances are cut to 15 bits, and rays end where they are nearly opaque.
-    rounding = (1 - least) * np.log1p(-opacity) / -opacity_unit * QUANTUM / of_a_sample
-    tolerance = rounding + 32 / step * 0.25 * QUANTUM + 0.0005 + 0.008 * (least > 0.99)
+    tolerance = 1e-5 + 0.001 * (least > 0.998)  # rays end where they are nearly opaque
     assert least - tolerance < picture[4, 4, 3] < most + tolerance
 
 
@@ -63,8 +60,7 @@ def test_a_flat_face_has_the_intensity_of_blinn_phong(azimuth, polar, light):
     to_light = to_viewer if light.kind == "headlight" else light.direction(camera).numpy()
     expected = blinn_phong(color, (0, 0, 1), to_viewer, to_light, look)
     centre = picture[16, 16]
-    # Normals have 16 bits: the highlight, a power of 20, is off by a little more than the rest.
-    np.testing.assert_allclose(centre[:3] / centre[3], expected, atol=0.008)
+    np.testing.assert_allclose(centre[:3] / centre[3], expected, atol=2e-4)
 
 
 @pytest.mark.parametrize("light", [HEADLIGHT, Light("directional", -60, 35), Light("directional", 150, 10)])
@@ -99,7 +95,7 @@ def test_what_is_at_a_place_appears_where_the_camera_projects_it(width, height):
     grid = Grid(values, (1.0, 1.5, 0.8))
     voxel = np.array(grid.spacing) * grid.scale
     world = np.array(grid.aabb[0]) + voxel * np.array(places)  # [5, 3]
-    mapper = CpuMapper(grid, Appearance(opacity_unit=0.02), 2)
+    mapper = Caster(grid, Appearance(opacity_unit=0.02))
     tf = TransferFunction(((0, 0), (1, 0.3)), ((0, 1, 1, 1),))
     rows, columns = np.mgrid[:height, :width] + 0.5
     errors = []
@@ -120,17 +116,17 @@ def test_pixels_are_premultiplied_to_the_edge():
     camera = orbit(-60, 20, 2, 34, 100, 80)
     tf = TransferFunction(((0.3, 0), (0.5, 0.2), (1, 0.9)), ((0, 0.8, 0.4, 0.2),))
     picture = render(ball(), tf, camera, ambient=1.0, diffuse=0.0, specular=0.0)
-    assert (picture[..., :3] <= picture[..., 3:] + 0.006).all()
+    assert (picture[..., :3] <= picture[..., 3:] + 1e-6).all()
     edge = (picture[..., 3] > 0.05) & (picture[..., 3] < 0.9)
     assert edge.sum() > 50
     straight = picture[edge, :3] / picture[edge, 3:]
-    np.testing.assert_allclose(straight, np.broadcast_to([0.8, 0.4, 0.2], straight.shape), atol=0.02)
+    np.testing.assert_allclose(straight, np.broadcast_to([0.8, 0.4, 0.2], straight.shape), atol=1e-4)
 
 
 def test_nothing_in_sight_is_zero():
     viewmat = look_at(torch.tensor([0.0, 0.0, 3.0]), torch.tensor([0.0, 0.0, 6.0]))
     away = Camera(viewmat, intrinsics(30, 20, 10), 20, 10)
-    mapper = CpuMapper(ball(16), Appearance(), 1)
+    mapper = Caster(ball(16), Appearance())
     assert mapper.render(SHELLS, orbit(0, 0, 3, 30, 20, 10), HEADLIGHT).any()
     picture = mapper.render(SHELLS, away, HEADLIGHT)
     assert picture.shape == (10, 20, 4)
@@ -142,7 +138,7 @@ def test_rays_parallel_to_a_side_and_at_the_border_go_all_the_way(azimuth, polar
     x, y, _ = lattice(33, 33, 33)
     camera = orbit(azimuth, polar, 1.5, 12, size, size)  # the volume fills the view
     look = Appearance(step=0.125, opacity_unit=0.02)
-    alpha = CpuMapper(Grid(x + 0.3 * y), look, 2).render(constant(0.01), camera, HEADLIGHT)[..., 3]
+    alpha = Caster(Grid(x + 0.3 * y), look).render(constant(0.01), camera, HEADLIGHT)[..., 3]
     v, u = np.mgrid[:size, :size] + 0.5
     K, viewmat = camera.K.double().numpy(), camera.viewmat.double().numpy()
     rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(K).T @ viewmat[:3, :3]
@@ -155,11 +151,13 @@ def test_rays_parallel_to_a_side_and_at_the_border_go_all_the_way(azimuth, polar
 
 def test_pictures_are_the_same_bits_with_any_number_of_threads_and_every_time():
     camera, light = orbit(-60, 20, 2, 34, 64, 48), Light("directional", 30, 40)
-    one = CpuMapper(ball(), Appearance(), 1)
-    first = one.render(SHELLS, camera, light)
-    one.render(SHELLS, orbit(10, -30, 1.5, 40, 40, 70), HEADLIGHT)  # leaves nothing behind
-    np.testing.assert_array_equal(one.render(SHELLS, camera, light), first)
-    np.testing.assert_array_equal(render(ball(), SHELLS, camera, light, threads=2), first)
+    caster, threads = Caster(ball(), Appearance()), torch.get_num_threads()
+    first = caster.render(SHELLS, camera, light)
+    caster.render(SHELLS, orbit(10, -30, 1.5, 40, 40, 70), HEADLIGHT)  # leaves nothing behind
+    for count in (1, 2, 5):
+        torch.set_num_threads(count)
+        np.testing.assert_array_equal(caster.render(SHELLS, camera, light), first)
+    torch.set_num_threads(threads)
 
 
 def test_a_camera_inside_sees_what_is_before_it():
@@ -167,17 +165,142 @@ def test_a_camera_inside_sees_what_is_before_it():
     position = torch.tensor([0.0, 0.0, 0.2])
     inside = Camera(look_at(position, torch.zeros(3)), intrinsics(20, 15, 15), 15, 15)
     alpha = render(Grid(x), constant(0.05), inside, opacity_unit=0.05)[7, 7, 3]
-    assert alpha == pytest.approx(1 - 0.95 ** (0.7 / 0.05), abs=0.01)
+    assert alpha == pytest.approx(1 - 0.95 ** (0.7 / 0.05), abs=0.002)
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "int8", "uint16", "int16"])
-def test_integers_and_floats_of_one_volume_look_the_same(dtype):
-    levels = np.round(ball().values.clip(0, 1) * 120)
-    grid = Grid(levels.astype(dtype))
-    tf = TransferFunction(((36, 0), (60, 0.3), (96, 0.6)), ((36, 0.8, 0.4, 0.2), (72, 0.1, 0.2, 0.9)))
-    camera = orbit(-60, 20, 2, 34, 80, 80)
-    pictures = [over_white(render(volume, tf, camera)) for volume in (grid, Grid(levels.astype(np.float32)))]
-    assert psnr(*pictures) > (50 if np.dtype(dtype).itemsize == 1 else 30)
+@pytest.mark.parametrize("dims", [(32, 32, 32), (3, 9, 14), (2, 2, 2), (5, 2, 3)])
+@pytest.mark.parametrize("dtype", [*TYPES, "bool", ">u2", ">f4"])
+def test_every_type_of_samples_looks_the_same(dtype, dims):
+    """A slope of whole numbers, from -60 to 60, or 0 to 120 where there is no sign."""
+    x, y, z = lattice(*dims)
+    low, high = {"b": (0, 1), "u": (0, 120)}.get(np.dtype(dtype).kind, (-60, 60))
+    levels = np.round(low + (high - low) * (0.5 + 0.3 * x + 0.15 * y + 0.05 * z))
+    half, most = (low + f * (high - low) for f in (0.5, 0.8))
+    tf = TransferFunction(
+        ((low, 0), (half, 0.3), (most, 0.6), (high, 0.9)), ((half, 0.8, 0.4, 0.2), (high, 0.1, 0.2, 0.9))
+    )
+    camera, light = orbit(-60, 20, 2, 34, 40, 40), Light("directional", 30, 40)
+    expected = render(Grid(levels), tf, camera, light)
+    assert (expected[..., 3] > 0.1).any()
+    np.testing.assert_array_equal(render(Grid(levels.astype(dtype)), tf, camera, light), expected)
+
+
+@pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (1.0, 0.6, 1.7)])
+@pytest.mark.parametrize("light", [HEADLIGHT, Light("directional", 30, 40)])
+@pytest.mark.parametrize("step", [0.25, 0.5])
+def test_it_is_what_marching_in_torch_sees(step, light, spacing):
+    grid, camera, look = (
+        Grid(ball(40).values, spacing),
+        orbit(-60, 20, 2.5, 30, 60, 50),
+        Appearance(step=step),
+    )
+    expected = march(grid, SHELLS, camera, look, light)
+    found = Caster(grid, look).cast(SHELLS, camera, light, OUTPUTS)
+    np.testing.assert_allclose(
+        found.rgba[..., :3], expected.color, atol=0.0015
+    )  # light that is left at an end
+    np.testing.assert_allclose(found.rgba[..., 3], expected.alpha, atol=0.0015)
+    assert psnr(found.rgba.numpy(), torch.cat([expected.color, expected.alpha[..., None]], -1).numpy()) > 70
+    seen = expected.alpha > 0.01
+    np.testing.assert_allclose(found.depth[seen], expected.depth[seen], atol=1e-3)
+    np.testing.assert_allclose(found.normal[seen], expected.normal[seen], atol=5e-3)
+    assert not found.depth[expected.alpha == 0].any()
+
+
+def test_the_median_is_where_half_of_the_light_is_gone():
+    x, _, _ = lattice(33, 33, 33)
+    camera, look = orbit(-90, 0, 3, 10, 9, 9), Appearance(step=0.05, opacity_unit=0.05)
+    found = Caster(Grid(x), look).cast(constant(0.1), camera, HEADLIGHT, ("median",))
+    assert float(found.median[4, 4]) == pytest.approx(2.5 + 0.05 * np.log(0.5) / np.log(0.9), abs=2e-3)
+    thin = Caster(Grid(x), look).cast(constant(0.01), camera, HEADLIGHT, ("median",))
+    assert float(thin.median[4, 4]) == 0
+
+
+@pytest.mark.parametrize("light", [HEADLIGHT, Light("directional", 30, 40)])
+def test_vtk_sees_the_same(light):
+    camera, look = orbit(-60, 20, 2.5, 30, 60, 50), Appearance(step=0.25)
+    found = Caster(ball(64), look).render(SHELLS, camera, light)
+    expected = VtkCaster(ball(64), look, 2).render(SHELLS, camera, light)
+    assert psnr(over_white(found), over_white(expected)) > 48
+    assert psnr(found[..., 3], expected[..., 3]) > 48
+
+
+def test_a_value_at_the_end_of_a_function_is_visible():
+    """All samples of a saturated volume are there: between equal values nothing is rounded away."""
+    rng = np.random.default_rng(0)
+    values = np.full((20, 20, 20), 255, np.uint8)
+    tf = TransferFunction(((200, 0.4), (255, 0.4)), ((200, 1, 1, 1),))
+    camera = orbit(*rng.uniform(-80, 80, 2), 2, 34, 40, 40)
+    look = Appearance(opacity_unit=0.05, step=0.1)
+    inner = TransferFunction(((200, 0.4), (300, 0.4)), ((200, 1, 1, 1),))
+    np.testing.assert_array_equal(
+        Caster(Grid(values), look).render(tf, camera, HEADLIGHT),
+        Caster(Grid(values), look).render(inner, camera, HEADLIGHT),
+    )
+
+
+def test_missing_values_are_transparent_and_counted():
+    values = ball(24).values.copy()
+    values[3:9, 4:11, 5:12] = np.nan
+    caster = Caster(Grid(values), Appearance())
+    assert caster.missing == 6 * 7 * 7
+    away = values.copy()
+    away[2:10, 3:12, 4:13] = -100  # with the cells around
+    camera = orbit(-60, 20, 2, 34, 50, 50)
+    tf = TransferFunction(((0.1, 0.5), (1, 0.9)), ((0, 1, 1, 1),))
+    found = caster.render(tf, camera, HEADLIGHT)
+    assert np.isfinite(found).all()
+    covered = Caster(Grid(np.nan_to_num(away, nan=-100)), Appearance()).render(tf, camera, HEADLIGHT)
+    assert psnr(found[..., 3], covered[..., 3]) > 25
+    assert not Caster(Grid(np.full((4, 4, 4), np.nan)), Appearance()).render(tf, camera, HEADLIGHT).any()
+
+
+def test_thin_things_between_transparent_bricks_are_not_leapt_over():
+    rng = np.random.default_rng(0)
+    tf = TransferFunction(((0.5, 0.0), (1, 1.0)), ((0, 1, 1, 1),))
+    for x, y, z in [(0, 0, 0), (21, 16, 0), *rng.integers(0, (22, 17, 18), (12, 3))]:
+        values = np.zeros((18, 17, 22), np.float32)
+        values[z, y, x] = 1
+        grid = Grid(values, (1.0, 0.7, 1.3))
+        place = torch.tensor(np.array(grid.aabb[0]) + np.array(grid.spacing) * grid.scale * (x, y, z))
+        viewmat = look_at(torch.tensor([0.1, 0.1, 3.0], dtype=torch.float64), place).float()
+        camera = Camera(viewmat, intrinsics(2, 5, 5), 5, 5)
+        look = Appearance(step=0.1, opacity_unit=0.001)
+        seen = Caster(grid, look).cast(tf, camera, HEADLIGHT, ("depth",))
+        assert seen.rgba[2, 2, 3] > 0.9
+        assert float(seen.depth[2, 2]) == pytest.approx(
+            float(viewmat[2, :3] @ place.float() + viewmat[2, 3]), abs=0.03
+        )
+
+
+def test_points_of_a_function_hold_both_sides_of_steps():
+    tf = TransferFunction(
+        ((0, 0.2), (1, 0.4), (1, 0.8), (2, 0.0)), ((0.5, 1, 0, 0), (0.5, 0, 1, 0), (1.5, 0, 0, 1))
+    )
+    rows = points_of(tf).tolist()
+    expected = [
+        [0.0, 0.2, 1, 0, 0],
+        [0.5, 0.3, 1, 0, 0],
+        [0.5, 0.3, 0, 1, 0],
+        [1.0, 0.4, 0, 0.5, 0.5],
+        [1.0, 0.8, 0, 0.5, 0.5],
+        [1.5, 0.4, 0, 0, 1],
+        [2.0, 0.0, 0, 0, 1],
+    ]
+    np.testing.assert_allclose(rows, expected, atol=1e-6)
+
+
+@pytest.mark.parametrize(("change", "message"), [
+    ({"outputs": ("colour",)}, "outputs: expected some of depth, median, normal, got colour"),
+    ({"values": np.zeros((4, 4, 4), np.float16)}, "expected samples of uint8, .* or bool, got float16"),
+    ({"values": np.broadcast_to(np.uint8(0), (2, 1 << 14, 1 << 14))}, "slices of less than 256 MiB"),
+])  # fmt: skip
+def test_mistakes_are_named(change, message, monkeypatch):
+    monkeypatch.setattr(np, "ascontiguousarray", lambda values, dtype=None: values)
+    with pytest.raises(ArgumentError, match=message):
+        Caster(Grid(change.get("values", ball(8).values)), Appearance()).cast(
+            SHELLS, orbit(0, 0, 3, 30, 8, 8), HEADLIGHT, change.get("outputs", ())
+        )
 
 
 def test_a_step_in_opacity_is_a_sharp_edge():
@@ -215,56 +338,33 @@ def test_eight_bits_show_no_bands():
 CHILD = """
 import numpy as np, sys
 from texgs.core.camera import orbit
+from texgs.core.light import Light
 from texgs.core.memory import peak_memory
 from texgs.volume.appearance import Appearance
-from texgs.volume.cpu_mapper import CpuMapper
+from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
-from texgs.core.light import Light
 
-size = 192
-values = np.zeros((size, size, size), sys.argv[1])
-values[...] = np.arange(size) // 2
-mapper = CpuMapper(Grid(values), Appearance(), 1)
 tf = TransferFunction(((0, 0), (100, 0.5)), ((0, 1, 1, 1),))
-assert mapper.render(tf, orbit(-60, 20, 2, 34, 60, 60), Light("headlight")).any()
-with open("/proc/self/maps") as file:
-    libraries = {line.split("/")[-1].strip() for line in file if "/" in line}
-found = [name for name in libraries if name.startswith(("libGL", "libEGL", "libOSMesa", "libOpenGL"))]
-print(peak_memory(), values.nbytes, *found)
+camera, light = orbit(-60, 20, 2, 34, 60, 60), Light("headlight")
+Caster(Grid(np.zeros((9, 9, 9), sys.argv[1])), Appearance()).render(tf, camera, light)
+before, size = peak_memory(), 320
+values = np.zeros((size, size, size), sys.argv[1])
+values[...] = np.arange(size) // 4
+assert Caster(Grid(values), Appearance()).render(tf, camera, light).any()
+print((peak_memory() - before) / values.nbytes, *[name for name in sys.modules if name.startswith("vtk")])
 """
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("dtype", ["float32", "uint8"])
-def test_a_process_needs_no_opengl_and_little_memory(dtype):
-    hidden = {"DISPLAY", "WAYLAND_DISPLAY"}
-    environment = {name: value for name, value in os.environ.items() if name not in hidden}
-    environment["VTK_DEFAULT_OPENGL_WINDOW"] = "nonsense"
+def test_it_takes_little_more_memory_than_the_samples_and_no_vtk(dtype):
     command = [sys.executable, "-c", CHILD, dtype]
-    child = subprocess.run(command, env=environment, capture_output=True, text=True, check=False, timeout=100)
+    child = subprocess.run(command, capture_output=True, text=True, check=False, timeout=100)
     assert child.returncode == 0, child.stderr
-    assert child.stderr == ""
-    peak, n_bytes, *libraries = child.stdout.split()
-    assert libraries == []
-    # 16 bits and a normal of 3 bytes for each sample of 8 bits.
-    assert int(peak) < (2 if dtype == "float32" else 6) * int(n_bytes) + 500e6
-
-
-def test_an_image_that_cannot_be_read_is_an_error(monkeypatch):
-    mapper = CpuMapper(ball(16), Appearance(), 1)
-
-    class Image:
-        def GetImage(self):
-            return "nothing"
-
-    class Mapper:
-        def __getattr__(self, _name):
-            return lambda *_args: Image()
-
-    monkeypatch.setattr(mapper, "_mapper", Mapper())
-    with pytest.raises(NativeError, match=r"expected a pointer, got 'nothing'; install VTK 9\.4 or newer"):
-        mapper.render(SHELLS, orbit(0, 0, 3, 30, 8, 8), HEADLIGHT)
+    share, *modules = child.stdout.split()
+    assert modules == []
+    assert float(share) < 1.3
 
 
 def test_a_real_volume_is_seen_and_lit():

@@ -1,6 +1,6 @@
-"""Depth, normals and a reference picture of a volume, by marching rays through it in torch.
+"""A picture of a volume, its depth and its normals, by marching rays through it in torch.
 
-This is the definition that the mappers are tested against, and the ground truth of geometry.
+This is the definition that `texgs.volume.caster` is tested against.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from tests.volume.sampled_field import BLOCK, SampledField
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
-from texgs.volume.field import BLOCK, SampledField
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.vtk_camera import directions
@@ -32,39 +32,6 @@ class March(NamedTuple):
     alpha: Tensor  # [H, W]
     depth: Tensor  # [H, W] expected camera z, world units; 0 where alpha is 0
     normal: Tensor  # [H, W, 3] expected normal, world axes, towards the camera; length at most 1
-
-
-def geometry(
-    grid: Grid,
-    tf: TransferFunction,
-    camera: Camera,
-    step: float,
-    opacity_unit: float,
-    mask: Tensor | None = None,
-) -> tuple[Tensor, Tensor]:
-    """Expected depth and normal of each pixel: the means of those of its samples, weighted as their colours.
-
-    With the weight w_i = T_i a_i of sample i, depth = sum w_i z_i / sum w_i, and likewise the normal, where a
-    sample's is the direction of the gradient (central differences), turned against the ray.
-
-    Args:
-        grid: the volume.
-        tf: in data values.
-        camera: any pinhole.
-        step: sample distance, voxels of the finest axis.
-        opacity_unit: length over which the opacity of `tf` applies, world units.
-        mask: [H, W] bool, pixels to look at; the others are 0. Default all.
-
-    Returns:
-        depth [H, W], camera z in world units, and normal [H, W, 3], world axes; float32, 0 where nothing is
-        seen. A normal is shorter than 1 where a pixel sees several directions.
-
-    Raises:
-        ArgumentError, ShapeError: if `step` or `opacity_unit` is not above 0, or `mask` does not fit.
-    """
-    appearance = Appearance(step=step, opacity_unit=opacity_unit)
-    result = march(grid, tf, camera, appearance, None, mask)
-    return result.depth, result.normal
 
 
 def march(

@@ -1,12 +1,12 @@
-"""Volume rendering on the CPU by VTK's fixed-point ray caster, without OpenGL.
+"""Volume rendering by VTK's fixed-point ray caster, without OpenGL: another program to compare with.
 
 VTK casts the rays into a 15-bit RGBA image of its own, and only to show that image does it need OpenGL. Here
 the image is taken as it is: no driver, no display, no loss to 8 bits. Lights and viewer are distant: the
 directions to them are the same for all points of one view (OpenGL's light model without local viewer).
 
 Its numbers have 15 bits: opacities of samples and colours are rounded to 1/32767, which tells where things
-are very transparent and steps short. Rays end at an opacity of 0.992. Between the samples of the grid,
-intensities are interpolated, not gradients.
+are very transparent and steps short. Rays end at an opacity of 0.992, and too early where they are almost
+parallel to a side of the volume. Intensities are interpolated between the samples of the grid, not gradients.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ import re
 from dataclasses import replace
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
@@ -24,19 +23,16 @@ from texgs.core.errors import NativeError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.volume.appearance import Appearance, image_data, volume_property
-from texgs.volume.geometry import march
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.vtk_camera import aim, point_light
 
 BYTES = 200  # of memory for a pixel: VTK's image, the picture, and directions of rays in double precision
 FULL = 32767  # 1.0 in the mapper's fixed-point numbers
-OPAQUE = 0.99  # nothing behind shows
 MARGIN = 2  # pixels; the mapper may leave out the last row and column of a view that the volume fills
-SHORTENED = 0.03  # part of a ray's length that may be missing
 
 
-class CpuMapper:
+class VtkCaster:
     """Renders one volume from any camera.
 
     Args:
@@ -44,8 +40,6 @@ class CpuMapper:
         appearance: shading and sampling.
         threads: that cast rays.
     """
-
-    local_viewer = False
 
     def __init__(self, grid: Grid, appearance: Appearance, threads: int) -> None:
         # The first import registers what the mapper creates when it is made.
@@ -55,7 +49,6 @@ class CpuMapper:
         from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 
         image, self._factor = image_data(grid)
-        self._grid = grid
         self._appearance = appearance
         self._mapper = vtkFixedPointVolumeRayCastMapper()
         self._mapper.SetInputData(image)
@@ -82,12 +75,7 @@ class CpuMapper:
         """
         what = f"a view of {camera.width} x {camera.height} pixels"
         require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
-        picture = self._cast(tf, _with_margin(camera), light)[MARGIN:-MARGIN, MARGIN:-MARGIN]
-        cut = _shortened(self._grid, camera, self._appearance.step) & (picture[..., 3] < OPAQUE)
-        if cut.any():
-            seen = march(self._grid, tf, camera, self._appearance, light, torch.from_numpy(cut))
-            picture[cut] = torch.cat([seen.color, seen.alpha[..., None]], dim=-1).numpy()[cut]
-        return picture
+        return self._cast(tf, _with_margin(camera), light)[MARGIN:-MARGIN, MARGIN:-MARGIN]
 
     def _cast(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
         """What VTK's rays see."""
@@ -131,18 +119,3 @@ def _with_margin(camera: Camera) -> Camera:
     K = camera.K.clone()
     K[:2, 2] += MARGIN
     return replace(camera, K=K, width=camera.width + 2 * MARGIN, height=camera.height + 2 * MARGIN)
-
-
-def _shortened(grid: Grid, camera: Camera, step: float) -> NDArray[np.bool_]:
-    """Pixels [H, W] whose rays VTK ends too early: those almost parallel to a side of the volume.
-
-    It counts how many steps lead to the end of the ray along each axis, with a step rounded to 1/32767 voxel.
-    A small component that is rounded up, such as 0.6 to 1, gives too few.
-    """
-    K, R_cw = camera.K.double().cpu().numpy(), camera.viewmat[:3, :3].double().cpu().numpy()
-    v, u = np.mgrid[: camera.height, : camera.width] + 0.5
-    rays = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(K).T @ R_cw  # [H, W, 3]
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    spacing = np.array(grid.spacing)
-    steps = np.abs(rays) * (step * spacing.min() / spacing * FULL)
-    return (np.round(steps) * (1 - SHORTENED) > steps).any(axis=-1)

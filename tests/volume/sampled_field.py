@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from torch import Tensor
-from torch.nn.functional import grid_sample, max_pool2d, max_pool3d, normalize, pad
+from torch.nn.functional import max_pool2d, max_pool3d, normalize, pad
 
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
@@ -47,13 +47,21 @@ class SampledField:
         return self.visible[z, y, x]
 
     def sample(self, points: Tensor) -> Tensor:
-        """Values [...] at points [..., 3], trilinear; constant outside the box."""
-        shape, count, parts = points.shape[:-1], points[..., 0].numel(), torch.get_num_threads()
-        points = pad(points.reshape(-1, 3), [0, 0, 0, -count % parts])
-        points = points.reshape(parts, 1, 1, -1, 3)  # torch has a thread for each element of a batch
-        values = self.values.expand(parts, -1, -1, -1, -1)
-        sampled = grid_sample(values, points, align_corners=True, padding_mode="border")
-        return sampled.reshape(-1)[:count].reshape(shape)
+        """Values [...] at points [..., 3], trilinear; constant outside the box.
+
+        Between equal values it is exactly these: a + t (b - a), where grid_sample rounds.
+        """
+        place = ((points + 1) * (self.cells / 2)).clamp(min=torch.zeros(3), max=self.cells.float())
+        lower = torch.minimum(place.floor(), self.cells - 1.0)
+        inside, (x, y, z) = place - lower, lower.long().unbind(-1)
+        v = self.values[0, 0]
+        corners = [v[z + dz, y + dy, x + dx] for dz in (0, 1) for dy in (0, 1) for dx in (0, 1)]
+        for axis in range(3):
+            corners = [
+                torch.lerp(low, high, inside[..., axis])
+                for low, high in zip(corners[::2], corners[1::2], strict=True)
+            ]
+        return corners[0]
 
     def normals(self, points: Tensor) -> Tensor:
         """Directions [n, 3] of the gradient at points [n, 3], world axes; 0 where it is 0."""

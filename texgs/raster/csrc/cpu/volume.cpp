@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes on CPUs: what is known of their bricks, and rays through them, rows of pixels in parallel.
+#include "../texgs_volume.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#include "../status.h"
+#include "dispatch.h"
+#include "parallel.h"
+#include "volume_kernels.h"
+
+namespace texgs {
+namespace {
+
+constexpr int kBrick = TEXGS_BRICK;
+constexpr int kFarthest = 255;
+constexpr int kPixels = 64;  // of a row that one worker casts at a time
+
+const VolumeKernels& volume_kernels() {
+#if defined(__x86_64__) || defined(_M_X64)
+    if (active_isa() == Isa::avx512) return avx512::kVolumeKernels;
+    if (active_isa() == Isa::avx2) return avx2::kVolumeKernels;
+#endif
+    return portable::kVolumeKernels;
+}
+
+int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {
+    for (int a = 0; a < 3; ++a) size[a] = (volume.size[a] - 1 + kBrick - 1) / kBrick;
+    return int64_t(size[0]) * size[1] * size[2];
+}
+
+void check_volume(const texgs_volume& volume) {
+    static constexpr int kBytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+    require(volume.type >= TEXGS_U8 && volume.type <= TEXGS_F64, "volume: expected a known type of samples");
+    for (int a = 0; a < 3; ++a) {
+        require(volume.size[a] >= 2 && volume.size[a] < 1 << 20, "volume: expected 2 to 2^20 - 1 samples along an axis");
+        require(volume.half[a] > 0.0f && std::isfinite(volume.half[a]), "volume: expected sides above 0");
+    }
+    const int64_t slice = int64_t(volume.size[0]) * volume.size[1] * kBytes[volume.type];
+    require(slice < 1 << 28, "volume: expected slices of less than 256 MiB");
+    int32_t bricks[3];
+    require(count_bricks(volume, bricks) < std::numeric_limits<int32_t>::max() - 3, "volume: expected fewer samples");
+}
+
+void check_transfer(const texgs_transfer& transfer) {
+    require(transfer.n >= 2 && transfer.n <= 1024, "transfer function: expected 2 to 1024 points");
+    for (int i = 1; i < transfer.n; ++i)
+        require(transfer.points[5 * i] >= transfer.points[5 * i - 5], "transfer function: expected ascending values");
+    require(transfer.points[5 * transfer.n - 5] > transfer.points[0], "transfer function: expected a range of values");
+}
+
+// -- Bricks ------------------------------------------------------------------------------------------------------
+
+// Extremes of a row of bricks (by, bz), and how many of the samples that are no other row's are NaN.
+template <class T>
+int64_t row_extremes(const texgs_volume& volume, const int32_t bricks[3], int by, int bz, float* extremes) {
+    const T* values = static_cast<const T*>(volume.values);
+    const int32_t nx = volume.size[0], ny = volume.size[1], nz = volume.size[2];
+    for (int b = 0; b < bricks[0]; ++b)
+        extremes[2 * b] = std::numeric_limits<float>::infinity(), extremes[2 * b + 1] = -extremes[2 * b];
+    const int z_end = std::min(kBrick * bz + kBrick, nz - 1), y_end = std::min(kBrick * by + kBrick, ny - 1);
+    int64_t missing = 0;
+    for (int z = kBrick * bz; z <= z_end; ++z)
+        for (int y = kBrick * by; y <= y_end; ++y) {
+            const T* row = values + (int64_t(z) * ny + y) * nx;
+            const bool is_own = (z < kBrick * bz + kBrick || z == nz - 1) && (y < kBrick * by + kBrick || y == ny - 1);
+            for (int b = 0; b < bricks[0]; ++b) {
+                float low = extremes[2 * b], high = extremes[2 * b + 1];
+                for (int x = kBrick * b, end = std::min(x + kBrick, nx - 1); x <= end; ++x) {
+                    const float value = static_cast<float>(row[x]);
+                    low = value < low ? value : low;
+                    high = value > high ? value : high;
+                    missing += value != value && is_own && (x < kBrick * b + kBrick || x == nx - 1);
+                }
+                extremes[2 * b] = low, extremes[2 * b + 1] = high;
+            }
+        }
+    return missing;
+}
+
+using RowExtremes = int64_t (*)(const texgs_volume&, const int32_t[3], int, int, float*);
+constexpr RowExtremes kRowExtremes[] = {
+    row_extremes<uint8_t>, row_extremes<int8_t>,   row_extremes<uint16_t>, row_extremes<int16_t>, row_extremes<uint32_t>,
+    row_extremes<int32_t>, row_extremes<uint64_t>, row_extremes<int64_t>,  row_extremes<float>,   row_extremes<double>,
+};
+
+// Whether a transfer function shows anything of values from low to high.
+bool shows(const texgs_transfer& transfer, float low, float high) {
+    for (int i = 0; i + 1 < transfer.n; ++i) {
+        const float *p = transfer.points + 5 * i, *q = p + 5;
+        const float from = std::max(low, p[0]), to = std::min(high, q[0]);
+        if (from > to) continue;
+        const auto opacity = [&](float v) { return q[0] > p[0] ? p[1] + (q[1] - p[1]) * (v - p[0]) / (q[0] - p[0]) : q[1]; };
+        if (opacity(from) > 0.0f || opacity(to) > 0.0f) return true;
+    }
+    return false;
+}
+
+// Spreads distances, 0 or kFarthest at first, to all bricks: forwards from the neighbours before a brick, then back.
+// Bricks outside, one on each side, are farthest.
+class Spread {
+public:
+    explicit Spread(const int32_t (&size)[3]) : nx_(size[0]), ny_(size[1]), nz_(size[2]), row_(nx_ + 2) {
+        slice_ = row_ * (ny_ + 2);
+        distance_.assign(slice_ * (nz_ + 2), kFarthest);
+        for (int64_t dz = -1; dz <= 1; ++dz)
+            for (int64_t dy = -1; dy <= 1; ++dy)
+                for (int64_t dx = -1; dx <= 1; ++dx)
+                    if (9 * dz + 3 * dy + dx < 0) before_.push_back(dz * slice_ + dy * row_ + dx);
+    }
+    uint8_t* row(int64_t y, int64_t z) { return distance_.data() + (z + 1) * slice_ + (y + 1) * row_ + 1; }
+
+    void run() {
+        for (int64_t z = 0; z < nz_; ++z)
+            for (int64_t y = 0; y < ny_; ++y)
+                for (int64_t x = 0; x < nx_; ++x) update(row(y, z) + x, 1);
+        for (int64_t z = nz_; z-- > 0;)
+            for (int64_t y = ny_; y-- > 0;)
+                for (int64_t x = nx_; x-- > 0;) update(row(y, z) + x, -1);
+    }
+
+private:
+    void update(uint8_t* brick, int64_t side) {
+        if (*brick == 0) return;
+        int least = kFarthest - 1;
+        for (const int64_t offset : before_) least = std::min<int>(least, brick[side * offset]);
+        *brick = static_cast<uint8_t>(std::min<int>(*brick, least + 1));
+    }
+
+    int64_t nx_, ny_, nz_, row_, slice_;
+    std::vector<int64_t> before_;
+    std::vector<uint8_t> distance_;
+};
+
+// Points as arrays, see CastTable.
+struct Table {
+    std::vector<float> numbers;
+    CastTable view;
+
+    explicit Table(const texgs_transfer& transfer) : numbers(6 * size_t(transfer.n), 0.0f) {
+        const int n = transfer.n;
+        float* column[6];
+        for (int c = 0; c < 6; ++c) column[c] = numbers.data() + c * n;
+        for (int i = 0; i < n; ++i) {
+            const float* p = transfer.points + 5 * i;
+            column[0][i] = p[0], column[2][i] = p[1];
+            if (i + 1 < n && p[5] > p[0]) column[1][i] = 1.0f / (p[5] - p[0]);
+            for (int c = 0; c < 3; ++c) column[3 + c][i] = p[2 + c];
+        }
+        view = {n, column[0], column[1], column[2], {column[3], column[4], column[5]}};
+    }
+};
+
+// Bricks in which something shows, as a box of bricks; empty where there is none.
+struct Shown {
+    int32_t lower[3] = {1, 1, 1}, upper[3] = {0, 0, 0};
+
+    Shown(const uint8_t* distance, const int32_t (&size)[3]) {
+        for (int z = 0; z < size[2]; ++z)
+            for (int y = 0; y < size[1]; ++y) {
+                const uint8_t* row = distance + (int64_t(z) * size[1] + y) * size[0];
+                const auto* first = static_cast<const uint8_t*>(std::memchr(row, 0, size[0]));
+                if (!first) continue;
+                int last = size[0] - 1;
+                while (row[last]) --last;
+                const int32_t low[3] = {static_cast<int32_t>(first - row), y, z}, high[3] = {last + 1, y + 1, z + 1};
+                const bool is_first = upper[0] == 0;
+                for (int a = 0; a < 3; ++a) {
+                    lower[a] = is_first ? low[a] : std::min(lower[a], low[a]);
+                    upper[a] = is_first ? high[a] : std::max(upper[a], high[a]);
+                }
+            }
+    }
+    bool any() const { return upper[0] > 0; }
+};
+
+// Pixels [x0, x1) x [y0, y1) of a view.
+struct Frame {
+    int x0, y0, x1, y1;
+};
+
+// Pixels that a box may be seen in: all, where a part of it is behind the camera.
+Frame frame_of(const CastJob& job) {
+    const texgs_cast_view& v = job.view;
+    double low[2] = {1e30, 1e30}, high[2] = {-1e30, -1e30};
+    for (int corner = 0; corner < 8; ++corner) {
+        double camera[3];
+        for (int i = 0; i < 3; ++i) {
+            camera[i] = v.viewmat[4 * i + 3];
+            for (int a = 0; a < 3; ++a) {
+                const double cells = job.volume.size[a] - 1, place = corner >> a & 1 ? job.upper[a] : job.lower[a];
+                camera[i] += v.viewmat[4 * i + a] * (2.0 * place / cells - 1.0) * job.volume.half[a];
+            }
+        }
+        if (camera[2] < 1e-6) return {0, 0, v.width, v.height};
+        const double at[2] = {v.K[0] * camera[0] / camera[2] + v.K[2], v.K[4] * camera[1] / camera[2] + v.K[5]};
+        for (int i = 0; i < 2; ++i) low[i] = std::min(low[i], at[i]), high[i] = std::max(high[i], at[i]);
+    }
+    const auto pixel = [](double place, int size) { return static_cast<int>(std::clamp(place, 0.0, double(size))); };
+    return {pixel(low[0] - 1.0, v.width), pixel(low[1] - 1.0, v.height), pixel(high[0] + 2.0, v.width),
+            pixel(high[1] + 2.0, v.height)};
+}
+
+// Nothing, in all pixels.
+void clear(const texgs_cast_view& view) {
+    const int64_t n = int64_t(view.width) * view.height;
+    std::fill_n(view.rgba, 4 * n, 0.0f);
+    if (view.depth) std::fill_n(view.depth, n, 0.0f);
+    if (view.median) std::fill_n(view.median, n, 0.0f);
+    if (view.normal) std::fill_n(view.normal, 3 * n, 0.0f);
+}
+
+void check_view(const texgs_cast_view& view) {
+    require(view.width >= 1 && view.height >= 1, "view: expected at least one pixel");
+    require(view.width <= TEXGS_MAX_SIDE && view.height <= TEXGS_MAX_SIDE, "view: expected fewer pixels");
+    require(view.step > 0.0f && view.opacity_unit > 0.0f, "view: expected a step and an opacity unit above 0");
+}
+
+}  // namespace
+}  // namespace texgs
+
+using namespace texgs;
+
+int64_t texgs_volume_bricks(const texgs_volume* volume, int32_t size[3]) { return count_bricks(*volume, size); }
+
+int32_t texgs_volume_extremes(const texgs_volume* volume, float* extremes, int64_t* missing, void*) {
+    return guarded([&] {
+        check_volume(*volume);
+        int32_t size[3];
+        count_bricks(*volume, size);
+        std::atomic<int64_t> all{0};
+        parallel_for(int64_t(size[1]) * size[2], 1, [&](int64_t begin, int64_t end, int) {
+            for (int64_t i = begin; i < end; ++i)
+                all += kRowExtremes[volume->type](*volume, size, static_cast<int>(i % size[1]),
+                                                  static_cast<int>(i / size[1]), extremes + 2 * i * size[0]);
+        });
+        *missing = all;
+    });
+}
+
+int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes, const texgs_transfer* transfer,
+                              uint8_t* distance, void*) {
+    return guarded([&] {
+        check_volume(*volume);
+        check_transfer(*transfer);
+        int32_t size[3];
+        count_bricks(*volume, size);
+        Spread spread(size);
+        const int64_t rows = int64_t(size[1]) * size[2];
+        parallel_for(rows, 16, [&](int64_t begin, int64_t end, int) {
+            for (int64_t i = begin; i < end; ++i) {
+                uint8_t* row = spread.row(i % size[1], i / size[1]);
+                const float* ends = extremes + 2 * i * size[0];
+                for (int x = 0; x < size[0]; ++x)
+                    if (shows(*transfer, ends[2 * x], ends[2 * x + 1])) row[x] = 0;
+            }
+        });
+        spread.run();
+        for (int64_t i = 0; i < rows; ++i)
+            std::copy_n(spread.row(i % size[1], i / size[1]), size[0], distance + i * size[0]);
+    });
+}
+
+int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, const uint8_t* distance,
+                   const texgs_cast_view* view, void*) {
+    return guarded([&] {
+        check_volume(*volume);
+        check_transfer(*transfer);
+        check_view(*view);
+        clear(*view);
+        int32_t size[3];
+        count_bricks(*volume, size);
+        const Shown shown(distance, size);
+        if (!shown.any()) return;
+        const Table table(*transfer);
+        CastJob job{*volume, *view, table.view, distance, {}, {}};
+        for (int a = 0; a < 3; ++a) {
+            job.lower[a] = static_cast<float>(kBrick * shown.lower[a]);
+            job.upper[a] = static_cast<float>(std::min(kBrick * shown.upper[a], volume->size[a] - 1));
+        }
+        const Frame frame = frame_of(job);
+        const int64_t parts = (frame.x1 - frame.x0 + kPixels - 1) / kPixels;
+        parallel_for(parts * (frame.y1 - frame.y0), 1, [&](int64_t begin, int64_t end, int) {
+            for (int64_t i = begin; i < end; ++i) {
+                const int first = frame.x0 + static_cast<int>(i % parts) * kPixels;
+                const int y = frame.y0 + static_cast<int>(i / parts);
+                volume_kernels().cast(job, y, first, std::min(first + kPixels, frame.x1));
+            }
+        });
+    });
+}

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+// What volume.cpp hands to the kernels of an instruction set, and the table of those kernels.
+#pragma once
+#include <cstdint>
+
+#include "../texgs_volume.h"
+
+namespace texgs {
+
+// Points of a transfer function, one array for each number, with the width of the interval behind each.
+struct CastTable {
+    int32_t n;
+    const float *value, *per_width, *opacity, *color[3];
+};
+
+struct CastJob {
+    texgs_volume volume;
+    texgs_cast_view view;
+    CastTable table;
+    const uint8_t* distance;    // [bricks]
+    float lower[3], upper[3];  // corners of a box that holds all bricks in which something shows, in samples
+};
+
+struct VolumeKernels {
+    // Casts the rays of the pixels [begin, end) of row y.
+    void (*cast)(const CastJob&, int y, int begin, int end);
+};
+
+// One table per instruction set, each in cast.cpp.
+namespace portable {
+extern const VolumeKernels kVolumeKernels;
+}
+namespace avx2 {
+extern const VolumeKernels kVolumeKernels;
+}
+namespace avx512 {
+extern const VolumeKernels kVolumeKernels;
+}
+
+}  // namespace texgs

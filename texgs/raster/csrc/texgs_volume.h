@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0
+ *
+ * Rays through a volume: a regular grid of samples that a transfer function makes visible. The conventions are those of
+ * texgs.h.
+ */
+#ifndef TEXGS_VOLUME_H
+#define TEXGS_VOLUME_H
+#include "texgs.h"
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+enum { TEXGS_BRICK = 4 }; /* cells along each side of a brick: what is known to be empty or not */
+typedef enum {
+    TEXGS_U8,
+    TEXGS_I8,
+    TEXGS_U16,
+    TEXGS_I16,
+    TEXGS_U32,
+    TEXGS_I32,
+    TEXGS_U64,
+    TEXGS_I64,
+    TEXGS_F32,
+    TEXGS_F64,
+} texgs_sample_type;
+
+/* Samples at the corners of cells, in a box around the origin. Between them values are trilinear. */
+typedef struct {
+    const void* values; /* [z, y, x]; NaN is transparent, with all cells that it is a corner of */
+    int32_t type;       /* a texgs_sample_type */
+    int32_t size[3];    /* samples along x, y, z, at least 2; a slice has less than 2^28 bytes */
+    float half[3];      /* half the box's sides, world units */
+} texgs_volume;
+
+/* The colour of values, and their opacity over a unit of length, linear between points [n, 5] of value, opacity, red,
+ * green and blue, ascending by value. The second of two points at one value holds there. Beyond all points nothing
+ * shows. n: 2 to 1024. */
+typedef struct {
+    int32_t n;
+    const float* points;
+} texgs_transfer;
+
+/* Bricks along x, y and z, and their number. */
+TEXGS_API int64_t texgs_volume_bricks(const texgs_volume*, int32_t size[3]);
+/* The smallest and the largest value in each brick, its faces included, extremes [bricks, 2]; of a brick without any
+ * number the smallest is infinite. Returns in *missing how many samples are NaN. */
+TEXGS_API int32_t texgs_volume_extremes(const texgs_volume*, float* extremes, int64_t* missing, void* stream);
+/* How far it is from each brick to one in which something shows, distance [bricks + 3], the last three unused: by how many
+ * bricks along the axis along which it is farthest, 0 there, at most 255. */
+TEXGS_API int32_t texgs_volume_distance(const texgs_volume*, const float* extremes, const texgs_transfer*,
+                                        uint8_t* distance, void* stream);
+
+/* A view, and how it is lit: Blinn-Phong with a distant viewer and a distant white light. A sample k of a ray is at
+ * (k + 0.5) steps from where the ray enters the box. Rays end where less than 1e-3 of the light is left. */
+typedef struct {
+    const float* viewmat; /* [4, 4] */
+    const float* K;       /* [3, 3] without skew */
+    int32_t width, height;
+    float step;           /* between samples, world units */
+    float opacity_unit;   /* length that the opacity of values is over, world units */
+    float to_viewer[3], to_light[3];
+    float ambient, diffuse, specular, shininess;
+    float* rgba;   /* [H, W, 4] premultiplied */
+    float* depth;  /* [H, W] mean camera z, weighted as colours are; 0 where nothing shows; or NULL */
+    float* median; /* [H, W] camera z at which half of the light is gone, 0 where it never is; or NULL */
+    float* normal; /* [H, W, 3] mean normal, against the ray, world axes; or NULL */
+} texgs_cast_view;
+
+TEXGS_API int32_t texgs_cast(const texgs_volume*, const texgs_transfer*, const uint8_t* distance,
+                             const texgs_cast_view*, void* stream);
+
+#ifdef __cplusplus
+}
+#endif
+#endif

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// The maths of rays through a volume, shared by every back end. F is float (CUDA, scalar) or a vector of floats (CPU).
+//
+// Include it after a header that declares fma, select, sqrt, min, max, exp2, log2 and comparisons for F in namespace
+// texgs::TEXGS_ISA.
+#pragma once
+#include "maths.h"
+#include "texgs_volume.h"
+
+namespace texgs::TEXGS_ISA {
+namespace {
+
+constexpr float kOpaque = 1e-3f;  // light below which a ray ends
+
+// Places in a volume are in samples: (0, 0, 0) is the first one.
+struct Lattice {
+    double per_unit[3], middle[3];  // place = middle + per_unit * world
+    float last[3];                  // place of the last sample
+    int32_t bricks[3];
+};
+
+TEXGS_MATHS Lattice lattice_of(const texgs_volume& volume) {
+    Lattice l;
+    for (int a = 0; a < 3; ++a) {
+        const int cells = volume.size[a] - 1;
+        l.per_unit[a] = cells / (2.0 * volume.half[a]);
+        l.middle[a] = 0.5 * cells;
+        l.last[a] = static_cast<float>(cells);
+        l.bricks[a] = (cells + TEXGS_BRICK - 1) / TEXGS_BRICK;
+    }
+    return l;
+}
+
+// Sample k is at entry + (k + 0.5) * step, and its camera z at near + (k + 0.5) * z.
+struct CastRay {
+    float entry[3], step[3], direction[3];  // the last in the world, with z 1 in the camera
+    float near, z;
+    int32_t samples;
+};
+
+// The ray through the centre of pixel (x, y).
+TEXGS_MATHS CastRay cast_ray(const Lattice& lattice, const texgs_cast_view& view, int x, int y) {
+    const float *m = view.viewmat, *K = view.K;
+    const double c[3] = {(x + 0.5 - K[2]) / K[0], (y + 0.5 - K[5]) / K[4], 1.0};
+    double origin[3], along[3], near = 0.0, far = 1e30, length = 0.0;
+    CastRay ray;
+    for (int a = 0; a < 3; ++a) {
+        double position = 0.0, direction = 0.0;
+        for (int i = 0; i < 3; ++i) {
+            position -= double(m[4 * i + a]) * m[4 * i + 3];
+            direction += double(m[4 * i + a]) * c[i];
+        }
+        ray.direction[a] = static_cast<float>(direction);
+        length += direction * direction;
+        origin[a] = lattice.middle[a] + lattice.per_unit[a] * position;
+        along[a] = lattice.per_unit[a] * direction;
+        if (along[a] == 0.0) along[a] = 1e-30;
+        const double one = -origin[a] / along[a], other = (lattice.last[a] - origin[a]) / along[a];
+        near = near > (one < other ? one : other) ? near : (one < other ? one : other);
+        far = far < (one < other ? other : one) ? far : (one < other ? other : one);
+    }
+    const double z = view.step / ::sqrt(length), samples = ::ceil((far - near) / z - 0.5);
+    for (int a = 0; a < 3; ++a) {
+        ray.entry[a] = static_cast<float>(origin[a] + near * along[a]);
+        ray.step[a] = static_cast<float>(along[a] * z);
+    }
+    ray.near = static_cast<float>(near), ray.z = static_cast<float>(z);
+    ray.samples = samples > 0.0 ? static_cast<int32_t>(samples < 1e9 ? samples : 1e9) : 0;
+    return ray;
+}
+
+// A box of bricks that hold all that shows; places of its corners.
+struct Extent {
+    float lower[3], upper[3];
+};
+
+// The first sample of a ray, and the one behind the last, that may be in a box.
+TEXGS_MATHS void clip(const CastRay& ray, const Extent& box, int32_t& first, int32_t& end) {
+    float enter = 0.0f, leave = static_cast<float>(ray.samples);
+    for (int a = 0; a < 3; ++a) {
+        const float one = (box.lower[a] - ray.entry[a]) / ray.step[a], other = (box.upper[a] - ray.entry[a]) / ray.step[a];
+        const float near = one < other ? one : other, far = one < other ? other : one;
+        enter = near > enter ? near : enter;
+        leave = far < leave ? far : leave;
+    }
+    first = static_cast<int32_t>(enter > 1.0f ? enter - 1.0f : 0.0f);  // rounding must not pass one by
+    end = leave + 1.0f < static_cast<float>(ray.samples) ? static_cast<int32_t>(leave + 1.0f) : ray.samples;
+}
+
+// The next sample of a ray that may be outside of the bricks within `distance` of one, which show nothing.
+TEXGS_MATHS int32_t leap(const CastRay& ray, int32_t k, const float place[3], const int32_t brick[3], int distance) {
+    float leave = 1e9f;
+    for (int a = 0; a < 3; ++a) {
+        const int side = ray.step[a] > 0.0f ? brick[a] + distance : brick[a] - distance + 1;
+        const float steps = (static_cast<float>(TEXGS_BRICK * side) - place[a]) / ray.step[a];
+        leave = steps < leave ? steps : leave;
+    }
+    const int32_t samples = static_cast<int32_t>(::ceilf(leave - 1e-3f));  // rounding must not pass one by
+    return k + (samples > 1 ? samples : 1);
+}
+
+template <class F>
+TEXGS_MATHS F mix(F a, F b, F t) {
+    return fma(t, b - a, a);  // a where both are the same
+}
+
+// The opacity of a sample, whose stretch of a ray is `lengths` units of length: 1 - (1 - a)^lengths, with small
+// opacities as exact as large ones.
+template <class F>
+TEXGS_MATHS F step_opacity(F a, float lengths) {
+    const F s = a / (a - F(2.0f)), s2 = s * s;  // log2(1 - a) = 2 / ln 2 atanh(s)
+    F p = fma(F(0.412198583f), s2, F(0.577078016f));
+    p = fma(p, s2, F(0.961796694f));
+    p = fma(p, s2, F(2.885390082f));
+    const F y = F(lengths) * select(a < F(0.25f), s * p, log2(max(F(1.0f) - a, F(1e-30f))));
+    F q = fma(F(1.333355814e-3f), y, F(9.618129108e-3f));  // (2^y - 1) / y
+    q = fma(q, y, F(5.550410866e-2f));
+    q = fma(q, y, F(2.402265070e-1f));
+    q = fma(q, y, F(6.931471806e-1f));
+    return select(a < F(1.0f), select(F(-0.25f) < y, F(0.0f) - y * q, F(1.0f) - exp2(y)), F(1.0f));
+}
+
+// The eight corners of cells, x first, and the places inside of them.
+template <class F>
+TEXGS_MATHS F trilinear(const F (&v)[8], const F (&f)[3]) {
+    const F low = mix(mix(v[0], v[1], f[0]), mix(v[2], v[3], f[0]), f[1]);
+    return mix(low, mix(mix(v[4], v[5], f[0]), mix(v[6], v[7], f[0]), f[1]), f[2]);
+}
+
+// What lights a view, ready for use.
+struct Lamp {
+    float viewer[3], light[3], half[3];  // half: between the two
+    float ambient, diffuse, specular, shininess;
+};
+TEXGS_MATHS Lamp lamp_of(const texgs_cast_view& view) {
+    Lamp lamp;
+    float length = 0.0f;
+    for (int a = 0; a < 3; ++a) {
+        lamp.viewer[a] = view.to_viewer[a], lamp.light[a] = view.to_light[a];
+        lamp.half[a] = lamp.viewer[a] + lamp.light[a];
+        length += lamp.half[a] * lamp.half[a];
+    }
+    for (int a = 0; a < 3; ++a) lamp.half[a] /= length > 0.0f ? ::sqrtf(length) : 1.0f;
+    lamp.ambient = view.ambient, lamp.diffuse = view.diffuse;
+    lamp.specular = view.specular, lamp.shininess = view.shininess;
+    return lamp;
+}
+
+// A unit vector, or 0.
+template <class F>
+TEXGS_MATHS Vec3<F> unit(Vec3<F> v) {
+    const F length = sqrt(dot(v, v));
+    const F scale = select(F(1e-18f) < length, F(1.0f) / length, F(0.0f));
+    return scale * v;
+}
+template <class F>
+TEXGS_MATHS F along(Vec3<F> v, const float (&d)[3]) {
+    return fma(v.x, F(d[0]), fma(v.y, F(d[1]), v.z * F(d[2])));
+}
+template <class F>
+TEXGS_MATHS Vec3<F> turned(Vec3<F> n, F side) {  // towards where side is above 0
+    const F sign = select(side < F(0.0f), F(-1.0f), F(1.0f));
+    return sign * n;
+}
+
+// Blinn-Phong: c (k_a + k_d max(n.l, 0)) + k_s max(n.h, 0)^beta in [0, 1]. A normal of 0 is ambient.
+template <class F>
+TEXGS_MATHS Vec3<F> lit(Vec3<F> color, Vec3<F> normal, const Lamp& lamp) {
+    const F zero = 0.0f, one = 1.0f;
+    const Vec3<F> n = turned(normal, along(normal, lamp.viewer));
+    const F n_l = max(along(n, lamp.light), zero), n_h = max(along(n, lamp.half), zero);
+    const F power = exp2(max(F(lamp.shininess) * log2(max(n_h, F(1e-30f))), F(-126.0f)));
+    const F specular = F(lamp.specular) * select(zero < n_l, power, zero);
+    const F diffuse = fma(F(lamp.diffuse), n_l, F(lamp.ambient));
+    return {min(max(fma(color.x, diffuse, specular), zero), one), min(max(fma(color.y, diffuse, specular), zero), one),
+            min(max(fma(color.z, diffuse, specular), zero), one)};
+}
+
+}  // namespace
+}  // namespace texgs::TEXGS_ISA

@@ -1,0 +1,195 @@
+"""Volume rendering on the CPU by the native library: rays through the samples as they are stored.
+
+Values are trilinear, in single precision; colours and opacities are exact between the points of a transfer
+function and at them. Gradients are central differences, one voxel to both sides. Lights and viewer are
+distant: the directions to them are the same for all points of one view. Nothing of the volume is copied:
+bricks of 4 x 4 x 4 cells are known by their extremes, and rays leap over those in which nothing shows.
+
+The result has the same bits for any number of threads.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
+from texgs.core.memory import require_memory
+from texgs.raster import native
+from texgs.volume.appearance import Appearance
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction, right_limit
+from texgs.volume.vtk_camera import directions
+
+TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
+OUTPUTS = ("depth", "median", "normal")
+BYTES = 64  # of memory for a pixel
+PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
+CPU = torch.device("cpu")
+
+
+class NativeVolume(Structure):
+    """`texgs_volume`."""
+
+    _fields_ = [("values", c_void_p), ("type", c_int32), ("size", c_int32 * 3), ("half", c_float * 3)]
+
+
+class NativeTransfer(Structure):
+    """`texgs_transfer`."""
+
+    _fields_ = [("n", c_int32), ("points", c_void_p)]
+
+
+class NativeView(Structure):
+    """`texgs_cast_view`."""
+
+    _fields_ = [
+        *(("viewmat", c_void_p), ("K", c_void_p), ("width", c_int32), ("height", c_int32)),
+        *((name, c_float) for name in ("step", "opacity_unit")),
+        *((name, c_float * 3) for name in ("to_viewer", "to_light")),
+        *((name, c_float) for name in ("ambient", "diffuse", "specular", "shininess")),
+        *((name, c_void_p) for name in ("rgba", *OUTPUTS)),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class Cast:
+    """What rays see; float32."""
+
+    rgba: Tensor  # [H, W, 4] premultiplied
+    depth: Tensor | None = None  # [H, W] mean camera z, weighted as colours are; 0 where alpha is 0
+    median: Tensor | None = None  # [H, W] camera z at which half of the light is gone; 0 where it never is
+    normal: Tensor | None = None  # [H, W, 3] mean normal, against the ray, world axes; length at most 1
+
+
+class Caster:
+    """Renders one volume from any camera.
+
+    Args:
+        grid: the volume; samples in C order and native bytes are not copied.
+        appearance: shading and sampling.
+
+    Attributes:
+        missing: how many samples are NaN: they are transparent, with the cells around them.
+
+    Raises:
+        ArgumentError: if the samples are of a type that is not known, or there are too many of them.
+    """
+
+    local_viewer = False
+
+    def __init__(self, grid: Grid, appearance: Appearance) -> None:
+        self._appearance = appearance
+        self._values = np.ascontiguousarray(grid.values, grid.values.dtype.newbyteorder("="))
+        kind = "uint8" if self._values.dtype == bool else self._values.dtype.name
+        if kind not in TYPES:
+            raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
+        half = [float(side) for side in grid.aabb[1]]
+        self._voxel = min(2 * side / (size - 1) for side, size in zip(half, grid.dims, strict=True))
+        self._volume = NativeVolume(
+            self._values.ctypes.data, TYPES.index(kind), (c_int32 * 3)(*grid.dims), (c_float * 3)(*half)
+        )
+        _describe()
+        bricks = native.library("cpu").texgs_volume_bricks(byref(self._volume), (c_int32 * 3)())
+        self._extremes = torch.empty(bricks, 2)
+        missing = c_int64()
+        addresses = self._extremes.data_ptr(), byref(missing)
+        native.call("texgs_volume_extremes", byref(self._volume), *addresses, device=CPU)
+        self.missing = missing.value
+        self._prepared: tuple[TransferFunction, Tensor, Tensor] | None = None
+
+    def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
+        """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values.
+
+        Raises:
+            OutOfMemoryError: if the view needs more memory than there is.
+        """
+        return self.cast(tf, camera, light).rgba.numpy()
+
+    def cast(self, tf: TransferFunction, camera: Camera, light: Light, outputs: Collection[str] = ()) -> Cast:
+        """A view, with what else is wanted of OUTPUTS, in one pass.
+
+        Raises:
+            ArgumentError: if an output is unknown.
+            OutOfMemoryError: if the view needs more memory than there is.
+        """
+        if unknown := sorted(set(outputs) - set(OUTPUTS)):
+            raise ArgumentError(f"outputs: expected some of {', '.join(OUTPUTS)}, got {unknown[0]}")
+        height, width = camera.height, camera.width
+        require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
+        points, distance = self._prepare(tf)
+        matrices = [x.detach().float().cpu().contiguous() for x in (camera.viewmat, camera.K)]
+        seen = {"rgba": torch.empty(height, width, 4)}
+        seen |= {name: torch.empty(height, width, *([3] if name == "normal" else [])) for name in outputs}
+        look = self._appearance
+        view = NativeView(
+            *(x.data_ptr() for x in matrices),
+            *(width, height, look.step * self._voxel, look.opacity_unit),
+            *((c_float * 3)(*vector) for vector in directions(camera, light)),
+            *(look.ambient, look.diffuse, look.specular, look.shininess),
+            *(seen[name].data_ptr() if name in seen else None for name in ("rgba", *OUTPUTS)),
+        )
+        transfer = NativeTransfer(len(points), points.data_ptr())
+        arguments = byref(self._volume), byref(transfer), distance.data_ptr(), byref(view)
+        native.call("texgs_cast", *arguments, device=CPU)
+        return Cast(**seen)
+
+    def _prepare(self, tf: TransferFunction) -> tuple[Tensor, Tensor]:
+        """Points of a transfer function, and how far each brick is from one in which it shows something."""
+        if self._prepared is None or self._prepared[0] != tf:
+            points = points_of(tf)
+            distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8)
+            transfer = NativeTransfer(len(points), points.data_ptr())
+            arguments = self._extremes.data_ptr(), byref(transfer), distance.data_ptr()
+            native.call("texgs_volume_distance", byref(self._volume), *arguments, device=CPU)
+            self._prepared = tf, points, distance
+        return self._prepared[1:]
+
+
+def points_of(tf: TransferFunction) -> Tensor:
+    """Points [n, 5] of value, opacity, red, green and blue, as `texgs_transfer` has them."""
+    low, high = tf.opacity[0][0], tf.opacity[-1][0]
+    inner = {value for value, *_ in (*tf.opacity, *tf.color) if low < value < high}
+    rows = []
+    for value in (low, *sorted(inner), high):
+        before, at = (
+            np.concatenate([limit(table, value) for table in (tf.opacity, tf.color)])
+            for limit in (_left_limit, _right_limit)
+        )
+        if value in inner and (before != at).any():
+            rows.append([value, *before])
+        rows.append([value, *at])
+    return torch.tensor(np.array(rows), dtype=torch.float32)
+
+
+def _right_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[np.float64]:
+    return right_limit(points, np.array(value))
+
+
+def _left_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[np.float64]:
+    return right_limit([(-at, *rest) for at, *rest in reversed(points)], np.array(-value))
+
+
+@cache
+def _describe() -> None:
+    """Tell ctypes the argument types."""
+    volume, transfer, view = (POINTER(kind) for kind in (NativeVolume, NativeTransfer, NativeView))
+    signatures = {
+        "texgs_volume_extremes": [volume, c_void_p, POINTER(c_int64), c_void_p],
+        "texgs_volume_distance": [volume, c_void_p, transfer, c_void_p, c_void_p],
+        "texgs_cast": [volume, transfer, c_void_p, view, c_void_p],
+    }
+    library = native.library("cpu")
+    for name, arguments in signatures.items():
+        native.function(library, name).argtypes = arguments
+    count = native.function(library, "texgs_volume_bricks")
+    count.argtypes, count.restype = [volume, c_void_p], c_int64
