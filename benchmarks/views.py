@@ -62,7 +62,8 @@ def _run(settings: Settings) -> Section:
     grid, look = sphere(size), Appearance()
     shots = icosphere(3, *Lens().square(pixels))[:n_views]
     where = {"volume": size, "size": pixels}
-    mappers: dict[str, Any] = {"texgs": Caster(grid, look), "VTK": VtkCaster(grid, look, settings.threads[-1])}
+    vtk = VtkCaster(grid, look, settings.threads[-1])
+    mappers: dict[str, Any] = {"texgs": Caster(grid, look), "VTK": vtk}
     cases = [
         Case("frame", where | {"by": name}, {"frame": partial(mapper.render, SHELLS, shots[0], LIGHT)})
         for name, mapper in mappers.items()

@@ -66,7 +66,8 @@ def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
         return _lines(iterable, total, title, unit)
     from tqdm import tqdm
 
-    return tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
+    bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
+    return bar
 
 
 def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterator[T]:
