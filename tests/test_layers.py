@@ -11,7 +11,8 @@ ROOT = Path(__file__).parents[1]
 LEFT = {
     "core": set(),
     "config": {"core"},
-    **{name: {"config", "core"} for name in ("volume", "raster", "track")},
+    **{name: {"config", "core"} for name in ("raster", "track")},
+    "volume": {"config", "core", "raster"},
     **{name: {"config", "core", "volume", "raster"} for name in ("fields", "models")},
 }
 LEFT["scene"] = LEFT["fields"] | {"fields"}
