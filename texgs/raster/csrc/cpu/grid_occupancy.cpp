@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "chebyshev.h"
 #include "grid_kernels.h"
 #include "memory.h"
 #include "parallel.h"
@@ -54,24 +55,6 @@ void spread(const Blocks& blocks, const uint64_t* from, uint64_t* to, int64_t x,
         }
 }
 
-// Two sweeps over all blocks, each looking at the 13 neighbours that it has passed: exact for Chebyshev distances.
-void sweep(const Blocks& b, uint8_t* distance, bool backwards) {
-    const int side = backwards ? 1 : -1;
-    for (int64_t step = 0; step < b.count(); ++step) {
-        const int64_t i = backwards ? b.count() - 1 - step : step;
-        const int64_t x = i / (b.y * b.z), y = i / b.z % b.y, z = i % b.z;
-        int least = distance[i];
-        if (least == 0) continue;
-        for (int k = 0; k < 13; ++k) {
-            // places 0 to 12 of 27 in the order x, y, z: those before the middle
-            const int64_t nx = x - side * (k / 9 - 1), ny = y - side * (k / 3 % 3 - 1), nz = z - side * (k % 3 - 1);
-            if (nx < 0 || ny < 0 || nz < 0 || nx >= b.x || ny >= b.y || nz >= b.z) continue;
-            least = std::min(least, distance[b.at(nx, ny, nz)] + 1);
-        }
-        distance[i] = static_cast<uint8_t>(least);
-    }
-}
-
 }  // namespace
 
 void occupy(const texgs_grid& grid, uint64_t* occupied, uint8_t* distance) {
@@ -86,8 +69,7 @@ void occupy(const texgs_grid& grid, uint64_t* occupied, uint8_t* distance) {
     for_planes(blocks, [&](int64_t x) { spread(blocks, occupied, other, x, 1); });
     for_planes(blocks, [&](int64_t x) { spread(blocks, other, occupied, x, 0); });
     for (int64_t i = 0; i < blocks.count(); ++i) distance[i] = occupied[i] ? 0 : 255;
-    sweep(blocks, distance, false);
-    sweep(blocks, distance, true);
+    spread_distances({blocks.x, blocks.y, blocks.z}, distance);
 }
 
 }  // namespace texgs

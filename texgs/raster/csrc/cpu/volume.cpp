@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "../status.h"
+#include "chebyshev.h"
 #include "dispatch.h"
 #include "parallel.h"
 #include "volume_kernels.h"
@@ -18,7 +19,6 @@ namespace texgs {
 namespace {
 
 constexpr int kBrick = TEXGS_BRICK;
-constexpr int kFarthest = 255;
 constexpr int kPixels = 64;  // of a row that one worker casts at a time
 
 const VolumeKernels& volume_kernels() {
@@ -100,42 +100,6 @@ bool shows(const texgs_transfer& transfer, float low, float high) {
     }
     return false;
 }
-
-// Spreads distances, 0 or kFarthest at first, to all bricks: forwards from the neighbours before a brick, then back.
-// Bricks outside, one on each side, are farthest.
-class Spread {
-public:
-    explicit Spread(const int32_t (&size)[3]) : nx_(size[0]), ny_(size[1]), nz_(size[2]), row_(nx_ + 2) {
-        slice_ = row_ * (ny_ + 2);
-        distance_.assign(slice_ * (nz_ + 2), kFarthest);
-        for (int64_t dz = -1; dz <= 1; ++dz)
-            for (int64_t dy = -1; dy <= 1; ++dy)
-                for (int64_t dx = -1; dx <= 1; ++dx)
-                    if (9 * dz + 3 * dy + dx < 0) before_.push_back(dz * slice_ + dy * row_ + dx);
-    }
-    uint8_t* row(int64_t y, int64_t z) { return distance_.data() + (z + 1) * slice_ + (y + 1) * row_ + 1; }
-
-    void run() {
-        for (int64_t z = 0; z < nz_; ++z)
-            for (int64_t y = 0; y < ny_; ++y)
-                for (int64_t x = 0; x < nx_; ++x) update(row(y, z) + x, 1);
-        for (int64_t z = nz_; z-- > 0;)
-            for (int64_t y = ny_; y-- > 0;)
-                for (int64_t x = nx_; x-- > 0;) update(row(y, z) + x, -1);
-    }
-
-private:
-    void update(uint8_t* brick, int64_t side) {
-        if (*brick == 0) return;
-        int least = kFarthest - 1;
-        for (const int64_t offset : before_) least = std::min<int>(least, brick[side * offset]);
-        *brick = static_cast<uint8_t>(std::min<int>(*brick, least + 1));
-    }
-
-    int64_t nx_, ny_, nz_, row_, slice_;
-    std::vector<int64_t> before_;
-    std::vector<uint8_t> distance_;
-};
 
 // Points as arrays, see CastTable.
 struct Table {
@@ -250,19 +214,12 @@ int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes,
         check_transfer(*transfer);
         int32_t size[3];
         count_bricks(*volume, size);
-        Spread spread(size);
-        const int64_t rows = int64_t(size[1]) * size[2];
-        parallel_for(rows, 16, [&](int64_t begin, int64_t end, int) {
-            for (int64_t i = begin; i < end; ++i) {
-                uint8_t* row = spread.row(i % size[1], i / size[1]);
-                const float* ends = extremes + 2 * i * size[0];
-                for (int x = 0; x < size[0]; ++x)
-                    if (shows(*transfer, ends[2 * x], ends[2 * x + 1])) row[x] = 0;
-            }
+        const int64_t count = int64_t(size[0]) * size[1] * size[2];
+        parallel_for(count, 1024, [&](int64_t begin, int64_t end, int) {
+            for (int64_t i = begin; i < end; ++i)
+                distance[i] = shows(*transfer, extremes[2 * i], extremes[2 * i + 1]) ? 0 : 255;
         });
-        spread.run();
-        for (int64_t i = 0; i < rows; ++i)
-            std::copy_n(spread.row(i % size[1], i / size[1]), size[0], distance + i * size[0]);
+        spread_distances({size[2], size[1], size[0]}, distance);
     });
 }
 
