@@ -19,6 +19,7 @@ from filelock import FileLock
 
 from texgs.config.code import library_sources
 from texgs.raster import grid_abi, losses_abi, native
+from texgs.volume import caster
 
 SOURCE = Path(__file__).parent
 BUILD = SOURCE.parents[1] / "build" / "cuda_emulation"
@@ -62,6 +63,7 @@ def library() -> ctypes.CDLL:
     with patch.object(native, "library", lambda device_type="cpu": lib):
         losses_abi._describe.__wrapped__("cpu")
         grid_abi._describe.__wrapped__("cpu")
+        caster._describe.__wrapped__("cpu")
     describe(lib)
     return lib
 
@@ -99,5 +101,6 @@ def emulated_cuda(seed: int) -> Iterator[None]:
         patch.object(native, "call", _call),
         patch.object(losses_abi, "_describe", lambda device_type: None),
         patch.object(grid_abi, "_describe", lambda device_type: None),
+        patch.object(caster, "_describe", lambda device_type: None),
     ):
         yield

@@ -170,7 +170,7 @@ def test_a_camera_inside_sees_what_is_before_it():
 
 @pytest.mark.parametrize("dims", [(32, 32, 32), (3, 9, 14), (2, 2, 2), (5, 2, 3)])
 @pytest.mark.parametrize("dtype", [*TYPES, "bool", ">u2", ">f4"])
-def test_every_type_of_samples_looks_the_same(dtype, dims):
+def test_every_type_of_samples_looks_the_same(dtype, dims, device):
     """A slope of whole numbers, from -60 to 60, or 0 to 120 where there is no sign."""
     x, y, z = lattice(*dims)
     low, high = {"b": (0, 1), "u": (0, 120)}.get(np.dtype(dtype).kind, (-60, 60))
@@ -179,16 +179,19 @@ def test_every_type_of_samples_looks_the_same(dtype, dims):
     tf = TransferFunction(
         ((low, 0), (half, 0.3), (most, 0.6), (high, 0.9)), ((half, 0.8, 0.4, 0.2), (high, 0.1, 0.2, 0.9))
     )
-    camera, light = orbit(-60, 20, 2, 34, 40, 40), Light("directional", 30, 40)
-    expected = render(Grid(levels), tf, camera, light)
+    camera, light = orbit(-60, 20, 2, 34, 20, 20), Light("directional", 30, 40)
+    expected, found = (
+        Caster(grid, Appearance(), device).render(tf, camera, light)
+        for grid in (Grid(levels), Grid(levels.astype(dtype)))
+    )
     assert (expected[..., 3] > 0.1).any()
-    np.testing.assert_array_equal(render(Grid(levels.astype(dtype)), tf, camera, light), expected)
+    np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("spacing", [(1.0, 1.0, 1.0), (1.0, 0.6, 1.7)])
 @pytest.mark.parametrize("light", [HEADLIGHT, Light("directional", 30, 40)])
 @pytest.mark.parametrize("step", [0.25, 0.5])
-def test_it_is_what_marching_in_torch_sees(step, light, spacing):
+def test_it_is_what_marching_in_torch_sees(step, light, spacing, device):
     grid, camera, look = (
         Grid(ball(40).values, spacing),
         orbit(-60, 20, 2.5, 30, 60, 50),
@@ -207,12 +210,12 @@ def test_it_is_what_marching_in_torch_sees(step, light, spacing):
     assert not found.depth[expected.alpha == 0].any()
 
 
-def test_the_median_is_where_half_of_the_light_is_gone():
+def test_the_median_is_where_half_of_the_light_is_gone(device):
     x, _, _ = lattice(33, 33, 33)
     camera, look = orbit(-90, 0, 3, 10, 9, 9), Appearance(step=0.05, opacity_unit=0.05)
-    found = Caster(Grid(x), look).cast(constant(0.1), camera, HEADLIGHT, ("median",))
+    found = Caster(Grid(x), look, device).cast(constant(0.1), camera, HEADLIGHT, ("median",))
     assert float(found.median[4, 4]) == pytest.approx(2.5 + 0.05 * np.log(0.5) / np.log(0.9), abs=2e-3)
-    thin = Caster(Grid(x), look).cast(constant(0.01), camera, HEADLIGHT, ("median",))
+    thin = Caster(Grid(x), look, device).cast(constant(0.01), camera, HEADLIGHT, ("median",))
     assert float(thin.median[4, 4]) == 0
 
 
@@ -225,7 +228,7 @@ def test_vtk_sees_the_same(light):
     assert psnr(found[..., 3], expected[..., 3]) > 48
 
 
-def test_a_value_at_the_end_of_a_function_is_visible():
+def test_a_value_at_the_end_of_a_function_is_visible(device):
     """All samples of a saturated volume are there: between equal values nothing is rounded away."""
     rng = np.random.default_rng(0)
     values = np.full((20, 20, 20), 255, np.uint8)
@@ -234,28 +237,29 @@ def test_a_value_at_the_end_of_a_function_is_visible():
     look = Appearance(opacity_unit=0.05, step=0.1)
     inner = TransferFunction(((200, 0.4), (300, 0.4)), ((200, 1, 1, 1),))
     np.testing.assert_array_equal(
-        Caster(Grid(values), look).render(tf, camera, HEADLIGHT),
-        Caster(Grid(values), look).render(inner, camera, HEADLIGHT),
+        Caster(Grid(values), look, device).render(tf, camera, HEADLIGHT),
+        Caster(Grid(values), look, device).render(inner, camera, HEADLIGHT),
     )
 
 
-def test_missing_values_are_transparent_and_counted():
+def test_missing_values_are_transparent_and_counted(device):
     values = ball(24).values.copy()
     values[3:9, 4:11, 5:12] = np.nan
-    caster = Caster(Grid(values), Appearance())
+    caster = Caster(Grid(values), Appearance(), device)
     assert caster.missing == 6 * 7 * 7
     away = values.copy()
     away[2:10, 3:12, 4:13] = -100  # with the cells around
-    camera = orbit(-60, 20, 2, 34, 50, 50)
+    camera = orbit(-60, 20, 2, 34, 25, 25)
     tf = TransferFunction(((0.1, 0.5), (1, 0.9)), ((0, 1, 1, 1),))
     found = caster.render(tf, camera, HEADLIGHT)
     assert np.isfinite(found).all()
-    covered = Caster(Grid(np.nan_to_num(away, nan=-100)), Appearance()).render(tf, camera, HEADLIGHT)
+    covered = Caster(Grid(np.nan_to_num(away, nan=-100)), Appearance(), device).render(tf, camera, HEADLIGHT)
     assert psnr(found[..., 3], covered[..., 3]) > 25
-    assert not Caster(Grid(np.full((4, 4, 4), np.nan)), Appearance()).render(tf, camera, HEADLIGHT).any()
+    nothing = Caster(Grid(np.full((4, 4, 4), np.nan)), Appearance(), device)
+    assert not nothing.render(tf, camera, HEADLIGHT).any()
 
 
-def test_thin_things_between_transparent_bricks_are_not_leapt_over():
+def test_thin_things_between_transparent_bricks_are_not_leapt_over(device):
     rng = np.random.default_rng(0)
     tf = TransferFunction(((0.5, 0.0), (1, 1.0)), ((0, 1, 1, 1),))
     for x, y, z in [(0, 0, 0), (21, 16, 0), *rng.integers(0, (22, 17, 18), (12, 3))]:
@@ -266,7 +270,7 @@ def test_thin_things_between_transparent_bricks_are_not_leapt_over():
         viewmat = look_at(torch.tensor([0.1, 0.1, 3.0], dtype=torch.float64), place).float()
         camera = Camera(viewmat, intrinsics(2, 5, 5), 5, 5)
         look = Appearance(step=0.1, opacity_unit=0.001)
-        seen = Caster(grid, look).cast(tf, camera, HEADLIGHT, ("depth",))
+        seen = Caster(grid, look, device).cast(tf, camera, HEADLIGHT, ("depth",))
         assert seen.rgba[2, 2, 3] > 0.9
         assert float(seen.depth[2, 2]) == pytest.approx(
             float(viewmat[2, :3] @ place.float() + viewmat[2, 3]), abs=0.03

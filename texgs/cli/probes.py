@@ -150,7 +150,7 @@ def opengl() -> Finding:
         return Finding("offscreen OpenGL", "ok", offscreen_opengl())
     except TexgsError as error:
         trouble, _, advice = str(error).removeprefix("offscreen OpenGL: ").partition("; ")
-        return Finding("offscreen OpenGL", "missing", trouble, f"only for views.mapper=gpu: {advice}")
+        return Finding("offscreen OpenGL", "missing", trouble, f"only for views.mapper=vtk: {advice}")
 
 
 def cache() -> Finding:

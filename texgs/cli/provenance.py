@@ -72,8 +72,10 @@ def device(settings: Mapping[str, Any]) -> str:
     """What did the work."""
     if settings.get("fit", {}).get("device") == "cuda":
         return gpu_name()
-    by_gpu = settings.get("views", {}).get("mapper") == "gpu"
-    return "OpenGL" if by_gpu else f"{platform.machine()} CPU"
+    mapper = settings.get("views", {}).get("mapper")
+    if mapper == "gpu":
+        return gpu_name()
+    return "VTK" if mapper == "vtk" else f"{platform.machine()} CPU"
 
 
 def seed(settings: Mapping[str, Any]) -> int | None:

@@ -31,7 +31,11 @@ class Device:
     """What the work runs on."""
 
     name: str = key("cpu", "device of tensors", choices=("cpu", "cuda"))
-    mapper: str = key("cpu", "volume mapper", choices=("cpu", "gpu"))
+    mapper: str = key(
+        "cpu",
+        "what renders volumes: the caster, on the CPU or a GPU; or VTK",
+        choices=("cpu", "gpu", "vtk"),
+    )
 
 
 @dataclass

@@ -63,7 +63,11 @@ class ViewKeys:
     shading: Shading = key(Shading, "material of the volume")
     step: float = key(0.25, "sample distance along rays", "voxels", above=0)
     opacity_unit: float = key(0.005, "length over which a TF's opacity applies", "world units", above=0)
-    mapper: str = key(II("device.mapper"), "volume mapper", choices=("cpu", "gpu"))
+    mapper: str = key(
+        II("device.mapper"),
+        "what renders: the caster, on the CPU or a GPU; or VTK",
+        choices=("cpu", "gpu", "vtk"),
+    )
     geometry: bool = key(False, "also write depth and normals of the test views, geometry/*.npz; slow")
     turntable: int = key(36, "frames of the turntable", least=1)
 

@@ -1,19 +1,21 @@
-"""Volume rendering on the CPU by the native library: rays through the samples as they are stored.
+"""Volume rendering by the native libraries: rays through the samples as they are stored.
 
 Values are trilinear, in single precision; colours and opacities are exact between the points of a transfer
 function and at them. Gradients are central differences, one voxel to both sides. Lights and viewer are
-distant: the directions to them are the same for all points of one view. Nothing of the volume is copied:
-bricks of 4 x 4 x 4 cells are known by their extremes, and rays leap over those in which nothing shows.
+distant: the directions to them are the same for all points of one view. Nothing of the volume is copied on a
+CPU: bricks of 4 x 4 x 4 cells are known by their extremes, and rays leap over those in which nothing shows.
 
 The result has the same bits for any number of threads.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection
 from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 import torch
@@ -34,7 +36,6 @@ TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64
 OUTPUTS = ("depth", "median", "normal")
 BYTES = 64  # of memory for a pixel
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
-CPU = torch.device("cpu")
 
 
 class NativeVolume(Structure):
@@ -77,6 +78,7 @@ class Caster:
     Args:
         grid: the volume; samples in C order and native bytes are not copied.
         appearance: shading and sampling.
+        device: that casts rays; the samples go there.
 
     Attributes:
         missing: how many samples are NaN: they are transparent, with the cells around them.
@@ -87,24 +89,24 @@ class Caster:
 
     local_viewer = False
 
-    def __init__(self, grid: Grid, appearance: Appearance) -> None:
-        self._appearance = appearance
-        self._values = np.ascontiguousarray(grid.values, grid.values.dtype.newbyteorder("="))
-        kind = "uint8" if self._values.dtype == bool else self._values.dtype.name
+    def __init__(self, grid: Grid, appearance: Appearance, device: torch.device | str = "cpu") -> None:
+        self._appearance, self._device = appearance, torch.device(device)
+        values = np.ascontiguousarray(grid.values, grid.values.dtype.newbyteorder("="))
+        kind = "uint8" if values.dtype == bool else values.dtype.name
         if kind not in TYPES:
             raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
         half = [float(side) for side in grid.aabb[1]]
         self._voxel = min(2 * side / (size - 1) for side, size in zip(half, grid.dims, strict=True))
+        self._values = bytes_of(values).to(self._device)
         self._volume = NativeVolume(
-            self._values.ctypes.data, TYPES.index(kind), (c_int32 * 3)(*grid.dims), (c_float * 3)(*half)
+            self._values.data_ptr(), TYPES.index(kind), (c_int32 * 3)(*grid.dims), (c_float * 3)(*half)
         )
-        _describe()
-        bricks = native.library("cpu").texgs_volume_bricks(byref(self._volume), (c_int32 * 3)())
-        self._extremes = torch.empty(bricks, 2)
-        missing = c_int64()
-        addresses = self._extremes.data_ptr(), byref(missing)
-        native.call("texgs_volume_extremes", byref(self._volume), *addresses, device=CPU)
-        self.missing = missing.value
+        _describe(self._device.type)
+        bricks = native.library(self._device.type).texgs_volume_bricks(byref(self._volume), (c_int32 * 3)())
+        self._extremes = torch.empty(bricks, 2, device=self._device)
+        missing = torch.zeros(1, dtype=torch.int64, device=self._device)
+        self._call("texgs_volume_extremes", self._extremes.data_ptr(), missing.data_ptr())
+        self.missing = int(missing)
         self._prepared: tuple[TransferFunction, Tensor, Tensor] | None = None
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
@@ -113,7 +115,7 @@ class Caster:
         Raises:
             OutOfMemoryError: if the view needs more memory than there is.
         """
-        return self.cast(tf, camera, light).rgba.numpy()
+        return self.cast(tf, camera, light).rgba.cpu().numpy()
 
     def cast(self, tf: TransferFunction, camera: Camera, light: Light, outputs: Collection[str] = ()) -> Cast:
         """A view, with what else is wanted of OUTPUTS, in one pass.
@@ -127,9 +129,12 @@ class Caster:
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
         points, distance = self._prepare(tf)
-        matrices = [x.detach().float().cpu().contiguous() for x in (camera.viewmat, camera.K)]
-        seen = {"rgba": torch.empty(height, width, 4)}
-        seen |= {name: torch.empty(height, width, *([3] if name == "normal" else [])) for name in outputs}
+        matrices = [x.detach().float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
+        planes = {"rgba": [4], "normal": [3]}
+        seen = {
+            name: torch.empty(height, width, *planes.get(name, []), device=self._device)
+            for name in ("rgba", *outputs)
+        }
         look = self._appearance
         view = NativeView(
             *(x.data_ptr() for x in matrices),
@@ -139,20 +144,29 @@ class Caster:
             *(seen[name].data_ptr() if name in seen else None for name in ("rgba", *OUTPUTS)),
         )
         transfer = NativeTransfer(len(points), points.data_ptr())
-        arguments = byref(self._volume), byref(transfer), distance.data_ptr(), byref(view)
-        native.call("texgs_cast", *arguments, device=CPU)
+        self._call("texgs_cast", byref(transfer), distance.data_ptr(), byref(view))
         return Cast(**seen)
 
     def _prepare(self, tf: TransferFunction) -> tuple[Tensor, Tensor]:
         """Points of a transfer function, and how far each brick is from one in which it shows something."""
         if self._prepared is None or self._prepared[0] != tf:
-            points = points_of(tf)
-            distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8)
+            points = points_of(tf).to(self._device)
+            distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8, device=self._device)
             transfer = NativeTransfer(len(points), points.data_ptr())
-            arguments = self._extremes.data_ptr(), byref(transfer), distance.data_ptr()
-            native.call("texgs_volume_distance", byref(self._volume), *arguments, device=CPU)
+            addresses = self._extremes.data_ptr(), byref(transfer), distance.data_ptr()
+            self._call("texgs_volume_distance", *addresses)
             self._prepared = tf, points, distance
         return self._prepared[1:]
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        native.call(name, byref(self._volume), *arguments, device=self._device)
+
+
+def bytes_of(values: NDArray[Any]) -> Tensor:
+    """An array as bytes [n], not copied: torch has not all types of samples."""
+    with warnings.catch_warnings():  # torch dislikes maps of files, which cannot be written
+        warnings.simplefilter("ignore", UserWarning)
+        return torch.from_numpy(values.reshape(-1).view(np.uint8))
 
 
 def points_of(tf: TransferFunction) -> Tensor:
@@ -180,15 +194,15 @@ def _left_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[
 
 
 @cache
-def _describe() -> None:
+def _describe(device_type: str) -> None:
     """Tell ctypes the argument types."""
     volume, transfer, view = (POINTER(kind) for kind in (NativeVolume, NativeTransfer, NativeView))
     signatures = {
-        "texgs_volume_extremes": [volume, c_void_p, POINTER(c_int64), c_void_p],
+        "texgs_volume_extremes": [volume, c_void_p, c_void_p, c_void_p],
         "texgs_volume_distance": [volume, c_void_p, transfer, c_void_p, c_void_p],
         "texgs_cast": [volume, transfer, c_void_p, view, c_void_p],
     }
-    library = native.library("cpu")
+    library = native.library(device_type)
     for name, arguments in signatures.items():
         native.function(library, name).argtypes = arguments
     count = native.function(library, "texgs_volume_bricks")

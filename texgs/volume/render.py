@@ -21,7 +21,7 @@ from texgs.volume.view_set import View
 
 
 class Mapper(Protocol):
-    """What renders a volume: `Caster` or `GpuMapper`."""
+    """What renders a volume: `Caster` or `VtkMapper`."""
 
     local_viewer: bool  # whether directions to viewer and headlight differ from point to point
 

@@ -17,6 +17,7 @@ from texgs.cli.stages.tf import in_data_values
 from texgs.config.dataset import BasicTF
 from texgs.config.views import CameraPath, ViewKeys
 from texgs.core.camera import Camera
+from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_atomic
 from texgs.core.lens import Lens
@@ -87,12 +88,12 @@ def appearance_of(views: ViewKeys) -> Appearance:
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
-    """What casts rays on the CPU, or OpenGL on a GPU."""
-    if kind == "gpu":
-        from texgs.volume.gpu_mapper import GpuMapper  # VTK takes a second
+    """The caster on the CPU or a GPU, or VTK."""
+    if kind == "vtk":
+        from texgs.volume.vtk_mapper import VtkMapper  # takes a second
 
-        return GpuMapper(grid, appearance)
-    return Caster(grid, appearance)
+        return VtkMapper(grid, appearance)
+    return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
 
 
 def cameras(path: CameraPath, lens: Lens) -> list[Camera]:

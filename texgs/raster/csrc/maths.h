@@ -6,12 +6,7 @@
 // Include it after a header that declares fma, select, sqrt, abs, min, max and comparisons for F in namespace
 // texgs::TEXGS_ISA.
 #pragma once
-
-#ifdef __CUDACC__
-#define TEXGS_MATHS __host__ __device__ inline
-#else
-#define TEXGS_MATHS inline
-#endif
+#include "both.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Volumes on CPUs: what is known of their bricks, and rays through them, rows of pixels in parallel.
-#include "../texgs_volume.h"
+#include "../volume_bricks.h"
 
 #include <algorithm>
 #include <atomic>
@@ -9,7 +9,6 @@
 #include <limits>
 #include <vector>
 
-#include "../status.h"
 #include "chebyshev.h"
 #include "dispatch.h"
 #include "parallel.h"
@@ -29,26 +28,8 @@ const VolumeKernels& volume_kernels() {
     return portable::kVolumeKernels;
 }
 
-int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {
-    for (int a = 0; a < 3; ++a) size[a] = (volume.size[a] - 1 + kBrick - 1) / kBrick;
-    return int64_t(size[0]) * size[1] * size[2];
-}
-
-void check_volume(const texgs_volume& volume) {
-    static constexpr int kBytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
-    require(volume.type >= TEXGS_U8 && volume.type <= TEXGS_F64, "volume: expected a known type of samples");
-    for (int a = 0; a < 3; ++a) {
-        require(volume.size[a] >= 2 && volume.size[a] < 1 << 20, "volume: expected 2 to 2^20 - 1 samples along an axis");
-        require(volume.half[a] > 0.0f && std::isfinite(volume.half[a]), "volume: expected sides above 0");
-    }
-    const int64_t slice = int64_t(volume.size[0]) * volume.size[1] * kBytes[volume.type];
-    require(slice < 1 << 28, "volume: expected slices of less than 256 MiB");
-    int32_t bricks[3];
-    require(count_bricks(volume, bricks) < std::numeric_limits<int32_t>::max() - 3, "volume: expected fewer samples");
-}
-
 void check_transfer(const texgs_transfer& transfer) {
-    require(transfer.n >= 2 && transfer.n <= 1024, "transfer function: expected 2 to 1024 points");
+    check_points(transfer);
     for (int i = 1; i < transfer.n; ++i)
         require(transfer.points[5 * i] >= transfer.points[5 * i - 5], "transfer function: expected ascending values");
     require(transfer.points[5 * transfer.n - 5] > transfer.points[0], "transfer function: expected a range of values");
@@ -88,18 +69,6 @@ constexpr RowExtremes kRowExtremes[] = {
     row_extremes<uint8_t>, row_extremes<int8_t>,   row_extremes<uint16_t>, row_extremes<int16_t>, row_extremes<uint32_t>,
     row_extremes<int32_t>, row_extremes<uint64_t>, row_extremes<int64_t>,  row_extremes<float>,   row_extremes<double>,
 };
-
-// Whether a transfer function shows anything of values from low to high.
-bool shows(const texgs_transfer& transfer, float low, float high) {
-    for (int i = 0; i + 1 < transfer.n; ++i) {
-        const float *p = transfer.points + 5 * i, *q = p + 5;
-        const float from = std::max(low, p[0]), to = std::min(high, q[0]);
-        if (from > to) continue;
-        const auto opacity = [&](float v) { return q[0] > p[0] ? p[1] + (q[1] - p[1]) * (v - p[0]) / (q[0] - p[0]) : q[1]; };
-        if (opacity(from) > 0.0f || opacity(to) > 0.0f) return true;
-    }
-    return false;
-}
 
 // Points as arrays, see CastTable.
 struct Table {
@@ -179,12 +148,6 @@ void clear(const texgs_cast_view& view) {
     if (view.normal) std::fill_n(view.normal, 3 * n, 0.0f);
 }
 
-void check_view(const texgs_cast_view& view) {
-    require(view.width >= 1 && view.height >= 1, "view: expected at least one pixel");
-    require(view.width <= TEXGS_MAX_SIDE && view.height <= TEXGS_MAX_SIDE, "view: expected fewer pixels");
-    require(view.step > 0.0f && view.opacity_unit > 0.0f, "view: expected a step and an opacity unit above 0");
-}
-
 }  // namespace
 }  // namespace texgs
 
@@ -228,7 +191,7 @@ int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, c
     return guarded([&] {
         check_volume(*volume);
         check_transfer(*transfer);
-        check_view(*view);
+        check_cast(*view);
         clear(*view);
         int32_t size[3];
         count_bricks(*volume, size);

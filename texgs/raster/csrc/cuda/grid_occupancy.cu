@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Where a sparse voxel grid can show anything, a thread for each block: cells with a density above 0 at a corner, and
 // how far they are away.
+#include "chebyshev.cuh"
 #include "grid.cuh"
 
 namespace texgs::cuda {
@@ -39,21 +40,9 @@ __global__ __launch_bounds__(kThreads) void spread_kernel(Blocks blocks, const u
     to[i] = from[i] | (from[i] >> shift & ~last) | (next << 3 * shift & last);
 }
 
-// Chebyshev distance, one axis after the other: the least over a line of the larger of the distance along it and the
-// distance so far.
-__global__ __launch_bounds__(kThreads) void distance_kernel(Blocks blocks, const uint64_t* occupied,
-                                                            const uint8_t* from, uint8_t* to, int axis) {
-    for_blocks<kThreads>(blocks.count(), [&](int64_t i) {
-        const int own = blocks.place(i, axis);
-        const int64_t stride = blocks.stride(axis), line = i - own * stride;
-        int least = kFar;
-        for (int k = 0; k < blocks.side[axis]; ++k) {
-            const int so_far = from ? from[line + k * stride] : occupied[line + k * stride] ? 0 : kFar;
-            const int along = k < own ? own - k : k - own, larger = along > so_far ? along : so_far;
-            least = larger < least ? larger : least;
-        }
-        to[i] = static_cast<uint8_t>(least);
-    });
+// 0 where a block can show anything, else the farthest.
+__global__ __launch_bounds__(kThreads) void shown_kernel(Blocks blocks, const uint64_t* occupied, uint8_t* shown) {
+    for_blocks<kThreads>(blocks.count(), [&](int64_t i) { shown[i] = occupied[i] ? 0 : kFar; });
 }
 
 }  // namespace
@@ -65,12 +54,9 @@ void occupy(const texgs_grid& grid, uint64_t* occupied, uint8_t* distance, uint6
     launch(spread_kernel, threads, kThreads, stream, blocks, scratch, occupied, 2);
     launch(spread_kernel, threads, kThreads, stream, blocks, occupied, scratch, 1);
     launch(spread_kernel, threads, kThreads, stream, blocks, scratch, occupied, 0);
-    auto* other = reinterpret_cast<uint8_t*>(scratch);
-    const uint8_t* none = nullptr;
-    const int64_t fewer = blocks_for(blocks.count(), kBytes * kThreads);
-    launch(distance_kernel, fewer, kThreads, stream, blocks, occupied, none, distance, 2);
-    launch(distance_kernel, fewer, kThreads, stream, blocks, occupied, distance, other, 1);
-    launch(distance_kernel, fewer, kThreads, stream, blocks, occupied, other, distance, 0);
+    auto* shown = reinterpret_cast<uint8_t*>(scratch);
+    launch(shown_kernel, blocks_for(blocks.count(), kBytes * kThreads), kThreads, stream, blocks, occupied, shown);
+    spread_distances(blocks.side, shown, distance, stream);
 }
 
 }  // namespace texgs::cuda

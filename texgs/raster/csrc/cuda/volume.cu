@@ -1,0 +1,238 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes on GPUs: what is known of their bricks, a thread each, and rays through them, a thread each.
+#include "../volume_bricks.h"
+#include "chebyshev.cuh"
+#include "maths.cuh"
+#include "workspace.cuh"
+
+#include "../volume_maths.h"
+
+using namespace texgs;
+using namespace texgs::cuda;
+
+namespace texgs::cuda {
+namespace {
+
+constexpr int kThreads = 128;
+constexpr int kTileX = 16, kTileY = 8;  // pixels of a block
+
+__device__ inline int64_t thread_index() { return int64_t(blockIdx.x) * kThreads + threadIdx.x; }
+
+// -- Bricks ------------------------------------------------------------------------------------------------------
+
+template <class T>
+__global__ __launch_bounds__(kThreads) void extremes_kernel(const texgs_volume volume, int64_t bricks, float* extremes,
+                                                            unsigned long long* missing) {
+    const int64_t i = thread_index();
+    if (i >= bricks) return;
+    const auto* values = static_cast<const T*>(volume.values);
+    int64_t rest = i;
+    int first[3], end[3];
+    for (int a = 0; a < 3; ++a) {
+        const int along = (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
+        first[a] = TEXGS_BRICK * static_cast<int>(rest % along);
+        end[a] = first[a] + TEXGS_BRICK < volume.size[a] ? first[a] + TEXGS_BRICK + 1 : volume.size[a];
+        rest /= along;
+    }
+    float low = INFINITY, high = -INFINITY;
+    unsigned long long none = 0;
+    for (int z = first[2]; z < end[2]; ++z)
+        for (int y = first[1]; y < end[1]; ++y)
+            for (int x = first[0]; x < end[0]; ++x) {
+                const float value = static_cast<float>(values[(int64_t(z) * volume.size[1] + y) * volume.size[0] + x]);
+                low = value < low ? value : low, high = value > high ? value : high;
+                const int at[3] = {x, y, z};
+                bool is_own = value != value;  // samples on the upper faces are those of the next brick, if there is one
+                for (int a = 0; a < 3; ++a) is_own &= at[a] < first[a] + TEXGS_BRICK || at[a] == volume.size[a] - 1;
+                none += is_own;
+            }
+    extremes[2 * i] = low, extremes[2 * i + 1] = high;
+    if (none) atomicAdd(missing, none);
+}
+
+__global__ __launch_bounds__(kThreads) void shown_kernel(const texgs_transfer transfer, int64_t bricks,
+                                                         const float* extremes, uint8_t* shown) {
+    const int64_t first = 4 * thread_index();  // bytes of one word
+    for (int64_t i = first; i < first + 4 && i < bricks; ++i)
+        shown[i] = shows(transfer, extremes[2 * i], extremes[2 * i + 1]) ? 0 : 255;
+}
+
+// -- Rays --------------------------------------------------------------------------------------------------------
+
+template <class T>
+struct Samples {
+    const T* values;
+    int size[3];
+
+    __device__ float at(int x, int y, int z) const {
+        const int i[3] = {clamped(x, 0), clamped(y, 1), clamped(z, 2)};
+        return static_cast<float>(values[(int64_t(i[2]) * size[1] + i[1]) * size[0] + i[0]]);
+    }
+    __device__ int clamped(int i, int axis) const { return i < 0 ? 0 : i < size[axis] ? i : size[axis] - 1; }
+};
+
+// A cell and the place in it.
+struct Spot {
+    int cell[3];
+    float inside[3];
+
+    __device__ Spot(const Lattice& lattice, const CastRay& ray, int k) {
+        for (int a = 0; a < 3; ++a) {
+            const float at = fma(static_cast<float>(k) + 0.5f, ray.step[a], ray.entry[a]);
+            const float place = fminf(fmaxf(at, 0.0f), lattice.last[a]);
+            cell[a] = static_cast<int>(fminf(floorf(place), lattice.last[a] - 1.0f));
+            inside[a] = place - static_cast<float>(cell[a]);
+        }
+    }
+    template <class T>
+    __device__ float value(const Samples<T>& s) const {
+        float v[8];
+        for (int i = 0; i < 8; ++i) v[i] = s.at(cell[0] + (i & 1), cell[1] + (i >> 1 & 1), cell[2] + (i >> 2));
+        return trilinear(v, inside);
+    }
+    template <class T>
+    __device__ float difference(const Samples<T>& s, int axis) const {
+        const int dx = axis == 0, dy = axis == 1, dz = axis == 2;
+        float v[8];
+        for (int i = 0; i < 8; ++i) {
+            const int x = cell[0] + (i & 1), y = cell[1] + (i >> 1 & 1), z = cell[2] + (i >> 2);
+            v[i] = s.at(x + dx, y + dy, z + dz) - s.at(x - dx, y - dy, z - dz);
+        }
+        return trilinear(v, inside);
+    }
+};
+
+// The interval of a transfer function that a value is in, and how far.
+struct Interval {
+    const float *from, *to;
+    float place;
+
+    __device__ Interval(const texgs_transfer& t, float value) {
+        int i = 0;
+        for (int j = 1; j < t.n - 1; ++j) i += t.points[5 * j] <= value;
+        from = t.points + 5 * i, to = from + 5;
+        place = to[0] > from[0] ? (value - from[0]) / (to[0] - from[0]) : 0.0f;
+    }
+    __device__ float column(int c) const { return mix(from[c], to[c], place); }
+};
+
+template <class T>
+__global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const texgs_transfer transfer,
+                                                        const uint8_t* distance, const texgs_cast_view view, int tiles) {
+    const int x = static_cast<int>(blockIdx.x) % tiles * kTileX + static_cast<int>(threadIdx.x) % kTileX;
+    const int y = static_cast<int>(blockIdx.x) / tiles * kTileY + static_cast<int>(threadIdx.x) / kTileX;
+    if (x >= view.width || y >= view.height) return;
+    const Lattice lattice = lattice_of(volume);
+    const Lamp lamp = lamp_of(view);
+    const CastRay ray = cast_ray(lattice, view, x, y);
+    const Samples<T> samples{static_cast<const T*>(volume.values), {volume.size[0], volume.size[1], volume.size[2]}};
+    const float low = transfer.points[0], high = transfer.points[5 * (transfer.n - 1)];
+    float light = 1.0f, depth = 0.0f, median = 0.0f, color[3] = {}, normal[3] = {};
+    for (int k = 0; k < ray.samples && light >= kOpaque;) {
+        float place[3];
+        int brick[3];
+        for (int a = 0; a < 3; ++a) {
+            place[a] = fma(static_cast<float>(k) + 0.5f, ray.step[a], ray.entry[a]);
+            const int own = static_cast<int>(fmaxf(place[a], 0.0f)) / TEXGS_BRICK;
+            brick[a] = own < lattice.bricks[a] ? own : lattice.bricks[a] - 1;
+        }
+        const int64_t row = int64_t(brick[2]) * lattice.bricks[1] + brick[1];
+        if (const int far = distance[row * lattice.bricks[0] + brick[0]]) {
+            k = leap(ray, k, place, brick, far);
+            continue;
+        }
+        const Spot spot(lattice, ray, k);
+        const float value = spot.value(samples), z = ray.near + (static_cast<float>(k) + 0.5f) * ray.z;
+        ++k;
+        if (!(value >= low && value <= high)) continue;
+        const Interval interval(transfer, value);
+        const float opacity = interval.column(1);
+        if (!(opacity > 0.0f)) continue;
+        const float weight = light * step_opacity(opacity, view.step / view.opacity_unit), left = light - weight;
+        if (light > 0.5f && left <= 0.5f) median = z;
+        light = left;
+        depth += weight * z;
+        Vec3<float> slope{spot.difference(samples, 0), spot.difference(samples, 1), spot.difference(samples, 2)};
+        const float scale = 1.0f / (high - low);
+        slope.x *= static_cast<float>(lattice.per_unit[0]) * scale;
+        slope.y *= static_cast<float>(lattice.per_unit[1]) * scale;
+        slope.z *= static_cast<float>(lattice.per_unit[2]) * scale;
+        const Vec3<float> n = unit(slope);
+        const Vec3<float> shown = lit(Vec3<float>{interval.column(2), interval.column(3), interval.column(4)}, n, lamp);
+        const Vec3<float> against = turned(n, -along(n, ray.direction));
+        color[0] = fma(weight, shown.x, color[0]), normal[0] = fma(weight, against.x, normal[0]);
+        color[1] = fma(weight, shown.y, color[1]), normal[1] = fma(weight, against.y, normal[1]);
+        color[2] = fma(weight, shown.z, color[2]), normal[2] = fma(weight, against.z, normal[2]);
+    }
+    const int64_t pixel = int64_t(y) * view.width + x;
+    const float alpha = 1.0f - light, per_alpha = alpha > 0.0f ? 1.0f / alpha : 0.0f;
+    for (int c = 0; c < 3; ++c) view.rgba[4 * pixel + c] = color[c];
+    view.rgba[4 * pixel + 3] = alpha;
+    if (view.depth) view.depth[pixel] = depth * per_alpha;
+    if (view.median) view.median[pixel] = median;
+    if (view.normal)
+        for (int c = 0; c < 3; ++c) view.normal[3 * pixel + c] = normal[c] * per_alpha;
+}
+
+// Calls body(sample) with a sample of the volume's type.
+template <class Body>
+void with_type(const texgs_volume& volume, const Body& body) {
+    switch (volume.type) {
+        case TEXGS_U8: return body(uint8_t());
+        case TEXGS_I8: return body(int8_t());
+        case TEXGS_U16: return body(uint16_t());
+        case TEXGS_I16: return body(int16_t());
+        case TEXGS_U32: return body(uint32_t());
+        case TEXGS_I32: return body(int32_t());
+        case TEXGS_U64: return body(uint64_t());
+        case TEXGS_I64: return body(int64_t());
+        case TEXGS_F32: return body(float());
+        default: return body(double());
+    }
+}
+
+}  // namespace
+}  // namespace texgs::cuda
+
+int64_t texgs_volume_bricks(const texgs_volume* volume, int32_t size[3]) { return count_bricks(*volume, size); }
+
+int32_t texgs_volume_extremes(const texgs_volume* volume, float* extremes, int64_t* missing, void* on) {
+    return on_device_of(extremes, on, [&](cudaStream_t stream) {
+        check_volume(*volume);
+        int32_t size[3];
+        const int64_t bricks = count_bricks(*volume, size);
+        check(cudaMemsetAsync(missing, 0, sizeof(*missing), stream), "clearing a count");
+        auto* count = reinterpret_cast<unsigned long long*>(missing);
+        with_type(*volume, [&](auto sample) {
+            launch(extremes_kernel<decltype(sample)>, blocks_for(bricks, kThreads), kThreads, stream, *volume, bricks,
+                   extremes, count);
+        });
+    });
+}
+
+int32_t texgs_volume_distance(const texgs_volume* volume, const float* extremes, const texgs_transfer* transfer,
+                              uint8_t* distance, void* on) {
+    return with_workspace(extremes, on, [&](Workspace& workspace, cudaStream_t stream) {
+        check_volume(*volume);
+        check_points(*transfer);
+        int32_t size[3];
+        const int64_t bricks = count_bricks(*volume, size);
+        auto* shown = reinterpret_cast<uint8_t*>(workspace.planes.ensure<uint32_t>(blocks_for(bricks, 4)));
+        launch(shown_kernel, blocks_for(bricks, 4 * kThreads), kThreads, stream, *transfer, bricks, extremes, shown);
+        spread_distances({size[2], size[1], size[0]}, shown, distance, stream);
+    });
+}
+
+int32_t texgs_cast(const texgs_volume* volume, const texgs_transfer* transfer, const uint8_t* distance,
+                   const texgs_cast_view* view, void* on) {
+    return on_device_of(view->rgba, on, [&](cudaStream_t stream) {
+        check_volume(*volume);
+        check_points(*transfer);
+        check_cast(*view);
+        const int tiles = (view->width + kTileX - 1) / kTileX, rows = (view->height + kTileY - 1) / kTileY;
+        with_type(*volume, [&](auto sample) {
+            launch(cast_kernel<decltype(sample)>, int64_t(tiles) * rows, kThreads, stream, *volume, *transfer, distance,
+                   *view, tiles);
+        });
+    });
+}

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// What every back end knows of a volume and its bricks, and what the C interface refuses before any work.
+#pragma once
+#include "both.h"
+#include "status.h"
+#include "texgs_volume.h"
+
+namespace texgs {
+
+inline void check_volume(const texgs_volume& volume) {
+    constexpr int kBytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
+    require(volume.type >= TEXGS_U8 && volume.type <= TEXGS_F64, "volume: expected a known type of samples");
+    int64_t bricks = 1;
+    for (int a = 0; a < 3; ++a) {
+        require(volume.size[a] >= 2 && volume.size[a] < 1 << 20, "volume: expected 2 to 2^20 - 1 samples along an axis");
+        require(volume.half[a] > 0.0f && volume.half[a] < 1e30f, "volume: expected sides above 0");
+        bricks *= (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
+    }
+    require(bricks < (int64_t(1) << 31) - 4, "volume: expected fewer samples");
+    const int64_t slice = int64_t(volume.size[0]) * volume.size[1] * kBytes[volume.type];
+    require(slice < 1 << 28, "volume: expected slices of less than 256 MiB");
+}
+
+inline void check_points(const texgs_transfer& transfer) {
+    require(transfer.n >= 2 && transfer.n <= 1024, "transfer function: expected 2 to 1024 points");
+}
+
+inline void check_cast(const texgs_cast_view& view) {
+    require(view.width >= 1 && view.height >= 1, "view: expected at least one pixel");
+    require(view.width <= TEXGS_MAX_SIDE && view.height <= TEXGS_MAX_SIDE, "view: expected fewer pixels");
+    require(view.step > 0.0f && view.opacity_unit > 0.0f, "view: expected a step and an opacity unit above 0");
+}
+
+inline int64_t count_bricks(const texgs_volume& volume, int32_t size[3]) {
+    for (int a = 0; a < 3; ++a) size[a] = (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
+    return int64_t(size[0]) * size[1] * size[2];
+}
+
+// Whether a transfer function shows anything of values from low to high.
+TEXGS_MATHS bool shows(const texgs_transfer& transfer, float low, float high) {
+    for (int i = 0; i + 1 < transfer.n; ++i) {
+        const float *p = transfer.points + 5 * i, *q = p + 5;
+        const float from = low > p[0] ? low : p[0], to = high < q[0] ? high : q[0];
+        if (from > to) continue;
+        const float slope = q[0] > p[0] ? (q[1] - p[1]) / (q[0] - p[0]) : 0.0f, start = q[0] > p[0] ? p[1] : q[1];
+        if (start + slope * (from - p[0]) > 0.0f || start + slope * (to - p[0]) > 0.0f) return true;
+    }
+    return false;
+}
+
+}  // namespace texgs
