@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.viewer.messages import (
-    READERS,
     Cancel,
     Clicked,
     Edit,
@@ -20,8 +19,8 @@ from texgs.viewer.messages import (
     Segment,
     Undo,
     View,
-    parse,
 )
+from texgs.viewer.reading import READERS, parse
 
 CAMERA = {
     "target": [0, 0, 0],

@@ -61,8 +61,9 @@ class Page:
         self._tell_newest({"type": "job", "title": title, "done": done, "failed": failed})
 
     def tell_scene(self, message: dict[str, Any]) -> None:
-        """Send what the scene is now, in place of what waits."""
-        self._tell_newest(message)
+        """Send what the scene is now, in place of what waits; of that stays what the message does not say."""
+        before = self._news.get("scene", {"scene": {}})
+        self._tell_newest({**before, **message, "scene": {**before["scene"], **message["scene"]}})
 
     def try_on(self, textures: Mapping[str, Path | None] | None) -> None:
         """Show parts with other textures on this page alone, beside those before; None: as all pages do."""

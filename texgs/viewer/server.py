@@ -1,22 +1,20 @@
-"""The server of a viewer: the page, its modules, stills, and a WebSocket for each page that is open."""
+"""The server of a viewer: what requests ask for, and a WebSocket for each page that is open."""
 
 from __future__ import annotations
 
 import asyncio
 import secrets
 from collections.abc import AsyncIterator
-from pathlib import Path
 from typing import Any
 
 import torch
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError
 from texgs.edit.pictures import PICTURES
 from texgs.fields.files import kind_of
 from texgs.models.filters.vocabulary import WORDS
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import known
 from texgs.scene.session import Session
 from texgs.viewer.description import bounds_of, describe
 from texgs.viewer.downloads import exports_of
@@ -37,21 +35,17 @@ from texgs.viewer.messages import (
     Segment,
     Undo,
     View,
-    parse,
-    view_of,
 )
 from texgs.viewer.opening import Opened
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
+from texgs.viewer.reading import parse
+from texgs.viewer.requests import Requests
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import LARGEST as LARGEST_FILE
-from texgs.viewer.styles import thumbnail
-from texgs.viewer.values import parse_json
 from texgs.viewer.work import Work
 
 Change = Edit | Undo | Redo | Save | Rename | Remove
-WEB = Path(__file__).parent / "web"
-SERVED = (".js", ".css", ".svg")
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
@@ -91,69 +85,13 @@ class Server:
             host: that it listens on.
         """
         app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_FILE)
-        app.router.add_get(f"/{token}/", self.page)
         app.router.add_get(f"/{token}/socket", self.socket)
-        app.router.add_get(f"/{token}/still.png", self.still)
-        app.router.add_get(f"/{token}/styles/{{name}}.jpg", self.style)
-        app.router.add_get(f"/{token}/files/{{name}}", self.file)
-        app.router.add_post(f"/{token}/styles", self.new_style)
-        app.router.add_get(f"/{token}/{{name}}", self.module)
+        app.router.add_routes(Requests(self.edits, self.frames, self.work).routes(token))
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
         return app
 
-    # ---- Requests -----------------------------------------------------------
-
-    async def page(self, request: web.Request) -> web.StreamResponse:
-        """The page itself."""
-        return web.FileResponse(WEB / "page.html")
-
-    async def module(self, request: web.Request) -> web.StreamResponse:
-        """A module or a style sheet of the page, by its name in a list of those that there are."""
-        files = {path.name: path for path in WEB.iterdir() if path.suffix in SERVED}
-        path = files.get(request.match_info["name"])
-        if path is None:
-            raise web.HTTPNotFound
-        return web.FileResponse(path)
-
-    async def still(self, request: web.Request) -> web.StreamResponse:
-        """A PNG file of the view in the query, as `texgs render` writes it."""
-        try:
-            values = parse_json(request.query.get("view", ""))
-            known(values, None, "view")
-            view = view_of(values)
-            png = await self.frames.still(view, self.edits.shown(view))
-        except TexgsError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
-        return web.Response(
-            body=png,
-            content_type="image/png",
-            headers={"Content-Disposition": f'attachment; filename="{Path(self.edits.name).stem}.png"'},
-        )
-
-    async def style(self, request: web.Request) -> web.StreamResponse:
-        """A small view of a picture that texgs paints."""
-        try:
-            picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
-        except TexgsError as error:
-            raise web.HTTPNotFound(text=str(error)) from error
-        return web.Response(body=picture, content_type="image/jpeg")
-
-    async def new_style(self, request: web.Request) -> web.StreamResponse:
-        """Take in a picture of the page's user; the name that it has from then on."""
-        content = await request.read()
-        try:
-            name = await asyncio.to_thread(self.work.styles.add, request.query.get("name", ""), content)
-        except TexgsError as error:
-            raise web.HTTPBadRequest(text=str(error)) from error
-        return web.Response(text=name)
-
-    async def file(self, request: web.Request) -> web.StreamResponse:
-        """A file that was written for a page."""
-        path = self.work.downloads.file(request.match_info["name"])
-        if path is None:
-            raise web.HTTPNotFound
-        return web.FileResponse(path)
+    # ---- Pages ----------------------------------------------------------------
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """One page: what it asks for is done until it is gone."""

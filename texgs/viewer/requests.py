@@ -1,0 +1,95 @@
+"""What a page asks of its server besides its socket: itself, its modules, pictures and files."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+from aiohttp import web
+
+from texgs.core.errors import TexgsError
+from texgs.scene.scene_file import known
+from texgs.viewer.frames import Frames
+from texgs.viewer.reading import view_of
+from texgs.viewer.shared_edits import SharedEdits
+from texgs.viewer.styles import thumbnail
+from texgs.viewer.values import parse_json
+from texgs.viewer.work import Work
+
+WEB = Path(__file__).parent / "web"
+SERVED = (".js", ".css", ".svg")
+
+
+class Requests:
+    """Handlers of plain requests.
+
+    Args:
+        edits: that all pages share.
+        frames: renders.
+        work: has the pictures of styles, and files that were written.
+    """
+
+    def __init__(self, edits: SharedEdits, frames: Frames, work: Work) -> None:
+        self._edits, self._frames, self._work = edits, frames, work
+
+    def routes(self, token: str) -> list[web.RouteDef]:
+        """What is answered, below the token."""
+        return [
+            web.get(f"/{token}/", self.page),
+            web.get(f"/{token}/still.png", self.still),
+            web.get(f"/{token}/styles/{{name}}.jpg", self.style),
+            web.get(f"/{token}/files/{{name}}", self.file),
+            web.post(f"/{token}/styles", self.new_style),
+            web.get(f"/{token}/{{name}}", self.module),
+        ]
+
+    async def page(self, request: web.Request) -> web.StreamResponse:
+        """The page itself."""
+        return web.FileResponse(WEB / "page.html")
+
+    async def module(self, request: web.Request) -> web.StreamResponse:
+        """A module or a style sheet of the page, by its name in a list of those that there are."""
+        files = {path.name: path for path in WEB.iterdir() if path.suffix in SERVED}
+        path = files.get(request.match_info["name"])
+        if path is None:
+            raise web.HTTPNotFound
+        return web.FileResponse(path)
+
+    async def still(self, request: web.Request) -> web.StreamResponse:
+        """A PNG file of the view in the query, as `texgs render` writes it."""
+        try:
+            values = parse_json(request.query.get("view", ""))
+            known(values, None, "view")
+            view = view_of(values)
+            png = await self._frames.still(view, self._edits.shown(view))
+        except TexgsError as error:
+            raise web.HTTPBadRequest(text=str(error)) from error
+        return web.Response(
+            body=png,
+            content_type="image/png",
+            headers={"Content-Disposition": f'attachment; filename="{Path(self._edits.name).stem}.png"'},
+        )
+
+    async def style(self, request: web.Request) -> web.StreamResponse:
+        """A small view of a picture that texgs paints."""
+        try:
+            picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
+        except TexgsError as error:
+            raise web.HTTPNotFound(text=str(error)) from error
+        return web.Response(body=picture, content_type="image/jpeg")
+
+    async def new_style(self, request: web.Request) -> web.StreamResponse:
+        """Take in a picture of the page's user; the name that it has from then on."""
+        content = await request.read()
+        try:
+            name = await asyncio.to_thread(self._work.styles.add, request.query.get("name", ""), content)
+        except TexgsError as error:
+            raise web.HTTPBadRequest(text=str(error)) from error
+        return web.Response(text=name)
+
+    async def file(self, request: web.Request) -> web.StreamResponse:
+        """A file that was written for a page."""
+        path = self._work.downloads.file(request.match_info["name"])
+        if path is None:
+            raise web.HTTPNotFound
+        return web.FileResponse(path)
