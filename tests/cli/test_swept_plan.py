@@ -26,7 +26,7 @@ def test_a_sweep_of_edits_has_the_jobs_of_one_fit(planned):
     single = stages(planned("edit.text.size=64", edit="gold"))
     swept = stages(planned("edit.text.size=64,128,256 edit.seed=0,1", edit="gold"))
     assert single["edit_text"] == single["edit_metrics"] == 1
-    assert swept == {**single, "edit_text": 6, "edit_metrics": 6}
+    assert swept == Counter({**single, "edit_text": 6, "edit_metrics": 6, "page": 0}), "a sweep has no pages"
 
 
 def test_variants_with_the_same_fit_share_it(planned):

@@ -47,7 +47,7 @@ def test_interpolations_are_resolved():
         ("dataset.name=logs", "dataset.name: logs is a folder of texgs"),
         ("dataset=123", "expected the name of a file of conf/"),
         ("tracking=http://x", "an address goes to tracking.uri"),
-        ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, got gpuu, did you mean gpu?"),
+        ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, vtk, got gpuu, did you mean gpu?"),
         ("dataset=turbulnce", "turbulnce, did you mean turbulence?"),
         ("views=hugge", "views: expected one of default, paper, relight, small, unseen, got hugge"),
         (

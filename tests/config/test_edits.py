@@ -62,8 +62,8 @@ def test_a_mistake_is_one_sentence(words, message):
 
 def test_each_method_has_its_stage_and_the_models_are_those_of_another_configuration():
     for name, stages in (
-        ("glass", {"edit_image", "edit_metrics"}),
-        ("gold", {"edit_text", "edit_metrics"}),
+        ("glass", {"edit_image", "edit_metrics", "page"}),
+        ("gold", {"edit_text", "edit_metrics", "page"}),
         ("lobe", {"edit_segment"}),
     ):
         config = compose(("dataset=engine", f"edit={name}"))
