@@ -17,7 +17,7 @@ from texgs.methods.image import how
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
-CLICK = ("edit=lobe", "edit.segment.model=TF01", "edit.segment.points=[[0.6, 0.5]]")
+CLICK = ("edit=lobe", "edit.segment.model=TF01", "edit.segment.points=[[0.6, 0.4]]")
 
 
 @pytest.fixture(scope="module")

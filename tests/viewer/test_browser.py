@@ -242,7 +242,7 @@ def test_a_model_gets_the_style_of_a_picture(chromium, scene_file):
         assert still(page) == first
         make.click()
         expect(page.get_by_role("listitem")).to_have_text(["TF01 dots"], timeout=WAIT)
-        page.get_by_role("button", name="Close", exact=True).click()
+        page.get_by_role("form", name="New look").get_by_role("button", name="Close").click()
         page.get_by_role("textbox", name="Palette of TF02").fill("#00ff00")
         save_as(page, "dots.yaml")
         kept = still(page)

@@ -27,14 +27,14 @@ sys.meta_path[:] = [finder for finder in sys.meta_path if "ScikitBuild" not in t
 class Project:
     """The copied sources and a working directory for results."""
 
-    def __init__(self, folder: Path, *, native: bool = False):
+    def __init__(self, folder: Path):
         self.sources, self.work = folder / "sources", folder / "work"
         self.work.mkdir(parents=True)
         for name in ("conf", "workflow", "texgs"):
             shutil.copytree(
                 ROOT / name,
                 self.sources / name,
-                ignore=shutil.ignore_patterns("__pycache__", *([] if native else ["csrc", "_native"])),
+                ignore=shutil.ignore_patterns("__pycache__", "libtexgs_cuda*"),
             )
         for path in (self.sources / "conf" / "dataset").iterdir():
             if path.stem not in DATASETS:  # one of the user

@@ -7,7 +7,7 @@ import time
 
 from tests.workflow.project import Project
 
-LONG = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=160 views.height=160 views.step=0.1"
+LONG = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=800 views.height=800 views.step=0.03"
 
 
 def test_killed_in_the_middle_of_the_views(tmp_path):
@@ -50,7 +50,7 @@ def test_a_second_run_in_the_same_results_is_refused_and_harms_nothing(tmp_path)
     deadline = time.monotonic() + 300
     while len(images(work)) < 2 and first.poll() is None and time.monotonic() < deadline:
         time.sleep(0.02)
-    second = project.snakemake("--nolock", overrides=f"{LONG} views.step=0.2")
+    second = project.snakemake("--nolock", overrides=f"{LONG} views.step=0.04")
     assert second.returncode == 2
     assert "results: another run works there; wait for it to end" in second.stderr
     out, err = first.communicate(timeout=200)

@@ -37,7 +37,7 @@ def test_every_job_has_a_finished_run(tmp_path):
 
 
 def test_the_best_psnr_by_view_count_is_a_query(tmp_path):
-    project = Project(tmp_path, native=True)
+    project = Project(tmp_path)
     words = "fit.surfels.iterations=4 fit.shading.iterations=4 fit.shading.densify.stop=2"
     done = project.snakemake(
         targets=("report",),
