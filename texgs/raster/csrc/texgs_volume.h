@@ -46,8 +46,8 @@ TEXGS_API int64_t texgs_volume_bricks(const texgs_volume*, int32_t size[3]);
 /* The smallest and the largest value in each brick, its faces included, extremes [bricks, 2]; of a brick without any
  * number the smallest is infinite. Returns in *missing how many samples are NaN. */
 TEXGS_API int32_t texgs_volume_extremes(const texgs_volume*, float* extremes, int64_t* missing, void* stream);
-/* How far it is from each brick to one in which something shows, distance [bricks + 3], the last three unused: by how many
- * bricks along the axis along which it is farthest, 0 there, at most 255. */
+/* How far it is from each brick to one in which something shows, distance [bricks + 3], the last three unused: by how
+ * many bricks along the axis along which it is farthest, 0 there, at most 255. */
 TEXGS_API int32_t texgs_volume_distance(const texgs_volume*, const float* extremes, const texgs_transfer*,
                                         uint8_t* distance, void* stream);
 
@@ -57,8 +57,8 @@ typedef struct {
     const float* viewmat; /* [4, 4] */
     const float* K;       /* [3, 3] without skew */
     int32_t width, height;
-    float step;           /* between samples, world units */
-    float opacity_unit;   /* length that the opacity of values is over, world units */
+    float step;         /* between samples, world units */
+    float opacity_unit; /* length that the opacity of values is over, world units */
     float to_viewer[3], to_light[3];
     float ambient, diffuse, specular, shininess;
     float* rgba;   /* [H, W, 4] premultiplied */

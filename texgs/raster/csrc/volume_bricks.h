@@ -12,7 +12,8 @@ inline void check_volume(const texgs_volume& volume) {
     require(volume.type >= TEXGS_U8 && volume.type <= TEXGS_F64, "volume: expected a known type of samples");
     int64_t bricks = 1;
     for (int a = 0; a < 3; ++a) {
-        require(volume.size[a] >= 2 && volume.size[a] < 1 << 20, "volume: expected 2 to 2^20 - 1 samples along an axis");
+        require(volume.size[a] >= 2 && volume.size[a] < 1 << 20,
+                "volume: expected 2 to 2^20 - 1 samples along an axis");
         require(volume.half[a] > 0.0f && volume.half[a] < 1e30f, "volume: expected sides above 0");
         bricks *= (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
     }

@@ -78,7 +78,8 @@ struct Extent {
 TEXGS_MATHS void clip(const CastRay& ray, const Extent& box, int32_t& first, int32_t& end) {
     float enter = 0.0f, leave = static_cast<float>(ray.samples);
     for (int a = 0; a < 3; ++a) {
-        const float one = (box.lower[a] - ray.entry[a]) / ray.step[a], other = (box.upper[a] - ray.entry[a]) / ray.step[a];
+        const float one = (box.lower[a] - ray.entry[a]) / ray.step[a],
+                    other = (box.upper[a] - ray.entry[a]) / ray.step[a];
         const float near = one < other ? one : other, far = one < other ? other : one;
         enter = near > enter ? near : enter;
         leave = far < leave ? far : leave;

@@ -18,8 +18,7 @@ struct Queue {
     // Takes the first samples away.
     void drop(int count) {
         n = n > count ? n - count : 0;
-        for (int i = 0; i < n; ++i)
-            k[i] = k[count + i], value[i] = value[count + i], weight[i] = weight[count + i];
+        for (int i = 0; i < n; ++i) k[i] = k[count + i], value[i] = value[count + i], weight[i] = weight[count + i];
     }
     // The numbers of the first `used` samples; other lanes repeat the last one.
     vf numbers(int used) const {
@@ -46,7 +45,9 @@ template <class T>
 class Caster {
 public:
     Caster(const CastJob& job)
-        : job_(job), lattice_(lattice_of(job.volume)), lamp_(lamp_of(job.view)),
+        : job_(job),
+          lattice_(lattice_of(job.volume)),
+          lamp_(lamp_of(job.view)),
           values_(static_cast<const T*>(job.volume.values)) {
         for (int a = 0; a < 3; ++a) box_.lower[a] = job.lower[a], box_.upper[a] = job.upper[a];
         const CastTable& t = job.table;

@@ -36,9 +36,7 @@ public:
     }
 
 private:
-    uint8_t* row(int64_t i) {
-        return distance_.data() + (i / sides_[1] + 1) * plane_ + (i % sides_[1] + 1) * row_ + 1;
-    }
+    uint8_t* row(int64_t i) { return distance_.data() + (i / sides_[1] + 1) * plane_ + (i % sides_[1] + 1) * row_ + 1; }
     void update(uint8_t* place, int64_t side) {
         if (*place == 0) return;
         int least = kFarthest - 1;

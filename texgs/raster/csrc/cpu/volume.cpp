@@ -66,8 +66,9 @@ int64_t row_extremes(const texgs_volume& volume, const int32_t bricks[3], int by
 
 using RowExtremes = int64_t (*)(const texgs_volume&, const int32_t[3], int, int, float*);
 constexpr RowExtremes kRowExtremes[] = {
-    row_extremes<uint8_t>, row_extremes<int8_t>,   row_extremes<uint16_t>, row_extremes<int16_t>, row_extremes<uint32_t>,
-    row_extremes<int32_t>, row_extremes<uint64_t>, row_extremes<int64_t>,  row_extremes<float>,   row_extremes<double>,
+    row_extremes<uint8_t>,  row_extremes<int8_t>,  row_extremes<uint16_t>, row_extremes<int16_t>,
+    row_extremes<uint32_t>, row_extremes<int32_t>, row_extremes<uint64_t>, row_extremes<int64_t>,
+    row_extremes<float>,    row_extremes<double>,
 };
 
 // Points as arrays, see CastTable.

@@ -17,7 +17,7 @@ struct CastJob {
     texgs_volume volume;
     texgs_cast_view view;
     CastTable table;
-    const uint8_t* distance;    // [bricks]
+    const uint8_t* distance;   // [bricks]
     float lower[3], upper[3];  // corners of a box that holds all bricks in which something shows, in samples
 };
 

@@ -42,7 +42,8 @@ __global__ __launch_bounds__(kThreads) void extremes_kernel(const texgs_volume v
                 const float value = static_cast<float>(values[(int64_t(z) * volume.size[1] + y) * volume.size[0] + x]);
                 low = value < low ? value : low, high = value > high ? value : high;
                 const int at[3] = {x, y, z};
-                bool is_own = value != value;  // samples on the upper faces are those of the next brick, if there is one
+                bool is_own =
+                    value != value;  // samples on the upper faces are those of the next brick, if there is one
                 for (int a = 0; a < 3; ++a) is_own &= at[a] < first[a] + TEXGS_BRICK || at[a] == volume.size[a] - 1;
                 none += is_own;
             }
@@ -118,7 +119,8 @@ struct Interval {
 
 template <class T>
 __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volume, const texgs_transfer transfer,
-                                                        const uint8_t* distance, const texgs_cast_view view, int tiles) {
+                                                        const uint8_t* distance, const texgs_cast_view view,
+                                                        int tiles) {
     const int x = static_cast<int>(blockIdx.x) % tiles * kTileX + static_cast<int>(threadIdx.x) % kTileX;
     const int y = static_cast<int>(blockIdx.x) / tiles * kTileY + static_cast<int>(threadIdx.x) / kTileX;
     if (x >= view.width || y >= view.height) return;
@@ -178,16 +180,26 @@ __global__ __launch_bounds__(kThreads) void cast_kernel(const texgs_volume volum
 template <class Body>
 void with_type(const texgs_volume& volume, const Body& body) {
     switch (volume.type) {
-        case TEXGS_U8: return body(uint8_t());
-        case TEXGS_I8: return body(int8_t());
-        case TEXGS_U16: return body(uint16_t());
-        case TEXGS_I16: return body(int16_t());
-        case TEXGS_U32: return body(uint32_t());
-        case TEXGS_I32: return body(int32_t());
-        case TEXGS_U64: return body(uint64_t());
-        case TEXGS_I64: return body(int64_t());
-        case TEXGS_F32: return body(float());
-        default: return body(double());
+        case TEXGS_U8:
+            return body(uint8_t());
+        case TEXGS_I8:
+            return body(int8_t());
+        case TEXGS_U16:
+            return body(uint16_t());
+        case TEXGS_I16:
+            return body(int16_t());
+        case TEXGS_U32:
+            return body(uint32_t());
+        case TEXGS_I32:
+            return body(int32_t());
+        case TEXGS_U64:
+            return body(uint64_t());
+        case TEXGS_I64:
+            return body(int64_t());
+        case TEXGS_F32:
+            return body(float());
+        default:
+            return body(double());
     }
 }
 
