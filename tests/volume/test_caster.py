@@ -8,7 +8,7 @@ from torch.nn.functional import normalize
 
 from tests.real_data import real_data
 from tests.volume.march import march
-from tests.volume.scenes import SHELLS, ball, constant, lattice, over_white, psnr
+from tests.volume.scenes import SHELLS, SPECK, ball, constant, lattice, over_white, psnr, specks
 from tests.volume.vtk_caster import VtkCaster
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError
@@ -260,21 +260,11 @@ def test_missing_values_are_transparent_and_counted(device):
 
 
 def test_thin_things_between_transparent_bricks_are_not_leapt_over(device):
-    rng = np.random.default_rng(0)
-    tf = TransferFunction(((0.5, 0.0), (1, 1.0)), ((0, 1, 1, 1),))
-    for x, y, z in [(0, 0, 0), (21, 16, 0), *rng.integers(0, (22, 17, 18), (12, 3))]:
-        values = np.zeros((18, 17, 22), np.float32)
-        values[z, y, x] = 1
-        grid = Grid(values, (1.0, 0.7, 1.3))
-        place = torch.tensor(np.array(grid.aabb[0]) + np.array(grid.spacing) * grid.scale * (x, y, z))
-        viewmat = look_at(torch.tensor([0.1, 0.1, 3.0], dtype=torch.float64), place).float()
-        camera = Camera(viewmat, intrinsics(2, 5, 5), 5, 5)
+    for grid, camera, depth in specks():
         look = Appearance(step=0.1, opacity_unit=0.001)
-        seen = Caster(grid, look, device).cast(tf, camera, HEADLIGHT, ("depth",))
+        seen = Caster(grid, look, device).cast(SPECK, camera, HEADLIGHT, ("depth",))
         assert seen.rgba[2, 2, 3] > 0.9
-        assert float(seen.depth[2, 2]) == pytest.approx(
-            float(viewmat[2, :3] @ place.float() + viewmat[2, 3]), abs=0.03
-        )
+        assert float(seen.depth[2, 2]) == pytest.approx(depth, abs=0.03)
 
 
 def test_points_of_a_function_hold_both_sides_of_steps():

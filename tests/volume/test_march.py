@@ -4,8 +4,8 @@ import torch
 from torch.nn.functional import normalize
 
 from tests.volume.march import march, shade
-from tests.volume.scenes import ball, constant, lattice
-from texgs.core.camera import Camera, intrinsics, look_at, orbit
+from tests.volume.scenes import SPECK, ball, constant, lattice, specks
+from texgs.core.camera import Camera, orbit
 from texgs.volume.appearance import Appearance
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
@@ -79,21 +79,10 @@ def test_a_mask_chooses_pixels():
 
 
 def test_thin_things_between_transparent_blocks_are_not_skipped():
-    rng = np.random.default_rng(0)
-    tf = TransferFunction(((0.5, 0.0), (1, 1.0)), ((0, 1, 1, 1),))
-    for x, y, z in [(0, 0, 0), (21, 16, 0), *rng.integers(0, (22, 17, 18), (12, 3))]:
-        values = np.zeros((18, 17, 22), np.float32)
-        values[z, y, x] = 1
-        grid = Grid(values, (1.0, 0.7, 1.3))
-        lowest, voxel = np.array(grid.aabb[0]), np.array(grid.spacing) * grid.scale
-        place = torch.tensor(lowest + voxel * (x, y, z))
-        viewmat = look_at(torch.tensor([0.1, 0.1, 3.0], dtype=torch.float64), place).float()
-        camera = Camera(viewmat, intrinsics(2, 5, 5), 5, 5)
-        seen = march(grid, tf, camera, Appearance(step=0.1, opacity_unit=0.001), None)
+    for grid, camera, depth in specks():
+        seen = march(grid, SPECK, camera, Appearance(step=0.1, opacity_unit=0.001), None)
         assert seen.alpha[2, 2] > 0.9
-        assert seen.depth[2, 2] == pytest.approx(
-            float(viewmat[2, :3] @ place.float() + viewmat[2, 3]), abs=0.03
-        )
+        assert seen.depth[2, 2] == pytest.approx(depth, abs=0.03)
 
 
 def test_shading_of_single_samples():

@@ -68,7 +68,7 @@ class ViewKeys:
         "what renders: the caster, on the CPU or a GPU; or VTK",
         choices=("cpu", "gpu", "vtk"),
     )
-    geometry: bool = key(False, "also write depth and normals of the test views, geometry/*.npz; slow")
+    geometry: bool = key(False, "also write depth and normals of the test views, geometry/*.npz")
     turntable: int = key(36, "frames of the turntable", least=1)
 
     @property

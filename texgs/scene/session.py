@@ -249,8 +249,9 @@ class Session:
 
     def _composition_of(self, scene: Scene) -> Composed:
         states: list[object] = [state_of(file) for file in files_of(scene)]
-        if self._opened is not None and self._opened[0] == states:
-            return self._opened[1]
+        opened = self._opened  # another thread may put another one there
+        if opened is not None and opened[0] == states:
+            return opened[1]
         composition = scene.open(self._device)
         self._opened = (states, composition)
         return composition
