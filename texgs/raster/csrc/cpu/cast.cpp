@@ -35,6 +35,22 @@ struct Short {
     explicit operator float() const { return static_cast<float>(value); }
 };
 
+// The intervals of a transfer function that values are in, and how far.
+struct Intervals {
+    vi first;  // points
+    vf place;
+
+    TEXGS_INLINE Intervals(const CastTable& t, vf value) {
+        vf passed = 0.0f;
+        for (int i = 1; i < t.n - 1; ++i) passed = add_where(vf(t.value[i]) <= value, passed, 1.0f);
+        first = truncate(passed);
+        place = (value - gather(t.value, first)) * gather(t.per_width, first);
+    }
+    TEXGS_INLINE vf mixed(const float* column) const {
+        return mix(gather(column, first), gather(column, first + splat(1)), place);
+    }
+};
+
 // What a ray gathers.
 struct Sums {
     vf color[3], normal[3];
@@ -127,14 +143,6 @@ private:
         return high - low > most_slices_ ? -1 : low > 0 ? low - 1 : 0;
     }
 
-    // The first point of the interval that values are in.
-    TEXGS_INLINE vi interval_of(vf value) const {
-        const CastTable& t = job_.table;
-        vf passed = 0.0f;
-        for (int i = 1; i < t.n - 1; ++i) passed = add_where(vf(t.value[i]) <= value, passed, 1.0f);
-        return truncate(passed);
-    }
-
     // Finds what the first samples weigh, and lets those that show something wait.
     void weigh(const CastRay& ray, Queue& waiting, int used, Queue& seen, Sums& sums) {
         vf cell[3], inside[3];
@@ -143,9 +151,7 @@ private:
         if (first < 0) return one_by_one(ray, waiting, used, seen, sums);
         const CastTable& t = job_.table;
         const vf value = values_in(slices(first), Cells(job_.volume.size, cell, first), inside);
-        const vi i = interval_of(value);
-        const vf place = (value - gather(t.value, i)) * gather(t.per_width, i);
-        const vf opacity = mix(gather(t.opacity, i), gather(t.opacity, i + splat(1)), place);
+        const vf opacity = Intervals(t, value).mixed(t.opacity);
         const vm visible = (vf(t.value[0]) <= value) & (value <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
         float alpha[kLanes], values[kLanes];
         store(alpha, zero_unless(visible, step_opacity(opacity, job_.view.step / job_.view.opacity_unit)));
@@ -179,12 +185,10 @@ private:
         differences_in(slices(first), Cells(job_.volume.size, cell, first), inside, slope);
         const Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(slope_[0]), slope[1] * vf(slope_[1]), slope[2] * vf(slope_[2])});
         const CastTable& t = job_.table;
-        const vf value = load(seen.value), weight = load_part(seen.weight, used);
-        const vi i = interval_of(value);
-        const vf place = (value - gather(t.value, i)) * gather(t.per_width, i);
-        vf color[3];
-        for (int c = 0; c < 3; ++c) color[c] = mix(gather(t.color[c], i), gather(t.color[c], i + splat(1)), place);
-        const Vec3<vf> shown = lit(Vec3<vf>{color[0], color[1], color[2]}, n, lamp_);
+        const vf weight = load_part(seen.weight, used);
+        const Intervals intervals(t, load(seen.value));
+        const Vec3<vf> color{intervals.mixed(t.color[0]), intervals.mixed(t.color[1]), intervals.mixed(t.color[2])};
+        const Vec3<vf> shown = lit(color, n, lamp_);
         const Vec3<vf> against = turned(n, vf(0.0f) - along(n, ray.direction));
         const vf looks[3] = {shown.x, shown.y, shown.z}, normals[3] = {against.x, against.y, against.z};
         const vm is_used = vf(0.0f) < weight;  // other lanes may hold anything
