@@ -54,6 +54,8 @@ rule gallery:
     log:
         log_of("gallery"),
     threads: 4
+    resources:
+        gpu=FIT_GPU,
     params:
         code=code("gallery"),
         words=words("gallery"),

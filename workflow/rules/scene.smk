@@ -14,6 +14,8 @@ rule compose:
     log:
         log_of("compose"),
     threads: 4
+    resources:
+        gpu=FIT_GPU,
     params:
         code=code("compose"),
         words=words("compose"),
@@ -29,6 +31,8 @@ rule pse:
     log:
         log_of("pse"),
     threads: 4
+    resources:
+        gpu=FIT_GPU,
     params:
         code=code("pse"),
         words=words("pse"),

@@ -104,8 +104,8 @@ def agreement(
 ) -> dict[str, Any]:
     """Consistency of views in the middle of the path, near and far, as they look with the scene's light.
 
-    Fields that have light in their colours can be compared with others so. None where no two views see the
-    same, as of a scene that is nowhere opaque.
+    As many pairs near as far. Fields that have light in their colours can be compared with others so. None
+    where no two views see the same, as of a scene that is nowhere opaque.
     """
     start = max(0, (len(cameras) - count - LONG) // 2)
     some = cameras[start : start + count + LONG]
@@ -121,7 +121,7 @@ def agreement(
     for name, apart in (("short", SHORT), ("long", LONG)):
         if len(frames) > apart:
             try:
-                measured = consistency(frames, apart, perceptual)
+                measured = consistency(frames[: count + apart], apart, perceptual)
             except ArgumentError:
                 measures |= {f"{name}_rmse": None, f"{name}_lpips": None}
                 continue
