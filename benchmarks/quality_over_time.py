@@ -126,7 +126,8 @@ def draw(looks: list[Look], path: Path) -> None:
         ends = [row for row in own if row.is_final]
         axes.plot([row.seconds for row in ends], [row.psnr for row in ends], "o", color=f"C{index}")
         for row in ends:
-            axes.annotate(row.phase, (row.seconds, row.psnr), (4, -10), textcoords="offset points", fontsize=7)
+            place = row.seconds, row.psnr
+            axes.annotate(row.phase, place, (4, -10), textcoords="offset points", fontsize=7)
     axes.set(xlabel="seconds of fitting", ylabel="PSNR of test views, dB", xscale="log")
     axes.grid(which="both", alpha=0.2)
     axes.legend()

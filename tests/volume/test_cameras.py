@@ -1,4 +1,5 @@
 import json
+from itertools import pairwise
 from math import atan, degrees, tan
 
 import numpy as np
@@ -85,6 +86,15 @@ def test_orbit_path_is_one_turn_without_its_end():
     expected = [[0, up, flat], [flat, up, 0], [0, up, -flat], [-flat, up, 0]]
     np.testing.assert_allclose(positions(views), expected, atol=1e-6)
     assert (views[0].width, views[0].height) == (80, 60)
+
+
+def test_cameras_are_spread_evenly_over_a_path():
+    path = cameras.spiral(181, **LENS)
+    assert cameras.spread(path, 181) == cameras.spread(path, 500) == path
+    places = [path.index(camera) for camera in cameras.spread(path, 61)]
+    assert len(places) == 61
+    assert {after - before for before, after in pairwise(places)} <= {2, 3}
+    assert cameras.spread(path, 1) == path[:1]
 
 
 def test_mistakes_are_named():

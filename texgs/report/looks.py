@@ -22,8 +22,8 @@ LABELS = (
 ALL = MEASURES | {"style_nnfm": Column("NNFM", 3), "style_gram": Column("Gram", 3)}
 ORDER = ("style", "instruction", "")  # by what edits follow
 CAPTION = (
-    "Minutes of the edit alone; frames along the test path; NNFM and Gram distance to the style in views "
-    f"that it was not learned from. {CONSISTENCY}"
+    "Minutes of the edit alone; frames spread over the test path; NNFM and Gram distance to the style in "
+    f"views that it was not learned from. {CONSISTENCY}"
 )
 
 

@@ -136,7 +136,7 @@ PAPERS = (
     TableSpec(
         "rendering",
         "Rendering",
-        "Frames of scenes as fitted along the test path, beside those of the volume in the same job.",
+        "Frames of scenes as fitted, spread over the test path, beside those of the volume in the same job.",
         "rendering",
         ("timing",),
         rendering,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import asin, atan2, degrees
 
 from texgs.core.camera import Camera, orbit
@@ -88,6 +89,12 @@ def orbit_path(
         raise ArgumentError(f"count: expected at least 1 camera, got {count}")
     turn = [FRONT + 360 * index / count for index in range(count)]
     return [orbit(azimuth, polar, radius, fov_y, width, height) for azimuth in turn]
+
+
+def spread(cameras: Sequence[Camera], count: int) -> list[Camera]:
+    """So many cameras of a path, evenly spread over it and in its order; all, if it has no more."""
+    count = min(count, len(cameras))
+    return [cameras[index * len(cameras) // count] for index in range(count)]
 
 
 def _orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:

@@ -10,7 +10,7 @@ import torch
 
 from texgs.cli.stages.edit import Settings as EditSettings
 from texgs.cli.stages.outcome import Outcome
-from texgs.cli.stages.timing import milliseconds
+from texgs.cli.stages.timing import FRAMES, milliseconds
 from texgs.config.fields import kinds
 from texgs.config.methods import method_of
 from texgs.config.views import ViewKeys
@@ -30,7 +30,7 @@ from texgs.models.vgg import Vgg
 from texgs.report.results import EditMeasures
 from texgs.scene.scene import Scene
 from texgs.scene.scene_file import read_scene
-from texgs.volume.cameras import spiral
+from texgs.volume.cameras import spiral, spread
 
 
 @dataclass
@@ -56,8 +56,10 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
     scenes = after.open(device), before.open(device)
     cameras = [camera.to(device) for camera in spiral(views.test.count, *views.lens)]
-    some = cameras[:: max(1, len(cameras) // settings.compared)]
-    frames = milliseconds(lambda camera: scenes[0].render(camera, after.light, after.edits), cameras, title)
+    some = spread(cameras, settings.compared)
+    frames = milliseconds(
+        lambda camera: scenes[0].render(camera, after.light, after.edits), spread(cameras, FRAMES), title
+    )
     result = EditMeasures(
         edit.name,
         edit.method,

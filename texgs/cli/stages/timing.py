@@ -16,10 +16,10 @@ from texgs.core.device import torch_device
 from texgs.core.progress import progress
 from texgs.report.results import TimingResult
 from texgs.scene.scene_file import read_scene
-from texgs.volume.cameras import spiral
+from texgs.volume.cameras import spiral, spread
 
 WARM = 3  # frames before those that count
-VOLUME_FRAMES = 12  # of the volume, spread over the path: they take long, and differ little
+FRAMES, VOLUME_FRAMES = 61, 12  # spread over the path: more say the same; the volume's take long
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -31,12 +31,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         output: folder.
     """
     scene, views = read_scene(inputs["scene"]), settings.views
-    cameras = spiral(views.test.count, *views.lens)
+    path = spiral(views.test.count, *views.lens)
     composition = scene.open(torch_device(settings.fit.device))
     title = f"{settings.dataset}: timing"
     device = composition.device
     frames = milliseconds(
-        lambda camera: composition.render(camera.to(device), scene.light, scene.edits), cameras, title
+        lambda camera: composition.render(camera.to(device), scene.light, scene.edits),
+        spread(path, FRAMES),
+        title,
     )
     result = TimingResult(
         fmean(frames),
@@ -49,9 +51,10 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     )
     if "volume" in inputs:
         volume = VolumeScene(settings, inputs["volume"])
-        some = cameras[:: max(1, len(cameras) // VOLUME_FRAMES)]
         of_volume = milliseconds(
-            lambda camera: volume.render(camera, scene.light, scene.edits), some, f"{title}, volume"
+            lambda camera: volume.render(camera, scene.light, scene.edits),
+            spread(path, VOLUME_FRAMES),
+            f"{title}, volume",
         )
         result = replace(result, volume_mean_ms=fmean(of_volume), volume_max_ms=max(of_volume))
     return Outcome(result)

@@ -1,0 +1,57 @@
+"""The whole way from a volume to edited scenes, tables and report: seconds of `texgs run`, by stage.
+
+`python -m benchmarks.main_job OUTPUT.json DATASET,DATASET... KEY=VALUE...` runs each data set in a folder of
+its own, where nothing is done yet; words with = are overrides for all of them. What the jobs do not account
+for is the plan, starts of jobs, and waiting.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections import defaultdict
+from dataclasses import asdict
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import torch
+
+from benchmarks import machine
+from benchmarks.load import Load
+from texgs.report.metrics_files import COPIES, read
+
+WORDS = ("fit=quick", "views.width=400", "views.height=400")
+EDITS = "edits=[glass,gold]"
+
+
+def main(output: str, names: str, *overrides: str) -> None:
+    """Run the data sets one after the other; print and write what each took."""
+    words = (*WORDS, EDITS, *overrides)
+    runs = {name: seconds_of(f"dataset={name}", *words) for name in names.split(",")}
+    described = machine.describe(torch.device("cpu"))
+    Path(output).write_text(json.dumps({"machine": described, "words": words, "runs": runs}, indent=1) + "\n")
+
+
+def seconds_of(*words: str) -> dict[str, Any]:
+    """Run a fresh project to its report."""
+    with tempfile.TemporaryDirectory() as folder:
+        with Load() as load:
+            start = perf_counter()
+            program = Path(sys.executable).with_name("texgs")
+            subprocess.run([program, "run", *words, "--directory", folder], check=True)
+            whole = perf_counter() - start
+        results = Path(folder, "results")
+        files = [path for path in results.rglob("metrics.json") if COPIES not in path.parts]
+        stages: dict[str, float] = defaultdict(float)
+        for record in read(files):
+            stages[record.stage] += record.facts["seconds"]
+    by_stage = {name: round(s, 2) for name, s in sorted(stages.items(), key=lambda item: -item[1])}
+    print(*words, f"took {whole:.0f} s, jobs {sum(stages.values()):.0f} s of these:", by_stage)
+    return {"seconds": round(whole, 1), "jobs": len(files), "stages": by_stage, "load": asdict(load)}
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
