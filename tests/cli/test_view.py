@@ -70,7 +70,9 @@ class Terminal(io.StringIO):
         return True
 
 
-@pytest.mark.parametrize(("stdin", "is_saved"), [(Terminal("y\n"), True), (Terminal("\n"), False)])
+@pytest.mark.parametrize(
+    ("stdin", "is_saved"), [(Terminal("y\n"), True), (Terminal("\n"), False), (Terminal(""), False)]
+)
 def test_unsaved_edits_are_asked_about(scene_file, monkeypatch, capsys, stdin, is_saved):  # noqa: F811
     edits = Server(open_scene(scene_file)).edits
     view.ask_to_save(edits)
@@ -80,6 +82,23 @@ def test_unsaved_edits_are_asked_about(scene_file, monkeypatch, capsys, stdin, i
     view.ask_to_save(edits)
     assert "Edits are not saved. Write them to" in capsys.readouterr().out
     assert read_scene(scene_file).models["TF01"].edit.visible is not is_saved
+
+
+def test_another_file_is_not_replaced_without_a_word(scene_file, monkeypatch, capsys):  # noqa: F811
+    """Scenes of jobs are saved as edited.yaml, which may be there; a name that is none is asked for again."""
+    (scene_file.parent / "metrics.json").write_text("{}")
+    (scene_file.parent / "edited.yaml").write_text("mine")
+    edits = Server(open_scene(scene_file)).edits
+    edits.edit(Edit("TF01", "visible", False, 0), author=1)
+    monkeypatch.setattr("sys.stdin", Terminal("n\n"))
+    view.ask_to_save(edits)
+    assert "edited.yaml? The file there is replaced. [y/N]" in capsys.readouterr().out
+    assert (scene_file.parent / "edited.yaml").read_text() == "mine"
+    monkeypatch.setattr(edits, "name", "../no.yaml")
+    monkeypatch.setattr("sys.stdin", Terminal("other.yaml\ny\n"))
+    view.ask_to_save(edits)
+    assert "save as: expected" in capsys.readouterr().err
+    assert not read_scene(scene_file.parent / "other.yaml").models["TF01"].edit.visible
 
 
 def test_unsaved_edits_are_told_where_nobody_can_be_asked(scene_file, monkeypatch, capsys):  # noqa: F811

@@ -26,9 +26,17 @@ HIGH = {"opacity": [[0.6, 0.0], [0.7, 0.9], [1.0, 0.9]], "color": [[0.6, 0.8, 0.
 
 def test_opacity_and_colour_of_a_transfer_function():
     found = edited(TF, PartEdit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
-    assert found.opacity == ((0, 0), (1, 0.75), (2, 1.0)), "at most 1"
+    np.testing.assert_allclose(found.opacity, [(0, 0), (1, 0.75), (17 / 12, 1), (2, 1)], err_msg="at most 1")
     np.testing.assert_allclose(found.color, [(0, 0.4, 0.4, 0.2), (2, 0.6, 0.6, 0.4)])
     assert edited(TF, PartEdit(), ()) == TF
+
+
+def test_what_an_edit_cuts_off_is_cut_off_at_every_value():
+    """Also between points: the product is at most 1 there, and no lower."""
+    values = np.linspace(0, 2, 41)
+    found = edited(TF, PartEdit(opacity=3.0, palette=(1.0, 0.0, 0.5)), (0.3, 0.5, 0.9))
+    color, alpha = TF(values)[:, :3] + [0.7, -0.5, -0.4], 3 * TF(values)[:, 3]
+    np.testing.assert_allclose(found(values), np.clip(np.column_stack([color, alpha]), 0, 1), atol=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -47,21 +55,37 @@ def volume(tmp_path_factory):
 CAMERA, LIGHT = orbit(20, 10, 4, 30, 48, 48), Light("headlight")
 
 
+HIDDEN = PartEdit(visible=False)
+
+
+def both(low=PartEdit(), high=PartEdit()):  # noqa: B008
+    return {"low": low, "high": high}
+
+
+def test_edits_are_those_of_the_basic_tf_of_their_name(volume):
+    """A scene may name its models in another order than the job's settings, which are sorted."""
+    edits = {"high": PartEdit(opacity=0.2), "low": PartEdit()}
+    found = volume.render(CAMERA, LIGHT, edits)
+    np.testing.assert_array_equal(found, volume.render(CAMERA, LIGHT, dict(reversed(edits.items()))))
+    assert not np.array_equal(found, volume.render(CAMERA, LIGHT, both(low=PartEdit(opacity=0.2))))
+
+
 def test_every_edit_reaches_the_picture(volume):
     plain = volume.render(CAMERA, LIGHT)
-    assert np.array_equal(volume.render(CAMERA, LIGHT, [PartEdit(), PartEdit()]), plain)
-    palettes = [(0.2, 0.3, 0.8), (0.8, 0.5, 0.2)]
-    red = volume.render(CAMERA, LIGHT, [PartEdit(palette=(0.9, 0.3, 0.1)), PartEdit()], palettes)
+    assert np.array_equal(volume.render(CAMERA, LIGHT, both()), plain)
+    palettes = {"low": (0.2, 0.3, 0.8), "high": (0.8, 0.5, 0.2)}
+    red = volume.render(CAMERA, LIGHT, both(low=PartEdit(palette=(0.9, 0.3, 0.1))), palettes)
     assert red[..., 0].sum() > 1.1 * plain[..., 0].sum()
     assert red[..., 2].sum() < 0.9 * plain[..., 2].sum()
     np.testing.assert_allclose(red[..., 3], plain[..., 3], atol=1e-3)
-    faint = volume.render(CAMERA, LIGHT, [PartEdit(opacity=0.2), PartEdit()])
+    faint = volume.render(CAMERA, LIGHT, both(low=PartEdit(opacity=0.2)))
     assert faint[..., 3].sum() < plain[..., 3].sum()
-    dark = volume.render(CAMERA, LIGHT, [PartEdit(ambient=0.2, diffuse=0.2, specular=0.0)] * 2)
+    dim = PartEdit(ambient=0.2, diffuse=0.2, specular=0.0)
+    dark = volume.render(CAMERA, LIGHT, both(low=dim, high=dim))
     assert dark[..., :3].sum() < 0.5 * plain[..., :3].sum()
-    alone = volume.render(CAMERA, LIGHT, [PartEdit(visible=False), PartEdit()])
+    alone = volume.render(CAMERA, LIGHT, both(low=HIDDEN))
     assert alone[..., 3].sum() < plain[..., 3].sum()
-    assert not volume.render(CAMERA, LIGHT, [PartEdit(visible=False)] * 2).any()
+    assert not volume.render(CAMERA, LIGHT, both(low=HIDDEN, high=HIDDEN)).any()
     side = volume.render(CAMERA, Light("directional", 110, 0))
     assert np.abs(side - plain).max() > 0.1
 
@@ -71,12 +95,12 @@ def test_a_scene_is_compared_with_the_volume_that_has_its_edits(volume):
     volume_render = volume.render
     fake = type("V", (), {"render": lambda self, *words: asked.append(words) or volume_render(*words)})()
     edits = [PartEdit(opacity=0.5), PartEdit(palette=(0, 1, 0))]
-    models = {str(i): SceneModel("x", edit) for i, edit in enumerate(edits)}
+    models = {name: SceneModel("x", edit) for name, edit in zip(("low", "high"), edits, strict=True)}
     step = Step("both", Scene(models, LIGHT))
     comparison, shown = compared(step, Composition([ball(1), ball(2)]), fake, [CAMERA])
     assert comparison.psnr > 0
     assert comparison.ssim < 1
     assert set(shown) == {"scene", "volume", "error"}
     assert asked[0][1] == LIGHT
-    assert asked[0][2] == edits
-    torch.testing.assert_close(torch.tensor(asked[0][3][0]), ball(1).parameters["palette"])
+    assert asked[0][2] == dict(zip(("low", "high"), edits, strict=True))
+    torch.testing.assert_close(torch.tensor(asked[0][3]["low"]), ball(1).parameters["palette"])

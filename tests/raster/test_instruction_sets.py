@@ -3,15 +3,23 @@
 import os
 import subprocess
 import sys
-from functools import cache
+from dataclasses import asdict
+from functools import cache, partial
 
+import numpy as np
 import pytest
 import torch
 
 from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything
 from tests.raster.threads import with_threads
+from texgs.core.camera import orbit
+from texgs.core.light import Light
 from texgs.raster import native
+from texgs.volume.appearance import Appearance
+from texgs.volume.caster import OUTPUTS, Caster
+from texgs.volume.grid import Grid
+from texgs.volume.transfer import TransferFunction
 
 CHILD = """
 import sys, torch
@@ -29,12 +37,30 @@ SCENES = {
 }
 
 
+VOLUMES = {  # type of samples, and how many along z, y and x: loads at the ends of rows differ
+    "bytes": ("uint8", (14, 9, 3)),
+    "signed shorts": ("int16", (3, 2, 5)),
+    "floats": ("float32", (33, 33, 33)),
+    "long integers": ("uint64", (6, 17, 4)),
+}
+FUNCTION = TransferFunction(((40, 0), (90, 0.6), (90, 0.2), (255, 0.9)), ((0, 1, 0, 0.5), (255, 0, 1, 0.2)))
+
+
+def cast_volume(kind, shape):
+    """What rays see of a random volume."""
+    values = np.random.default_rng(7).integers(0, 256, shape).astype(kind)
+    caster = Caster(Grid(values), Appearance(step=0.2, opacity_unit=0.05))
+    return asdict(caster.cast(FUNCTION, orbit(-50, 25, 2.5, 30, 37, 29), Light("headlight"), OUTPUTS))
+
+
 def computed():
-    """Everything of each scene; bits must not depend on the number of threads."""
+    """Everything of each scene and volume; bits must not depend on the number of threads."""
+    makers = {name: partial(everything, scene) for name, scene in SCENES.items()}
+    makers |= {name: partial(cast_volume, *of) for name, of in VOLUMES.items()}
     found = {}
-    for name, scene in SCENES.items():
-        found[name] = with_threads(1, everything, scene)
-        for quantity, value in with_threads(3, everything, scene).items():
+    for name, make in makers.items():
+        found[name] = with_threads(1, make)
+        for quantity, value in with_threads(3, make).items():
             assert torch.equal(value, found[name][quantity]), quantity
     return found
 

@@ -104,7 +104,7 @@ def shown(page):
 def save_as(page, name):
     page.get_by_role("button", name="Save").click()
     page.get_by_label("File name").fill(name)
-    page.get_by_role("dialog").get_by_role("button", name="Save", exact=True).click()
+    page.keyboard.press("Enter")
     expect(page.get_by_text(f"/{name}")).to_be_visible(timeout=WAIT)
 
 
@@ -213,7 +213,7 @@ def test_a_click_makes_a_segment(chromium, tmp_path):
         expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible"])
         page.get_by_role("button", name="Rename balls/blue").click()
         page.get_by_role("dialog").get_by_label("Name").fill("sea")
-        page.get_by_role("dialog").get_by_role("button", name="Rename").click()
+        page.keyboard.press("Enter")
         expect(page.get_by_role("checkbox", name="sea")).not_to_be_checked(timeout=WAIT)
         page.get_by_role("button", name="Undo").click()
         reds = shown(page)
@@ -284,7 +284,9 @@ def test_edits_stand_in_the_link(chromium, scene_file):
 def test_an_export_is_saved(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         with page.expect_download(timeout=WAIT) as download:
-            page.get_by_label("Export").select_option("3D Gaussians, PLY")
+            page.get_by_role("button", name="Export").click()
+            page.get_by_role("dialog").get_by_label("As").select_option("3D Gaussians, PLY")
+            page.get_by_role("dialog").get_by_role("button", name="Export").click()
         assert download.value.suggested_filename == "scene.ply"
 
 

@@ -13,6 +13,7 @@ from tests.viewer.test_segments import FRONT, ended
 from tests.viewer.test_server import TOKEN, origin, page, with_page
 from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
+from texgs.viewer.looks import Looks
 
 SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
 
@@ -168,7 +169,44 @@ def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
     assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
 
 
-def test_a_segment_gets_another_name(scene_file):
+def test_words_of_a_page_are_no_references_to_anything(scene_file, monkeypatch):
+    monkeypatch.setenv("SECRET", "a secret of the server")
+
+    async def work(browser, client):
+        await browser.send(**look(instruction="${oc.env:SECRET}"))
+        said = (await browser.next("notice"))["text"]
+        assert "${oc.env:SECRET}" in said
+        assert "secret of" not in said
+
+    with_page(scene_file, work)
+
+
+def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(scene_file, monkeypatch):
+    reached, go_on, run = threading.Event(), threading.Event(), Looks._make
+
+    def slow(*words):
+        result = run(*words)
+        reached.set()
+        go_on.wait(30)
+        return result
+
+    monkeypatch.setattr(Looks, "_make", slow)
+
+    async def work(browser, client):
+        before = await picture(browser)
+        await browser.send(**look(style="glass", preview=True))
+        await asyncio.to_thread(reached.wait, 30)
+        await browser.send(type="cancel")
+        assert (await browser.next("trial"))["parts"] == []
+        go_on.set()
+        assert "It was cancelled" in (await browser.next("notice"))["text"]
+        await ended(browser)
+        assert (await picture(browser) == before).all()
+
+    with_page(scene_file, work)
+
+
+def test_only_a_segment_gets_another_name(scene_file):
     async def work(browser, client):
         await browser.send(type="rename", part="TF01", name="x")
         assert "expected a segment to rename, got the model TF01" in (await browser.next("notice"))["text"]

@@ -82,7 +82,7 @@ def test_half_of_a_camera_sees_the_same():
         ({"camera": {**CAMERA, "width": 1e3}}, "camera.width: expected a whole number from 1 to 4096"),
         ({"camera": {**CAMERA, "width": 9000}}, "camera.width: expected a whole number from 1 to 4096"),
         ({"camera": {**CAMERA, "target": [0, 0]}}, "camera.target: expected three numbers, got [0, 0]"),
-        ({"camera": {**CAMERA, "distance": "3"}}, "camera.distance: expected a number from 0.001 to 1000"),
+        ({"camera": {**CAMERA, "distance": "3"}}, "camera.distance: expected a number from 1e-06 to 1e+06"),
         ({"only": None}, "only: expected a text, got None"),
         ({"type": "undo"}, "message: no such key 'id'"),
     ],

@@ -1,6 +1,7 @@
 """The modules of the front end as one script."""
 
 import re
+from importlib.resources import files
 
 import pytest
 
@@ -28,7 +29,9 @@ def test_all_imports_and_exports_are_known_ones(page):
 
 
 def test_what_a_module_imports_is_exported():
-    for name in ("standalone.js", "webgl.js", "shaders.js", "light.js"):
+    modules = sorted(path.name for path in (files("texgs.viewer") / "web").iterdir() if path.suffix == ".js")
+    assert set(PAGES) < set(modules)
+    for name in modules:
         for names, other in IMPORT.findall(web_file(name)):
             exported = {export for _, export in EXPORT.findall(web_file(other))}
             assert set(re.findall(r"\w+", names)) <= exported

@@ -142,7 +142,7 @@ def test_sockets_of_strangers_get_403(scene_file, path, headers):
     ],
 )
 def test_hosts(name, host, is_own):
-    assert guard.is_own_host(name, host) is is_own
+    assert guard.is_own_host(name, host, (host,)) is is_own
 
 
 def test_pages_are_served_with_a_strict_policy_and_nothing_else(scene_file):

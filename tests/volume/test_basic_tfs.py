@@ -69,6 +69,8 @@ def test_combined_functions_show_what_each_shows(first, second, apart):
     for tf in (first, second):
         inside = (values > tf.support[0]) & (values < tf.support[1])
         np.testing.assert_allclose(both(values[inside]), tf(values[inside]), atol=1e-12)
+    if apart:
+        assert both(high)[3] == pytest.approx(first(high)[3], abs=1e-12), "also at its end"
     outside = ~np.any([(values > tf.support[0]) & (values < tf.support[1]) for tf in (first, second)], axis=0)
     assert (both(values[outside])[:, 3] == 0).all()
 

@@ -4,9 +4,11 @@ import sys
 import numpy as np
 import pytest
 import torch
+from hypothesis import given
 from torch.nn.functional import normalize
 
 from tests.real_data import real_data
+from tests.volume.functions import functions
 from tests.volume.march import march
 from tests.volume.scenes import SHELLS, SPECK, ball, constant, lattice, over_white, psnr, specks
 from tests.volume.vtk_caster import VtkCaster
@@ -14,7 +16,7 @@ from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.volume.appearance import Appearance
-from texgs.volume.caster import OUTPUTS, TYPES, Caster, points_of
+from texgs.volume.caster import OUTPUTS, TYPES, Cast, Caster, points_of
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
@@ -198,7 +200,8 @@ def test_it_is_what_marching_in_torch_sees(step, light, spacing, device):
         Appearance(step=step),
     )
     expected = march(grid, SHELLS, camera, look, light)
-    found = Caster(grid, look).cast(SHELLS, camera, light, OUTPUTS)
+    cast = Caster(grid, look, device).cast(SHELLS, camera, light, OUTPUTS)
+    found = Cast(*(plane.cpu() for plane in (cast.rgba, cast.depth, cast.median, cast.normal)))
     np.testing.assert_allclose(
         found.rgba[..., :3], expected.color, atol=0.0015
     )  # light that is left at an end
@@ -253,6 +256,7 @@ def test_missing_values_are_transparent_and_counted(device):
     tf = TransferFunction(((0.1, 0.5), (1, 0.9)), ((0, 1, 1, 1),))
     found = caster.render(tf, camera, HEADLIGHT)
     assert np.isfinite(found).all()
+    assert bool(caster.cast(tf, camera, HEADLIGHT, ("normal",)).normal.isfinite().all())
     covered = Caster(Grid(np.nan_to_num(away, nan=-100)), Appearance(), device).render(tf, camera, HEADLIGHT)
     assert psnr(found[..., 3], covered[..., 3]) > 25
     nothing = Caster(Grid(np.full((4, 4, 4), np.nan)), Appearance(), device)
@@ -284,13 +288,45 @@ def test_points_of_a_function_hold_both_sides_of_steps():
     np.testing.assert_allclose(rows, expected, atol=1e-6)
 
 
+@given(functions())
+def test_points_hold_the_function_at_every_value(tf):
+    """What the libraries make of the points: of those before the last, the last that is not above a value."""
+    points = points_of(tf).double().numpy()
+    low, high = points[0, 0], points[-1, 0]
+    values = np.array([x for x in np.arange(-64, 65) / 8 if low <= x <= high])
+    first = (points[1:-1, 0][:, None] <= values).sum(axis=0)
+    one, other = points[first], points[first + 1]
+    width = other[:, :1] - one[:, :1]
+    place = np.divide(values[:, None] - one[:, :1], width, where=width > 0, out=np.zeros_like(width))
+    found = one[:, 1:] + place * (other[:, 1:] - one[:, 1:])
+    np.testing.assert_allclose(found[:, [1, 2, 3, 0]], tf(values), atol=1e-5)
+
+
+def test_values_that_single_precision_cannot_tell_apart():
+    tf = TransferFunction(((16777216, 0.5), (16777217, 0.5)), ((0, 1, 1, 1),))
+    with pytest.raises(
+        ArgumentError, match="values that differ in single precision, got 16777216 to 16777217"
+    ):
+        points_of(tf)
+
+
+def test_another_shading_is_that_of_a_caster_that_has_it(device):
+    grid, dark, camera = (
+        Grid(ball(16).values),
+        Appearance(ambient=0.1, specular=0.0),
+        orbit(9, 9, 3, 30, 9, 9),
+    )
+    found = Caster(grid, Appearance(), device).looking(dark).render(SHELLS, camera, HEADLIGHT)
+    np.testing.assert_array_equal(found, Caster(grid, dark, device).render(SHELLS, camera, HEADLIGHT))
+
+
 @pytest.mark.parametrize(("change", "message"), [
     ({"outputs": ("colour",)}, "outputs: expected some of depth, median, normal, got colour"),
     ({"values": np.zeros((4, 4, 4), np.float16)}, "expected samples of uint8, .* or bool, got float16"),
     ({"values": np.broadcast_to(np.uint8(0), (2, 1 << 14, 1 << 14))}, "slices of less than 256 MiB"),
 ])  # fmt: skip
 def test_mistakes_are_named(change, message, monkeypatch):
-    monkeypatch.setattr(np, "ascontiguousarray", lambda values, dtype=None: values)
+    monkeypatch.setattr(np, "require", lambda values, dtype, how: values)
     with pytest.raises(ArgumentError, match=message):
         Caster(Grid(change.get("values", ball(8).values)), Appearance()).cast(
             SHELLS, orbit(0, 0, 3, 30, 8, 8), HEADLIGHT, change.get("outputs", ())

@@ -117,7 +117,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         config.results,
         config.tracking.uri,
         config.tracking.experiment,
-        int(config.device.mapper == "gpu"),
+        int(any(each.views.mapper == "gpu" for each in configs)),
         int(config.device.name == "cuda"),
         {folder: plain(job, config.results) for folder, job in jobs.items()},
         sweeps,

@@ -89,11 +89,29 @@ def name_of(host: str) -> str:
 
 def ask_to_save(edits: "SharedEdits") -> None:
     """Offer to save what would be lost, or say that it is, where nobody can be asked."""
+    from texgs.core.errors import TexgsError
+
     if edits.is_saved:
         return
     if not sys.stdin.isatty():
         sys.stderr.write("Edits were not saved.\n")
         return
-    path = edits.path_of(edits.name)
-    if input(f"\nEdits are not saved. Write them to {path}? [y/N] ").strip().lower() in ("y", "yes"):
-        print(edits.save(edits.name))
+    name = edits.name
+    while name:
+        try:
+            there = " The file there is replaced." if edits.would_replace(name) else ""
+            agreed = answer(f"\nEdits are not saved. Write them to {edits.path_of(name)}?{there} [y/N] ")
+            if agreed.lower() in ("y", "yes"):
+                print(edits.save(name))
+            return
+        except TexgsError as error:
+            sys.stderr.write(f"{error}\n")
+            name = answer("Another name that ends in .yaml, or nothing: ")
+
+
+def answer(question: str) -> str:
+    """What somebody types; nothing at the end of the input."""
+    try:
+        return input(question).strip()
+    except EOFError:
+        return ""

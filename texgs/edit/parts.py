@@ -57,6 +57,19 @@ def parts_of(scene: Scene, names: Sequence[str]) -> list[ScenePart]:
     return [by_name[name] for name in names] or [ScenePart(model) for model in scene.models]
 
 
+def parts_with_surfels(scene: Scene) -> list[str]:
+    """Names of all models and segments, but for those whose surfels are all in (other) segments."""
+    names = []
+    for name, entry in scene.models.items():
+        own = [name, *(f"{name}/{segment}" for segment in entry.segments)]
+        if entry.segments:
+            model, masks = entry.surfels()
+            labels = set(labels_of(masks, len(model)).unique().tolist())
+            own = [part for number, part in enumerate(own) if number in labels]
+        names += own
+    return names
+
+
 def edit_parts(
     scene: Scene,
     names: Sequence[str],

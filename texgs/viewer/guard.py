@@ -8,6 +8,7 @@ import os
 import re
 import secrets
 import socket
+from collections.abc import Collection
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -40,6 +41,7 @@ def guard(token: str, host: str) -> Middleware:
         token: first part of every path.
         host: that the server listens on.
     """
+    names = (host.lower(), socket.gethostname().lower(), socket.getfqdn().lower())  # a resolver may be slow
 
     @web.middleware
     async def middleware(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -47,7 +49,7 @@ def guard(token: str, host: str) -> Middleware:
         name = request.headers.get("Host", "")
         if not hmac.compare_digest(given.encode("utf-8", "replace"), token.encode()):
             raise web.HTTPForbidden(text="Wrong token: open the address that texgs view printed.")
-        if not is_own_host(name, host):
+        if not is_own_host(name, host, names):
             raise web.HTTPForbidden(text="Wrong host: open the address that texgs view printed.")
         needs_origin = is_socket(request) or request.method != "GET"
         if not is_own_origin(request.headers.get("Origin"), name, needs_origin):
@@ -61,11 +63,11 @@ def guard(token: str, host: str) -> Middleware:
     return middleware
 
 
-def is_own_host(header: str, host: str) -> bool:
+def is_own_host(header: str, host: str, names: Collection[str]) -> bool:
     """Whether a Host header names this machine. The port may be another one, that of a tunnel.
 
     A server on the loopback interface has its names only. Another one has addresses, which no foreign site
-    can have as its name, the name that it was given, and the machine's.
+    can have as its name, and `names`: the one that it was given, and the machine's.
     """
     name = hostname(f"//{header}") if HOST.fullmatch(header) else None
     if name is None:
@@ -74,7 +76,7 @@ def is_own_host(header: str, host: str) -> bool:
         return True
     if is_loopback(host):
         return False
-    return is_address(name) or name in (host.lower(), socket.gethostname().lower(), socket.getfqdn().lower())
+    return is_address(name) or name in names
 
 
 def is_own_origin(origin: str | None, header: str, required: bool) -> bool:

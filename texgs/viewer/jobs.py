@@ -60,7 +60,10 @@ class Jobs:
 
         def watched_work() -> T:
             with watched(step):
-                return work()
+                result = work()
+            if watch.stop.is_set():  # after the last step, or there was none
+                raise Stopped("It was cancelled; nothing has changed.")
+            return result
 
         return await loop.run_in_executor(self._thread, watched_work)
 

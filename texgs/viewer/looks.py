@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
@@ -33,6 +35,7 @@ from texgs.volume.view_set import View
 LENS = Lens().square(400)  # of the views that parts learn from
 VIEWS = 92
 BETWEEN = 2.0  # seconds between textures on their way that are shown
+KEPT = 20  # files of them: several parts show theirs at a time, and frames may be on their way
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
 GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
@@ -114,7 +117,10 @@ class Looks:
 
     def _typed(self, asked: Look, choice: dict[str, Any]) -> Any:
         (method,) = choice
-        return typed(Edit, {"name": method, "method": method, "parts": list(asked.parts), **choice})
+        edit = typed(Edit, {"name": method, "method": method})
+        # What a page has written is taken as it is: a configuration would look for references in it.
+        chosen = replace(getattr(edit, method), **choice[method])
+        return replace(edit, parts=list(asked.parts), **{method: chosen})
 
     def _make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
         method = method_of(edit)
@@ -140,13 +146,18 @@ class Offered:
 
     def __init__(self, show: Callable[[str, Path], None], folder: Callable[[], Path]) -> None:
         self._show, self._folder, self._latest = show, folder, monotonic()
+        self._shown: deque[Path] = deque()  # folders of the files that a frame may be reading
 
     def __call__(self, part: str, model: Callable[[], Surfels]) -> None:
         """Show a part, unless one was shown a moment ago."""
         if monotonic() - self._latest < BETWEEN:
             return
-        self._show(part, write_texture(self._folder() / part_file("look", part), model()))
+        folder = self._folder()
+        self._show(part, write_texture(folder / part_file("look", part), model()))
         self._latest = monotonic()
+        self._shown.append(folder)
+        if len(self._shown) > KEPT:
+            rmtree(self._shown.popleft())
 
 
 def has_weights(edit: Any) -> bool:

@@ -136,5 +136,7 @@ class Remove:
 class Cancel:
     """Stop the job that is at work, and show no preview any more."""
 
+    only_preview: bool = False  # the job goes on
+
 
 Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Export | Rename | Remove | Cancel

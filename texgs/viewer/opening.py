@@ -10,6 +10,7 @@ from texgs.core.names import label
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene
 
+SCENE = "scene.yaml"  # as jobs write it
 SCENES = (".yaml", ".yml")
 OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
 MOST_LISTED = 5
@@ -41,13 +42,13 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     if path.is_dir():
         path = only_scene(path)
     if path.suffix in SCENES:
-        of_job = (path.parent / OF_JOBS).exists()
+        of_job = path.name == SCENE and (path.parent / OF_JOBS).exists()
         name, file = ("edited.yaml", None) if of_job else (path.name, path)
         return Opened(read_scene(path), title_of(path), folder or path.parent, name, file)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
     scene = Scene({label(str(path), path.stem): SceneModel(path)})
-    return Opened(scene, title_of(path), folder or path.parent, "scene.yaml")
+    return Opened(scene, title_of(path), folder or path.parent, SCENE)
 
 
 def only_scene(folder: Path) -> Path:
@@ -56,7 +57,7 @@ def only_scene(folder: Path) -> Path:
     Raises:
         ArgumentError: if there is none, or several.
     """
-    found = sorted(folder.rglob("scene.yaml"))
+    found = sorted(folder.rglob(SCENE))
     if len(found) != 1:
         some = ", ".join(str(each.relative_to(folder)) for each in found[:MOST_LISTED])
         more = ", ..." if len(found) > MOST_LISTED else ""

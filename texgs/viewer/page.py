@@ -41,6 +41,7 @@ class Page:
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
         self._mask: Mask | None = None
+        self._masking: asyncio.Task[None] | None = None
         self._trial: dict[str, Path | None] = {}
         self._pace = Pace()
         self.answered = 0  # messages that change the scene
@@ -75,29 +76,36 @@ class Page:
         self._notices.append({"type": "notice", "text": text, **more})
         self._wake.set()
 
-    def tell_error(self, error: Exception) -> None:
+    def tell_error(self, error: Exception, **more: Any) -> None:
         """Send what went wrong; what is no mistake of the user is logged here with its place as well."""
         if not isinstance(error, TexgsError):
             log.error("%s", error, exc_info=error)
         text = str(error) if isinstance(error, TexgsError) else f"internal error: {first_line(error)}"
-        self.tell(text, level="error")
+        self.tell(text, level="error", **more)
 
     async def send(self) -> None:
         """Send what waits, until the page is gone. One frame is on its way at a time."""
-        while not self._socket.closed:
-            await self._wake.wait()
-            self._wake.clear()
-            while self._notices:
-                await self._socket.send_str(json.dumps(self._notices.popleft()))
-            news, self._news = self._news, {}
-            for message in news.values():
-                await self._socket.send_str(json.dumps({**message, "answered": self.answered}))
-            if self._mask is not None:
-                mask, self._mask = self._mask, None
-                await self._send_mask(mask)
-            if self._view is not None:
-                view, self._view = self._view, None
-                await self._send_frame(view)
+        try:
+            while not self._socket.closed:
+                await self._wake.wait()
+                self._wake.clear()
+                await self._send_what_waits()
+        finally:
+            if self._masking is not None:
+                self._masking.cancel()
+
+    async def _send_what_waits(self) -> None:
+        while self._notices:
+            await self._socket.send_str(json.dumps(self._notices.popleft()))
+        news, self._news = self._news, {}
+        for message in news.values():
+            await self._socket.send_str(json.dumps(message))
+        if self._mask is not None and (self._masking is None or self._masking.done()):
+            mask, self._mask = self._mask, None
+            self._masking = asyncio.create_task(self._find_mask(mask))
+        if self._view is not None:
+            view, self._view = self._view, None
+            await self._send_frame(view)
 
     def shown(self, view: View) -> Scene:
         """What a view shows on this page.
@@ -109,23 +117,21 @@ class Page:
 
     def _tell_newest(self, message: dict[str, Any]) -> None:
         self._news.pop(message["type"], None)  # the new one goes behind what others wait
-        self._news[message["type"]] = message
+        self._news[message["type"]] = {**message, "answered": self.answered}
         self._wake.set()
 
     async def _send_frame(self, view: View) -> None:
         try:
             frame = await self._frames.frame(view, self.shown(view), self._pace)
         except Exception as error:  # whatever it is, the server goes on
-            self.tell_error(error)
-            self._notices[-1]["frame"] = view.id
+            self.tell_error(error, frame=view.id)
             return
         await self._socket.send_bytes(frame)
 
-    async def _send_mask(self, mask: Mask) -> None:
+    async def _find_mask(self, mask: Mask) -> None:
+        """Find what clicks select: it may have to wait for a job of another page, while frames go on."""
         try:
-            message = await self._segmenter.mask(self._edits.scene, mask)
+            self._tell_newest(await self._segmenter.mask(self._edits.scene, mask))
         except Exception as error:  # whatever it is, the server goes on
-            self.tell_error(error)
-            self._notices[-1]["mask"] = mask.id
-            return
-        await self._socket.send_str(json.dumps(message))
+            self.tell_error(error, mask=mask.id)
+        self._wake.set()  # another may wait

@@ -28,7 +28,7 @@ from texgs.viewer.messages import (
 from texgs.viewer.values import flag, number, parse_json, whole, words
 
 MOST_PIXELS = 4096  # of a side
-FARTHEST = 1000.0  # world units
+NEAREST, FARTHEST = 1e-6, 1e6  # world units
 MOST_POINTS = 100
 MOST_PARTS = 1000
 Reader = Callable[[Mapping[str, Any]], Message]
@@ -84,7 +84,7 @@ def orbit_of(values: Any) -> Orbit:
         target=(x, y, z),
         azimuth=number("camera.azimuth", values.get("azimuth"), -1e6, 1e6),
         polar=number("camera.polar", values.get("polar"), -90, 90),
-        distance=number("camera.distance", values.get("distance"), 1e-3, FARTHEST),
+        distance=number("camera.distance", values.get("distance"), NEAREST, FARTHEST),
         fov_y=number("camera.fov_y", values.get("fov_y"), 1, 150),
         width=whole("camera.width", values.get("width"), 1, MOST_PIXELS),
         height=whole("camera.height", values.get("height"), 1, MOST_PIXELS),
@@ -165,6 +165,11 @@ def _save(values: Mapping[str, Any]) -> Save:
     return Save(words("name", values.get("name")), flag("replace", values.get("replace", False)))
 
 
+def _cancel(values: Mapping[str, Any]) -> Cancel:
+    known(values, ("preview",), "cancel")
+    return Cancel(flag("preview", values.get("preview", False)))
+
+
 def _bare(message: Message) -> Reader:
     """Reads a message that has no values."""
 
@@ -187,5 +192,5 @@ READERS: dict[str, Reader] = {
     "export": _export,
     "rename": _rename,
     "remove": _remove,
-    "cancel": _bare(Cancel()),
+    "cancel": _cancel,
 }

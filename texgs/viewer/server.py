@@ -125,7 +125,7 @@ class Server:
                     raise ArgumentError("message: expected text, got bytes")
                 await self._answer(parse(received.data), page, number)
             except Exception as error:  # whatever a page sends, the server goes on
-                page.tell_error(error)
+                page.tell_error(error, refused=True)
                 page.tell_scene(self.scene_message())  # it shows what it has asked for already
 
     async def _answer(self, message: Message, page: Page, number: int) -> None:
@@ -140,7 +140,8 @@ class Server:
         elif isinstance(message, Export):
             self.work.begin_export(message, page)
         elif isinstance(message, Cancel):
-            self.work.stop(page)
+            if not message.only_preview:
+                self.work.stop(page)
             page.try_on(None)
         else:
             try:
@@ -203,5 +204,5 @@ class Server:
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:
         yield
-        self.work.close()
+        await asyncio.to_thread(self.work.close)
         self.frames.close()

@@ -9,7 +9,7 @@ from typing import Any
 
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT
 from texgs.core.names import file_name, part_file
 from texgs.scene.parts import part_names, with_textures
@@ -82,7 +82,7 @@ class SharedEdits:
         goes_on = step is not None and step == self._latest and self._session.undo()
         try:
             self._change(edit)
-        except TexgsError:
+        except Exception:
             if goes_on:
                 self._session.redo()
             raise
@@ -115,7 +115,10 @@ class SharedEdits:
         Raises:
             ArgumentError: if there is no such segment, or it cannot have the name.
         """
+        before = self.scene
         self._session.rename_segment(part, name)
+        if self.scene is before:
+            return
         self._step(f"{part} renamed to {name}")
 
     def remove_segment(self, part: str) -> None:

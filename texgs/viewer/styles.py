@@ -6,6 +6,7 @@ import io
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from threading import Lock
 
 import numpy as np
 from PIL import Image
@@ -26,6 +27,7 @@ class Styles:
     def __init__(self) -> None:
         self._folder = TemporaryDirectory(prefix="texgs-styles-")
         self._files: dict[str, Path] = {}
+        self._adding = Lock()  # pages may send several at once
 
     def add(self, name: str, content: bytes) -> str:
         """Take a file in; the name that it has from then on.
@@ -37,6 +39,10 @@ class Styles:
         Raises:
             ArgumentError: if it is no picture that a style can be taken from, or there are too many.
         """
+        with self._adding:
+            return self._add(name, content)
+
+    def _add(self, name: str, content: bytes) -> str:
         if len(self._files) >= MOST:
             raise ArgumentError(f"style: expected at most {MOST} pictures, got another one; start again")
         known = f"{len(self._files) + 1} {file_name('style', name)}"

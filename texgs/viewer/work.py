@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
@@ -14,6 +15,7 @@ import torch
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import require_name
+from texgs.edit.parts import parts_with_surfels
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.scene.scene import Scene
 from texgs.viewer.downloads import Downloads, require_kind
@@ -100,7 +102,8 @@ class Work:
 
     def _begin(self, page: Page, job: Callable[[Watch], Awaitable[None]]) -> None:
         if self._task is not None and not self._task.done():
-            raise ArgumentError("a job is at work already: wait for it, or cancel it")
+            of = " for another page: wait for it" if page is not self._page else ": wait for it, or cancel it"
+            raise ArgumentError(f"a job is at work already{of}")
         self._page, self._stop = page, threading.Event()
         self._task = asyncio.create_task(self._work(page, job, Watch(page.tell_job, self._stop)))
 
@@ -126,7 +129,10 @@ class Work:
     async def _look(self, asked: Look, edit: Any, page: Page, watch: Watch) -> None:
         """Textures on their way show on the page that asked; those of a preview stay until others come."""
         scene, loop = self._edits.scene, asyncio.get_running_loop()
-        name = asked.style or asked.instruction
+        name, parts = asked.style or asked.instruction, asked.parts
+        if not parts:
+            parts = tuple(await asyncio.to_thread(parts_with_surfels, scene))
+            edit = replace(edit, parts=list(parts))
         output = self._looks.trial_folder() if asked.is_preview else self._edits.new_folder(edit.name)
 
         def show(part: str, file: Path) -> None:
@@ -134,16 +140,15 @@ class Work:
 
         try:
             edited = await self._looks.make(scene, edit, output, watch, show)
-            textures = textures_of(edited.scene, asked.parts)
+            textures = textures_of(edited.scene, parts)
             if asked.is_preview:
                 page.try_on(textures)
                 return
-            try:
-                async with self._changing:
-                    await asyncio.to_thread(self._edits.give_textures, textures, name)
-            except Exception:
-                rmtree(output)
-                raise
+            async with self._changing:
+                await asyncio.to_thread(self._edits.give_textures, textures, name)
+        except Exception:
+            rmtree(output, ignore_errors=True)
+            raise
         finally:
             if not asked.is_preview:
                 page.try_on(None)
@@ -155,6 +160,6 @@ class Work:
         page.tell(f"{path.name}: {path.stat().st_size / 2**20:.1f} MiB", level="file", name=path.name)
 
 
-def textures_of(scene: Scene, parts: tuple[str, ...]) -> dict[str, Path | None]:
-    """Texture files of parts of a scene; of all models where none is named."""
-    return {part: entry_of(scene, part).texture for part in parts or scene.models}
+def textures_of(scene: Scene, parts: Sequence[str]) -> dict[str, Path | None]:
+    """Texture files of parts of a scene."""
+    return {part: entry_of(scene, part).texture for part in parts}

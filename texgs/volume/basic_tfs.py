@@ -49,15 +49,22 @@ def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
     check_disjoint(basic)
     opacity: list[tuple[float, ...]] = []
     color: list[tuple[float, ...]] = []
+    end = 0.0  # of what the functions so far show
     for tf in sorted(basic.values(), key=lambda each: each.support):
         low, high = tf.support
         points = list(_cut(tf.opacity, low, high))
         if not opacity or opacity[-1][0] < low:  # transparent between two, also where one ends in a step
             points = [(low, 0.0), *points] if points[0][1] > 0 else points
-            opacity += [(opacity[-1][0], 0.0)] if opacity and opacity[-1][1] > 0 else []
+            opacity += [(end, 0.0)] if opacity and opacity[-1][1] > 0 and end < low else []
         opacity += points
+        end = just_above(high) if tf(high)[3] > 0 else high
         color += _cut(tf.color, low, high)
     return TransferFunction(tuple(opacity), tuple(color))  # type: ignore[arg-type]
+
+
+def just_above(value: float) -> float:
+    """The next number in single precision: a function whose opacity ends above 0 holds at its end."""
+    return float(np.nextafter(np.float32(value), np.float32(np.inf)))
 
 
 def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Collection
+from copy import copy
 from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 from functools import cache
@@ -91,7 +92,7 @@ class Caster:
 
     def __init__(self, grid: Grid, appearance: Appearance, device: torch.device | str = "cpu") -> None:
         self._appearance, self._device = appearance, torch.device(device)
-        values = np.ascontiguousarray(grid.values, grid.values.dtype.newbyteorder("="))
+        values = np.require(grid.values, grid.values.dtype.newbyteorder("="), ["C", "ALIGNED"])
         kind = "uint8" if values.dtype == bool else values.dtype.name
         if kind not in TYPES:
             raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
@@ -103,11 +104,18 @@ class Caster:
         )
         _describe(self._device.type)
         bricks = native.library(self._device.type).texgs_volume_bricks(byref(self._volume), (c_int32 * 3)())
+        require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
         self._extremes = torch.empty(bricks, 2, device=self._device)
         missing = torch.zeros(1, dtype=torch.int64, device=self._device)
         self._call("texgs_volume_extremes", self._extremes.data_ptr(), missing.data_ptr())
         self.missing = int(missing)
         self._prepared: tuple[TransferFunction, Tensor, Tensor] | None = None
+
+    def looking(self, appearance: Appearance) -> Caster:
+        """The same volume with another shading and sampling; nothing is read again."""
+        other = copy(self)
+        other._appearance = appearance
+        return other
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
         """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values.
@@ -179,10 +187,17 @@ def points_of(tf: TransferFunction) -> Tensor:
             np.concatenate([limit(table, value) for table in (tf.opacity, tf.color)])
             for limit in (_left_limit, _right_limit)
         )
-        if value in inner and (before != at).any():
-            rows.append([value, *before])
-        rows.append([value, *at])
-    return torch.tensor(np.array(rows), dtype=torch.float32)
+        is_step = value > low and bool((before != at).any())
+        rows += [[value, *before], [value, *at]] if is_step else [[value, *at]]
+        if is_step and value == high:
+            rows.append(rows[-1])  # the last interval has no width: values at its start have those of its end
+    points = torch.tensor(np.array(rows), dtype=torch.float32)
+    if not points[0, 0] < points[-1, 0]:
+        raise ArgumentError(
+            "transfer function: expected values that differ in single precision, got "
+            f"{low:.9g} to {high:.9g}; scale or shift the data"
+        )
+    return points
 
 
 def _right_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[np.float64]:

@@ -96,9 +96,9 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> Arr
         turn = nibabel.io_orientation(image.affine)
         if np.isnan(turn).any():
             raise ArgumentError("expected three independent axes, got a singular affine matrix")
-        require_room(dims_of(shape[::-1]), stored)
         proxy: Any = image.dataobj
         is_scaled = (proxy.slope, proxy.inter) != (1, 0)
+        require_room(dims_of(shape[::-1]), np.dtype(np.float32) if is_scaled else stored)
         samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
         values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]
         affine = image.affine @ nibabel.orientations.inv_ornt_aff(turn, shape)

@@ -13,9 +13,12 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
+from texgs.core.memory import require_memory
 from texgs.volume.boxes import Box, content_box
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
+
+BYTES = 64  # of memory for a pixel of a view that is being read
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +81,21 @@ def load(views: Sequence[View], reduce: int = 1) -> Images:
 
     Raises:
         ArgumentError: if there is no view, or the size cannot be divided.
+        OutOfMemoryError: if the views would not fit into memory.
     """
     if not views:
         raise ArgumentError("views: expected at least one, got none")
     height, width = views[0].camera.height, views[0].camera.width
     if height % reduce or width % reduce:
         raise ArgumentError(f"reduce: expected a divisor of {width} x {height} pixels, got {reduce}")
+    threads = torch.get_num_threads()
+    pixels = 4 * len(views) * (height // reduce) * (width // reduce) + BYTES * height * width * threads
+    require_memory(pixels, f"{len(views)} views of {width} x {height} pixels", "raise fit.reduce")
     planes = torch.empty(len(views), 4, height // reduce, width // reduce, dtype=torch.uint8)
 
     def read(index: int) -> None:
         planes[index] = over_white(views[index], reduce).mul_(255).round_().to(torch.uint8)
 
-    with ThreadPoolExecutor() as pool:
+    with ThreadPoolExecutor(threads) as pool:
         list(pool.map(read, range(len(views))))
     return Images(planes, [smaller(view.camera, reduce) for view in views], [view.light for view in views])

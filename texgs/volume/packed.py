@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import bz2
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +20,22 @@ Unpack = Callable[[bytes, int], bytes]  # of a stream, and how much of it at mos
 
 
 def deflated(packed: bytes, most: int) -> bytes:
-    """Bytes of a zlib or gzip stream."""
-    return zlib.decompressobj(ZLIB_OR_GZIP).decompress(packed, most)
+    """Bytes of zlib or gzip streams, one behind the other."""
+    return b"".join(streams(packed, most, partial(zlib.decompressobj, ZLIB_OR_GZIP)))
 
 
 def bzip2(packed: bytes, most: int) -> bytes:
-    """Bytes of a bzip2 stream."""
-    return bz2.BZ2Decompressor().decompress(packed, most)
+    """Bytes of bzip2 streams, one behind the other."""
+    return b"".join(streams(packed, most, bz2.BZ2Decompressor))
+
+
+def streams(packed: bytes, most: int, start: Callable[[], Any]) -> Iterator[bytes]:
+    """Bytes of each stream: programs that pack on several cores write many."""
+    while packed and most > 0:
+        stream = start()
+        part = stream.decompress(packed, most)
+        yield part
+        packed, most = stream.unused_data, most - len(part)
 
 
 def unpacked(

@@ -16,6 +16,7 @@ from texgs.core.image import write_png
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.core.progress import progress
+from texgs.volume.appearance import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import View
 
@@ -24,6 +25,9 @@ class Mapper(Protocol):
     """What renders a volume: `Caster` or `VtkMapper`."""
 
     local_viewer: bool  # whether directions to viewer and headlight differ from point to point
+
+    def looking(self, appearance: Appearance) -> Mapper:
+        """The same volume with another shading."""
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
         """Premultiplied RGBA [H, W, 4] in [0, 1]."""

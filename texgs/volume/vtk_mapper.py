@@ -6,6 +6,8 @@ Its shading is Phong's, with a viewer nearby: highlights differ from those of `t
 from __future__ import annotations
 
 import os
+from copy import copy
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -60,6 +62,12 @@ class VtkMapper:
         self._light = vtkLight()
         self._plotter.renderer.AddLight(self._light)
         self._plotter.renderer.AddVolume(self._volume)
+
+    def looking(self, appearance: Appearance) -> VtkMapper:
+        """The same volume and window with another shading; `step` stays."""
+        other = copy(self)
+        other._appearance = replace(appearance, step=self._appearance.step)
+        return other
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
         """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""

@@ -55,7 +55,7 @@ rule gallery:
         log_of("gallery"),
     threads: 4
     resources:
-        gpu=FIT_GPU,
+        gpu=max(MAPPER_GPU, FIT_GPU),
     params:
         code=code("gallery"),
         words=words("gallery"),

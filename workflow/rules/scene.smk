@@ -32,7 +32,7 @@ rule pse:
         log_of("pse"),
     threads: 4
     resources:
-        gpu=FIT_GPU,
+        gpu=max(MAPPER_GPU, FIT_GPU),
     params:
         code=code("pse"),
         words=words("pse"),
@@ -50,7 +50,7 @@ rule timing:
         log_of("timing"),
     threads: 16
     resources:
-        gpu=FIT_GPU,
+        gpu=max(MAPPER_GPU, FIT_GPU),
     params:
         code=code("timing"),
         words=words("timing"),

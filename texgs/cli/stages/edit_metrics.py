@@ -1,12 +1,13 @@
 """Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from texgs.cli.stages.edit import Settings as EditSettings
 from texgs.cli.stages.outcome import Outcome
@@ -55,7 +56,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     device = torch_device(settings.fit.device)
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
     scenes = after.open(device), before.open(device)
-    cameras = [camera.to(device) for camera in spiral(views.test.count, *views.lens)]
+    cameras = [camera.to(device) for camera in spiral(max(2, views.test.count), *views.lens)]
     some = spread(cameras, settings.compared)
     frames = milliseconds(
         lambda camera: scenes[0].render(camera, after.light, after.edits), spread(cameras, FRAMES), title
@@ -179,12 +180,11 @@ def clip_numbers(
     if not edit.source_caption or not edit.target_caption:
         return {"clip_missing": "the edit has no captions"}
     clip = Clip.load(backbone, compositions[0].device)
-    edited, originals = (
-        (
-            composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
-            for camera in progress(cameras, title=f"{title}, CLIP", unit="view")
-        )
-        for scene, composition in zip(scenes, compositions, strict=True)
-    )
+
+    def views_of(scene: Scene, composition: Composed) -> Iterator[Tensor]:
+        for camera in progress(cameras, title=f"{title}, CLIP", unit="view"):
+            yield composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
+
+    edited, originals = map(views_of, scenes, compositions)
     scores = clip_scores(clip, edited, originals, edit.source_caption, edit.target_caption)
     return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}

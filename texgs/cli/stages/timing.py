@@ -31,7 +31,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         output: folder.
     """
     scene, views = read_scene(inputs["scene"]), settings.views
-    path = spiral(views.test.count, *views.lens)
+    path = spiral(max(2, views.test.count), *views.lens)
     composition = scene.open(torch_device(settings.fit.device))
     title = f"{settings.dataset}: timing"
     device = composition.device
@@ -51,8 +51,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     )
     if "volume" in inputs:
         volume = VolumeScene(settings, inputs["volume"])
+        edits = {name: model.edit for name, model in scene.models.items()}
         of_volume = milliseconds(
-            lambda camera: volume.render(camera, scene.light, scene.edits),
+            lambda camera: volume.render(camera, scene.light, edits),
             spread(path, VOLUME_FRAMES),
             f"{title}, volume",
         )
@@ -64,11 +65,17 @@ def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], 
     """Milliseconds of each frame, the first ones not counted."""
     for camera in cameras[:WARM]:
         render(camera)
+    settle()
     times = []
     for camera in progress(cameras, title=title, unit="frame"):
         start = time.perf_counter()
         render(camera)
-        if torch.cuda.is_available():
-            torch.cuda.synchronize()
+        settle()
         times.append(1e3 * (time.perf_counter() - start))
     return times
+
+
+def settle() -> None:
+    """Wait for a GPU, where one is at work."""
+    if torch.cuda.is_initialized():
+        torch.cuda.synchronize()

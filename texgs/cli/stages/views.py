@@ -76,7 +76,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             )
     turntable(mapper, tf, views, output, title)
     if views.geometry:
-        write_geometry(Caster(grid, appearance), tf, shots["test"], output / "geometry", title)
+        caster = mapper if isinstance(mapper, Caster) else Caster(grid, appearance)
+        write_geometry(caster, tf, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
         write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
     return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
@@ -139,8 +140,11 @@ def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folde
         if path.exists():
             continue
         seen = caster.cast(tf, view.camera, view.light, ("depth", "normal"))
-        depth, normal = np.asarray(seen.depth), np.asarray(seen.normal, np.float16)
-        write = partial(np.savez_compressed, depth=depth, normal=normal)
+        planes = {"depth": seen.depth, "normal": seen.normal}
+        arrays = {name: x.cpu().numpy() for name, x in planes.items() if x is not None}
+        write = partial(
+            np.savez_compressed, depth=arrays["depth"], normal=arrays["normal"].astype(np.float16)
+        )
         write_atomic(path, write)
 
 

@@ -1,8 +1,10 @@
 """The volume with all basic TFs, edited as a scene is: what its pictures are compared with."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +15,8 @@ from texgs.core.camera import Camera
 from texgs.core.io import read_json
 from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
-from texgs.volume.appearance import Appearance
 from texgs.volume.basic_tfs import combine
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.render import Mapper
 from texgs.volume.transfer import TransferFunction
 
 
@@ -36,15 +36,14 @@ class VolumeScene:
         }
         self.grid = open_grid(volume)
         self.look = appearance_of(settings.views)
-        self.kind = settings.views.mapper
-        self._mappers: dict[Appearance, Mapper] = {}
+        self._mapper = mapper_for(settings.views.mapper, self.grid, self.look)
 
     def render(
         self,
         camera: Camera,
         light: Light,
-        edits: Sequence[PartEdit] | None = None,
-        palettes: Sequence[Sequence[float]] = (),
+        edits: Mapping[str, PartEdit] | None = None,
+        palettes: Mapping[str, Sequence[float]] | None = None,
     ) -> np.ndarray:
         """Premultiplied RGBA [H, W, 4] of all visible basic TFs with edits.
 
@@ -54,30 +53,43 @@ class VolumeScene:
         Args:
             camera: from where.
             light: shines on it.
-            edits: one for each basic TF; by default nothing is changed.
-            palettes: as fitted, of each model; needed where an edit changes one.
+            edits: by basic TF, those of the models of a scene; by default nothing is changed.
+            palettes: as fitted, by model; needed where an edit changes one.
         """
-        edits = [PartEdit()] * len(self.tfs) if edits is None else edits
-        shown = {}
-        for index, (name, edit) in enumerate(zip(self.tfs, edits, strict=True)):
-            if edit.visible and edit.opacity > 0:
-                shown[name] = edited(self.tfs[name], edit, palettes[index] if edit.palette else ())
-        if not shown:
+        edits = dict.fromkeys(self.tfs, PartEdit()) if edits is None else edits
+        visible = {name: edit for name, edit in edits.items() if edit.visible and edit.opacity > 0}
+        if not visible:
             return np.zeros((camera.height, camera.width, 4), dtype=np.float32)
-        first = next(edit for edit in edits if edit.visible and edit.opacity > 0)
-        names = ("ambient", "diffuse", "specular", "shininess")
+        shown = {
+            name: edited(self.tfs[name], edit, (palettes or {})[name] if edit.palette else ())
+            for name, edit in visible.items()
+        }
+        first, names = next(iter(visible.values())), ("ambient", "diffuse", "specular", "shininess")
         factors = {name: getattr(self.look, name) * getattr(first, name) for name in names}
-        look = replace(self.look, **factors)
-        if look not in self._mappers:
-            self._mappers[look] = mapper_for(self.kind, self.grid, look)
-        return self._mappers[look].render(combine(shown), camera, light)
+        self._mapper = self._mapper.looking(replace(self.look, **factors))
+        return self._mapper.render(combine(shown), camera, light)
 
 
 def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
-    """A basic TF with an edit's colour and opacity."""
-    opacity = tuple((value, min(1.0, alpha * edit.opacity)) for value, alpha in tf.opacity)
-    color = tf.color
-    if edit.palette is not None:
-        moved = np.subtract(edit.palette, palette)
-        color = tuple((point[0], *np.clip(np.add(point[1:], moved), 0, 1).tolist()) for point in tf.color)
-    return TransferFunction(opacity, color)
+    """A basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
+    opacity = clipped([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
+    if edit.palette is None:
+        return TransferFunction(opacity, tf.color)
+    moved = np.subtract(edit.palette, palette)
+    return TransferFunction(opacity, clipped([(value, *np.add(rgb, moved)) for value, *rgb in tf.color]))
+
+
+def clipped(points: Sequence[tuple[float, ...]]) -> Any:
+    """Points of a piecewise linear function that is cut off at 0 and 1, with those where that begins."""
+    made = [points[0]]
+    for before, after in pairwise(points):
+        places = {
+            (bound - one) / (other - one)
+            for one, other in zip(before[1:], after[1:], strict=True)
+            for bound in (0, 1)
+            if min(one, other) < bound < max(one, other) and before[0] < after[0]
+        }
+        for t in sorted(places):
+            made.append(tuple((1 - t) * one + t * other for one, other in zip(before, after, strict=True)))
+        made.append(after)
+    return tuple((value, *np.clip(channels, 0, 1).tolist()) for value, *channels in made)

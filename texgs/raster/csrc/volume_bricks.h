@@ -23,7 +23,7 @@ inline void check_volume(const texgs_volume& volume) {
 }
 
 inline void check_points(const texgs_transfer& transfer) {
-    require(transfer.n >= 2 && transfer.n <= 1024, "transfer function: expected 2 to 1024 points");
+    require(transfer.n >= 2 && transfer.n <= 1 << 16, "transfer function: expected 2 to 65536 points");
 }
 
 inline void check_cast(const texgs_cast_view& view) {

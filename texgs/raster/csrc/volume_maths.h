@@ -84,6 +84,8 @@ TEXGS_MATHS void clip(const CastRay& ray, const Extent& box, int32_t& first, int
         enter = near > enter ? near : enter;
         leave = far < leave ? far : leave;
     }
+    enter = enter < static_cast<float>(ray.samples) ? enter : static_cast<float>(ray.samples);
+    leave = leave > -1.0f ? leave : -1.0f;
     first = static_cast<int32_t>(enter > 1.0f ? enter - 1.0f : 0.0f);  // rounding must not pass one by
     end = leave + 1.0f < static_cast<float>(ray.samples) ? static_cast<int32_t>(leave + 1.0f) : ray.samples;
 }
@@ -147,12 +149,13 @@ TEXGS_MATHS Lamp lamp_of(const texgs_cast_view& view) {
     return lamp;
 }
 
-// A unit vector, or 0.
+// A unit vector, or 0: also where a difference reaches to a missing or an infinite sample.
 template <class F>
 TEXGS_MATHS Vec3<F> unit(Vec3<F> v) {
-    const F length = sqrt(dot(v, v));
-    const F scale = select(F(1e-18f) < length, F(1.0f) / length, F(0.0f));
-    return scale * v;
+    const F length = sqrt(dot(v, v)), scale = F(1.0f) / length, zero = 0.0f;
+    const auto is_known = (F(1e-18f) < length) & (length < F(3e38f));
+    return {select(is_known, scale * v.x, zero), select(is_known, scale * v.y, zero),
+            select(is_known, scale * v.z, zero)};
 }
 template <class F>
 TEXGS_MATHS F along(Vec3<F> v, const float (&d)[3]) {

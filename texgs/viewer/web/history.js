@@ -18,7 +18,7 @@ export class EditHistory {
     get("redo").onclick = () => page.state.redo();
     get("before").onclick = () => this.#compare();
     document.addEventListener("keydown", (event) => {
-      if (!TYPED.includes(event.target.type) && this.#press(event)) event.preventDefault();
+      if (this.#press(event, TYPED.includes(event.target.type))) event.preventDefault();
     });
     page.state.addEventListener("change", () => this.#show());
     this.#show();
@@ -34,17 +34,21 @@ export class EditHistory {
     }
   }
 
-  /** Whether a key does something. */
-  #press({ key, ctrlKey, metaKey, altKey, shiftKey }) {
+  /** Whether a key does something; while somebody types, only what is held does. */
+  #press({ key, ctrlKey, metaKey, altKey, shiftKey }, isTyping) {
     const { state } = this.#page, low = key.toLowerCase();
     if (document.querySelector("dialog[open]") || altKey) return false;
+    if ((ctrlKey || metaKey) && low in this.#held) {
+      this.#held[low]();
+      return true;
+    }
+    if (isTyping) return false;
     if (!(ctrlKey || metaKey)) {
       if (low === "b") this.#compare();
       return low === "b";
     }
     if (low === "z" && !shiftKey) state.undo();
     else if (low === "y" || low === "z") state.redo();
-    else if (low in this.#held) this.#held[low]();
     else return false;
     return true;
   }

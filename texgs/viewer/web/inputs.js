@@ -9,7 +9,8 @@ export function gesture(input, edit) {
     step ||= ++gestures;
     edit(step);
   });
-  input.addEventListener("change", () => { step = 0; });
+  // a value that was typed and typed back makes no "change"
+  for (const end of ["change", "blur"]) input.addEventListener(end, () => { step = 0; });
   return { isBusy: () => step !== 0 };
 }
 
@@ -60,14 +61,16 @@ export function slider(label, what, { max, most = 1000, unedited = 1, min = 0, s
   const reset = resetButton(what, () => edit(null, 0));
   const row = element("div", { className: "row" }, element("span", { className: "name" }, label), range, number,
     reset);
+  let latest = unedited;
   const show = (value) => {
+    latest = value;
     if (uses.some((use) => use.isBusy())) return;
     range.value = value;
     number.value = Number(value.toFixed(3));
     reset.disabled = value === unedited;
   };
-  const enable = (enabled) => { range.disabled = number.disabled = !enabled; };
-  return { row, show, enable };
+  number.addEventListener("blur", () => show(latest)); // where it was left empty
+  return { row, show };
 }
 
 /** A colour with a button that resets it. */
@@ -90,13 +93,14 @@ export function tick(label, edit, properties = {}) {
   return { row, show: (value) => { input.checked = value; } };
 }
 
-/** Ask for a text in a dialog that has one input; null where none was given. */
-export function ask(dialog, text) {
-  const input = dialog.querySelector("input");
-  input.value = text;
+/** Ask in a dialog that has one input, for a text or a choice; null where none was given. */
+export function ask(dialog, value) {
+  const input = dialog.querySelector("input, select");
+  input.value = value;
   dialog.returnValue = "";
   dialog.showModal();
-  input.select();
+  input.focus();
+  input.select?.();
   return new Promise((resolve) => {
     dialog.onclose = () => resolve(dialog.returnValue ? input.value.trim() : null);
   });

@@ -2,9 +2,11 @@
 
 const get = (id) => document.getElementById(id);
 
-/** Dispatches "begin" and "end"; detail.hasFailed says whether nothing came of it. */
+/** Dispatches "begin" and "end"; detail.kind is the type of the message that asked for it, and detail.hasFailed
+ * says whether nothing came of it. */
 export class Job extends EventTarget {
   isAtWork = false;
+  kind = "";
   #connection;
 
   constructor(connection) {
@@ -19,12 +21,20 @@ export class Job extends EventTarget {
 
   /** Ask for something; whether there was a connection to ask by. */
   begin(message) {
-    return !this.isAtWork && this.#connection.send(message);
+    const isAsked = !this.isAtWork && this.#connection.send(message);
+    if (isAsked) this.kind = message.type;
+    return isAsked;
   }
 
   /** Stop what is being made, and take a preview off. */
   cancel() {
     this.#connection.send({ type: "cancel" });
+  }
+
+  /** The same, unless what is being made is of another kind: that goes on. */
+  leave(kind) {
+    const isOther = this.isAtWork && this.kind !== kind;
+    this.#connection.send({ type: "cancel", preview: isOther });
   }
 
   #show({ title, done, failed = false }) {
@@ -36,6 +46,7 @@ export class Job extends EventTarget {
       get("job-title").textContent = title;
     }
     if (wasAtWork === this.isAtWork) return;
-    this.dispatchEvent(new CustomEvent(this.isAtWork ? "begin" : "end", { detail: { hasFailed: failed } }));
+    const detail = { kind: this.kind, hasFailed: failed };
+    this.dispatchEvent(new CustomEvent(this.isAtWork ? "begin" : "end", { detail }));
   }
 }

@@ -1,11 +1,10 @@
 // The light: at the camera, or from a direction that is dragged on a ball or set by its angles.
 
-import { angles, direction } from "./camera.js";
+import { angles, direction, dot } from "./camera.js";
 import { element, gesture, slider, tick } from "./inputs.js";
 
 const SIZE = 96; // CSS pixels of the ball
 const BALL = 0.46; // its radius, part of the size
-const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 
 export class LightControl {
   #state; #camera; #canvas; #headlight; #azimuth; #polar;

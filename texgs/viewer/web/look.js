@@ -10,7 +10,7 @@ export class LookTool {
   #isTried = false; // whether the page shows a preview, or a look on its way
 
   /**
-   * @param {object} page - with connection, job, notices, state, and draw()
+   * @param {object} page - with canvas, connection, job, notices, state, beginLook() and draw()
    * @param {{styles: string[], words: string[]}} choices - pictures and words that the server knows
    */
   constructor(page, { styles, words }) {
@@ -31,6 +31,7 @@ export class LookTool {
     connection.addEventListener("message", ({ detail }) => {
       if (detail.type === "trial") this.#try(detail.parts);
     });
+    connection.addEventListener("lost", () => this.#try([]));
     for (const event of ["begin", "end"]) job.addEventListener(event, () => this.#show());
     state.addEventListener("change", () => this.#showParts());
     this.#showParts();
@@ -40,6 +41,7 @@ export class LookTool {
   start(part = ALL) {
     get("look").hidden = false;
     get("look-part").value = part;
+    if (get("look-part").selectedIndex < 0) get("look-part").selectedIndex = 0;
     get("look-styles").querySelector("input").focus();
     this.#show();
   }
@@ -47,7 +49,9 @@ export class LookTool {
   /** Take the preview off, and close. */
   leave() {
     if (get("look").hidden) return;
-    if (this.#isTried || this.#page.job.isAtWork) this.#page.job.cancel();
+    const { job } = this.#page;
+    if (this.#isTried || (job.isAtWork && job.kind === "look")) job.leave("look");
+    if (get("look").contains(document.activeElement)) this.#page.canvas.focus();
     get("look").hidden = true;
   }
 
@@ -89,8 +93,8 @@ export class LookTool {
     document.addEventListener("drop", (event) => {
       event.preventDefault();
       if (!event.dataTransfer.files.length || this.#page.job.isAtWork) return;
-      if (get("look").hidden) this.start();
-      this.#send(event.dataTransfer.files);
+      if (get("look").hidden) this.#page.beginLook();
+      if (!get("look").hidden) this.#send(event.dataTransfer.files);
     });
   }
 

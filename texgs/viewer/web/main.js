@@ -31,12 +31,12 @@ class Page extends ScenePage {
     this.looks = new LookTool(this, choices);
     this.panel = new Panel(this.state,
       { models: get("models"), background: get("background"), steps: get("steps") },
-      { segment: (model) => this.#segment(model), look: (part) => this.#look(part),
+      { segment: (model) => this.#segment(model), look: (part) => this.beginLook(part),
         rename: (part) => this.#rename(part), remove: (part) => this.state.remove(part) });
     this.toolbar = new Toolbar(this, choices);
     get("transfer-section").hidden = !scene.transfer;
     if (scene.transfer) new TransferPanel(get("transfer"), scene.transfer, (only) => this.#single(only));
-    get("look-start").onclick = () => this.#look();
+    get("look-start").onclick = () => this.beginLook();
     get("look-start").disabled = !scene.models.some((model) => model.can.includes("look"));
     this.follow();
   }
@@ -47,19 +47,20 @@ class Page extends ScenePage {
   }
 
   #segment(model) {
-    if (!this.#mayBegin()) return;
+    if (!this.mayBegin()) return;
     this.looks.leave();
     this.segments.start(model);
   }
 
-  #look(part) {
-    if (!this.#mayBegin()) return;
+  /** Choose a new look for a part, or for all. */
+  beginLook(part) {
+    if (get("look-start").disabled || !this.mayBegin()) return;
     this.segments.leave();
     this.looks.start(part);
   }
 
-  /** Whether nothing is being made. */
-  #mayBegin() {
+  /** Whether nothing is being made here; says so where something is. */
+  mayBegin() {
     if (this.job.isAtWork) this.notices.tell("Something is being made: wait for it, or cancel it.", "info");
     return !this.job.isAtWork;
   }
@@ -73,6 +74,11 @@ class Page extends ScenePage {
   adopt(message) {
     get("title").textContent = get("title").title = message.scene.name;
     const isAnother = message.run && this.run && message.run !== this.run;
+    if (isAnother && message.scene.name !== this.state.scene.name) {
+      location.replace(location.pathname); // nothing of this page is of the other scene
+      return;
+    }
+    if (isAnother) this.state.original = message.original;
     const lost = isAnother ? difference(message.scene, this.state.scene) : [];
     this.run = message.run ?? this.run;
     this.state.adopt(message);

@@ -18,7 +18,8 @@ export class Notices {
   tell(text, level = "info") {
     const shown = [...this.#root.querySelectorAll(".passing")];
     shown.find((each) => each.dataset.text === text)?.remove();
-    if (shown.length >= MOST) shown[0].remove();
+    const going = shown.filter((each) => !each.classList.contains("offer"));
+    if (going.length >= MOST) going[0].remove();
     const notice = element("p", { className: `notice passing ${level}` }, text);
     notice.dataset.text = text;
     notice.append(element("button", { "aria-label": "Close", onclick: () => notice.remove() }, "×"));

@@ -46,6 +46,8 @@ export class Panel {
   }
 
   #build(structure) {
+    const used = this.#root.contains(document.activeElement) && document.activeElement.getAttribute("aria-label");
+    const opened = new Set([...this.#root.querySelectorAll("details[open]")].map((each) => each.dataset.part));
     this.#structure = structure;
     this.#parts.clear();
     this.#root.replaceChildren(...this.#state.scene.models.map((model) => {
@@ -57,6 +59,8 @@ export class Panel {
       }
       return box;
     }));
+    for (const each of this.#root.querySelectorAll("details")) each.open = opened.has(each.dataset.part);
+    if (used) [...this.#root.querySelectorAll("[aria-label]")].find((each) => each.ariaLabel === used)?.focus();
   }
 
   #segment(model, name) {
@@ -95,6 +99,7 @@ export class Panel {
     const factors = Object.entries(FACTORS).filter(([key]) => can.includes(key));
     if (factors.length) {
       const material = element("details", {}, element("summary", {}, "Material"));
+      material.dataset.part = part;
       for (const [key, max] of factors) add(material, key, factor(key, max));
       box.append(material);
     }

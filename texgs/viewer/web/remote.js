@@ -1,6 +1,6 @@
 // The renderer on the server: asks for frames and shows them. The next one is asked for when the last is there.
 
-const MOST_PIXELS = 4096; // of a side, as the server has it
+import { sizeOf } from "./size.js";
 
 export class Remote {
   #canvas; #context; #notice; #connection;
@@ -28,7 +28,8 @@ export class Remote {
     this.modes = scene.modes;
     connection.addEventListener("frame", ({ detail }) => this.#receive(detail));
     connection.addEventListener("message", ({ detail }) => {
-      if (detail.frame === this.#asked) this.#next(); // it could not be rendered; a notice says why
+      // it could not be rendered, or asked for; a notice says why
+      if (detail.frame === this.#asked || detail.refused) this.#next();
     });
     connection.addEventListener("open", () => {
       this.#wanted ??= this.#latest;
@@ -39,20 +40,13 @@ export class Remote {
 
   /** Size of the picture in pixels of the screen. */
   size() {
-    const { clientWidth, clientHeight } = this.#canvas, ratio = window.devicePixelRatio;
-    const scale = Math.min(ratio, MOST_PIXELS / Math.max(clientWidth, clientHeight, 1));
-    return [clientWidth, clientHeight].map((side) => Math.max(1, Math.round(scale * side)));
+    return sizeOf(this.#canvas);
   }
 
   /** Ask for a frame; of those that cannot be asked for at once, the newest is. */
   draw(camera, scene, { moving, mode = "shaded", before = false, only = "" }) {
     this.#wanted = { camera: camera.wire(...this.size()), mode, moving, before, only };
     if (this.#asked === null) this.#next();
-  }
-
-  /** Have no more of it. */
-  dispose() {
-    this.#connection = null;
   }
 
   #next() {

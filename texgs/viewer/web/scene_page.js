@@ -19,7 +19,7 @@ const get = (id) => document.getElementById(id);
 function editsOf(text) {
   try {
     const edits = JSON.parse(text ?? "[]");
-    return Array.isArray(edits) ? edits.filter((each) => typeof each?.part === "string") : [];
+    return Array.isArray(edits) ? edits.filter((each) => typeof each?.part === "string" && typeof each.key === "string") : [];
   } catch {
     return [];
   }
@@ -100,11 +100,13 @@ export class ScenePage {
 
   /** Go where the link says, and make its edits, as far as they are not made. */
   follow() {
+    if (this.#isLocked()) return;
     const fragment = location.hash.slice(1), words = new URLSearchParams(fragment), mode = words.get("mode");
     this.camera.goHome(this.canvas.clientWidth, this.canvas.clientHeight);
     this.camera.fromFragment(fragment);
-    if (this.renderer.modes.includes(mode)) this.show({ mode });
-    for (const { part, key, value } of editsOf(words.get("edits"))) {
+    this.show({ mode: this.renderer.modes.includes(mode) ? mode : "shaded" });
+    const isOfAnother = (words.get("scene") ?? this.state.scene.name) !== this.state.scene.name;
+    for (const { part, key, value } of isOfAnother ? [] : editsOf(words.get("edits"))) {
       if (isDifferent(this.state.scene, { part, key, value })) this.state.edit(part, key, value);
     }
     this.moved();
@@ -115,6 +117,7 @@ export class ScenePage {
     const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene);
     const words = new URLSearchParams();
     if (mode !== "shaded") words.set("mode", mode);
+    if (edits.length) words.set("scene", this.state.scene.name);
     if (edits.length) words.set("edits", JSON.stringify(edits));
     return [this.camera.toFragment(), words.toString()].filter(Boolean).join("&");
   }
@@ -138,11 +141,11 @@ export class ScenePage {
     view.addEventListener("change", () => {
       const { value } = view;
       if (value) this.goTo(value);
-      view.value = value;
+      view.value = this.#isLocked() ? "" : value;
     });
     fov.addEventListener("input", () => {
-      if (this.#isLocked()) return;
-      this.camera.place({ fov_y: Number(fov.value) });
+      if (this.#isLocked()) fov.value = this.camera.fov_y;
+      else this.camera.place({ fov_y: Number(fov.value) });
       this.moved();
     });
   }

@@ -2,10 +2,11 @@
 
 const get = (id) => document.getElementById(id);
 const STILL = 4; // CSS pixels that a click may move
+const MOST_POINTS = 100; // as the server has it
 const COLORS = { true: "#0a8f2f", false: "#1540d0" }; // of points on the object, and beside it
 
 export class SegmentTool {
-  #page; #model = null; #points = []; #asked = 0; #picture = null; #down = null;
+  #page; #model = null; #points = []; #confirmed = 0; #asked = 0; #picture = null; #down = null;
 
   /** @param {object} page - with camera, canvas, connection, notices, renderer, state, and show() */
   constructor(page) {
@@ -28,7 +29,8 @@ export class SegmentTool {
     connection.addEventListener("message", ({ detail }) => this.#receive(detail));
     connection.addEventListener("lost", () => this.#end());
     job.addEventListener("begin", () => this.#show());
-    job.addEventListener("end", ({ detail }) => detail.hasFailed ? this.#show() : this.#end());
+    job.addEventListener("end", ({ detail }) =>
+      detail.kind !== "segment" || detail.hasFailed ? this.#show() : this.#end());
   }
 
   /** Whether the camera has to stay: points belong to one view. */
@@ -62,14 +64,26 @@ export class SegmentTool {
       this.#page.notices.tell("Click on the object first.", "info");
       return;
     }
+    if (this.#points.length === MOST_POINTS) {
+      this.#page.notices.tell(`A segment has at most ${MOST_POINTS} points.`, "info");
+      return;
+    }
     this.#points.push([x, y, positive]);
+    this.#ask();
+  }
+
+  /** Ask what the points select. */
+  #ask() {
     this.#asked += 1;
-    this.#page.connection.send({ type: "mask", id: this.#asked, model: this.#model, ...this.#clicked() });
+    if (this.isLocked) {
+      this.#page.connection.send({ type: "mask", id: this.#asked, model: this.#model, ...this.#clicked() });
+    }
     this.#show();
   }
 
   #clear() {
     this.#points = [];
+    this.#confirmed = 0; // of the points, from the first on, a mask has been found for
     get("segment-negative").checked = false;
     this.#picture = null;
     this.#asked += 1; // masks that are on their way are none of ours
@@ -83,13 +97,15 @@ export class SegmentTool {
 
   /** Stop. */
   leave() {
-    if (this.#page.job.isAtWork) this.#page.job.cancel();
+    const { job } = this.#page;
+    if (job.isAtWork && job.kind === "segment") job.cancel();
     this.#end();
   }
 
   #end() {
     if (!this.#model) return;
     this.#model = null;
+    if (get("segment").contains(document.activeElement)) this.#page.canvas.focus();
     get("segment").hidden = true;
     this.#clear();
     this.#page.show({ only: "" });
@@ -105,6 +121,7 @@ export class SegmentTool {
 
   #receive(message) {
     if (message.type === "mask" && message.id === this.#asked) {
+      this.#confirmed = this.#points.length;
       const picture = new Image();
       picture.onload = () => {
         if (message.id !== this.#asked) return;
@@ -113,9 +130,9 @@ export class SegmentTool {
       };
       picture.src = message.picture;
       get("segment-by").textContent = `Mask by ${message.by}.`;
-    } else if (message.mask !== undefined && message.mask === this.#asked) {
-      this.#points.pop(); // the notice says what is wrong with it
-      this.#show();
+    } else if (message.mask === this.#asked && this.#confirmed < this.#points.length) {
+      this.#points.splice(this.#confirmed, 1); // the notice says what is wrong; the first new one may be it
+      this.#ask();
     }
   }
 

@@ -12,9 +12,10 @@ export class SurfelPass {
    * @param {WebGL2RenderingContext} gl
    * @param {object} joined surfels, see surfels.js.
    * @param {object} optics `low_pass` of the models, and `step` of their texels.
+   * @param {number} rows of the table of parts.
    * @throws {Error} where textures of the scene are too large for the card, or no floats can be blended.
    */
-  constructor(gl, { count, surfels, lookups, texels }, optics) {
+  constructor(gl, { count, surfels, lookups, texels }, optics, rows) {
     if (!gl.getExtension("EXT_color_buffer_float")) {
       throw new Error("The graphics driver draws no floating-point pictures, which this scene needs: update it.");
     }
@@ -27,7 +28,6 @@ export class SurfelPass {
     const isSmall = texels instanceof Int8Array;
     const ofTexels = [isSmall ? gl.RGB8I : gl.RGB16I, gl.RGB_INTEGER, isSmall ? gl.BYTE : gl.SHORT];
     const floats = [gl.RGBA32F, gl.RGBA, gl.FLOAT];
-    const rows = 1 + lookups.reduce((most, row, k) => (k % 4 === 3 && row > most ? row : most), 0);
     this._textures = {
       surfels: makeTexture(gl, floats, [WIDTH, height, LAYERS.length], surfels),
       lookups: makeTexture(gl, [gl.RGBA32UI, gl.RGBA_INTEGER, gl.UNSIGNED_INT], [WIDTH, height], lookups),

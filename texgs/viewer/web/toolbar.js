@@ -20,11 +20,8 @@ export class Toolbar {
     this.#page = page;
     new EditHistory(page, { s: () => this.#askForName() });
     get("still").onclick = () => this.#still();
-    get("export").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
-    get("export").addEventListener("change", ({ target }) => {
-      this.#export(target.value);
-      target.value = "";
-    });
+    get("export-kind").append(...exports.map((kind) => new Option(EXPORTS[kind] ?? kind, kind)));
+    get("export").onclick = () => this.#export();
     get("save").onclick = () => this.#askForName();
     window.addEventListener("beforeunload", (event) => {
       if (!page.state.saved) event.preventDefault();
@@ -56,10 +53,9 @@ export class Toolbar {
     if (name !== null) this.#page.state.save(name);
   }
 
-  #export(kind) {
-    const { job, notices } = this.#page;
-    const begun = job.begin({ type: "export", kind, view: this.#view() });
-    if (!begun) notices.tell("Something is being made: wait for it, or cancel it.", "info");
+  async #export() {
+    const kind = await ask(get("export-dialog"), get("export-kind").value);
+    if (kind !== null && this.#page.mayBegin()) this.#page.job.begin({ type: "export", kind, view: this.#view() });
   }
 
   /** What is shown, as the server has it. */

@@ -4,6 +4,7 @@ import { direction } from "./camera.js";
 import { COLUMNS, firstRows, partTable } from "./parts.js";
 import { makeProgram } from "./program.js";
 import { PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
+import { sizeOf } from "./size.js";
 import { DepthOrder } from "./sort.js";
 import { NEAR, SurfelPass, bind } from "./surfel_pass.js";
 import { joinSurfels } from "./surfels.js";
@@ -12,7 +13,6 @@ import { unpack } from "./tensors.js";
 // Those of texgs/scene/frame.py but for depth.
 const MODES = ["shaded", "unshaded", "normal", "alpha", "ambient", "diffuse", "specular", "shininess"];
 const OVER_BLACK = MODES.slice(3);
-const MOST_PIXELS = 4096; // of a side, as `texgs view` has it
 const SLOW = 40; // milliseconds from frame to frame above which those of a moving scene have half the resolution
 const MISSING = "This browser has no WebGL2, which this scene needs: switch hardware acceleration on, or use another one.";
 const CONTEXT = { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" };
@@ -26,21 +26,18 @@ export class WebglRenderer {
   constructor(canvas, notice) {
     this.modes = MODES;
     this._canvas = canvas;
-    this._notice = notice;
     const gl = canvas.getContext("webgl2", CONTEXT);
     if (!gl) throw new Error(MISSING);
     this._gl = gl;
-    this._listeners = new AbortController();
-    const listen = { signal: this._listeners.signal };
     canvas.addEventListener("webglcontextlost", (event) => {
       event.preventDefault(); // asks for another context
       notice("The graphics driver has taken the picture back; it comes again by itself.");
-    }, listen);
+    });
     canvas.addEventListener("webglcontextrestored", () => {
       this._upload();
       notice("");
       this._ask();
-    }, listen);
+    });
   }
 
   /**
@@ -60,9 +57,7 @@ export class WebglRenderer {
 
   /** Size of the picture in pixels of the screen. */
   size() {
-    const { clientWidth, clientHeight } = this._canvas;
-    const ratio = Math.min(devicePixelRatio, MOST_PIXELS / Math.max(clientWidth, clientHeight, 1));
-    return [clientWidth, clientHeight].map((side) => Math.max(1, Math.round(ratio * side)));
+    return sizeOf(this._canvas);
   }
 
   /**
@@ -105,13 +100,6 @@ export class WebglRenderer {
       picture.set(upside.subarray(4 * width * (height - 1 - y), 4 * width * (height - y)), 4 * width * y);
     }
     return picture;
-  }
-
-  /** Gives the graphics memory back. */
-  dispose() {
-    this._listeners.abort();
-    cancelAnimationFrame(this._request);
-    this._gl.getExtension("WEBGL_lose_context")?.loseContext();
   }
 
   // ---- Frames ----
@@ -171,7 +159,8 @@ export class WebglRenderer {
   }
 
   _upload() {
-    this._pass = new SurfelPass(this._gl, this._surfels, this._optics);
+    const rows = partTable(this._original.models, this._optics.models).length / (4 * COLUMNS);
+    this._pass = new SurfelPass(this._gl, this._surfels, this._optics, rows);
     this._present = makeProgram(this._gl, PRESENT_VERTEX, PRESENT_FRAGMENT);
   }
 }
