@@ -5,8 +5,11 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
-from texgs.edit.parts import ScenePart, surfels_of
-from texgs.scene.scene import SceneModel, SceneSegment
+from texgs.edit.parts import ScenePart, parts_with_surfels, surfels_of
+from texgs.fields.surfels.model_file import write_model
+from texgs.fields.surfels.segment import labels_of
+from texgs.scene.scene import Scene, SceneModel, SceneSegment
+from texgs.scene.segment_file import write_segment
 
 
 def test_a_part_has_what_earlier_segments_left(tmp_path):
@@ -20,3 +23,17 @@ def test_a_part_has_what_earlier_segments_left(tmp_path):
         with pytest.raises(ArgumentError, match=f"edit.parts: expected surfels of {part.name}, got none"):
             surfels_of(part, entry, masks, model)
     assert surfels_of(ScenePart("ball"), SceneModel(tmp_path), [], model) is None
+
+
+def test_only_parts_that_have_surfels_are_named(tmp_path):
+    model = ball(1)
+    write_model(tmp_path / "ball.safetensors", model)
+    masks = {"all": torch.ones(len(model), dtype=torch.bool), "left": torch.arange(len(model)) < 10}
+    segments = {}
+    for name, mask in masks.items():
+        write_segment(tmp_path / f"{name}.safetensors", model, mask)
+        segments[name] = SceneSegment(tmp_path / f"{name}.safetensors")
+    assert labels_of(list(masks.values()), len(model)).unique().tolist() == [1]
+    whole = SceneModel(tmp_path / "ball.safetensors")
+    scene = Scene({"plain": whole, "cut": SceneModel(whole.file, segments=segments)})
+    assert parts_with_surfels(scene) == ["plain", "cut/all"]

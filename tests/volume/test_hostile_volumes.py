@@ -1,5 +1,6 @@
 """Headers that claim more than the file or the machine has, and files that never end."""
 
+import bz2
 import gzip
 import os
 import re
@@ -94,6 +95,16 @@ def test_text_and_bytes_to_skip_are_read_as_before(tmp_path):
         packed = gzip.compress(extra + values.tobytes())
         path = nrrd(tmp_path / "g.nrrd", encoding="gzip", more=f"byte skip: {skip}\n", data=packed)
         np.testing.assert_array_equal(open_source(path).slices(0, 2), values)
+
+
+@pytest.mark.parametrize(("encoding", "pack"), [("gzip", gzip.compress), ("bzip2", bz2.compress)])
+@pytest.mark.parametrize("behind", [b"", b"\0\0\0"])
+def test_streams_behind_each_other_are_one(tmp_path, encoding, pack, behind):
+    """As programs write them that pack on several cores; what else is behind them is none."""
+    values = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
+    packed = pack(values.tobytes()[:7]) + pack(values.tobytes()[7:]) + behind
+    source = open_source(nrrd(tmp_path / "v.nrrd", encoding=encoding, data=packed))
+    np.testing.assert_array_equal(source.slices(0, 2), values)
 
 
 def test_pages_of_a_tiff_that_do_not_fit_into_memory(tmp_path):

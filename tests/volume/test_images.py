@@ -5,7 +5,7 @@ import torch
 from PIL import Image
 
 from tests.fit.scenes import HEADLIGHT, cameras
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.image import write_png
 from texgs.volume.images import load
 from texgs.volume.reduced import over_white, smaller
@@ -84,6 +84,9 @@ def test_mistakes_are_named(tmp_path):
         load([view], 3)
     with pytest.raises(ArgumentError, match=r"gone\.png: no such file"):
         load([replace(view, path=tmp_path / "gone.png")])
+    large = replace(view, camera=replace(view.camera, width=1 << 20, height=1 << 20))
+    with pytest.raises(OutOfMemoryError, match="1 views of 1048576 x 1048576 pixels"):
+        load([large])
 
 
 def test_images_of_different_sizes_are_refused_before_any_is_read(tmp_path):

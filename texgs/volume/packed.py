@@ -31,7 +31,8 @@ def bzip2(packed: bytes, most: int) -> bytes:
 
 def streams(packed: bytes, most: int, start: Callable[[], Any]) -> Iterator[bytes]:
     """Bytes of each stream: programs that pack on several cores write many."""
-    while packed and most > 0:
+    magic = packed[:2]
+    while most > 0 and packed and packed.startswith(magic):
         stream = start()
         part = stream.decompress(packed, most)
         yield part
