@@ -1,6 +1,7 @@
 """The renderer of the HTML export against the rasterizer, for the same numbers, in a real browser."""
 
 import copy
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
+from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.segment_file import write_segment
 from texgs.viewer.description import describe
@@ -26,7 +28,7 @@ CAMERAS = [
     orbit(0, 90, 2.5, 30, 33, 47),
 ]
 SIDE = Light("directional", 100, 30)
-MODES = ("shaded", "unshaded", "normal", "alpha", "ambient", "diffuse", "specular", "shininess")
+MODES = get_args(Mode)
 LEVELS = 3  # of 255: a pixel of the rasterizer ends where 1e-4 of the light is left, ours does not
 
 

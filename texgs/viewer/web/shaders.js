@@ -2,7 +2,13 @@
 
 import { LAYERS, WIDTH } from "./surfels.js";
 
-const layers = LAYERS.map((name, k) => `const int ${name.toUpperCase()} = ${k};`).join("\n");
+/** Those of texgs/scene/frame.py; their places are numbers in the shaders. */
+export const MODES = ["shaded", "unshaded", "normal", "depth", "alpha", "texture", "discs", "ambient", "diffuse",
+  "specular", "shininess"];
+
+const numbered = (names) => names.map((name, k) => `const int ${name.toUpperCase()} = ${k};`).join("\n");
+const layers = numbered(LAYERS);
+const looks = numbered(MODES).replaceAll("const int ", "const int LOOK_");
 
 export const SURFEL_VERTEX = `#version 300 es
 precision highp float;
@@ -12,7 +18,10 @@ precision highp sampler2DArray;
 precision highp usampler2D;
 
 ${layers}
+${looks}
 const float ALPHA_MIN = 1.0 / 255.0;
+const float DISC = 1e6;          // opacity that makes a surfel a disc with a sharp rim
+const float NARROW = 0.1856399;  // scale at which this disc has a radius of one standard deviation
 const float FAR = 1e4;           // a distant viewer, world units
 const float SMALLEST = 1e-30;    // a cosine below is 0
 
@@ -107,11 +116,14 @@ vec4 box_of(Rows m, bool edge_on, float opacity) {
 // The colour of each mode of texgs/scene/frame.py, and the factor on texels.
 vec4 colour_of(vec3 color, vec4 material, vec3 mean, vec3 n, vec4 flags) {
   vec3 to_eye = -translation * rotation - mean;
-  if (look == 1) return vec4(color, 1.0);
-  if (look == 2) return vec4(0.5 + 0.5 * (dot(n, to_eye) < 0.0 ? -n : n), 0.0);
-  if (look == 3) return vec4(vec3(1.0), 0.0);
-  if (look >= 4) return vec4(vec3(look == 7 ? material.w / 100.0 : material[look - 4]), 0.0);
-  return shade(color, material, mean, n, flags.x > 0.5, flags.y > 0.5);
+  if (look == LOOK_UNSHADED) return vec4(color, 1.0);
+  if (look == LOOK_NORMAL) return vec4(0.5 + 0.5 * (dot(n, to_eye) < 0.0 ? -n : n), 0.0);
+  if (look == LOOK_ALPHA) return vec4(vec3(1.0), 0.0);
+  if (look == LOOK_SHININESS) return vec4(vec3(material.w / 100.0), 0.0);
+  if (look >= LOOK_AMBIENT && look < LOOK_SHININESS) return vec4(vec3(material[look - LOOK_AMBIENT]), 0.0);
+  if (look == LOOK_TEXTURE) return vec4(vec3(0.5), 1.0);
+  vec4 shaded = shade(color, material, mean, n, flags.x > 0.5, flags.y > 0.5);
+  return look == LOOK_DISCS ? vec4(shaded.rgb, 0.0) : shaded;
 }
 
 void main() {
@@ -121,10 +133,11 @@ void main() {
   uvec4 lookup = texelFetch(lookups, at, 0);
   vec4 part = texelFetch(parts, ivec2(0, lookup.w), 0);
   float opacity = min(place.w * part.w, 1.0);
+  if (look == LOOK_DISCS && opacity > 0.0) opacity = DISC;
   if (opacity < ALPHA_MIN) return;
 
   Axes world = axes(normalize(texelFetch(surfels, ivec3(at, QUATS), 0)));
-  vec2 scales = texelFetch(surfels, ivec3(at, SCALES), 0).xy;
+  vec2 scales = (look == LOOK_DISCS ? NARROW : 1.0) * texelFetch(surfels, ivec3(at, SCALES), 0).xy;
   vec3 p = rotation * place.xyz + translation;
   vec3 a = scales.x * (rotation * world.u), b = scales.y * (rotation * world.v);
 
@@ -156,10 +169,12 @@ precision highp float;
 precision highp int;
 precision highp isampler2D;
 
+${looks}
 const float LOG2_E = 1.44269504;
 const float ALPHA_MAX = 0.99, ALPHA_MIN = 1.0 / 255.0;
 
 uniform isampler2D texels;
+uniform int look;
 uniform float low_pass, near;
 
 flat in vec2 centre;
@@ -191,10 +206,11 @@ void main() {
   bool in_front = w > 0.0 && w * near < perspective.z;
   if (abs(w) < 1e-12) w = 1e-12; // keeps (u, v) finite
   vec2 uv = vec2(dot(forms.xy, d), dot(forms.zw, d)) / w;
-  float rho = min(in_front ? dot(uv, uv) : 1e30, low_pass * dot(d, d));
+  float of_surfel = in_front ? dot(uv, uv) : 1e30, rho = min(of_surfel, low_pass * dot(d, d));
   float alpha = min(exp2(base.w - 0.5 * LOG2_E * rho), ALPHA_MAX);
   if (alpha < ALPHA_MIN) discard;
   vec3 color = gain == 0.0 ? base.xyz : base.xyz + gain * texel(uv);
+  if (look == LOOK_DEPTH) color = vec3(of_surfel <= rho ? perspective.z / w : perspective.z);
   fragment = vec4(alpha * color, alpha);
 }
 `;
@@ -210,10 +226,15 @@ precision highp float;
 precision highp sampler2D;
 uniform sampler2D picture;
 uniform vec3 background;
+uniform vec2 range;              // of depths, which are shown where it is not empty
 out vec4 shown;
 void main() {
   ivec2 at = ivec2(gl_FragCoord.xy);
   vec4 blended = texelFetch(picture, ivec2(at.x, textureSize(picture, 0).y - 1 - at.y), 0);
+  if (range.y > 0.0) {
+    float depth = blended.r / max(blended.a, 1e-12), place = (depth - range.x) / max(range.y - range.x, 1e-6);
+    blended.rgb = vec3(0.9 * clamp(place, 0.0, 1.0) * blended.a);
+  }
   shown = vec4(blended.rgb + (1.0 - blended.a) * background, 1.0);
 }
 `;

@@ -77,6 +77,21 @@ export class SurfelPass {
     return this._picture;
   }
 
+  /** The least and the largest mean depth of pixels that are not faint, where depth was blended; 0 where none is. */
+  depths() {
+    const gl = this._gl, [width, height] = this._size;
+    const pixels = new Float32Array(4 * width * height);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this._target);
+    gl.readPixels(0, 0, width, height, gl.RGBA, gl.FLOAT, pixels);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, null);
+    let low = Infinity, high = 0;
+    for (let i = 0; i < pixels.length; i += 4) {
+      const alpha = pixels[i + 3], depth = pixels[i] / alpha;
+      if (alpha > 0.5) [low, high] = [Math.min(low, depth), Math.max(high, depth)];
+    }
+    return high ? [low, high] : [0, 0];
+  }
+
   /** A quad for each surfel, of which only its number comes from a buffer. */
   _makeInstances(count) {
     const gl = this._gl;

@@ -3,16 +3,14 @@
 import { direction } from "./camera.js";
 import { COLUMNS, firstRows, partTable } from "./parts.js";
 import { makeProgram } from "./program.js";
-import { PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
+import { MODES, PRESENT_FRAGMENT, PRESENT_VERTEX } from "./shaders.js";
 import { sizeOf } from "./size.js";
 import { DepthOrder } from "./sort.js";
 import { NEAR, SurfelPass, bind } from "./surfel_pass.js";
 import { joinSurfels } from "./surfels.js";
 import { unpack } from "./tensors.js";
 
-// Those of texgs/scene/frame.py but for depth.
-const MODES = ["shaded", "unshaded", "normal", "alpha", "ambient", "diffuse", "specular", "shininess"];
-const OVER_BLACK = MODES.slice(3);
+const OVER_BLACK = ["alpha", "ambient", "diffuse", "specular", "shininess"];
 const SLOW = 40; // milliseconds from frame to frame above which those of a moving scene have half the resolution
 const MISSING = "This browser has no WebGL2, which this scene needs: switch hardware acceleration on, or use another one.";
 const CONTEXT = { alpha: false, antialias: false, depth: false, powerPreference: "high-performance" };
@@ -136,9 +134,11 @@ export class WebglRenderer {
     const table = partTable(scene.models, this._optics.models);
     const light = scene.light && direction(scene.light.azimuth, scene.light.polar);
     const picture = this._pass.blend(view, { mode: MODES.indexOf(mode), light }, table, this._sort(view, table));
+    const range = mode === "depth" ? this._pass.depths() : [0, 0];
     const { program, uniforms } = this._present;
     gl.useProgram(program);
     bind(gl, 0, picture, uniforms.picture);
+    gl.uniform2fv(uniforms.range, range);
     gl.uniform3fv(uniforms.background, OVER_BLACK.includes(mode) ? [0, 0, 0] : scene.background);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
   }
