@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -10,6 +11,7 @@ from contextlib import redirect_stderr
 from functools import partial
 from io import StringIO
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,7 @@ from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from tests.volume.vtk_caster import VtkCaster
+from texgs.core.camera import orbit
 from texgs.core.errors import DeviceError
 from texgs.core.lens import Lens
 from texgs.core.light import Light
@@ -123,39 +126,62 @@ def view_set(grid: Grid, look: Appearance, shots: list, where: dict) -> Case:
 
 
 def large_volume() -> list[Measurement]:
-    """Seconds and resident memory of reading a sparse raw file of 8 GB reduced, in a process of its own."""
+    """Seconds and memory of a sparse raw file of 8 GB, read reduced and cast as it is, each in a process."""
     with tempfile.TemporaryDirectory() as folder:
         raw = Path(folder, "large.raw")
         with raw.open("wb") as file:
             file.truncate(LARGE**3)
             file.seek(LARGE**3 // 2)
             file.write(np.arange(256, dtype=np.uint8).tobytes())
-        code = f"from benchmarks.views import child; child({folder!r})"
-        done = subprocess.run(
-            [sys.executable, "-c", code],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=True,
-            preexec_fn=machine.unbind,
-        )
-    seconds, resident = map(float, done.stdout.split())
-    where = {"volume": LARGE, "reduce": REDUCE}
+        seconds, resident = in_child("reduced", raw)
+        ready, frame, own = in_child("cast", raw)
+    reduced, whole = {"volume": LARGE, "reduce": REDUCE}, {"volume": LARGE, "size": 800}
     return [
-        Measurement.of("open a raw file", where, "ms", [1e3 * seconds]),
-        Measurement.of("resident", where, "MB", [resident]),
+        Measurement.of("open a raw file", reduced, "ms", [1e3 * seconds]),
+        Measurement.of("resident", reduced, "MB", [resident]),
+        Measurement.of("make ready to cast", whole, "ms", [1e3 * ready]),
+        Measurement.of("cast a frame", whole, "ms", [1e3 * frame]),
+        Measurement.of("memory but for the mapped file", whole, "MB", [own]),
     ]
 
 
-def child(folder: str) -> None:
-    """Print the seconds and the peak of resident memory in MB of preparing the large volume."""
-    from time import perf_counter
+def in_child(work: str, raw: Path) -> list[float]:
+    """What a function of this module prints of a raw file, in a process of its own."""
+    code = f"from pathlib import Path; from benchmarks.views import {work}; {work}(Path({str(raw)!r}))"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+        preexec_fn=machine.unbind,
+    )
+    return [float(number) for number in done.stdout.split()]
 
+
+def reduced(raw: Path) -> None:
+    """Print the seconds and the peak of resident memory in MB of preparing the large volume."""
     from texgs.core.memory import peak_memory
     from texgs.volume.prepare import prepare
     from texgs.volume.sources import open_source
 
     start = perf_counter()
-    source = open_source(Path(folder, "large.raw"), dims=(LARGE,) * 3, dtype="uint8")
-    prepare(source, Path(folder, "small.nrrd"), reduce=REDUCE)
+    source = open_source(raw, dims=(LARGE,) * 3, dtype="uint8")
+    prepare(source, raw.with_name("small.nrrd"), reduce=REDUCE)
     print(perf_counter() - start, peak_memory() / 1e6)
+
+
+def cast(raw: Path) -> None:
+    """Print the seconds until the large volume can be cast, those of a second frame, and MB of memory.
+
+    The system counts pages of the mapped file as resident until it takes them back; they are left out.
+    """
+    start = perf_counter()
+    caster = Caster(Grid(np.memmap(raw, np.uint8, "r", shape=(LARGE,) * 3)), Appearance(step=0.5))
+    ready = perf_counter() - start
+    tf = TransferFunction(((20, 0.0), (255, 0.9)), ((0, 0.9, 0.6, 0.2),))
+    for azimuth in (-60, -30):
+        start = perf_counter()
+        caster.render(tf, orbit(azimuth, 20, 2.5, 30, 800, 800), LIGHT)
+    own = re.search(r"RssAnon:\s+(\d+) kB", Path("/proc/self/status").read_text())
+    print(ready, perf_counter() - start, 1024 * int(own[1]) / 1e6 if own else float("nan"))

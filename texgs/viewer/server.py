@@ -204,5 +204,7 @@ class Server:
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:
         yield
+        if self.work.is_at_work:
+            print("Waiting for what is being made to stop.", flush=True)
         await asyncio.to_thread(self.work.close)
         self.frames.close()

@@ -87,6 +87,11 @@ class Work:
         require_kind(self._edits.scene, asked.kind)
         self._begin(page, partial(self._export, asked, page))
 
+    @property
+    def is_at_work(self) -> bool:
+        """Whether something is being made."""
+        return self._task is not None and not self._task.done()
+
     def stop(self, page: Page | None = None) -> None:
         """Stop the job that is at work, if there is one, and it is for this page or whichever."""
         if page is None or page is self._page:
@@ -101,7 +106,7 @@ class Work:
         self.styles.close()
 
     def _begin(self, page: Page, job: Callable[[Watch], Awaitable[None]]) -> None:
-        if self._task is not None and not self._task.done():
+        if self.is_at_work:
             of = " for another page: wait for it" if page is not self._page else ": wait for it, or cancel it"
             raise ArgumentError(f"a job is at work already{of}")
         self._page, self._stop = page, threading.Event()
