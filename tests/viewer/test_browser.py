@@ -287,7 +287,7 @@ def test_an_export_is_saved(chromium, scene_file):
             page.get_by_role("button", name="Export").click()
             page.get_by_role("dialog").get_by_label("As").select_option("3D Gaussians, PLY")
             page.get_by_role("dialog").get_by_role("button", name="Export").click()
-        assert download.value.suggested_filename == "scene.ply"
+        assert download.value.suggested_filename == "scene-3dgs.ply"
 
 
 def test_pages_share_their_edits(chromium, scene_file):
@@ -315,6 +315,6 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
             with served(scene_file, port) as (_, again):
                 assert again == address
                 expect(lost).to_be_hidden(timeout=WAIT)
-                page.get_by_role("button", name="Make them again").click()
+                page.get_by_role("button", name="Make the other edits again").click()
                 expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()

@@ -169,6 +169,24 @@ def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
     assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
 
 
+def test_a_look_has_its_own_colours(scene_file):
+    """A palette that was chosen before belongs to other texels: it goes back in the step of the look."""
+
+    async def work(browser, client):
+        edits = client.server_side.edits
+        await browser.send(type="edit", part="TF01", key="palette", value=[0.1, 0.9, 0.1])
+        tinted = await picture(browser)
+        await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
+        await ended(browser)
+        assert edits.scene.models["TF01"].edit.palette is None
+        assert edits.state()["past"] == ["TF01 palette", "TF01 turn it into gold"]
+        await browser.send(type="undo")
+        assert (await picture(browser) == tinted).all()
+        assert edits.scene.models["TF01"].edit.palette == (0.1, 0.9, 0.1)
+
+    with_page(scene_file, work)
+
+
 def test_words_of_a_page_are_no_references_to_anything(scene_file, monkeypatch):
     monkeypatch.setenv("SECRET", "a secret of the server")
 

@@ -97,7 +97,7 @@ def test_a_wide_frame_has_the_view_in_its_middle(scene):
 
 def test_views_show_one_transfer_function(scene):
     for shown in (scene, only(scene, "TF02"), only(scene, "none")):
-        with pytest.raises(ArgumentError, match="expected one visible model that has some"):
+        with pytest.raises(ArgumentError, match="Training views show one transfer function each"):
             origins(scene).frame(view("truth"), shown, 1.0)
 
 

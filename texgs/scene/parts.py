@@ -70,18 +70,21 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
     return replace(scene, models={**scene.models, model: entry})
 
 
-def with_textures(scene: Scene, files: Mapping[str, Path | None]) -> Scene:
+def with_textures(scene: Scene, files: Mapping[str, Path | None], own_colors: bool = False) -> Scene:
     """The scene with other texture files for some of its parts.
 
     Args:
         scene: to change.
         files: by part; None stands for the texels that a part was fitted with.
+        own_colors: whether palettes of these parts go back to the fitted ones, which texels were made for.
 
     Raises:
         ArgumentError: if there is no such part.
     """
     for part, file in files.items():
-        scene = replaced(scene, part, replace(entry_of(scene, part), texture=file))
+        entry = entry_of(scene, part)
+        edit = replace(entry.edit, palette=None) if own_colors else entry.edit
+        scene = replaced(scene, part, replace(entry, texture=file, edit=edit))
     return scene
 
 

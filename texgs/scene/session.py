@@ -92,13 +92,15 @@ class Session:
         """
         self.set_textures({part: file})
 
-    def set_textures(self, files: Mapping[str, Path | None]) -> None:
-        """Give several parts other texels in one step; see `set_texture`.
+    def set_textures(self, files: Mapping[str, Path | None], own_colors: bool = False) -> None:
+        """Give several parts other texels in one step; see `set_texture`, and `with_textures` for palettes.
 
         Raises:
             ArgumentError, ShapeError: as `set_texture`; no part has another texture then.
         """
-        self._push_read(with_textures(self.scene, files), {split(self.scene, part)[0] for part in files})
+        self._push_read(
+            with_textures(self.scene, files, own_colors), {split(self.scene, part)[0] for part in files}
+        )
 
     def set_file(self, part: str, file: Path) -> None:
         """Put another file in the place of a model or a segment.

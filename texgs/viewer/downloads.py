@@ -64,7 +64,8 @@ class Downloads:
     def _write(self, scene: Scene, asked: Export, name: str) -> Path:
         require_kind(scene, asked.kind)
         ending = asked.kind if asked.kind in (*FILMS, "html") else "ply"
-        path = Path(self._folder.name, f"{name}.{ending}")
+        stem = f"{name}-{asked.kind}" if ending == "ply" else name  # there are several kinds of these
+        path = Path(self._folder.name, f"{stem}.{ending}")
         if asked.kind in FILMS:
             return write_frames(path, self._turntable(scene, asked.view))
         if asked.kind == "html":

@@ -15,6 +15,7 @@ from aiohttp import web
 from texgs.core.errors import TexgsError, first_line
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
+from texgs.viewer.jobs import Stopped
 from texgs.viewer.messages import Mask, View
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
@@ -81,7 +82,7 @@ class Page:
         if not isinstance(error, TexgsError):
             log.error("%s", error, exc_info=error)
         text = str(error) if isinstance(error, TexgsError) else f"internal error: {first_line(error)}"
-        self.tell(text, level="error", **more)
+        self.tell(text, level="info" if isinstance(error, Stopped) else "error", **more)
 
     async def send(self) -> None:
         """Send what waits, until the page is gone. One frame is on its way at a time."""

@@ -56,7 +56,8 @@ class SharedEdits:
         if view.before:
             return self.original
         names, textures = part_names(self.scene), trial or {}
-        return with_textures(self.scene, {part: textures[part] for part in names if part in textures})
+        tried = {part: textures[part] for part in names if part in textures}
+        return with_textures(self.scene, tried, own_colors=True)
 
     @property
     def is_saved(self) -> bool:
@@ -101,12 +102,12 @@ class SharedEdits:
         self._step(f"{part} new")
 
     def give_textures(self, textures: Mapping[str, Path | None], look: str) -> None:
-        """Give parts the textures of a new look.
+        """Give parts the textures of a new look, and back the palettes that these were made for.
 
         Raises:
             ArgumentError, ShapeError: if there is no such part any more, or a texture is none of it.
         """
-        self._session.set_textures(textures)
+        self._session.set_textures(textures, own_colors=True)
         self._step(f"{', '.join(textures)} {look}")
 
     def rename_segment(self, part: str, name: str) -> None:

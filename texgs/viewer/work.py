@@ -157,7 +157,8 @@ class Work:
         finally:
             if not asked.is_preview:
                 page.try_on(None)
-        page.tell(f"{name}: {edited.how}, {edited.seconds:.0f} s, written to {output}", level="info")
+        how = f"{name}: {edited.how}, {edited.seconds:.0f} s."
+        page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")
 
     async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
         scene, name = page.shown(asked.view), Path(self._edits.name).stem

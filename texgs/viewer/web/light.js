@@ -8,6 +8,7 @@ const BALL = 0.46; // its radius, part of the size
 
 export class LightControl {
   #state; #camera; #canvas; #headlight; #azimuth; #polar;
+  #hint = element("p", { className: "hint" });
 
   /**
    * @param {Element} root - for its inputs
@@ -28,7 +29,7 @@ export class LightControl {
     this.#polar = angle("polar", "Height", 90);
     for (const { row } of [this.#azimuth, this.#polar]) row.querySelector(".reset").remove();
     const about = element("div", {}, this.#headlight.row,
-      element("p", { className: "hint" }, "It moves with the camera. Drag on the ball to fix the light."));
+      this.#hint);
     root.append(element("div", { className: "light" }, this.#canvas, about), this.#azimuth.row, this.#polar.row);
     root.hidden = !state.scene.models.some((model) => model.can.includes("diffuse")); // nothing shows the light
     this.#listen();
@@ -40,6 +41,8 @@ export class LightControl {
   show() {
     const { light } = this.#state.scene, { azimuth, polar } = this.#angles();
     this.#headlight.show(light === null);
+    this.#hint.textContent = light ? "Drag on the ball to turn the light."
+      : "It moves with the camera. Drag on the ball to fix the light.";
     this.#azimuth.show(azimuth);
     this.#polar.show(polar);
     this.#draw();
@@ -60,10 +63,12 @@ export class LightControl {
 
   #listen() {
     const canvas = this.#canvas;
+    let box = null;
     const use = (event) => {
-      if (event.type === "pointerdown") canvas.setPointerCapture(event.pointerId);
-      else if (!canvas.hasPointerCapture(event.pointerId)) return;
-      const box = canvas.getBoundingClientRect();
+      if (event.type === "pointerdown") {
+        canvas.setPointerCapture(event.pointerId);
+        box = canvas.getBoundingClientRect(); // the panel may move under the pointer
+      } else if (!canvas.hasPointerCapture(event.pointerId)) return;
       this.#point = [0.5 - (event.clientX - box.left) / box.width, 0.5 - (event.clientY - box.top) / box.height];
       canvas.dispatchEvent(new Event("input"));
     };

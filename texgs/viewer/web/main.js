@@ -70,6 +70,15 @@ class Page extends ScenePage {
     if (given !== null && given !== name) this.state.rename(part, given);
   }
 
+  /** Offer to make edits again that a server does not know which was started again. */
+  #offerAgain(lost) {
+    const said = "The server was started again, without the edits of this page. "
+      + "New segments and looks come back with a scene that was saved: open its file.";
+    this.notices.offer(said, "Make the other edits again", () => {
+      for (const { part, key, value } of lost) this.state.edit(part, key, value);
+    });
+  }
+
   /** Show what the server has now. One that was started again knows nothing of edits before. */
   adopt(message) {
     get("title").textContent = get("title").title = message.scene.name;
@@ -80,12 +89,9 @@ class Page extends ScenePage {
     }
     if (isAnother) this.state.original = message.original;
     const lost = isAnother ? difference(message.scene, this.state.scene) : [];
-    this.run = message.run ?? this.run;
+this.run = message.run ?? this.run;
     this.state.adopt(message);
-    if (!lost.length) return;
-    this.notices.offer("The server was started again, without the edits of this page.", "Make them again", () => {
-      for (const { part, key, value } of lost) this.state.edit(part, key, value);
-    });
+    if (lost.length) this.#offerAgain(lost);
   }
 }
 
