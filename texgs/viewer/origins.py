@@ -105,8 +105,8 @@ class Origins:
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]
         if len(visible) != 1 or visible[0] not in self._origins:
             raise ArgumentError(
-                f"Training views show one transfer function each: show {' or '.join(self._origins)} alone, by "
-                f"the ticks beside their names. Visible now: {', '.join(visible) or 'none'}."
+                f"Training views show one transfer function each: show {' or '.join(self._origins)} alone "
+                f"by the ticks beside names. Visible now: {', '.join(visible) or 'none'}."
             )
         image = self._origins[visible[0]].nearest(camera)
         truth = over(image, scene.background)
