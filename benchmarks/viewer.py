@@ -109,8 +109,10 @@ def texgs(source: str) -> Iterator[str]:
     words = [sys.executable, "-m", "texgs.cli.main", "view", source, "--no-browser", "--port", str(PORT)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
-        yield process.stdout.readline().strip()
-        process.terminate()
+        try:
+            yield process.stdout.readline().strip()
+        finally:
+            process.terminate()
 
 
 @contextmanager
@@ -118,9 +120,11 @@ def viser(source: str) -> Iterator[str]:
     """That of viser."""
     port = PORT + 1
     with subprocess.Popen([sys.executable, "-m", "benchmarks.viser_viewer", source, str(port)]) as process:
-        time.sleep(10)
-        yield f"http://127.0.0.1:{port}"
-        process.terminate()
+        try:
+            time.sleep(10)
+            yield f"http://127.0.0.1:{port}"
+        finally:
+            process.terminate()
 
 
 @contextmanager
