@@ -89,7 +89,7 @@ class Page extends ScenePage {
     }
     if (isAnother) this.state.original = message.original;
     const lost = isAnother ? difference(message.scene, this.state.scene) : [];
-this.run = message.run ?? this.run;
+    this.run = message.run ?? this.run;
     this.state.adopt(message);
     if (lost.length) this.#offerAgain(lost);
   }

@@ -18,8 +18,8 @@ const get = (id) => document.getElementById(id);
 /** Edits in a link; none where there are none, or something else. */
 function editsOf(text) {
   try {
-    const edits = JSON.parse(text ?? "[]");
-    return Array.isArray(edits) ? edits.filter((each) => typeof each?.part === "string" && typeof each.key === "string") : [];
+    const edits = JSON.parse(text ?? "[]"), isNamed = (each) => [each?.part, each?.key].every((x) => typeof x === "string");
+    return Array.isArray(edits) ? edits.filter(isNamed) : [];
   } catch {
     return [];
   }
@@ -117,8 +117,10 @@ export class ScenePage {
     const { mode } = this.#shown, edits = difference(this.state.original, this.state.scene);
     const words = new URLSearchParams();
     if (mode !== "shaded") words.set("mode", mode);
-    if (edits.length) words.set("scene", this.state.scene.name);
-    if (edits.length) words.set("edits", JSON.stringify(edits));
+    if (edits.length) {
+      words.set("scene", this.state.scene.name); // edits of one scene are none of another
+      words.set("edits", JSON.stringify(edits));
+    }
     return [this.camera.toFragment(), words.toString()].filter(Boolean).join("&");
   }
 
