@@ -52,41 +52,42 @@ def volume(tmp_path_factory):
     return VolumeScene(OfScene("pse", "sphere", "", "fraction", basic, views, fit), folder / "volume.nrrd")
 
 
-CAMERA, LIGHT = orbit(20, 10, 4, 30, 48, 48), Light("headlight")
-
-
+CAMERA = orbit(20, 10, 4, 30, 48, 48)
+PALETTES = {"low": (0.2, 0.3, 0.8), "high": (0.8, 0.5, 0.2)}
 HIDDEN = PartEdit(visible=False)
 
 
-def both(low=PartEdit(), high=PartEdit()):  # noqa: B008
-    return {"low": low, "high": high}
+def render(volume, light=Light("headlight"), **edits):  # noqa: B008
+    """The volume with edits of its two basic TFs, in the order in which they are named."""
+    edits = {"low": PartEdit(), "high": PartEdit()} | edits
+    models = {name: SceneModel("x", edit) for name, edit in edits.items()}
+    return volume.render(CAMERA, Scene(models, light), [PALETTES[name] for name in models])
 
 
 def test_edits_are_those_of_the_basic_tf_of_their_name(volume):
     """A scene may name its models in another order than the job's settings, which are sorted."""
-    edits = {"high": PartEdit(opacity=0.2), "low": PartEdit()}
-    found = volume.render(CAMERA, LIGHT, edits)
-    np.testing.assert_array_equal(found, volume.render(CAMERA, LIGHT, dict(reversed(edits.items()))))
-    assert not np.array_equal(found, volume.render(CAMERA, LIGHT, both(low=PartEdit(opacity=0.2))))
+    models = {"high": SceneModel("x", PartEdit(opacity=0.2)), "low": SceneModel("x")}
+    scene = Scene(models, Light("headlight"))
+    shown = volume.render(CAMERA, scene, [PALETTES[name] for name in models])
+    np.testing.assert_array_equal(shown, render(volume, high=PartEdit(opacity=0.2)))
+    assert not np.array_equal(shown, render(volume, low=PartEdit(opacity=0.2)))
 
 
 def test_every_edit_reaches_the_picture(volume):
-    plain = volume.render(CAMERA, LIGHT)
-    assert np.array_equal(volume.render(CAMERA, LIGHT, both()), plain)
-    palettes = {"low": (0.2, 0.3, 0.8), "high": (0.8, 0.5, 0.2)}
-    red = volume.render(CAMERA, LIGHT, both(low=PartEdit(palette=(0.9, 0.3, 0.1))), palettes)
+    plain = render(volume)
+    red = render(volume, low=PartEdit(palette=(0.9, 0.3, 0.1)))
     assert red[..., 0].sum() > 1.1 * plain[..., 0].sum()
     assert red[..., 2].sum() < 0.9 * plain[..., 2].sum()
     np.testing.assert_allclose(red[..., 3], plain[..., 3], atol=1e-3)
-    faint = volume.render(CAMERA, LIGHT, both(low=PartEdit(opacity=0.2)))
+    faint = render(volume, low=PartEdit(opacity=0.2))
     assert faint[..., 3].sum() < plain[..., 3].sum()
     dim = PartEdit(ambient=0.2, diffuse=0.2, specular=0.0)
-    dark = volume.render(CAMERA, LIGHT, both(low=dim, high=dim))
+    dark = render(volume, low=dim, high=dim)
     assert dark[..., :3].sum() < 0.5 * plain[..., :3].sum()
-    alone = volume.render(CAMERA, LIGHT, both(low=HIDDEN))
+    alone = render(volume, low=HIDDEN)
     assert alone[..., 3].sum() < plain[..., 3].sum()
-    assert not volume.render(CAMERA, LIGHT, both(low=HIDDEN, high=HIDDEN)).any()
-    side = volume.render(CAMERA, Light("directional", 110, 0))
+    assert not render(volume, low=HIDDEN, high=HIDDEN).any()
+    side = render(volume, Light("directional", 110, 0))
     assert np.abs(side - plain).max() > 0.1
 
 
@@ -96,11 +97,10 @@ def test_a_scene_is_compared_with_the_volume_that_has_its_edits(volume):
     fake = type("V", (), {"render": lambda self, *words: asked.append(words) or volume_render(*words)})()
     edits = [PartEdit(opacity=0.5), PartEdit(palette=(0, 1, 0))]
     models = {name: SceneModel("x", edit) for name, edit in zip(("low", "high"), edits, strict=True)}
-    step = Step("both", Scene(models, LIGHT))
+    step = Step("both", Scene(models, Light("headlight")))
     comparison, shown = compared(step, Composition([ball(1), ball(2)]), fake, [CAMERA])
     assert comparison.psnr > 0
     assert comparison.ssim < 1
     assert set(shown) == {"scene", "volume", "error"}
-    assert asked[0][1] == LIGHT
-    assert asked[0][2] == dict(zip(("low", "high"), edits, strict=True))
-    torch.testing.assert_close(torch.tensor(asked[0][3]["low"]), ball(1).parameters["palette"])
+    assert asked[0][1] == step.scene
+    torch.testing.assert_close(torch.tensor(asked[0][2][0]), ball(1).parameters["palette"])

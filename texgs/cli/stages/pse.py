@@ -122,8 +122,6 @@ def compared(
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
     background = torch.tensor(step.scene.background, device=composition.device)
-    edits = {name: model.edit for name, model in step.scene.models.items()}
-    palettes = dict(zip(edits, composition.palettes, strict=True))
     for camera in cameras if volume else cameras[:1]:
         image = composition.render(
             camera.to(background.device), step.scene.light, step.scene.edits, background=background
@@ -131,7 +129,7 @@ def compared(
         image = image.cpu()
         shown.setdefault("scene", image.clamp(0, 1).numpy())
         if volume is not None:
-            rgba = torch.from_numpy(volume.render(camera, step.scene.light, edits, palettes))
+            rgba = torch.from_numpy(volume.render(camera, step.scene, composition.palettes))
             truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
             shown.setdefault("error", ERROR(signed_error(image, truth)).numpy())

@@ -90,9 +90,7 @@ class Studio:
     def _volume_frame(self, session: Session, shot: Shot) -> np.ndarray:
         assert self._volume is not None, "an input where a place shows it"
         scene = session.scene
-        edits = {name: model.edit for name, model in scene.models.items()}
-        palettes = dict(zip(edits, session.composition.palettes, strict=True))
-        rgba = self._volume.render(self._camera(shot), scene.light, edits, palettes)
+        rgba = self._volume.render(self._camera(shot), scene, session.composition.palettes)
         color = rgba[..., :3] + (1 - rgba[..., 3:]) * np.asarray(scene.background, dtype=np.float32)
         return self._cut(color.clip(0, 1), shot)
 

@@ -51,9 +51,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     )
     if "volume" in inputs:
         volume = VolumeScene(settings, inputs["volume"])
-        edits = {name: model.edit for name, model in scene.models.items()}
         of_volume = milliseconds(
-            lambda camera: volume.render(camera, scene.light, edits),
+            lambda camera: volume.render(camera, scene, composition.palettes),
             spread(path, VOLUME_FRAMES),
             f"{title}, volume",
         )

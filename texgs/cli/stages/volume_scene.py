@@ -1,6 +1,6 @@
 """The volume with all basic TFs, edited as a scene is: what its pictures are compared with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,8 +13,9 @@ from texgs.cli.stages.tf import in_data_values
 from texgs.cli.stages.views import appearance_of, mapper_for
 from texgs.core.camera import Camera
 from texgs.core.io import read_json
-from texgs.core.light import Light
 from texgs.fields.part_edit import PartEdit
+from texgs.raster.shading import MATERIAL
+from texgs.scene.scene import Scene
 from texgs.volume.basic_tfs import combine
 from texgs.volume.nrrd_file import open_grid
 from texgs.volume.transfer import TransferFunction
@@ -38,36 +39,27 @@ class VolumeScene:
         self.look = appearance_of(settings.views)
         self._mapper = mapper_for(settings.views.mapper, self.grid, self.look)
 
-    def render(
-        self,
-        camera: Camera,
-        light: Light,
-        edits: Mapping[str, PartEdit] | None = None,
-        palettes: Mapping[str, Sequence[float]] | None = None,
-    ) -> np.ndarray:
-        """Premultiplied RGBA [H, W, 4] of all visible basic TFs with edits.
+    def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> np.ndarray:
+        """Premultiplied RGBA [H, W, 4] of the basic TFs of a scene's visible models, with their edits.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
         of light hold for the whole volume: those of the first visible model.
 
         Args:
             camera: from where.
-            light: shines on it.
-            edits: by basic TF, those of the models of a scene; by default nothing is changed.
-            palettes: as fitted, by model; needed where an edit changes one.
+            scene: whose models have the names of basic TFs; its light shines.
+            palettes: of its models, as fitted.
         """
-        edits = dict.fromkeys(self.tfs, PartEdit()) if edits is None else edits
-        visible = {name: edit for name, edit in edits.items() if edit.visible and edit.opacity > 0}
-        if not visible:
+        edits = [(name, model.edit) for name, model in scene.models.items()]
+        shown, factors = {}, list[dict[str, float]]()
+        for (name, edit), palette in zip(edits, palettes, strict=True):
+            if edit.visible and edit.opacity > 0:
+                shown[name] = edited(self.tfs[name], edit, palette)
+                factors.append({key: getattr(self.look, key) * getattr(edit, key) for key in MATERIAL})
+        if not shown:
             return np.zeros((camera.height, camera.width, 4), dtype=np.float32)
-        shown = {
-            name: edited(self.tfs[name], edit, (palettes or {})[name] if edit.palette else ())
-            for name, edit in visible.items()
-        }
-        first, names = next(iter(visible.values())), ("ambient", "diffuse", "specular", "shininess")
-        factors = {name: getattr(self.look, name) * getattr(first, name) for name in names}
-        self._mapper = self._mapper.looking(replace(self.look, **factors))
-        return self._mapper.render(combine(shown), camera, light)
+        self._mapper = self._mapper.looking(replace(self.look, **factors[0]))
+        return self._mapper.render(combine(shown), camera, scene.light)
 
 
 def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
