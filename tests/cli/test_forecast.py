@@ -61,6 +61,13 @@ def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, t
     assert not list(tmp_path.iterdir())  # nothing is written
 
 
+def test_a_sweep_and_mistakes_are_those_of_a_run(capsys):
+    assert main(["doctor", "dataset=orbital", "fit=demo", "fit.seed=0,1"]) == 0
+    assert " 4 texture" in capsys.readouterr().out, "two seeds of two basic TFs"
+    assert main(["doctor", "dataset=orbital", "fit=plenoxels_quick", "device=cuda"]) == 2
+    assert "device: expected cpu for fit=plenoxels_quick" in capsys.readouterr().err
+
+
 def test_a_run_that_would_not_start_is_told(capsys):
     assert main(["doctor", "dataset=wood", "fit=quick"]) == 1
     told = capsys.readouterr().out

@@ -39,7 +39,7 @@ def studio(tmp_path_factory):
     write_json(folder / "volume.json", bounds)
     views = ViewKeys(shading=Shading(), step=0.5, mapper="cpu", width=8, height=8)
     basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
-    fit = FitLabel("quick", "surfels", 0, "none", "", "cpu")
+    fit = FitLabel("quick", "surfels", 0, "none", "", "cpu", False)
     settings = OfScene("gallery", "sphere", "", "fraction", basic, views, fit)
     return Studio(settings, {"quick/none": scene, "volume": folder / "volume.nrrd"}, SIZE)
 

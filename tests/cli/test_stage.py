@@ -177,6 +177,10 @@ def test_a_job_of_the_workflow(folder, capsys):
     assert main(["views", "--settings", settings, "--output", str(output)]) == 2
     assert "expected the settings of a views job" in capsys.readouterr().err
     assert main(["volume", "--settings", settings, "--output", str(output), "dataset=sphere"]) == 2
+    assert main(["volume", "--settings", settings, "--output", str(output), "--force"]) == 2
+    assert "no KEY=VALUE or --force" in capsys.readouterr().err
+    assert main(["volume", *TINY, "--output", str(output)]) == 2
+    assert "--input, --output: expected only with --settings" in capsys.readouterr().err
 
 
 def test_a_folder_of_others_is_left_alone(folder, capsys):

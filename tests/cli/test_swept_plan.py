@@ -1,11 +1,13 @@
 """Jobs of sweeps: which ones there are, what they share, and what tells them apart."""
 
 from collections import Counter
+from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from texgs.cli.parents import WHOLE, of_sweep, owner
-from texgs.cli.plan import make, words_of
+from texgs.cli.plan import made, make, words_of
 from texgs.core.errors import ConfigError
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
@@ -49,6 +51,30 @@ def test_jobs_of_one_sweep_are_in_its_run_and_others_in_that_of_all(planned):
     assert owner(plan, "results/sphere/TF01/demo-42/texture") == "views"
     assert owner(plan, "results/sphere/TF01/demo/texture") == WHOLE
     assert owner(plan, "results/sphere/volume") == WHOLE, "both have it"
+
+
+def test_a_run_of_a_sweep_makes_what_it_shows_and_what_that_needs():
+    """All else that it plans stays as an earlier run left it, and in tables and report."""
+
+    def job(place, *inputs):
+        return SimpleNamespace(stage=SimpleNamespace(place=place), inputs=dict(enumerate(map(Path, inputs))))
+
+    jobs = {
+        "r/views": job("views", "data/volume.nrrd"),
+        "r/model": job("phase", "r/views/transforms_train.json"),
+        "r/compose": job("compose", "r/model/model.safetensors"),
+        "r/edit": job("edit", "r/compose/scene.yaml"),
+        "r/timing": job("timing", "r/compose/scene.yaml"),
+        "r/other": job("timing"),
+    }
+    swept = ["r/views", "r/model", "r/compose", "r/edit", "r/timing"]
+    assert made({"lambda_s": swept}, jobs) == {"r/views", "r/model", "r/compose", "r/edit"}
+    assert made({"": ["r/other"], "lambda_s": ["r/model"]}, jobs) == {"r/other", "r/views", "r/model"}
+
+
+def test_every_gpu_that_some_configuration_needs_is_asked_for(planned):
+    assert planned("").fit_gpu == 0
+    assert planned("datasets=[sphere,orbital] dataset.orbital.device=cuda").fit_gpu == 1
 
 
 def test_two_variants_of_one_folder_are_refused(planned):

@@ -48,7 +48,7 @@ def volume(tmp_path_factory):
     write_json(folder / "volume.json", bounds)
     views = ViewKeys(shading=Shading(), step=0.5, mapper="cpu")
     basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
-    fit = FitLabel("quick", "surfels", 0, "none", "", "cpu")
+    fit = FitLabel("quick", "surfels", 0, "none", "", "cpu", False)
     return VolumeScene(OfScene("pse", "sphere", "", "fraction", basic, views, fit), folder / "volume.nrrd")
 
 

@@ -35,7 +35,7 @@ def test_keys_are_there_and_can_have_the_papers_values(claim):
 def test_the_papers_recipes_differ_in_what_is_known():
     """c_ind starts from the zeroth harmonic and keeps the rate that it has in 2DGS, as in the release."""
     assert told(["paper"]) == [("fit.shading.rates.colors", "0.01", "0.0007", "paper")]
-    assert told([], ["style_paper", "text_paper", "lobe_paper"], ["paper"]) == []
+    assert told([], ["style_paper", "text_paper", "lobe_paper"]) == []
 
 
 def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
@@ -59,6 +59,11 @@ def test_recipes_with_the_same_difference_share_a_row():
     assert not {"fit.surfels.rates.sh", "fit.texture.rate"} & {row[0] for row in rows}, "of what is not run"
 
 
+def test_other_numbers_of_views_make_rows_with_their_data_sets():
+    views = {"training views": {162: ["wood"], 92: ["bonsai", "engine"]}, "test views": {181: ["wood"]}}
+    assert told([], views=views) == [("training views", "162", "92", "bonsai, engine")]
+
+
 def test_numbers_of_an_edits_recipe_are_those_it_runs_with():
     rows = told([], ["style", "text_quick", "style_untextured"])
     assert ("edit.image.recipe.iterations", "3000", "100", "style, style_untextured") in rows
@@ -68,7 +73,7 @@ def test_numbers_of_an_edits_recipe_are_those_it_runs_with():
 
 
 def test_what_has_nothing_to_compare_is_left_out():
-    assert told(["gaussians", "quick-variant"], ["none", "arf", "of-the-user"], ["nowhere"]) == []
+    assert told(["gaussians", "quick-variant"], ["none", "arf", "of-the-user"]) == []
     assert list(compared("fit", "gaussians")) == []
 
 

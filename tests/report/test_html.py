@@ -123,6 +123,29 @@ def test_every_figure_has_its_words_and_command(tmp_path, paths):
         assert Image.open(io.BytesIO(base64.b64decode(data))).format == "WEBP"
 
 
+def test_figures_of_sweeps_are_galleries_alone(tmp_path):
+    folder = tmp_path / "jobs"
+    folder.mkdir()
+    of_sweep = {"sweep": "resolution", "variant": "400"}
+    grid = job(folder, "gallery", GalleryResult("ablations", []), ["resolution.png"], **of_sweep)
+    single = job(folder, "figure", SheetResult(9, 2, 8, 4), ["figure.png"], **of_sweep)
+    captions = " ".join(page(tmp_path, [grid, single]).of("figcaption"))
+    assert "Words of resolution.png." in captions
+    assert "Words of figure.png." not in captions
+
+
+def test_commands_have_the_seeds_of_fit_and_edit(tmp_path):
+    folder = tmp_path / "jobs"
+    folder.mkdir()
+    edit = EditResult("gold", "text", "how", 6.0, follows="instruction", followed={"TF01": "gold"})
+    made = job(folder, "edit_text", edit, ["edit.png"], seed=2, fit_seed=3)
+    fit = job(folder, "figure", SheetResult(9, 2, 8, 4), ["figure.png"], seed=4, fit_seed=4, tf="TF01")
+    assert set(page(tmp_path, [made, fit]).of("code")) >= {
+        "texgs edit_text dataset=engine fit=quick edit=gold fit.seed=3 edit.seed=2",
+        "texgs figure dataset=engine tf=TF01 fit=quick fit.seed=4",
+    }
+
+
 def test_figures_are_in_their_sections(tmp_path, paths):
     text = write_report(tmp_path / "report.html", paths).read_text()
     places = {match[1]: match.start() for match in re.finditer(r'<h2 id="([a-z-]+)"', text)}

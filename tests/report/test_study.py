@@ -58,6 +58,15 @@ def test_edits_are_chosen_and_the_scene_before_is_of_the_best_fit(tmp_path):
     assert question.original.endswith("scene/plenoxels/compose/scene.yaml"), "no clip is of `other`"
 
 
+def test_variants_of_an_edit_have_the_scene_before_them(tmp_path):
+    fit(tmp_path)
+    for variant in ("0.5", "0.9"):
+        edit(tmp_path, "style", variant=variant)
+    (question,) = questions(tmp_path)
+    assert sorted(option.recipe for option in question.options) == ["quick-0.5", "quick-0.9"]
+    assert question.original.endswith("scene/quick/compose/scene.yaml")
+
+
 def test_what_cannot_be_asked_is_told(tmp_path):
     with pytest.raises(ArgumentError, match="no scenes with a new look among the results; run something"):
         questions(tmp_path)

@@ -21,7 +21,7 @@ def run(task):
     session = Session(task.scene)
     for model in task.scene.models:
         session.set(model, "opacity", task.settings.opacity)
-    return EditedScene(session.scene, "a toy", seconds=0.5)
+    return EditedScene(session.scene, "a toy")
 
 
 METHOD = Method(

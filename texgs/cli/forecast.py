@@ -55,8 +55,9 @@ def forecast(words: tuple[str, ...]) -> Forecast:
     """
     from texgs.cli.absent import lacking
     from texgs.config.experiments import selected
+    from texgs.config.product import as_sweep
 
-    selection = selected(words, lacking)
+    selection = selected(as_sweep(words), lacking)
     table, seconds, done = speeds(), 0.0, 0
     to_do: Counter[str] = Counter()
     for job, config in planned_jobs(selection):
@@ -70,13 +71,21 @@ def forecast(words: tuple[str, ...]) -> Forecast:
 
 
 def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
-    """All jobs of a selection, each once, with their configurations; not those whose files are not there."""
+    """All jobs of a selection, each once, with their configurations; not those whose files are not there.
+
+    Raises:
+        ConfigError, ArgumentError: for what would stop the run, as `texgs.cli.plan.add_jobs`.
+    """
+    from texgs.cli.fits import check_fit
     from texgs.cli.job import Job
+    from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.stages import jobs
     from texgs.core.checksum import Checksums
 
     checksums, seen = Checksums.load(), set()
     for config in (each for some in selection.by_sweep.values() for each in some):
+        check_basic_tfs(config.dataset)
+        check_fit(config)
         try:
             for stage, each in jobs(config):
                 if (folder := stage.output(each)) not in seen:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from texgs.core.checksum import Checksums
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
+SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places that are shown of a sweep
 OTHER_CODE = ("texgs.cli.tables", "texgs.cli.report")  # of rules that are no stages
 
 
@@ -118,7 +119,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         config.tracking.uri,
         config.tracking.experiment,
         int(any(each.views.mapper == "gpu" for each in configs)),
-        int(config.device.name == "cuda"),
+        int(any(each.device.name == "cuda" for each in configs)),
         {folder: plain(job, config.results) for folder, job in jobs.items()},
         sweeps,
         downloads(configs),
@@ -132,7 +133,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         },
         {module: code_digest(module) for module in OTHER_CODE},
         left_out(selection.left_out, config.results),
-        earlier(config.results, jobs, checksums),
+        earlier(config.results, made(sweeps, jobs), checksums),
     )
     checksums.save()
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
@@ -175,8 +176,20 @@ def add_jobs(
     return list(dict.fromkeys(folders))
 
 
+def made(sweeps: Mapping[str, Iterable[str]], jobs: Mapping[str, Job]) -> set[str]:
+    """The folders of the jobs that a run goes through: of a sweep what is shown, and what that needs."""
+    shown = [folder for sweep in sweeps.values() for folder in sweep if jobs[folder].stage.place in SWEPT]
+    waiting, folders = [*sweeps.get("", ()), *shown], set[str]()
+    while waiting:
+        folder = waiting.pop()
+        if folder in jobs and folder not in folders:
+            folders.add(folder)
+            waiting += [path.parent.as_posix() for path in jobs[folder].inputs.values()]
+    return folders
+
+
 def earlier(results: str, jobs: Iterable[str], checksums: Checksums) -> dict[str, str]:
-    """The metrics files of whole results that no job of the plan makes, with digests of their contents."""
+    """The metrics files of whole results that none of these jobs makes, with digests of their contents."""
     from texgs.cli.result import METRICS, is_complete
     from texgs.report.metrics_files import below
 

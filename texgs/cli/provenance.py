@@ -48,12 +48,12 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
 
 
 def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Recipe, its field, variant, sweep and seed, where the stage is of a fit or of what comes after it."""
+    """The recipe of the fit and what tells it from others, where the stage is of a fit or later."""
     fit = settings.get("fit", {})
     if "variant" not in fit:
         return {}
-    names = {"recipe": "name", "field": "field", "variant": "variant", "sweep": "sweep", "fit_seed": "seed"}
-    return {name: fit[key] for name, key in names.items()}
+    names = {"recipe": "name", "recipe_changed": "changed", "fit_seed": "seed"}
+    return {name: fit[names.get(name, name)] for name in (*names, "field", "variant", "sweep")}
 
 
 def edit(settings: Mapping[str, Any]) -> dict[str, str]:
@@ -61,21 +61,17 @@ def edit(settings: Mapping[str, Any]) -> dict[str, str]:
     return {"edit": settings["edit"]["name"]} if "edit" in settings else {}
 
 
-def gpu_name() -> str:
-    """Of the GPU that fits run on."""
-    import torch  # the jobs that need it have it already
-
-    return str(torch.cuda.get_device_name())
-
-
 def device(settings: Mapping[str, Any]) -> str:
-    """What did the work."""
-    if settings.get("fit", {}).get("device") == "cuda":
-        return gpu_name()
+    """What did the work: of jobs with a fit what showed its scene, of others what rendered the volume.
+
+    Some jobs of fits on a GPU do not use it, and then have none.
+    """
     mapper = settings.get("views", {}).get("mapper")
-    if mapper == "gpu":
-        return gpu_name()
-    return "VTK" if mapper == "vtk" else f"{platform.machine()} CPU"
+    kind = settings.get("fit", {}).get("device") or {"gpu": "cuda", "vtk": "VTK"}.get(mapper)
+    torch = sys.modules.get("torch")
+    if kind == "cuda" and torch and torch.cuda.is_initialized():
+        return str(torch.cuda.get_device_name())
+    return "VTK" if kind == "VTK" else f"{platform.machine()} CPU"
 
 
 def seed(settings: Mapping[str, Any]) -> int | None:

@@ -51,6 +51,11 @@ def run(arguments: argparse.Namespace) -> int:
     """Run the stage that the verb names."""
     if arguments.settings is not None:
         return run_settings(arguments)
+    if arguments.input or arguments.output is not None:
+        raise ArgumentError(
+            "--input, --output: expected only with --settings, as the workflow runs a job; by hand, "
+            "results=FOLDER says where results go"
+        )
     from texgs.cli.edits import require_base
     from texgs.cli.fits import require_fit
     from texgs.cli.stages.tf import check_basic_tfs
@@ -182,8 +187,8 @@ def run_settings(arguments: argparse.Namespace) -> int:
     from texgs.cli.tracked import of_workflow
     from texgs.config.stages import STAGES
 
-    if arguments.overrides or arguments.output is None:
-        raise ArgumentError("a job: expected --settings and --output and no KEY=VALUE; see --help")
+    if arguments.overrides or arguments.force or arguments.output is None:
+        raise ArgumentError("a job: expected --settings and --output, no KEY=VALUE or --force; see --help")
     try:
         settings = OmegaConf.to_container(OmegaConf.load(arguments.settings))
     except (OSError, YAMLError) as error:

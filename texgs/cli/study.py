@@ -1,6 +1,7 @@
 """Make a user study of edited scenes: one HTML page for voters, and the key that tells what they saw."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,7 +35,8 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.errors import ArgumentError
     from texgs.core.io import write_bytes
     from texgs.report.ballot_page import ballot_page
-    from texgs.report.metrics_files import below, read
+    from texgs.report.left_out import others
+    from texgs.report.metrics_files import below, read_known
     from texgs.report.study import KINDS, Study, questions_of, write_key
 
     key, page = arguments.output / KEY, arguments.output / PAGE
@@ -44,7 +46,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     if not LEAST <= arguments.size <= MOST:
         raise ArgumentError(f"--size: expected {LEAST} to {MOST} pixels, got {arguments.size}")
-    questions = questions_of(read(below(arguments.results)), arguments.edits, arguments.seed)
+    records, old = read_known(below(arguments.results))
+    for entry in others(old):
+        print(f"Left out: {entry}", file=sys.stderr)
+    questions = questions_of(records, arguments.edits, arguments.seed)
     films = films_of(questions, arguments.size, arguments.frames, torch_device(arguments.device))
     shown = ballot_page("", questions, films, arguments.size)
     study = Study(sha256(shown.encode()).hexdigest()[:12], arguments.seed, questions)

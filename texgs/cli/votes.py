@@ -23,7 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.report.ballots import read_votes
     from texgs.report.study import read_key
     from texgs.report.table_files import write_table
-    from texgs.report.votes import user_study
+    from texgs.report.tables import of_study
     from texgs.report.votes_figure import write_votes
 
     study, folder = read_key(arguments.key), arguments.key.parent / "votes"
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not ballots:
         raise ArgumentError(f"votes: no ballots in {folder}; put the files there that voters send")
     votes = read_votes(study, ballots)
-    table = user_study(votes)
+    table = of_study(votes).table([])
     write_table(arguments.output, NAME, table)
     write_votes(arguments.output / f"{NAME}.png", votes)
     print(table.markdown())

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 NATIVE = "texgs.raster.native"  # the module that calls the native library
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # of native libraries
 READS_TEXTS = b"importlib.resources"  # in modules that do
-TEXTS = (".css", ".html", ".j2", ".js")
+TEXTS = (".css", ".csv", ".html", ".j2", ".js", ".yaml")
 SOURCES = Sources()
 
 
@@ -49,7 +49,7 @@ def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
 
 
 def texts_beside(path: Path) -> str:
-    """The texts that are no modules in the folder of a module and below: pages, scripts, templates."""
+    """The texts that are no modules in the folder of a module and below: templates, published numbers."""
     files = sorted(each for each in path.parent.rglob("*") if each.suffix in TEXTS)
     return "".join(f"{each.name}\n{each.read_text(encoding='utf-8')}" for each in files)
 

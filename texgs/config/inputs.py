@@ -15,6 +15,7 @@ from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.config.looks import captions, looks_of
 from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.places import edit_folder, folder_of, made
+from texgs.config.project import members
 from texgs.config.variants import NO_SWEEP, fit_variant
 from texgs.core.errors import ConfigError, MissingDataError
 
@@ -107,8 +108,17 @@ def fit_label(config: DictConfig) -> dict[str, Any]:
             "sweep": config.sweep.name if variant else NO_SWEEP,
             "variant": variant,
             "device": config.device.name,
+            "changed": is_changed(config.fit),
         }
     }
+
+
+def is_changed(fit: DictConfig) -> bool:
+    """Whether a recipe is not that of the file with its name, but for its seed."""
+    if fit.name not in members("fit"):
+        return True
+    file = compose((f"fit={fit.name}",)).fit
+    return any(fit[key] != file[key] for key in file if key != "seed")
 
 
 def view_settings(config: DictConfig) -> dict[str, Any]:

@@ -92,7 +92,6 @@ class EditedScene:
 
     scene: Scene
     how: str  # what the method worked with, in tables
-    seconds: float
     pictures: Mapping[str, str] = field(default_factory=dict)  # what files of the output show, by their names
     lambda_s: float | None = None  # share of NNFM against CLIP
     notes: Mapping[str, Any] = field(default_factory=dict)  # what else there is to tell: no table reads it

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -35,7 +34,7 @@ def run(task: Task[ArfKeys]) -> EditedScene:
     from texgs.edit.voxel_style import ArfWeights, stylize_voxels
     from texgs.volume.images import load
 
-    keys, look, start = task.settings, style.Look.of(task), time.monotonic()
+    keys, look = task.settings, style.Look.of(task)
     added = ArfWeights(keys.content, keys.variation, keys.sh_variation, keys.ray_epochs, keys.exact)
 
     def one(name: str, model: Voxels, views: Sequence[View]) -> Voxels:
@@ -47,7 +46,7 @@ def run(task: Task[ArfKeys]) -> EditedScene:
         return edited
 
     scene = task.each_model(one)  # type: ignore[arg-type]
-    return look.result(scene, time.monotonic() - start)
+    return look.result(scene)
 
 
 def recipe_of(settings: ArfKeys, views: int, seed: int = 0) -> Recipe:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -66,7 +65,6 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     return EditedScene(
         scene,
         how(recipe, task.settings.clip),
-        sum(each["all"] for each in seconds.values()),
         style.write_styles(task.output, pictures),
         recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
         {"seconds": seconds},
@@ -92,7 +90,6 @@ def stylist(
     network = Clip.load(task.settings.clip, task.device) if recipe.needs_clip else None
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
-        start = time.monotonic()
         picture = pictures[name] = style_of(task.settings_for(name.split("/")[0]))
         pixels = picture.image.permute(1, 2, 0).to(task.device)
         clip = ClipLoss(network, pixels) if network else None
@@ -109,7 +106,7 @@ def stylist(
             show=partial(task.show, name),
         )
         losses[name] = result.history.losses
-        seconds[name] = {"all": time.monotonic() - start, **result.history.seconds}
+        seconds[name] = result.history.seconds
         return result.model
 
     return one

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
@@ -61,7 +60,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
     from texgs.edit.task import EditedScene
     from texgs.models.by_name import mask_model
 
-    settings, device, start = task.settings, task.device, time.monotonic()
+    settings, device = task.settings, task.device
     name = model_name(task.scene, settings.model, "edit.segment.model")
     clicks = clicks_of(settings, task.lens, device)
     made = new_segment(
@@ -74,12 +73,10 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
         connected=settings.connected,
         title=f"{task.title} {task.edit.name}",
     )
-    seconds = time.monotonic() - start
     show(task, clicks, made)
     return EditedScene(
         made.scene,
         f"{settings.masks}, {settings.vote}",
-        seconds,
         {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
         notes={
             "surfels": int(made.lifted.mask.sum()),

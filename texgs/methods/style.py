@@ -101,12 +101,12 @@ class Look:
         """Of a progress bar."""
         return f"{self.task.title} {self.task.edit.name}, {model}"
 
-    def result(self, scene: Scene, seconds: float) -> EditedScene:
+    def result(self, scene: Scene) -> EditedScene:
         """The edited scene; writes its style pictures."""
         from texgs.edit.task import EditedScene
 
         pictures = write_styles(self.task.output, self.pictures)
-        return EditedScene(scene, self.task.settings.how, seconds, pictures, losses=self.losses)
+        return EditedScene(scene, self.task.settings.how, pictures, losses=self.losses)
 
 
 def write_styles(folder: Path, pictures: Mapping[str, StylePicture]) -> dict[str, str]:

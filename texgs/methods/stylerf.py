@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -38,7 +37,7 @@ def run(task: Task[StyleRfKeys]) -> EditedScene:
     from texgs.edit.palette_style import StyleRfWeights, stylize_palette
     from texgs.volume.images import load
 
-    keys, look, start = task.settings, style.Look.of(task), time.monotonic()
+    keys, look = task.settings, style.Look.of(task)
     added, errors = StyleRfWeights(keys.variation, keys.distillation), {}
     pictures = [style.picture_of(name, STYLES) for name in keys.styles]
 
@@ -52,7 +51,7 @@ def run(task: Task[StyleRfKeys]) -> EditedScene:
         return edited
 
     scene = task.each_model(one)  # type: ignore[arg-type]
-    result = look.result(scene, time.monotonic() - start)
+    result = look.result(scene)
     return replace(result, notes={"distillation_rmse": errors})
 
 

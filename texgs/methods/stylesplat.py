@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -32,7 +31,6 @@ def run(task: Task[StyleSplatKeys]) -> EditedScene:
     from texgs.volume.reduced import smaller
 
     recipe, look = recipe_of(task.settings, task.edit.seed), style.Look.of(task)
-    start = time.monotonic()
 
     def one(name: str, model: Gaussians, views: Sequence[View]) -> Gaussians:
         cameras = [smaller(view.camera, task.reduce) for view in views]
@@ -41,7 +39,7 @@ def run(task: Task[StyleSplatKeys]) -> EditedScene:
         )
         return edited
 
-    return look.result(task.each_model(one), time.monotonic() - start)  # type: ignore[arg-type]
+    return look.result(task.each_model(one))  # type: ignore[arg-type]
 
 
 def recipe_of(settings: StyleSplatKeys, seed: int = 0) -> Recipe:

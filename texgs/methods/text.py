@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -50,11 +49,9 @@ def run(task: Task[TextKeys]) -> EditedScene:
 
     settings, guidance = task.settings, task.settings.opened(task.device)
     rows: dict[str, list[np.ndarray]] = {}
-    seconds: dict[str, float] = {}
     seen: dict[str, float] = {}
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
-        start = time.monotonic()
         result = edit_by_text(
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
@@ -65,7 +62,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
             size=settings.size,
             seed=task.edit.seed,
         )
-        seconds[name], seen[name] = time.monotonic() - start, result.seen
+        seen[name] = result.seen
         rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN]]
         rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN]]
         return result.model if settings.textured else untextured(result.model, surfels)
@@ -76,9 +73,8 @@ def run(task: Task[TextKeys]) -> EditedScene:
     return EditedScene(
         scene,
         f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),
-        sum(seconds.values()),
         PICTURE,
-        notes={"instruction": task.followed or settings.instruction, "seconds": seconds, "seen": seen},
+        notes={"instruction": task.followed or settings.instruction, "seen": seen},
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -108,7 +107,7 @@ def edit_by_updates(
     from texgs.edit.task import EditedScene
     from texgs.volume.images import load
 
-    keys, guidance, start = task.settings, task.settings.opened(task.device), time.monotonic()
+    keys, guidance = task.settings, task.settings.opened(task.device)
     closeness, updates = keys.closeness(task.device), dict[str, Updated]()
 
     def one(name: str, model: Field, views: Sequence[View]) -> Field:
@@ -124,7 +123,6 @@ def edit_by_updates(
         return updates[name].field
 
     scene = task.each_model(one)
-    seconds = time.monotonic() - start
     losses = {name: {"loss": each.losses} for name, each in updates.items()}
     _write_views(task.output / "views.png", updates)
     notes: dict[str, Any] = {
@@ -132,7 +130,7 @@ def edit_by_updates(
     }
     notes["instruction"] = task.followed or keys.instruction
     how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
-    return EditedScene(scene, how, seconds, PICTURE, notes=notes, losses=losses)
+    return EditedScene(scene, how, PICTURE, notes=notes, losses=losses)
 
 
 def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -53,9 +53,19 @@ class Other:
 
 
 @dataclass(frozen=True)
+class Count:
+    """How many views the paper has."""
+
+    what: str
+    paper: int
+    where: str
+
+
+@dataclass(frozen=True)
 class Published:
     """The paper's method: what a configuration can be compared with, and the rest."""
 
+    views: list[Count]
     keys: list[Claim]
     others: list[Other]
 
@@ -67,7 +77,11 @@ def published() -> Published:
     return typed(Published, parse_yaml(file.read_text(encoding="utf-8")))
 
 
-def differences(recipes: Sequence[str], edits: Sequence[str] = (), views: Sequence[str] = ()) -> Table:
+def differences(
+    recipes: Sequence[str],
+    edits: Sequence[str] = (),
+    views: Mapping[str, Mapping[int, Sequence[str]]] | None = None,
+) -> Table:
     """The table of what differs from the paper.
 
     A difference that several files share is one row. Names without a file in conf/, such as variants of a
@@ -77,13 +91,13 @@ def differences(recipes: Sequence[str], edits: Sequence[str] = (), views: Sequen
     Args:
         recipes: of fits, files of conf/fit.
         edits: files of conf/edit.
-        views: files of conf/views.
+        views: numbers of "training views" and "test views", each with the data sets that have so many.
 
     Raises:
         ConfigError: if a file cannot be composed.
     """
     names: dict[tuple[str, str], list[str]] = defaultdict(list)  # by key and value here
-    for group, given in (("views", views), ("fit", recipes), ("edit", edits)):
+    for group, given in (("fit", recipes), ("edit", edits)):
         for name in [name for name in given if name in members(group)]:
             for claim, here in compared(group, name):
                 if plain(here) != plain(claim.paper):
@@ -91,6 +105,12 @@ def differences(recipes: Sequence[str], edits: Sequence[str] = (), views: Sequen
     claims = {claim.key: claim for claim in published().keys}
     order = list(claims)
     rows = [
+        Row([count.what, text(count.paper), text(here), ", ".join(some), count.where], [])
+        for count in published().views
+        for here, some in sorted((views or {}).get(count.what, {}).items())
+        if here != count.paper
+    ]
+    rows += [
         Row([key, text(claims[key].paper), here, ", ".join(some), claims[key].where], [])
         for (key, here), some in sorted(names.items(), key=lambda item: order.index(item[0][0]))
     ]

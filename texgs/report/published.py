@@ -92,8 +92,9 @@ def is_alike(record: Record[FitResult], pixels: int | None = None, views: int = 
     """
     pixels = images().get(record.dataset) if pixels is None else pixels
     seen = (record.result.width, record.result.height, record.result.train_views)
-    is_changed = bool(record.stand_in) or (bool(record.variant) and not record.is_swept)
-    return not is_changed and record.recipe == RECIPE and seen == (pixels, pixels, views)
+    is_other = bool(record.stand_in) or (bool(record.variant) and not record.is_swept)
+    is_paper = record.recipe == RECIPE and not record.facts.get("recipe_changed")
+    return is_paper and not is_other and seen == (pixels, pixels, views)
 
 
 def beside(line: Line | None, keys: Sequence[str], alike: bool) -> list[Cell]:

@@ -65,7 +65,7 @@ class Figure:
 
 
 def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:
-    """All pictures of jobs by section, in the order of data sets; those of sweeps have a figure of all.
+    """All pictures of jobs by section, in the order of data sets; of sweeps those that show all variants.
 
     Args:
         records: of the jobs.
@@ -75,7 +75,8 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
     for record in in_order(records):
         for name, words in record.facts.get("pictures", {}).items():
             picture = record.path.with_name(name)
-            if picture.is_file() and name not in UNREPORTED and not record.is_swept:
+            is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
+            if picture.is_file() and name not in UNREPORTED and is_of_all:
                 figure = Figure(
                     record.title,
                     label(record),
@@ -139,7 +140,8 @@ def command(record: Record[Any]) -> str:
         "fit": next(iter(fits), ""),
         "edit": edit_of(record),
         "variant": record.variant,
-        "fit.seed": record.seed if record.recipe else 0,
+        "fit.seed": record.facts.get("fit_seed", 0),
+        "edit.seed": record.seed if edit_of(record) else 0,
         "fits": f"[{','.join(fits)}]" if len(fits) > 1 else "",
     }
     given = [f"{key}={value}" for key, value in words.items() if value]

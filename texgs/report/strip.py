@@ -53,17 +53,15 @@ def write_strip(
     figure = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(rows), len(titles), squeeze=False)
-    for row, (name, pictures) in enumerate(rows.items()):
-        for column, picture in enumerate(pictures):
-            at = axes[row, column]
+    for line, (name, pictures) in zip(axes, rows.items(), strict=True):
+        line[0].set_ylabel(words(name), fontsize=9)
+        for at, picture, note in zip(line, pictures, notes[name], strict=True):
             at.set(xticks=[], yticks=[], frame_on=picture is not None)
+            at.set_xlabel(words(note), fontsize=8)
             if picture is not None:
                 at.imshow(picture[box])
-            at.set_xlabel(words(notes[name][column]), fontsize=8)
-            if row == 0:
-                at.set_title(words(titles[column]), fontsize=8)
-            if column == 0:
-                at.set_ylabel(words(name), fontsize=9)
+    for at, title in zip(axes[0], titles, strict=True):
+        at.set_title(words(title), fontsize=8)
     return write_atomic(path, lambda file: figure.savefig(file, format="png", metadata={"Software": None}))
 
 

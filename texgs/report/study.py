@@ -127,7 +127,7 @@ def question_of(
         for each in looks
     ]
     order.shuffle(options)
-    original = original_of(first.dataset, {record.label for record in looks}, records)
+    original = original_of(first.dataset, {fit_of(record) for record in looks}, records)
     pictures = [
         first.path.with_name(name).as_posix()
         for name in first.facts.get("pictures", {})
@@ -137,28 +137,33 @@ def question_of(
     return Question(first.dataset, first.result.follows, followed, original.as_posix(), pictures, options)
 
 
-def original_of(dataset: str, recipes: set[str], records: Sequence[Record[Any]]) -> Path:
-    """The scene before the edits: of the recipe whose fits are closest to their test views.
+def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) -> Path:
+    """The scene before the edits: of the fits that are closest to their test views.
 
     Raises:
-        ArgumentError: if none of the recipes has a scene.
+        ArgumentError: if none of the fits has a scene.
     """
     scenes = {
-        record.label: record.path.with_name("scene.yaml")
+        fit_of(record): record.path.with_name("scene.yaml")
         for record in of(SceneResult, records)
-        if record.dataset == dataset and record.label in recipes
+        if record.dataset == dataset and fit_of(record) in fits
     }
     if not scenes:
         raise ArgumentError(
-            f"study: no scene of {dataset} by {', '.join(sorted(recipes))} before its edits among the "
+            f"study: no scene of {dataset} by {', '.join(sorted(fits))} before its edits among the "
             "results; texgs compose makes it"
         )
-    psnr: dict[str, dict[str | None, float]] = defaultdict(dict)  # by recipe and TF, of the best phase
+    psnr: dict[str, dict[str | None, float]] = defaultdict(dict)  # by fit and TF, of the best phase
     for record in of(FitResult, records):
-        if record.dataset == dataset and record.label in scenes and record.result.psnr is not None:
-            best = psnr[record.label]
+        if record.dataset == dataset and fit_of(record) in scenes and record.result.psnr is not None:
+            best = psnr[fit_of(record)]
             best[record.tf] = max(record.result.psnr, best.get(record.tf, record.result.psnr))
-    return scenes[max(sorted(scenes), key=lambda recipe: sum(psnr[recipe].values()))]
+    return scenes[max(sorted(scenes), key=lambda fit: sum(psnr[fit].values()))]
+
+
+def fit_of(record: Record[Any]) -> str:
+    """The folder of a job's fit, see `texgs.config.places`: variants of an edit have the same."""
+    return record.path.parents[2 if isinstance(record.result, EditResult) else 1].name
 
 
 def rank_name(rank: int, count: int) -> str:

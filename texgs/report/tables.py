@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -18,7 +19,7 @@ from texgs.report.looks import looks
 from texgs.report.meshes import meshes
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import images, meant
-from texgs.report.results import EditResult, FitResult
+from texgs.report.results import EditResult, FitResult, SheetResult
 from texgs.report.scene_tables import edits, model_size, rendering
 from texgs.report.sweep import sweep
 from texgs.report.table import Table
@@ -151,8 +152,17 @@ def of_recipes(records: Iterable[Record[Any]]) -> Table:
     records = list(records)
     recipes = sorted({record.recipe for record in of(FitResult, records)})
     edits = sorted({record.result.edit for record in of(EditResult, records)})
-    table = differences(recipes, edits)
+    table = differences(recipes, edits, views_of(records))
     return table if recipes else replace(table, rows=[])
+
+
+def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
+    """Numbers of training and test views, each with the data sets that have so many; of sweeps none."""
+    found: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for record in of(SheetResult, records):
+        for what, count in (("training views", record.result.train), ("test views", record.result.test)):
+            found[what][count].add(record.dataset)
+    return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in found.items()}
 
 
 OURS = (
@@ -167,7 +177,7 @@ OURS = (
     ),
     TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
     TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),
-    TableSpec("differences", "Where we differ", "", "differences", ("phase", "edit"), of_recipes),
+    TableSpec("differences", "Where we differ", "", "differences", ("phase", "edit", "sheet"), of_recipes),
 )
 
 

@@ -3,12 +3,10 @@ import os
 import re
 import shlex
 import sys
-from importlib.resources import files
 from pathlib import Path
 
 from texgs.cli import fork_client, parents
 from texgs.cli.plan import planned, words_of
-from texgs.config.sources import digest
 from texgs.config.places import PLACES
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
@@ -34,6 +32,7 @@ if MISSING:
 PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
 MAPPER_GPU, FIT_GPU = PLAN.mapper_gpu, PLAN.fit_gpu
+EVERY = 1024 # threads, of which a job gets as many as there are
 
 
 def job(place, wildcards):

@@ -36,7 +36,7 @@ rule edit_metrics:
         writes("edit_metrics"),
     log:
         log_of("edit_metrics"),
-    threads: 16
+    threads: EVERY # it measures frames, too
     resources:
         gpu=FIT_GPU,
     params:

@@ -40,7 +40,7 @@ rule pse:
         RUN
 
 
-# As many threads as most machines have: other jobs would be measured with it.
+# All threads: other jobs would be measured with it.
 rule timing:
     input:
         reads("timing"),
@@ -48,7 +48,7 @@ rule timing:
         writes("timing"),
     log:
         log_of("timing"),
-    threads: 16
+    threads: EVERY
     resources:
         gpu=max(MAPPER_GPU, FIT_GPU),
     params:

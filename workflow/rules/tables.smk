@@ -1,11 +1,11 @@
 # Tables and the report, from the metrics files of jobs.
 
 
+from texgs.cli.plan import SWEPT
 from texgs.report.table_files import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 
 SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", sweep=name))
-SWEPT = ("volume", "views", "phase", "edit", "edit_metrics")  # places that tables of sweeps read
 OF_SWEEPS = {file for name in SWEEPS for file in PLAN.done(*SWEPT, sweep=name)}
 TABLES = specs(SWEEPS)
 STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
@@ -41,7 +41,6 @@ rule report:
         "<logs>/report.log",
     params:
         code=PLAN.code["texgs.cli.report"],
-        template=digest(files("texgs.report").joinpath("report.html.j2").read_text()),
         earlier=list(PLAN.earlier),
         of_earlier=list(PLAN.earlier.values()),
         left_out=PLAN.left_out,

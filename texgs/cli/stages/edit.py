@@ -1,5 +1,6 @@
 """Stages `edit_METHOD`: a method of editing gives a scene a new look, or a new part."""
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -59,7 +60,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         title,
         settings.followed,
     )
+    start = time.monotonic()
     edited = method.run(task)
+    seconds = time.monotonic() - start  # of all methods alike: with what they read and write
     write_scene(output / "scene.yaml", edited.scene)
     pictures = dict(edited.pictures)
     if method.is_look:
@@ -69,7 +72,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         write_convergence(output / "convergence.png", edited.losses)
         pictures["convergence.png"] = FALLEN
     result = EditResult(
-        *(task.edit.name, method.name, edited.how, edited.seconds, edited.lambda_s, dict(edited.notes)),
+        *(task.edit.name, method.name, edited.how, seconds, edited.lambda_s, dict(edited.notes)),
         *(method.follows, followed(task), *fallen(edited.losses)),
     )
     return Outcome(result, pictures)
@@ -93,4 +96,5 @@ def followed(task: Task[Any]) -> dict[str, str]:
     if not follows:
         return {}
     parts = [part.name for part in parts_of(task.scene, task.edit.parts)]
-    return {name: Path(getattr(task.settings_for(name.split("/")[0]), follows)).name for name in parts}
+    looks = {name: str(getattr(task.settings_for(name.split("/")[0]), follows)) for name in parts}
+    return {name: Path(look).name for name, look in looks.items()} if follows == "style" else looks

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -139,7 +140,10 @@ def style_distance(
     device: torch.device,
     title: str,
 ) -> dict[str, Any]:
-    """NNFM and Gram distances of the models with a style, means over them; none of segments or by words."""
+    """NNFM and Gram distances of the models with a style, means over them.
+
+    None of segments, of looks by words, or where a model is nowhere opaque.
+    """
     edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
     if method.style is None or any(part.segment for part in parts) or not settings.weights["vgg16"]:
@@ -159,10 +163,11 @@ def style_distance(
                 f"{title}, {part.name}",
             )
         )
-    return {
+    means = {
         "style_nnfm": fmean(each.nnfm for each in likenesses),
         "style_gram": fmean(each.gram for each in likenesses),
     }
+    return {name: value for name, value in means.items() if isfinite(value)}
 
 
 @torch.no_grad()

@@ -28,11 +28,10 @@ from texgs.scene.session import Session
 from texgs.volume.cameras import orbit_path
 
 PICTURES = {
-    "pse.png": "Edits of opacity, colour and light, each on top of those before it; below each the volume "
-    "with the same edits, and the error of the worst channel, four times enlarged.",
-    "relight.png": "A light in front that moves from below to above, by its azimuth and polar angle; below "
-    "the volume under the same light, and the error.",
+    "pse.png": "Edits of opacity, colour and light, each on top of those before it",
+    "relight.png": "A light in front that moves from below to above, by its azimuth and polar angle",
 }
+BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
 COMPARED = 6  # views around the object, one of which is shown
 POLAR = 20.0  # of these views, degrees
 LEFT = Light("directional", -150.0, 20.0)
@@ -76,7 +75,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
                 rows.setdefault(name, []).append(image)
         titles = [caption(entry) for entry in done[group]]
         write_strip(output / f"{group}.png", rows, titles)
-    return Outcome(PseResult(COMPARED, **done), PICTURES)
+    end = BELOW if volume else "."
+    return Outcome(PseResult(COMPARED, **done), {name: words + end for name, words in PICTURES.items()})
 
 
 def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:

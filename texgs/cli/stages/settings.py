@@ -37,6 +37,7 @@ class FitLabel:
     sweep: str
     variant: str
     device: str
+    changed: bool  # from the file of its name
 
 
 @dataclass
