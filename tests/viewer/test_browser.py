@@ -123,7 +123,8 @@ def test_what_is_edited_shows_and_is_saved(chromium, scene_file):
         expected = rendered(red, page)
         assert still(page) == expected
         assert np.abs(shown(page) - pixels(expected)[:-50]).mean() < JPEG
-        expect(page.get_by_role("listitem")).to_have_text(["TF01 palette", "TF02 opacity", "TF02 visible"])
+        steps = ["TF01 palette #ff0000", "TF02 opacity 0.3", "TF02 visible off"]
+        expect(page.get_by_role("listitem")).to_have_text(steps)
         page.get_by_role("button", name="Undo").click()
         page.get_by_role("button", name="Undo").click()
         expect(page.get_by_role("checkbox", name="TF02")).to_be_checked()
@@ -182,10 +183,12 @@ def test_a_movement_is_one_step(chromium, scene_file):
     with served(scene_file) as (_, address), opened(chromium, address) as page:
         slider = page.get_by_role("slider", name="Opacity of TF01")
         drag(page, slider, (0.5, 0.5), (0.05, 0.5))
-        expect(page.get_by_role("listitem")).to_have_text(["TF01 opacity"])
+        expect(page.get_by_role("listitem")).to_have_text([f"TF01 opacity {float(slider.input_value()):g}"])
         assert float(slider.input_value()) < 0.3
         drag(page, page.locator(".ball"), (0.5, 0.5), (0.9, 0.5))
-        expect(page.get_by_role("listitem")).to_have_text(["TF01 opacity", "light"])
+        expect(page.get_by_role("listitem")).to_have_text(
+            [re.compile("TF01 opacity"), re.compile("light azimuth .*°, polar .*°")]
+        )
         # the right rim of the ball is to the right of a camera at azimuth 40
         azimuth = page.get_by_role("spinbutton", name="Azimuth of the light, degrees, as a number")
         assert 90 < float(azimuth.input_value()) < 135
@@ -210,7 +213,7 @@ def test_a_click_makes_a_segment(chromium, tmp_path):
         page.get_by_role("form", name="New segment").get_by_label("Name").fill("blue")
         page.get_by_role("button", name="Make segment").click()
         page.get_by_role("checkbox", name="blue").uncheck(timeout=WAIT)
-        expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible"])
+        expect(page.get_by_role("listitem")).to_have_text(["balls/blue new", "balls/blue visible off"])
         page.get_by_role("button", name="Rename balls/blue").click()
         page.get_by_role("dialog").get_by_label("Name").fill("sea")
         page.keyboard.press("Enter")
@@ -220,9 +223,12 @@ def test_a_click_makes_a_segment(chromium, tmp_path):
         is_blue = (reds[..., 2] - reds[..., 0] > 100).mean()
         assert (reds[..., 0] - reds[..., 2] > 100).mean() > 0.01
         assert is_blue < 0.001
-        page.get_by_role("button", name="Undo").click()
-        page.get_by_role("button", name="Undo").click()
+        page.get_by_role("button", name="Remove balls/blue").click()
         expect(page.get_by_role("checkbox", name="blue")).to_have_count(0)
+        expect(page.get_by_role("checkbox", name="balls")).to_be_focused()
+        for _ in range(3):
+            page.get_by_role("button", name="Undo").click()
+        expect(page.get_by_role("button", name="Nothing to undo")).to_be_disabled()
 
 
 def test_a_model_gets_the_style_of_a_picture(chromium, scene_file):
@@ -277,8 +283,15 @@ def test_edits_stand_in_the_link(chromium, scene_file):
         expect(page).not_to_have_url(re.compile("edits="), timeout=WAIT)
         page.goto("about:blank")
         page.goto(link)
+        expect(page.get_by_text("The link has 1 other edit of this scene")).to_be_visible(timeout=WAIT)
+        expect(page.get_by_role("checkbox", name="TF02")).to_be_checked()  # a step could be made again
+        page.get_by_role("button", name="Make it on all pages").click()
         expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked(timeout=WAIT)
-        expect(page.get_by_role("listitem")).to_have_text(["TF02 visible"])
+        expect(page.get_by_role("listitem")).to_have_text(["TF02 visible off"])
+    with served(scene_file) as (_, other), opened(chromium, other) as page:
+        page.goto("about:blank")
+        page.goto(other + link[link.index("#") :])
+        expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked(timeout=WAIT)
 
 
 def test_an_export_is_saved(chromium, scene_file):

@@ -51,6 +51,23 @@ def test_messages_are_read():
     assert parse(json.dumps({"type": "segment", "part": "TF01/a", **clicks})) == Segment("TF01/a", clicked)
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "value", "title"),
+    [
+        ("TF01", "opacity", 0.123456, "TF01 opacity 0.1235"),
+        ("TF01", "opacity", 1000, "TF01 opacity 1000"),
+        ("TF01", "palette", [1, 0.5, 0], "TF01 palette #ff8000"),
+        ("TF01", "palette", "#00ff00", "TF01 palette #00ff00"),
+        ("TF01/a", "visible", False, "TF01/a visible off"),
+        ("TF01", "palette", None, "TF01 palette reset"),
+        ("", "light", "headlight", "light headlight"),
+        ("", "light", {"polar": 12.4}, "light polar 12°"),
+    ],
+)
+def test_edits_have_titles(part, key, value, title):
+    assert Edit(part, key, value, 0).title == title
+
+
 def test_a_camera_is_that_of_the_renderer():
     camera, expected = parse(json.dumps(VIEW)).camera.camera(), orbit(30, 20, 3, 40, 64, 48)
     assert camera.viewmat.equal(expected.viewmat)

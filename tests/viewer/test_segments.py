@@ -103,7 +103,7 @@ def test_clicks_make_a_segment_that_is_edited_undone_and_saved(balls):
         await browser.send(type="edit", part="balls/red", key="opacity", value=0.5)
         while len((news := await browser.next("scene"))["past"]) < 2:
             pass
-        assert news["past"] == ["balls/red new", "balls/red opacity"]
+        assert news["past"] == ["balls/red new", "balls/red opacity 0.5"]
         await browser.send(type="save", name="scene.yaml")
         await browser.next("notice")
         await browser.send(type="undo")

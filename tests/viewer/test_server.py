@@ -252,17 +252,18 @@ def test_pages_share_edits_and_their_history(scene_file):
             for each in (one, other):
                 news = await each.next("scene")
                 assert news["scene"]["models"][0]["edit"]["palette"] == [1, 0, 0]
-                assert news["past"] == ["TF01 palette"]
+                assert news["past"] == ["TF01 palette #ff0000"]
                 assert not news["saved"]
             await other.send(type="undo")
             news = await one.next("scene")
             assert news["scene"]["models"][0]["edit"]["palette"] is None
-            assert (news["past"], news["future"]) == ([], ["TF01 palette"])
+            assert (news["past"], news["future"]) == ([], ["TF01 palette #ff0000"])
             assert news["saved"]
             await one.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
             await other.send(type="redo")
             await other.send(type="edit", part="", key="background", value=None)
-            while (news := await one.next("scene"))["past"] != ["light", "background"]:
+            steps = ["light azimuth 30°, polar 40°", "background reset"]
+            while (news := await one.next("scene"))["past"] != steps:
                 pass
             assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
 

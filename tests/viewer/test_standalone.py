@@ -24,6 +24,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.viewer import standalone
+from texgs.viewer.messages import Edit
 from texgs.viewer.modules import web_file
 
 HOSTILE = "</script><b>&'\""
@@ -163,6 +164,14 @@ def test_edits_and_lights_show_and_can_be_undone(page, file):
     page.get_by_label("Polar of the light, degrees", exact=True).fill("50")
     words = f"light=30,50 {HOSTILE}.palette=#ff2040 {HOSTILE}.opacity=0.5 B.visible=false"
     assert page.locator("#words textarea").input_value() == words
+    steps = [
+        Edit(HOSTILE, "palette", [1, 32 / 255, 64 / 255], 0),
+        Edit(HOSTILE, "opacity", 0.5, 0),
+        Edit("B", "visible", False, 0),
+        Edit("", "light", {"azimuth": 30, "polar": 50}, 0),
+    ]
+    titles = page.get_by_role("listitem").all_text_contents()
+    assert [*titles[:3], titles[4]] == [each.title for each in steps]  # the fourth is a light at the camera
     settle(page)
     edits = [PartEdit(palette=(1, 32 / 255, 64 / 255), opacity=0.5), PartEdit(visible=False)]
     assert differ(page, file, light=Light("directional", 30, 50), edits=edits) <= LEVELS

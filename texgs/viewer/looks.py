@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -35,7 +34,7 @@ from texgs.volume.view_set import View
 LENS = Lens().square(400)  # of the views that parts learn from
 VIEWS = 92
 BETWEEN = 2.0  # seconds between textures on their way that are shown
-KEPT = 20  # files of them: several parts show theirs at a time, and frames may be on their way
+KEPT = 20  # of these, and of previews: several parts show theirs at a time, and frames may be on their way
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
 GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
@@ -61,7 +60,9 @@ class Looks:
     def __init__(self, jobs: Jobs, styles: Styles, device: torch.device | str = "cpu") -> None:
         self._jobs, self._styles, self._device = jobs, styles, torch.device(device)
         self._folder = TemporaryDirectory(prefix="texgs-looks-")
-        self._shown = 0  # textures on their way so far
+        self._previews, self._on_the_way = (
+            Recent(Path(self._folder.name, kind)) for kind in ("preview", "on-the-way")
+        )
 
     def edit_of(self, asked: Look) -> Any:
         """The edit, as conf/edit has it, with a recipe whose weights are on this machine.
@@ -106,10 +107,9 @@ class Looks:
         """
         return await self._jobs.run(partial(self._make, scene, edit, output, show), watch)
 
-    def trial_folder(self) -> Path:
-        """A folder for a preview, removed in the end."""
-        self._shown += 1
-        return Path(self._folder.name, f"{self._shown}")
+    def preview_folder(self) -> Path:
+        """A new folder for a preview; it is removed when there are many, and in the end."""
+        return self._previews.new()
 
     def close(self) -> None:
         """Remove what was not kept."""
@@ -124,7 +124,7 @@ class Looks:
 
     def _make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
         method = method_of(edit)
-        settings, offered = method.of(edit), Offered(show, self.trial_folder)
+        settings, offered = method.of(edit), Offered(show, self._on_the_way)
         task = Around(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=offered)
         output.mkdir(parents=True)
         try:
@@ -136,28 +136,41 @@ class Looks:
             raise
 
 
+class Recent:
+    """Folders with files that frames may be reading: when there are many, the oldest is removed.
+
+    Args:
+        parent: folder that they are in.
+    """
+
+    def __init__(self, parent: Path) -> None:
+        self._parent, self._count = parent, 0
+
+    def new(self) -> Path:
+        """A place for a folder."""
+        self._count += 1
+        rmtree(self._parent / f"{self._count - KEPT}", ignore_errors=True)
+        return self._parent / f"{self._count}"
+
+
 class Offered:
     """Parts on their way, of which some are written and shown.
 
     Args:
         show: is called with a part and the file of its texture.
-        folder: makes a place for one file.
+        folders: for these files.
     """
 
-    def __init__(self, show: Callable[[str, Path], None], folder: Callable[[], Path]) -> None:
-        self._show, self._folder, self._latest = show, folder, monotonic()
-        self._shown: deque[Path] = deque()  # folders of the files that a frame may be reading
+    def __init__(self, show: Callable[[str, Path], None], folders: Recent) -> None:
+        self._show, self._folders, self._latest = show, folders, monotonic()
 
     def __call__(self, part: str, model: Callable[[], Surfels]) -> None:
         """Show a part, unless one was shown a moment ago."""
         if monotonic() - self._latest < BETWEEN:
             return
-        folder = self._folder()
-        self._show(part, write_texture(folder / part_file("look", part), model()))
+        file = self._folders.new() / part_file("look", part)
+        self._show(part, write_texture(file, model()))
         self._latest = monotonic()
-        self._shown.append(folder)
-        if len(self._shown) > KEPT:
-            rmtree(self._shown.popleft())
 
 
 def has_weights(edit: Any) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -52,6 +53,11 @@ class Edit:
     key: str  # of a `PartEdit`; "light" or "background" of the scene
     value: Any  # as in a scene file; None takes the edit back
     step: int  # edits of one number in a row are one step of the history, such as those of a slider
+
+    @property
+    def title(self) -> str:
+        """What the list of steps calls it, once it has been made."""
+        return f"{self.part} {self.key} {title_of_value(self.value)}".strip()
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,19 @@ class Cancel:
     """Stop the job that is at work, and show no preview any more."""
 
     only_preview: bool = False  # the job goes on
+
+
+def title_of_value(value: Any) -> str:
+    """A value of an edit in few letters: #rrggbb, angles, a number."""
+    if value is None:
+        return "reset"
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key} {angle:.0f}°" for key, angle in value.items())
+    if isinstance(value, list):
+        return "#" + "".join(f"{round(255 * x):02x}" for x in value)
+    return value if isinstance(value, str) else f"{value:.4g}"
 
 
 Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Export | Rename | Remove | Cancel

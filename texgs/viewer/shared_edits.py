@@ -17,7 +17,7 @@ from texgs.scene.scene import WHITE, Scene
 from texgs.scene.scene_file import known, light_of, write_scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import Edit, View
-from texgs.viewer.opening import SCENES, Opened
+from texgs.viewer.opening import SCENES, Opened, title_of
 from texgs.viewer.segments import alone
 
 
@@ -30,7 +30,8 @@ class SharedEdits:
     """
 
     def __init__(self, session: Session, opened: Opened) -> None:
-        self._session, self._folder, self.name = session, opened.folder, opened.name
+        self._session, self._folder = session, opened.folder
+        self.name, self._title = opened.name, opened.title
         self._own = {file.resolve() for file in (opened.file,) if file}  # replaced without a question
         self.original = self._saved = session.scene
         self._past, self._future = list[str](), list[str]()
@@ -71,6 +72,8 @@ class SharedEdits:
             "future": list(reversed(self._future)),
             "saved": self.is_saved,
             "file": self.name,
+            "folder": str(self._folder.resolve()),
+            "title": self._title,
         }
 
     def edit(self, edit: Edit, author: int) -> None:
@@ -89,7 +92,7 @@ class SharedEdits:
             raise
         if goes_on:
             self._past.pop()
-        self._step(f"{edit.part} {edit.key}".strip())
+        self._step(edit.title)
         self._latest = step
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
@@ -170,7 +173,7 @@ class SharedEdits:
         """
         path, scene = self.path_of(name), self.scene
         write_scene(path, scene)
-        self.name, self._saved = name, scene
+        self.name, self._title, self._saved = name, title_of(path), scene
         self._own.add(path.resolve())
         return path
 

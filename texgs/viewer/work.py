@@ -9,6 +9,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
+from time import monotonic
 from typing import Any
 
 import torch
@@ -138,11 +139,12 @@ class Work:
         if not parts:
             parts = tuple(await asyncio.to_thread(parts_with_surfels, scene))
             edit = replace(edit, parts=list(parts))
-        output = self._looks.trial_folder() if asked.is_preview else self._edits.new_folder(edit.name)
+        output = self._looks.preview_folder() if asked.is_preview else self._edits.new_folder(edit.name)
 
         def show(part: str, file: Path) -> None:
             loop.call_soon_threadsafe(page.try_on, {part: file})
 
+        start = monotonic()
         try:
             edited = await self._looks.make(scene, edit, output, watch, show)
             textures = textures_of(edited.scene, parts)
@@ -157,7 +159,7 @@ class Work:
         finally:
             if not asked.is_preview:
                 page.try_on(None)
-        how = f"{name}: {edited.how}, {edited.seconds:.0f} s."
+        how = f"{name}: {edited.how}, {monotonic() - start:.0f} s."
         page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")
 
     async def _export(self, asked: Export, page: Page, watch: Watch) -> None:

@@ -1,5 +1,6 @@
 // What the server makes for this page and takes a while: how far it is, and a button to stop it.
 
+const LEAST = 2; // seconds until the time that is left can be told
 const get = (id) => document.getElementById(id);
 
 /** Dispatches "begin" and "end"; detail.kind is the type of the message that asked for it, and detail.hasFailed
@@ -8,6 +9,7 @@ export class Job extends EventTarget {
   isAtWork = false;
   kind = "";
   #connection;
+  #begun = { title: "", at: 0 }; // of the loop that is at work; milliseconds
 
   constructor(connection) {
     super();
@@ -37,6 +39,15 @@ export class Job extends EventTarget {
     this.#connection.send({ type: "cancel", preview: isOther });
   }
 
+  /** How long a loop takes from now on, at the pace that it has had; nothing before that is known. */
+  #left(title, done) {
+    const now = performance.now();
+    if (title !== this.#begun.title || !done) this.#begun = { title, at: now };
+    const gone = (now - this.#begun.at) / 1000, left = gone * (1 - done) / done;
+    if (gone < LEAST) return "";
+    return left < 100 ? `${Math.ceil(left)} s left` : `${Math.ceil(left / 60)} min left`;
+  }
+
   #show({ title, done, failed = false }) {
     const wasAtWork = this.isAtWork;
     this.isAtWork = done !== null;
@@ -44,6 +55,7 @@ export class Job extends EventTarget {
     if (this.isAtWork) {
       get("job-progress").value = done;
       get("job-title").textContent = title;
+      get("job-left").textContent = this.#left(title, done);
     }
     if (wasAtWork === this.isAtWork) return;
     const detail = { kind: this.kind, hasFailed: failed };

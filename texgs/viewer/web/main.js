@@ -17,13 +17,15 @@ import { TransferPanel } from "./transfer.js";
 const get = (id) => document.getElementById(id);
 
 class Page extends ScenePage {
-  constructor({ scene, original, choices }, connection, notices) {
+  constructor(greeting, connection, notices) {
+    const { scene, choices, run } = greeting;
     const renderer = new Remote(get("picture"), (text, level) => notices.tell(text, level));
     renderer.onframe = ({ ms, width, height }) => {
       get("pace").textContent = `${width} × ${height}, ${Math.round(ms)} ms`;
     };
     renderer.open(connection, scene);
-    super(new SharedState(scene, original, connection), renderer, () => this.segments.isLocked);
+    super(new SharedState(greeting, connection), renderer, () => this.segments.isLocked);
+    this.run = run;
     this.connection = connection;
     this.notices = notices;
     this.job = new Job(connection);
@@ -75,14 +77,21 @@ class Page extends ScenePage {
     const said = "The server was started again, without the edits of this page. "
       + "New segments and looks come back with a scene that was saved: open its file.";
     this.notices.offer(said, "Make the other edits again", () => {
-      for (const { part, key, value } of lost) this.state.edit(part, key, value);
+      super.makeEdits(lost);
     });
+  }
+
+  /** Ask first, where other steps are there: all pages share them. */
+  makeEdits(edits) {
+    const { past, future } = this.state, make = () => super.makeEdits(edits);
+    const [some, them] = edits.length === 1 ? ["1 other edit", "it"] : [`${edits.length} other edits`, "them"];
+    if (!past.length && !future.length) make();
+    else this.notices.offer(`The link has ${some} of this scene.`, `Make ${them} on all pages`, make);
   }
 
   /** Show what the server has now. One that was started again knows nothing of edits before. */
   adopt(message) {
-    get("title").textContent = get("title").title = message.scene.name;
-    const isAnother = message.run && this.run && message.run !== this.run;
+    const isAnother = message.run && message.run !== this.run;
     if (isAnother && message.scene.name !== this.state.scene.name) {
       location.replace(location.pathname); // nothing of this page is of the other scene
       return;
@@ -100,8 +109,8 @@ const connection = new Connection(new URL("socket", location.href.replace(/^http
 let page = null;
 connection.addEventListener("message", ({ detail }) => {
   if (detail.type === "scene") {
-    page ??= new Page(detail, connection, notices);
-    page.adopt(detail);
+    if (page) page.adopt(detail);
+    else page = new Page(detail, connection, notices);
   } else if (detail.level === "question") {
     page.toolbar.askToReplace(detail);
   } else if (detail.level === "file") {

@@ -46,7 +46,8 @@ export class Panel {
   }
 
   #build(structure) {
-    const used = this.#root.contains(document.activeElement) && document.activeElement.getAttribute("aria-label");
+    const focused = this.#root.contains(document.activeElement) ? document.activeElement : null;
+    const used = focused?.ariaLabel, model = focused?.closest("fieldset").dataset.model;
     const opened = new Set([...this.#root.querySelectorAll("details[open]")].map((each) => each.dataset.part));
     this.#structure = structure;
     this.#parts.clear();
@@ -60,7 +61,14 @@ export class Panel {
       return box;
     }));
     for (const each of this.#root.querySelectorAll("details")) each.open = opened.has(each.dataset.part);
-    if (used) [...this.#root.querySelectorAll("[aria-label]")].find((each) => each.ariaLabel === used)?.focus();
+    if (focused) this.#focus(used, model);
+  }
+
+  /** Focus the input of this label, or the first one of the model if it is gone. */
+  #focus(label, model) {
+    const inputs = [...this.#root.querySelectorAll("input, button, summary")];
+    const isOfModel = (each) => each.closest("fieldset").dataset.model === model;
+    (inputs.find((each) => each.ariaLabel && each.ariaLabel === label) ?? inputs.find(isOfModel))?.focus();
   }
 
   #segment(model, name) {
@@ -83,6 +91,7 @@ export class Panel {
   #part(part, name, can) {
     const edit = (key) => (value, step) => this.#state.edit(part, key, value, step);
     const legend = element("legend"), box = element("fieldset", { className: "part" }, legend);
+    [box.dataset.model] = part.split("/");
     const shows = [];
     const add = (parent, key, input, value = (each) => each[key]) => {
       parent.append(input.row);
@@ -116,5 +125,7 @@ export class Panel {
     made.at(-1)?.setAttribute("aria-current", "step");
     const undone = future.map((name) => element("li", { className: "undone" }, name));
     this.#steps.replaceChildren(...made, ...undone);
+    this.#steps.scrollTop = this.#steps.scrollHeight * past.length / (past.length + future.length) // the current one
+      - this.#steps.clientHeight;
   }
 }

@@ -7,11 +7,20 @@ import { LightControl } from "./light.js";
 import { difference, edited } from "./state.js";
 
 const REST = 100; // milliseconds after the last movement until a whole frame is drawn
-const NAMES = {
-  shaded: "Shaded", unshaded: "Without light", normal: "Normals", depth: "Depth", alpha: "Opacity",
-  texture: "Texture alone", discs: "Surfels as discs",
-  truth: "Nearest training view", difference: "Difference from that view",
-  ambient: "Ambient factor", diffuse: "Diffuse factor", specular: "Specular factor", shininess: "Shininess",
+const MODES = { // names, and what their colours mean
+  shaded: ["Shaded", ""],
+  unshaded: ["Without light", ""],
+  normal: ["Normals", "Red, green and blue are x, y and z, grey is 0."],
+  depth: ["Depth", "Black is the nearest point of the view, light grey the farthest."],
+  alpha: ["Opacity", "Black is transparent, white opaque."],
+  texture: ["Texture alone", "What textures add to the palette; grey adds nothing."],
+  discs: ["Surfels as discs", "Each has the radius of one standard deviation."],
+  truth: ["Nearest training view", ""],
+  difference: ["Difference from that view", "Four times as bright as it is."],
+  ambient: ["Ambient factor", "Black is 0, white 1."],
+  diffuse: ["Diffuse factor", "Black is 0, white 1."],
+  specular: ["Specular factor", "Black is 0, white 1."],
+  shininess: ["Shininess", "Black is 0, white 100."],
 };
 const get = (id) => document.getElementById(id);
 
@@ -63,6 +72,7 @@ export class ScenePage {
   show(values) {
     Object.assign(this.#shown, values);
     get("mode").value = this.#shown.mode;
+    get("mode-legend").textContent = MODES[this.#shown.mode][1];
     get("badge").hidden = !this.#shown.before;
     this.draw();
   }
@@ -106,10 +116,15 @@ export class ScenePage {
     this.camera.fromFragment(fragment);
     this.show({ mode: this.renderer.modes.includes(mode) ? mode : "shaded" });
     const isOfAnother = (words.get("scene") ?? this.state.scene.name) !== this.state.scene.name;
-    for (const { part, key, value } of isOfAnother ? [] : editsOf(words.get("edits"))) {
-      if (isDifferent(this.state.scene, { part, key, value })) this.state.edit(part, key, value);
-    }
+    const edits = isOfAnother ? [] : editsOf(words.get("edits"));
+    const missing = edits.filter((edit) => isDifferent(this.state.scene, edit));
+    if (missing.length) this.makeEdits(missing);
     this.moved();
+  }
+
+  /** Make edits that a link has and the scene has not. */
+  makeEdits(edits) {
+    for (const { part, key, value } of edits) this.state.edit(part, key, value);
   }
 
   /** Camera, mode and edits as the link has them. */
@@ -135,7 +150,7 @@ export class ScenePage {
 
   #inputs() {
     const mode = get("mode"), view = get("view"), fov = get("fov");
-    mode.append(...this.renderer.modes.map((name) => new Option(NAMES[name] ?? name, name)));
+    mode.append(...this.renderer.modes.map((name) => new Option(MODES[name][0], name)));
     mode.addEventListener("change", () => this.show({ mode: mode.value }));
     const [home, ...trained] = this.state.scene.views.map(({ name }) => new Option(capital(name), name));
     view.append(home, ...Object.keys(AXES).map((name) => new Option(`From ${name}`, name)));

@@ -7,13 +7,12 @@ export class SharedState extends State {
   #sent = 0; // messages, of which the server answers each with the scene
 
   /**
-   * @param {object} scene - as it is now
-   * @param {object} original - as it was opened
+   * @param {object} greeting - of the server: the scene as it is now and as it was opened, and its history
    * @param {Connection} connection
    */
-  constructor(scene, original, connection) {
+  constructor({ scene, original, past, future, saved, file, folder, title }, connection) {
     super(scene);
-    this.original = original;
+    Object.assign(this, { original, past, future, saved, file, folder, title });
     this.#connection = connection;
   }
 
@@ -23,8 +22,9 @@ export class SharedState extends State {
   }
 
   /** Take the server's scene, unless it does not know yet what was edited here since. */
-  adopt({ scene, past, future, saved, file, answered }) {
-    if (answered === this.#sent) this.update({ scene: { ...this.scene, ...scene }, past, future, saved, file });
+  adopt({ scene, answered, past, future, saved, file, folder, title }) {
+    if (answered !== this.#sent) return;
+    this.update({ scene: { ...this.scene, ...scene }, past, future, saved, file, folder, title });
   }
 
   edit(part, key, value, step = 0) {

@@ -2,6 +2,8 @@
 // Edits are {part, key, value}: part is "TF01" or "TF01/segment", or "" for the light and the background of the
 // scene; value null takes an edit back.
 
+import { toHex } from "./inputs.js";
+
 const UNEDITED = {
   visible: true, palette: null, opacity: 1, ambient: 1, diffuse: 1, specular: 1, shininess: 1,
 };
@@ -41,6 +43,19 @@ function partsOf(scene) {
   ]));
 }
 
+/** What the list of steps calls an edit, as the server does. */
+export function titleOf({ part, key, value }) {
+  return `${part} ${key} ${titleOfValue(value)}`.trim();
+}
+
+function titleOfValue(value) {
+  if (value === null) return "reset";
+  if (typeof value === "boolean") return value ? "on" : "off";
+  if (Array.isArray(value)) return toHex(value);
+  if (typeof value === "number") return `${Number(value.toPrecision(4))}`;
+  return Object.entries(value).map(([key, angle]) => `${key} ${Math.round(angle)}°`).join(", ");
+}
+
 /** Whether a value of an edit changes nothing. */
 export function isUnedited(key, value) {
   return value === UNEDITED[key];
@@ -63,13 +78,12 @@ export class State extends EventTarget {
   /** Make an edit; those with the same number in a row are one step, such as those of a slider. */
   edit(part, key, value, step = 0) {
     const latest = step ? `${step} ${part} ${key}` : null;
-    if (!latest || latest !== this.#latest) {
-      this.#scenes.push(this.scene);
-      this.past = [...this.past, `${part} ${key}`.trim()];
-    }
+    const goesOn = latest !== null && latest === this.#latest, edit = { part, key, value };
+    if (!goesOn) this.#scenes.push(this.scene);
+    const past = [...(goesOn ? this.past.slice(0, -1) : this.past), titleOf(edit)];
     this.#undone = [];
     this.#latest = latest;
-    this.update({ scene: edited(this.scene, { part, key, value }), future: [], saved: false });
+    this.update({ scene: edited(this.scene, edit), past, future: [], saved: false });
   }
 
   /** Take the latest step back. */

@@ -31,10 +31,12 @@ export class Toolbar {
   }
 
   #show() {
-    const { saved, scene } = this.#page.state;
+    const { saved, folder, title } = this.#page.state;
     get("save").classList.toggle("unsaved", !saved);
     get("save").setAttribute("aria-label", saved ? "Save; nothing is unsaved" : "Save; there are unsaved edits");
-    document.title = `${saved ? "" : "• "}${scene.name}`;
+    document.title = `${saved ? "" : "• "}${title}`;
+    get("title").textContent = get("title").title = title;
+    get("save-folder").textContent = folder;
   }
 
   /** Ask before a file is replaced that is not this scene's. */
