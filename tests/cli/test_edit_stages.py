@@ -12,7 +12,7 @@ from tests.cli.test_scene_stages import WORDS
 from tests.models.clips import write_clip
 from texgs.cli.main import main
 from texgs.core.errors import MissingDataError
-from texgs.edit.recipe import preset
+from texgs.edit.recipe import DEFAULT, preset
 from texgs.methods.image import how
 from texgs.scene.scene_file import read_scene
 
@@ -187,9 +187,9 @@ def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results)
     ("words", "message"),
     [
         ("edit.segment.points=[]", "edit.segment.points: expected one at least"),
-        ("edit.segment.points=[[2, 0]]", r"edit.segment.points: expected two shares from 0 to 1"),
+        ("edit.segment.points=[[2, 0]]", r"edit.segment.points: expected two shares from 0 to below 1"),
         ("edit.segment.points=[[0.01, 0.01]]", "expected a place on the model, got background"),
-        ("edit.segment.points=[[a, b]]", "edit.segment.points: expected two shares from 0 to 1"),
+        ("edit.segment.points=[[a, b]]", "edit.segment.points: expected two shares from 0 to below 1"),
         ("edit.segment.view=[3]", "edit.segment.view: expected azimuth and polar angle, got [3.0]"),
         ("edit.segment.model=TF9", "edit.segment.model: expected one of TF01, TF02"),
     ],
@@ -211,7 +211,7 @@ def test_the_style_of_an_object_of_a_picture(results, tmp_path, monkeypatch, cap
     style = np.asarray(Image.open(results / "edits" / "red" / "style.png"))[..., :3]
     assert style[..., 1].mean() < 90, "the box around the object"
     assert main(["edit_image", *WORDS, *FEW, "edit=glass", *words, "edit.image.region=[[2, 0]]"]) == 2
-    assert "edit.image.region: expected two shares from 0 to 1, got [2, 0]" in capsys.readouterr().err
+    assert "edit.image.region: expected two shares from 0 to below 1, got [2, 0]" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -275,6 +275,9 @@ def test_a_scene_file_can_be_edited(results, tmp_path, capsys, monkeypatch):
 
 def test_tables_name_the_clip_of_the_loss():
     paper = preset("paper")
-    assert how(paper, "clip-vit-large-patch14") == "VGG-16 + clip-vit-large-patch14"
-    assert how(replace(paper, lambda_s=1.0), "clip-vit-large-patch14") == "VGG-16"
-    assert how(replace(paper, lambda_s=0.0), "clip-vit-base-patch32") == "clip-vit-base-patch32"
+    assert how([paper], "clip-vit-large-patch14") == "VGG-16 + clip-vit-large-patch14"
+    assert how([replace(paper, lambda_s=1.0)], "clip-vit-large-patch14") == "VGG-16"
+    translucent = DEFAULT.adapted(0.5)
+    assert how([translucent], "") == "VGG-16", "patches do not count in translucent scenes"
+    assert how([translucent, DEFAULT], "") == "VGG-16 + patches"
+    assert how([replace(paper, lambda_s=0.0)], "clip-vit-base-patch32") == "clip-vit-base-patch32"

@@ -16,9 +16,9 @@ def test_edits_of_the_project_have_none(edit):
     ("edit", "word", "message"),
     [
         ("style", "edit.image.style=nowhere.png", "one of strokes, glass, .*; got 'nowhere.png'"),
-        ("glass", "edit.image.region=[[2, 0]]", "edit.image.region: expected two shares from 0 to 1"),
+        ("glass", "edit.image.region=[[2, 0]]", "edit.image.region: expected two shares from 0 to below 1"),
         ("text", "edit.text.instruction=", "instruction: expected what to do in words"),
-        ("gold", "edit.text.instruction=fur", "which needs edit.text.guidance=instruct_pix2pix"),
+        ("gold", "edit.text.instruction=fur", "which needs guidance=instruct_pix2pix"),
         ("lobe", "edit.segment.name=", "edit.segment.name: expected a name without / . ="),
         ("lobe", "edit.segment.points=[]", "edit.segment.points: expected one at least"),
         ("lobe", "edit.segment.views=40", "views: expected 12, 42, 92"),

@@ -28,6 +28,15 @@ CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"
         (["comparison", "fit=quick"], "fits: expected several recipes to compare, such as fits=[quick,demo]"),
         (["comparison", "fits=[quick,plenoxels]", "device=cuda"], CPU_ONLY),
         (["voxels", *ON_A_GPU], CPU_ONLY),
+        (
+            ["surfels", "fit=paper", "fit.material_range=bounded"],
+            "fit.first_material.ambient: expected a value between 0 and 1, as material_range=bounded has",
+        ),
+        (["surfels", "fit=quick", "fit.texture.texels=0"], "fit.texture.texels: expected"),
+        (
+            ["gaussians", "fit=gaussians_quick", "fit.gaussians.seeds.kind=voxels"],
+            "fit.gaussians.seeds.kind: expected no voxels, which are for surfels alone; choose visible",
+        ),
         (["compose", *ON_A_GPU], CPU_ONLY),
         (
             ["palette", "fit=stylerf_quick", "device=cuda"],

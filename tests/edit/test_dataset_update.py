@@ -76,13 +76,17 @@ def test_fields_take_on_the_colour_that_views_are_given(kind, schedule):
     learner, images = LEARNERS[kind]()
     before = images.planes.clone()
     start = color_of(learner.original)
-    updated = update_field(learner, images, Tint(COLOR, lit=True), "anything", schedule)
+    updated = update_field(learner, images, Tint(COLOR, lit=True), "anything", schedule, shown=2)
     goal = torch.tensor(COLOR)
     assert (color_of(updated.field) - goal).norm() < 0.5 * (start - goal).norm()
     assert torch.equal(images.planes, before), "the training views stay as they are"
     assert torch.equal(color_of(learner.original), start), "so does the field before"
     assert len(updated.losses) == schedule.iterations
     assert updated.edits == schedule.rounds * (schedule.views or len(images))
+    assert len(updated.views) == 2
+    before, after = updated.views[0]
+    assert torch.equal(before, images.target(0).color)
+    assert (after.mean((0, 1)) - before.mean((0, 1))).norm() > 0.01
 
 
 @pytest.mark.parametrize("kind", FROZEN)
@@ -226,10 +230,10 @@ def test_what_a_guidance_returns_is_checked_and_a_loss_has_to_be_finite():
     learner, images = splats()
     with pytest.raises(ArgumentError, match="images edited by broken"):
         update_field(
-            *(learner, images, Returns(lambda views: views.images * float("nan")), "anything", Schedule(1, 1))
+            *(learner, images, Returns(lambda views: views.images * float("nan")), "anything", Schedule(1, 5))
         )
     with pytest.raises(ArgumentError, match="instruction: expected what to do in words"):
-        update_field(learner, images, Tint(COLOR), " ", Schedule(1, 1))
+        update_field(learner, images, Tint(COLOR), " ", Schedule(1, 5))
     learner.step = lambda *_: float("nan")
     with pytest.raises(FitError, match="iteration 0: expected a finite loss, got nan; lower the rates"):
-        update_field(learner, images, Tint(COLOR), "anything", Schedule(1, 1))
+        update_field(learner, images, Tint(COLOR), "anything", Schedule(1, 5))

@@ -9,7 +9,7 @@ from texgs.core.errors import ArgumentError, FitError, ShapeError
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import PRESETS, preset
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.style_start import pixel_side
+from texgs.edit.style_start import pixel_side, start_colors
 from texgs.edit.stylize import stylize
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
@@ -190,6 +190,18 @@ def test_starts(style):
     assert (colors["random"].mean(0) - pixels.mean(0)).abs().max() < 0.02
     assert (colors["transfer"].mean(0) - style.mean).abs().max() < 0.1
     assert colors["projected"].std(dim=0).min() > 0.05
+
+
+def test_colours_of_a_segment_are_moved_to_those_of_the_style(style):
+    model = ball()
+    _, surfel = owners(model.parameters)
+    mine = torch.zeros(len(surfel), dtype=torch.bool)
+    mine[owners(model.parameters)[0]] = surfel % 2 == 0
+    moved = start_colors("transfer", model, style, 0.01, 0, mine)
+    whole = start_colors("transfer", model, style, 0.01, 0)
+    goal = style.pixels.mean(0)
+    assert (moved[mine].mean(0) - goal).norm() < 0.05
+    assert not torch.equal(moved, whole)
 
 
 def test_a_pixel_is_as_large_as_the_camera_shows_it():

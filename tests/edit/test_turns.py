@@ -74,6 +74,10 @@ def test_what_no_schedule_can_be(values, message):
 @pytest.mark.parametrize(
     ("run", "message"),
     [
+        (
+            lambda: next(turns(Schedule(3, 100), 162, torch.Generator())),
+            "expected rounds of at least 162 iterations, in which 162 views are edited, got 100",
+        ),
         (lambda: in2n(In2nKeys(noise=[0.9, 0.1]), 3), "edit.in2n.noise: expected two shares from 0 to 1"),
         (lambda: igs2gs(Igs2gsKeys(noise=[0.9]), 3), "edit.igs2gs.noise: expected two shares from 0 to 1"),
         (lambda: dge(DgeKeys(noise=[2.0]), 3), "edit.dge.noise: expected shares from 0 to 1, at least one"),

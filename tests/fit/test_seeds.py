@@ -28,7 +28,7 @@ def view_set(folder=Path("views"), **metadata):
 
 
 def seeds(folder=Path("views"), images=None, metadata=None, **options):
-    defaults = {"kind": "auto", "count": 300, "opacity": 0.1, "half_size": 0.55, "seed": 0}
+    defaults = {"kind": "auto", "count": 300, "opacity": 0.1, "half_size": None, "seed": 0}
     views = view_set(folder, **metadata or {})
     return seed_surfels(images or ball_images(), views, **{**defaults, **options})
 
@@ -189,6 +189,20 @@ def test_colours_may_be_floats(tmp_path):
     assert torch.equal(read_points(tmp_path / "a.ply")[1], torch.full((5, 3), 0.5))
 
 
+@pytest.mark.parametrize(
+    ("kind", "values", "message"),
+    [
+        ("ushort", [0, 256, 0, 0, 65535], "from 0 to 255, as uint16 they are, got 0 to 65535"),
+        ("short", [-1, 0, 0, 0, 9], "from 0 to 255, as int16 they are, got -1 to 9"),
+        ("float", [0.0, 0.5, 255.0, 0.0, 0.0], "from 0 to 1, as float32 they are, got 0 to 255"),
+    ],
+)
+def test_colours_out_of_range_are_told(tmp_path, kind, values, message):
+    write_ply(tmp_path / "a.ply", {**xyz(), **dict.fromkeys(("red", "green", "blue"), (kind, values))})
+    with pytest.raises(ArgumentError, match=f"expected colours {message}"):
+        read_points(tmp_path / "a.ply")
+
+
 def test_mistakes_in_points_are_named(tmp_path):
     path = tmp_path / "points3d.ply"
     with pytest.raises(ArgumentError, match=r"points3d\.ply: no such file; .*visible needs no points"):
@@ -215,9 +229,18 @@ def test_mistakes_in_points_are_named(tmp_path):
 
 
 def test_the_box_is_that_of_the_data_with_a_margin():
-    low, high = box_of(view_set(aabb=[[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]), 9.0)
+    low, high = box_of(view_set(aabb=[[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]), None)
     torch.testing.assert_close(low, torch.tensor([-0.52, -0.27, -0.02]))
     torch.testing.assert_close(high, torch.tensor([0.52, 0.27, 0.12]))
+    low, high = box_of(view_set(), None)
+    assert torch.equal(high, torch.full((3,), 0.55))
+
+
+def test_a_cube_is_as_large_as_the_data_and_in_its_middle():
+    """The release has random points within 1.3 of the middle of data from -1 to 1."""
+    low, high = box_of(view_set(aabb=[[-0.5, -0.25, 0.0], [0.5, 0.25, 0.1]]), 1.3)
+    torch.testing.assert_close(low, torch.tensor([-0.65, -0.65, -0.6]))
+    torch.testing.assert_close(high, torch.tensor([0.65, 0.65, 0.7]))
     low, high = box_of(view_set(), 0.7)
     assert torch.equal(low, torch.full((3,), -0.7))
     assert torch.equal(high, torch.full((3,), 0.7))

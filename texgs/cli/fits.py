@@ -3,6 +3,7 @@
 from omegaconf import DictConfig
 
 from texgs.config.fields import kinds
+from texgs.config.phase import require_material
 from texgs.config.places import PLACES
 from texgs.config.stage import Stage
 from texgs.config.typed import typed
@@ -22,7 +23,9 @@ def check_fit(config: DictConfig) -> None:
             f"device: expected {' or '.join(sorted(kind.devices))} for fit={fit.name}, "
             f"which fits {fit.field}, got {config.device.name}; choose another device or fit"
         )
-    if kind.settings is not None:
+    if kind.settings is None:
+        require_material(fit.first_material, fit.material_range)
+    else:
         kind.check(typed(kind.settings, fit[kind.name]))
 
 

@@ -47,9 +47,11 @@ class Method(Generic[Settings]):
     adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
     """Parts that the scene has afterwards in addition, from the names of its models."""
     style: Callable[[Settings], Any] | None = None
-    """The `StylePicture` that it follows, which the result is compared with."""
+    """The `StylePicture` that it follows, which the result is compared with; None where there are several."""
     follows: str = ""
     """Which of its keys, "style" or "instruction", looks of a data set have an own value of."""
+    followed: Callable[[Settings], str] = lambda settings: ""
+    """What it follows, in tables: the name of a picture, or words."""
     numbers: Callable[[Settings], Mapping[str, Any]] = lambda settings: {}
     """Numbers of the recipe that its settings name, with what they change about it."""
     is_look: bool = True

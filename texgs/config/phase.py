@@ -1,8 +1,10 @@
 """Settings of the phases of a fit, and of where it starts. Kinds of field build on them."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from texgs.config.keys import key
+from texgs.core.errors import ArgumentError
 
 
 @dataclass
@@ -79,7 +81,11 @@ class Seeds:
     kind: str = key("auto", "auto: points of the views if there are any, else visible", choices=SEEDS)
     count: int = key(10000, "at the start; given points are taken as they are", least=1)
     opacity: float = key(0.1, "of each", least=0)
-    half_size: float = key(0.55, "half the side of the box, where views do not say", "world units", least=0)
+    half_size: float | None = key(
+        None,
+        "half the side of the cube, in halves of the data's longest side; default the box of the data",
+        above=0,
+    )
 
 
 @dataclass
@@ -92,11 +98,36 @@ class Material:
     shininess: float = key(20.0, "beta", least=0)
 
 
+RANGES = {  # that factors can be in, by the range of materials, see `fit.material_range`; others have none
+    "bounded": {
+        "ambient": (0.0, 1.0),
+        "diffuse": (0.0, 1.0),
+        "specular": (0.0, 1.0),
+        "shininess": (1.0, 100.0),
+    },
+    "paper": {"specular": (0.0, 5.0), "shininess": (0.0, 50.0)},  # those of the release
+}
+
+
+def require_material(factors: Mapping[str, float], kind: str) -> None:
+    """Require factors that a range of materials can express.
+
+    Raises:
+        ArgumentError: naming the first that it cannot.
+    """
+    for name, (low, high) in RANGES[kind].items():
+        if not low < factors[name] < high:
+            raise ArgumentError(
+                f"fit.first_material.{name}: expected a value between {low:g} and {high:g}, as "
+                f"material_range={kind} has them, got {factors[name]:g}"
+            )
+
+
 @dataclass
 class TextureKeys:
     """Texels: how many, and how they are found."""
 
-    texels: int | None = key(None, "in all; default where they are seen, about one per pixel")
+    texels: int | None = key(None, "in all; default where they are seen, about one per pixel", least=1)
     sweeps: int = key(3, "of the least-squares solver over all views", least=0)
     iterations: int = key(0, "of Adam on L1 + D-SSIM afterwards", least=0)
     rate: float = key(0.0025, "of Adam at the start, of texels", least=0)

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.edit.objective import LOSS_SCALE
 from texgs.models.lpips import Lpips
 from texgs.raster.ssim import l1_dssim
 
@@ -56,5 +57,5 @@ def differentiated(closeness: Closeness, image: Tensor, wanted: Tensor) -> tuple
     """The loss, and its gradient by the image, of the image's shape."""
     leaf = image.detach().requires_grad_()
     loss = closeness(leaf, wanted)
-    (gradient,) = torch.autograd.grad(loss, leaf)
-    return float(loss.detach()), gradient
+    (gradient,) = torch.autograd.grad(LOSS_SCALE * loss, leaf)
+    return float(loss.detach()), gradient / LOSS_SCALE

@@ -45,8 +45,8 @@ class Updated:
     """What an edit gives."""
 
     field: Field
-    views: dict[int, tuple[Tensor, Tensor]]
-    """Each view that was edited, as it was and as it was edited the last time; [H, W, 3]."""
+    views: list[tuple[Tensor, Tensor]]
+    """Some views that were edited, apart from each other, [H, W, 3]: as they were, and as they are."""
     losses: list[float]
     """In each iteration."""
     edits: int
@@ -63,6 +63,7 @@ def update_field(
     schedule: Schedule,
     *,
     keeps_renders: bool = False,
+    shown: int = 1,
     seed: int = 0,
     title: str = "edit",
 ) -> Updated:
@@ -75,6 +76,7 @@ def update_field(
         instruction: to the guidance.
         schedule: of edits and iterations.
         keeps_renders: edits stay close to views of the field as it was, as in DGE; or to the training views.
+        shown: views that are returned, at most.
         seed: of all random numbers.
         title: of the progress bar.
 
@@ -95,7 +97,7 @@ def update_field(
             raise FitError(
                 f"iteration {iteration}: expected a finite loss, got {losses[-1]}; lower the rates"
             )
-    return Updated(learner.field, edits.views, losses, edits.count, edits.seconds)
+    return Updated(learner.field, edits.some(shown), losses, edits.count, edits.seconds)
 
 
 class _Edits:
@@ -112,9 +114,9 @@ class _Edits:
     ) -> None:
         self.learner, self.guidance, self.instruction = learner, guidance, instruction
         self.generator = generator
-        self.images = replace(images, planes=images.planes.clone())
+        self.before, self.images = images, replace(images, planes=images.planes.clone())
         self.original = learner.original if keeps_renders else None
-        self.before: dict[int, Tensor] = {}
+        self.edited: set[int] = set()
         self.count, self.seconds = 0, 0.0
 
     @torch.no_grad()
@@ -128,23 +130,23 @@ class _Edits:
         guided = self.guidance(views, self.instruction, self.generator)
         for view, image in zip(ids, require_edited(guided, views, self.guidance.name), strict=True):
             self.images.planes[view, :3] = image.permute(2, 0, 1).mul(255).round().to(torch.uint8)
+        self.edited.update(ids)
         self.count, self.seconds = self.count + len(ids), self.seconds + time.monotonic() - start
 
     def _condition(self, view: int) -> Tensor:
         """What edits of a view stay close to [H, W, 3]: how it was before the first of them."""
-        if view not in self.before:
-            target = self.images.target(view)
-            if self.original is not None:
-                camera = target.camera.to(self.original.device)
-                self.before[view] = self.original.render(camera).color.clamp(0, 1).cpu()
-            else:
-                self.before[view] = target.color
-        return self.before[view]
+        if self.original is None:
+            return self.before.target(view).color
+        return (
+            self.original.render(self.before.cameras[view].to(self.original.device)).color.clamp(0, 1).cpu()
+        )
 
-    @property
-    def views(self) -> dict[int, tuple[Tensor, Tensor]]:
-        """Each view that was edited, as it was and as it is, by number."""
-        return {view: (old, self.images.target(view).color) for view, old in sorted(self.before.items())}
+    @torch.no_grad()
+    def some(self, count: int) -> list[tuple[Tensor, Tensor]]:
+        """So many views that were edited, as they were and as they are, at most."""
+        ids = sorted(self.edited)
+        chosen = ids[:: max(1, len(ids) // count)][:count]
+        return [(self._condition(view), self.images.target(view).color) for view in chosen]
 
 
 def azimuth(camera: Camera) -> float:

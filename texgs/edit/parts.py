@@ -16,7 +16,7 @@ from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of
 from texgs.fields.surfels.texture_file import write_texture
-from texgs.scene.parts import entry_of, replaced
+from texgs.scene.parts import replaced, with_textures
 from texgs.scene.scene import Scene, SceneModel
 
 
@@ -88,7 +88,7 @@ def edit_parts(
             all), to the edited model.
 
     Returns:
-        The scene with the new textures.
+        The scene with the new textures, without palettes that were edited before: these were of other texels.
     """
     for part in parts_of(scene, names):
         entry = scene.models[part.model]
@@ -96,7 +96,7 @@ def edit_parts(
         model = model.to(device)
         edited = edit(part, model, surfels_of(part, entry, masks, model))
         path = write_texture(output / part.file, edited, {"part": part.name})
-        scene = replaced(scene, part.name, replace(entry_of(scene, part.name), texture=path))
+        scene = with_textures(scene, {part.name: path}, own_colors=True)
     return scene
 
 

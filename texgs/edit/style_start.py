@@ -16,7 +16,9 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors
 
 
-def start_colors(kind: Start, model: Surfels, style: StylePicture, pixel: float, seed: int) -> Tensor:
+def start_colors(
+    kind: Start, model: Surfels, style: StylePicture, pixel: float, seed: int, changing: Tensor | None = None
+) -> Tensor:
     """Colours of all texels [T, 3] in [0, 1], without light.
 
     Args:
@@ -25,6 +27,7 @@ def start_colors(kind: Start, model: Surfels, style: StylePicture, pixel: float,
         style: at the size at which it is laid onto the surface.
         pixel: side of one of its pixels there, world units.
         seed: of random pixels.
+        changing: texels [T] bool whose colours are moved to those of the style; all by default.
     """
     p = model.parameters
     if kind == "projected":
@@ -37,7 +40,7 @@ def start_colors(kind: Start, model: Surfels, style: StylePicture, pixel: float,
         chosen = torch.randint(len(pixels), (len(p["texels"]),), generator=generator)
         return pixels[chosen.to(pixels.device)]
     own = bare_colors(model).clamp(0, 1)
-    matrix, shift = color_map(own, style.pixels)
+    matrix, shift = color_map(own if changing is None else own[changing], style.pixels)
     return (own @ matrix.T.to(own) + shift.to(own)).clamp(0, 1)
 
 

@@ -74,10 +74,11 @@ class StyleSteps:
         width, height = cameras[0].width, cameras[0].height
         scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height)).vivid(recipe.chroma)
         objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
-        texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed)
         colors, fixed = -p["palette"].expand_as(p["colors"]), None
         places, surfel = owners(p)
         owner = torch.empty_like(surfel).index_copy_(0, places, surfel)
+        moving = None if surfels is None else surfels[owner]
+        texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed, moving)
         if not recipe.is_textured:
             texels = mean_texels({**p, "texels": texels}).to(texels)[owner]
         if surfels is not None:

@@ -36,6 +36,7 @@ class Stylized:
 
     model: Surfels
     history: History
+    recipe: Recipe  # adapted to the scene
 
 
 def stylize(
@@ -86,7 +87,7 @@ def stylize(
             losses[name].append(value)
         if show is not None:
             show(steps.result)
-    return Stylized(steps.result(), History(dict(losses), dict(watch.seconds)))
+    return Stylized(steps.result(), History(dict(losses), dict(watch.seconds)), steps.recipe)
 
 
 def _check(

@@ -12,6 +12,7 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.memory import require_memory
 from texgs.edit.back_projection import seen_texels
 from texgs.edit.exposures import Exposure, expose
 from texgs.edit.followers import AdamFollower, Follower, SolveFollower
@@ -21,6 +22,9 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
+
+PIXEL = 112  # bytes of memory for a pixel of a view: what the guidance sees, returns, and texels follow
+SURFEL = 28  # and for a surfel in a view at one opacity
 
 
 @dataclass(frozen=True)
@@ -100,6 +104,7 @@ def update(
         title: of progress bars.
 
     Raises:
+        OutOfMemoryError: if the views would not fit into memory.
         ArgumentError, ShapeError: if the model has no texture, no surfel may change, the instruction is
             empty, or what the guidance returned is not finite or of another size.
     """
@@ -108,6 +113,9 @@ def update(
     changing = _changing(model, surfels)
     shine = light if (guidance.lit if lit is None else lit) else None
     generator = torch.Generator().manual_seed(seed)
+    size = cameras[0].width * cameras[0].height if cameras else 0
+    needed = len(cameras) * (PIXEL * size + SURFEL * len(policy.opacities) * len(model))
+    require_memory(needed, f"{len(cameras)} views that are edited", "edit fewer views, or smaller ones")
     colors = bare_colors(model)
     originals = render_views(model, colors, cameras, shine).images
     follower = _follower(model, policy, generator)

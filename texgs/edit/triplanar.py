@@ -10,9 +10,8 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.rotation import quats_to_matrices
-from texgs.fields.surfels.texels import owners
+from texgs.fields.surfels.texels import EXTENT, owners
 
-EXTENT = 6.0  # standard deviations that a texture spans along each tangent
 SHARPNESS = 8  # power of the normal's components that weighs the projections
 CHUNK = 1 << 18  # texels at a time
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Literal
 
 import torch
@@ -65,8 +66,17 @@ def turns(schedule: Schedule, count: int, generator: torch.Generator) -> Iterato
         schedule: of edits.
         count: of views.
         generator: of views and levels of noise.
+
+    Raises:
+        ArgumentError: if rounds are too short for all of their views: some would never be edited.
     """
     size, following = min(schedule.views or count, count), 0
+    least = ceil(size / schedule.group)
+    if schedule.period < least:
+        raise ArgumentError(
+            f"schedule: expected rounds of at least {least} iterations, in which {size} views are edited, "
+            f"got {schedule.period}; make rounds longer or edit fewer views in each"
+        )
     for iteration in range(schedule.iterations):
         round_, place = divmod(iteration, schedule.period)
         if place == 0:

@@ -62,7 +62,8 @@ class ContributionVotes:
         sums, weights = self._splat(camera, mask)
         self.sums += sums
         self.weights += weights
-        self.views.append((camera, mask))
+        if self.rounds:
+            self.views.append((camera, mask))
 
     @property
     def seen(self) -> Tensor:

@@ -61,7 +61,10 @@ class Field(Protocol):
         ...
 
     def sizes(self) -> dict[str, float]:
-        """MiB by contents, and `total_mib`, as the paper counts; with `stored_` before, as in a file."""
+        """MiB by contents, and `total_mib`, as the paper's break-down counts; `stored_`, as in a file.
+
+        `files_mib` is the total as the paper's tables of edits count.
+        """
         ...
 
 

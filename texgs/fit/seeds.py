@@ -21,6 +21,7 @@ from texgs.volume.voxels import visible_voxels
 
 POINTS = "points3d.ply"  # in a folder of views
 MARGIN = 0.02  # of the box around the data, relative to its longest side
+HALF_SIZE = 0.55  # of the cube around the origin where nothing else is known, world units
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
 
@@ -31,7 +32,7 @@ def seed_surfels(
     kind: str,
     count: int,
     opacity: float,
-    half_size: float,
+    half_size: float | None,
     seed: int,
     volume: Grid | None = None,
 ) -> tuple[dict[str, Tensor], Tensor]:
@@ -49,7 +50,8 @@ def seed_surfels(
             any, else visible.
         count: of surfels; points are taken as they are.
         opacity: of each, between 0 and 1; for "visible", before the quick fit.
-        half_size: half the side of the box, where the views' metadata has no `aabb`, world units.
+        half_size: half the side of the cube that seeds are in, in halves of the longest side of the data, the
+            views' `aabb`; in world units where they have none. By default the box of the data, or a cube.
         seed: of random numbers; the same one gives the same surfels.
         volume: that the views show; for "voxels".
 
@@ -101,17 +103,17 @@ def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> 
     return torch.from_numpy(points), torch.from_numpy(colors)
 
 
-def box_of(views: ViewSet, half_size: float) -> Box:
-    """The box of the data with a margin, or a cube around the origin where the views do not say.
+def box_of(views: ViewSet, half_size: float | None) -> Box:
+    """The box of the data with a margin, or a cube around its middle, see `seed_surfels`.
 
     Raises:
         ArgumentError: if the metadata's `aabb` is no box, or half_size is not above 0.
     """
+    if half_size is not None and not half_size > 0:
+        raise ArgumentError(f"seeds.half_size: expected more than 0, got {half_size}")
     aabb = views.metadata.get("aabb")
     if aabb is None:
-        if not half_size > 0:
-            raise ArgumentError(f"seeds.half_size: expected more than 0, got {half_size}")
-        corner = torch.full((3,), float(half_size))
+        corner = torch.full((3,), float(half_size or HALF_SIZE))
         return -corner, corner
     try:
         low, high = torch.tensor(aabb, dtype=torch.float32).reshape(2, 3)
@@ -121,15 +123,18 @@ def box_of(views: ViewSet, half_size: float) -> Box:
         ) from error
     if not bool((low <= high).all()):  # NaN ends here too
         raise ArgumentError(f"{views.folder}: aabb: expected the lowest corner, then the highest, got {aabb}")
-    margin = MARGIN * (high - low).max()
-    return low - margin, high + margin
+    longest = (high - low).max()
+    if half_size is None:
+        return low - MARGIN * longest, high + MARGIN * longest
+    middle, side = (low + high) / 2, half_size * longest / 2
+    return middle - side, middle + side
 
 
 def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
     """Points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file.
 
     Raises:
-        ArgumentError: if the file is missing, no PLY file, or has no finite x, y and z.
+        ArgumentError: if the file is missing, no PLY file, has no finite x, y and z, or colours out of range.
     """
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
@@ -145,7 +150,13 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
     if not {"red", "green", "blue"} <= set(names):
         return points, None
     colors = columns(vertices, ("red", "green", "blue"))
-    return points, colors / 255 if vertices.dtype["red"].kind == "u" else colors.clamp(0, 1)
+    most = 1.0 if vertices.dtype["red"].kind == "f" else 255.0
+    if not bool(((colors >= 0) & (colors <= most)).all()):
+        raise ArgumentError(
+            f"{path}: expected colours from 0 to {most:g}, as {vertices.dtype['red']} they are, got "
+            f"{float(colors.min()):g} to {float(colors.max()):g}"
+        )
+    return points, colors / most
 
 
 def columns(vertices: np.ndarray, names: tuple[str, ...]) -> Tensor:

@@ -11,11 +11,10 @@ from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.texels import EXTENT
 from texgs.raster import Texture, rasterize
 from texgs.raster.atlas import MOST_TEXELS
 from texgs.volume.images import Images
-
-EXTENT = 6.0  # standard deviations that a texture spans along each tangent
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from texgs.core import check
+from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
 from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
-from texgs.fit.texture_layout import EXTENT, Sight
+from texgs.fields.surfels.texels import footprint
+from texgs.fit.texture_layout import Sight
 from texgs.raster.ssim import l1_dssim
 from texgs.volume.images import Images, Target
 
@@ -37,6 +40,9 @@ def solve(
 
     Returns:
         The model with new texels; the one given, if these would not lower the squared error.
+
+    Raises:
+        FitError: if texels are no longer finite.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
     moving = Surfels({**model.parameters, "texels": texels}, model.shading, model.metadata)
@@ -52,6 +58,12 @@ def solve(
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
             texels.addcmul_(gradient, scale, value=-rate)
+    try:
+        check.finite(texels=texels)
+    except ArgumentError as error:
+        raise FitError(
+            f"texture: {error}; the training views or the model of the phase before are damaged"
+        ) from error
     solved = Surfels({**model.parameters, "texels": texels.detach()}, model.shading, model.metadata)
     return solved if sampled_error(solved, images) <= sampled_error(model, images) else model
 
@@ -71,21 +83,14 @@ def sampled_error(model: Surfels, images: Images) -> float:
 
 
 def curvature(sizes: Tensor, of_surfels: Tensor) -> Tensor:
-    """Share [T, 1] of each texel in the curvature of its surfel, which falls off like the Gaussian.
+    """Share [T, 1] of each texel in the curvature of its surfel.
 
     Args:
         sizes: texels along u and v [N, 2], one surfel after the other.
         of_surfels: [N].
     """
-    counts = sizes.long().prod(dim=1)
-    owner = torch.repeat_interleave(counts)  # [T]
-    place = torch.arange(len(owner), device=owner.device) - (counts.cumsum(dim=0) - counts)[owner]
-    columns, rows = sizes.long().unbind(dim=1)
-    u = EXTENT * ((place % columns[owner]) + 0.5) / columns[owner] - EXTENT / 2
-    v = EXTENT * ((place // columns[owner]) + 0.5) / rows[owner] - EXTENT / 2
-    gaussian = torch.exp(-0.5 * (u.square() + v.square()))
-    total = torch.zeros_like(of_surfels).index_add_(0, owner, gaussian)
-    return (gaussian * (of_surfels / total)[owner])[:, None]
+    owner = torch.repeat_interleave(sizes.long().prod(dim=1))  # [T]
+    return (footprint(sizes) * of_surfels[owner])[:, None]
 
 
 def _inverse(curvatures: Tensor, ridge: float) -> Tensor:

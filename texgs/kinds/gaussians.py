@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from texgs.config.fields import Kind
 from texgs.config.keys import key
 from texgs.config.phase import CommonRates, Densify, Losses, Phase, Rates, Seeds
+from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -92,6 +93,18 @@ def fit(task: FitTask[GaussianKeys]) -> Fitted:
     return Fitted(Gaussians(parameters, shading, task.metadata), seconds, keys.iterations, run.losses)
 
 
+def check(settings: GaussianKeys) -> None:
+    """Require a start that Gaussians can have.
+
+    Raises:
+        ArgumentError: for voxels of a volume, at which surfels alone start.
+    """
+    if settings.seeds.kind == "voxels":
+        raise ArgumentError(
+            "fit.gaussians.seeds.kind: expected no voxels, which are for surfels alone; choose visible"
+        )
+
+
 FIELD: Kind[GaussianKeys] = Kind(
     "gaussians",
     "fit 3D Gaussians, the field of 3DGS",
@@ -103,6 +116,7 @@ FIELD: Kind[GaussianKeys] = Kind(
     phases=("gaussians",),
     settings=GaussianKeys,
     fit=fit,
+    check=check,
     exports=("3dgs", "mesh"),
     depth="depth",  # the mean, as the authors of 2DGS take it of 3D Gaussians
 )

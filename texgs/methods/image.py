@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.clip import BACKBONES
@@ -61,10 +62,11 @@ def run(task: Task[ImageKeys]) -> EditedScene:
     pictures: dict[str, StylePicture] = {}
     losses: dict[str, dict[str, list[float]]] = {}
     seconds: dict[str, dict[str, float]] = {}
-    scene = task.each_part(stylist(task, recipe, pictures, losses, seconds))
+    adapted: dict[str, Recipe] = {}
+    scene = task.each_part(stylist(task, recipe, pictures, losses, seconds, adapted))
     return EditedScene(
         scene,
-        how(recipe, task.settings.clip),
+        how(list(adapted.values()), task.settings.clip),
         style.write_styles(task.output, pictures),
         recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
         {"seconds": seconds},
@@ -78,8 +80,9 @@ def stylist(
     pictures: dict[str, StylePicture],
     losses: dict[str, dict[str, list[float]]],
     seconds: dict[str, dict[str, float]],
+    adapted: dict[str, Recipe],
 ) -> Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]:
-    """What gives one part the style, for `Task.each_part`; it notes picture, losses and seconds by name."""
+    """What gives one part the style, for `Task.each_part`; it notes what there is to tell by name."""
     from texgs.edit.clip_loss import ClipLoss
     from texgs.edit.stylize import stylize
     from texgs.models.clip import Clip
@@ -106,7 +109,7 @@ def stylist(
             show=partial(task.show, name),
         )
         losses[name] = result.history.losses
-        seconds[name] = result.history.seconds
+        seconds[name], adapted[name] = result.history.seconds, result.recipe
         return result.model
 
     return one
@@ -135,16 +138,16 @@ def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
     )
 
 
-def how(recipe: Recipe, clip: str) -> str:
-    """What the edit works with, for tables; `clip` is the backbone of a CLIP term."""
+def how(recipes: Sequence[Recipe], clip: str) -> str:
+    """What the edit of some parts works with, for tables; `clip` is the backbone of a CLIP term."""
     names = {
-        "VGG-16": recipe.needs_vgg,
-        clip: recipe.needs_clip,
-        "patches": recipe.patches > 0 and recipe.iterations > 0,
+        "VGG-16": any(recipe.needs_vgg for recipe in recipes),
+        clip: any(recipe.needs_clip for recipe in recipes),
+        "patches": any(recipe.patches > 0 and recipe.iterations > 0 for recipe in recipes),
     }
     used = [name for name, is_used in names.items() if is_used] or ["projection"]
-    words = " + ".join(used) + ("" if recipe.needs_vgg or recipe.needs_clip else " (no weights)")
-    return words if recipe.is_textured else f"{words}, without texture"
+    words = " + ".join(used) + ("" if {"VGG-16", clip} & {*used} else " (no weights)")
+    return words if recipes[0].is_textured else f"{words}, without texture"
 
 
 def check(settings: ImageKeys) -> None:
@@ -176,5 +179,6 @@ METHOD = Method(
     files=style.files,
     style=style_of,
     follows="style",
+    followed=lambda settings: Path(settings.style).name,
     numbers=lambda settings: vars(recipe_of(settings)),
 )

@@ -176,11 +176,11 @@ def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:
     """The segment.
 
     Raises:
-        ConfigError: if there is no such model.
+        ConfigError: if there is no such model, or none is named of several.
     """
-    model = settings.model or models[0]
+    model = settings.model or (models[0] if len(models) == 1 else "")
     if model not in models:
-        raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model}")
+        raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model or 'none'}")
     return [f"{model}/{settings.name}"]
 
 

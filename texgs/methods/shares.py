@@ -24,5 +24,5 @@ def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
     for point in points:
         is_pair = isinstance(point, list) and len(point) == 2
         if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):
-            raise ArgumentError(f"{name}: expected two shares from 0 to 1, got {point}")
+            raise ArgumentError(f"{name}: expected two shares from 0 to below 1, got {point}")
     return list(points)

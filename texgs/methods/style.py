@@ -150,6 +150,7 @@ def look_method(
         files=files,
         style=lambda values: style_of(values, where),
         follows="style",
+        followed=lambda values: Path(values.style).name,
     )
 
 

@@ -25,7 +25,9 @@ STYLES = "edit.stylerf.styles"
 class StyleRfKeys(FeatureKeys):
     """How palette colours take on styles."""
 
-    styles: list[str] = key([], "a picture for each palette colour of the fit; default: `style` for all")
+    styles: list[str] = key(
+        [], "a picture for each palette colour of the fit, whatever looks say; default: `style` for all"
+    )
     epochs: float = key(5.0, "rounds through the training views, for the style", least=0)
     distillation: int = key(500, "steps before, in which free colours learn the recoloured palette", least=0)
     rate: float = key(1e-2, "of Adam", above=0)
@@ -101,4 +103,11 @@ LOOK = style.look_method(
     run,
     "palette",
 )
-METHOD = replace(LOOK, check=check, check_fit=check_fit, files=files)
+METHOD = replace(
+    LOOK,
+    check=check,
+    check_fit=check_fit,
+    files=files,
+    style=lambda settings: None if settings.styles else style.style_of(settings, "edit.stylerf"),
+    followed=lambda settings: ", ".join(Path(name).name for name in settings.styles or [settings.style]),
+)

@@ -95,5 +95,6 @@ METHOD = Method(
     lambda settings: settings.weights(),
     needs=frozenset({"texture", "relight"}),
     follows="instruction",
+    followed=lambda settings: settings.instruction,
     numbers=numbers,
 )

@@ -85,6 +85,7 @@ def update_method(
         lambda values: values.weights(),
         fields=frozenset({field}),
         follows="instruction",
+        followed=lambda settings: settings.instruction,
     )
 
 
@@ -117,6 +118,7 @@ def edit_by_updates(
             task.settings_for(name).instruction,
             schedule(keys, len(views)),
             keeps_renders=keeps_renders,
+            shown=SHOWN,
             seed=task.edit.seed,
             title=f"{task.title} {task.edit.name}, {name}",
         )
@@ -150,8 +152,6 @@ def _write_views(path: Path, updates: dict[str, Updated]) -> None:
 
     rows = {}
     for name, each in updates.items():
-        pairs = list(each.views.values())
-        some = pairs[:: max(1, len(pairs) // SHOWN)][:SHOWN]
-        rows[f"{name} before"] = [old.numpy() for old, _ in some]
-        rows[f"{name} edited"] = [new.numpy() for _, new in some]
-    write_strip(path, rows, [f"view {index + 1}" for index in range(len(some))])
+        rows[f"{name} before"] = [old.numpy() for old, _ in each.views]
+        rows[f"{name} edited"] = [new.numpy() for _, new in each.views]
+    write_strip(path, rows, [f"view {index + 1}" for index in range(len(each.views))])

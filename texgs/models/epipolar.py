@@ -121,7 +121,7 @@ class Consistency:
             if time < LAST:
                 self.role = "alone"
                 return torch.cat([branches([index]) for index in range(count)], dim=1)
-            self.key_ids = drawn_keys(count, generator)
+            self.key_ids, self.masks = drawn_keys(count, generator), {}  # those of all pairs take gigabytes
             self.role, self.stored = "key", {}
             by_view = dict(zip(self.key_ids, branches(self.key_ids).unbind(dim=1), strict=True))
             self.role = "view"

@@ -17,6 +17,7 @@ from texgs.fields.files import open_field
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of, with_variants
+from texgs.fields.surfels.texels import lean
 from texgs.fields.surfels.texture_file import with_texture
 from texgs.scene.segment_file import read_segment
 
@@ -109,8 +110,12 @@ class Scene:
             edits += [model.edit, *(segment.edit for segment in model.segments.values())]
         return edits
 
-    def open(self, device: torch.device | str = "cpu") -> Composed:
+    def open(self, device: torch.device | str = "cpu", *, is_lean: bool = False) -> Composed:
         """Read and join the models.
+
+        Args:
+            device: that they are on.
+            is_lean: surfels have no more texels than they need to look the same, see `lean`.
 
         Raises:
             ArgumentError, ShapeError: naming the model and its file.
@@ -121,7 +126,7 @@ class Scene:
                 model, masks = entry.open()
             except TexgsError as error:
                 raise type(error)(f"models.{name}: {error}") from error
-            models.append(model.to(device))
+            models.append((lean(model) if is_lean else model).to(device))
             segments.append([mask.to(device) for mask in masks])
         made_of = sorted({model.kind for model in models})
         if len(made_of) > 1:

@@ -2,6 +2,7 @@ import pytest
 import torch
 
 from tests.fields.surfels.samples import STAGES, sample
+from texgs.fields.surfels.groups import sizes
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 
@@ -52,6 +53,13 @@ def test_stored_is_the_file_without_its_header(tmp_path, stage):
     groups = ("stored_geometry_mib", "stored_shading_mib", "stored_texture_mib")
     assert found["stored_total_mib"] == pytest.approx(sum(found[group] for group in groups))
     assert header < 2048
+
+
+@pytest.mark.parametrize(("surfels", "published"), [(129857, 223), (108119, 221)], ids=["image", "text"])
+def test_files_are_as_large_as_in_the_papers_tables_of_edits(surfels, published):
+    """Means over four data sets of seven basic scenes with ten million texels each."""
+    p = {"means": torch.zeros(1, 3).expand(surfels, 3), "texels": torch.zeros(1, 3).expand(17_500_000, 3)}
+    assert round(sizes(p)["files_mib"] * 2**20 / 1e6) == published
 
 
 def test_groups():

@@ -92,9 +92,8 @@ def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, di
 
 def followed(task: Task[Any]) -> dict[str, str]:
     """The picture or the words that each part follows; none where the method follows neither."""
-    follows = method_of(task.edit).follows
-    if not follows:
+    method = method_of(task.edit)
+    if not method.follows:
         return {}
     parts = [part.name for part in parts_of(task.scene, task.edit.parts)]
-    looks = {name: str(getattr(task.settings_for(name.split("/")[0]), follows)) for name in parts}
-    return {name: Path(look).name for name, look in looks.items()} if follows == "style" else looks
+    return {name: method.followed(task.settings_for(name.split("/")[0])) for name in parts}

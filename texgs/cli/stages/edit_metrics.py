@@ -23,6 +23,7 @@ from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.edit.parts import parts_of
 from texgs.fields.field import Composed
+from texgs.fields.surfels.texels import lean
 from texgs.metrics.clip import clip_scores
 from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
 from texgs.metrics.style import likeness
@@ -56,7 +57,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     title, kind = f"{settings.dataset}: {edit.name}", kinds()[settings.fit.field]
     device = torch_device(settings.fit.device)
     after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
-    scenes = after.open(device), before.open(device)
+    scenes = after.open(device, is_lean=True), before.open(device)
     cameras = [camera.to(device) for camera in spiral(max(2, views.test.count), *views.lens)]
     some = spread(cameras, settings.compared)
     frames = milliseconds(
@@ -68,7 +69,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         fmean(frames),
         max(frames),
         len(scenes[0]),
-        megabytes=sum(size_of(after)) * MIB / 1e6,
+        megabytes=megabytes(after),
         geometry_kept=is_geometry_kept(*scenes, some, "normals" in kind.can),
         width=views.width,
         height=views.height,
@@ -79,9 +80,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(result)
 
 
-def size_of(scene: Scene) -> list[float]:
-    """MiB of each model, as the paper counts them."""
-    return [entry.open()[0].sizes()["total_mib"] for entry in scene.models.values()]
+def megabytes(scene: Scene) -> float:
+    """Of all models, as the paper's tables of edits count."""
+    return sum(lean(entry.open()[0]).sizes()["files_mib"] for entry in scene.models.values()) * MIB / 1e6
 
 
 @torch.no_grad()
@@ -142,15 +143,17 @@ def style_distance(
 ) -> dict[str, Any]:
     """NNFM and Gram distances of the models with a style, means over them.
 
-    None of segments, of looks by words, or where a model is nowhere opaque.
+    None of segments, of looks by words or by several pictures, or where a model is nowhere opaque.
     """
     edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
     if method.style is None or any(part.segment for part in parts) or not settings.weights["vgg16"]:
         return {}
-    vgg, likenesses = Vgg.load(device=device), []
+    vgg, likenesses = Vgg.load(device=device, dtype=torch.float32), []
     for part in parts:
         picture = method.style(method.of(edit, settings.followed.get(part.model)))
+        if picture is None:
+            return {}
         style = picture.scaled(max(cameras[0].width, cameras[0].height))
         likenesses.append(
             likeness(

@@ -134,4 +134,4 @@ ROLES: tuple[Role, Role] = ("geometry", "appearance")
 
 def _mebibytes(geometry: int, shading: int) -> dict[str, float]:
     sizes = {"geometry_mib": geometry / MIB, "shading_mib": shading / MIB, "texture_mib": 0.0}
-    return {**sizes, "total_mib": (geometry + shading) / MIB}
+    return {**sizes, "total_mib": (geometry + shading) / MIB, "files_mib": (geometry + shading) / MIB}

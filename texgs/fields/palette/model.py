@@ -116,7 +116,8 @@ class PaletteField:
             group = groups.get(name.split(".")[0], "shading")
             counted[group] += 4 * x.numel() if name.endswith(".table") else 0
             stored[group] += 4 * x.numel()
-        return {**_mebibytes("", counted), **_mebibytes("stored_", stored)}
+        sizes = _mebibytes("", counted)
+        return {**sizes, "files_mib": sizes["total_mib"], **_mebibytes("stored_", stored)}
 
 
 @torch.no_grad()

@@ -13,6 +13,7 @@ GEOMETRY = ("means", "quats", "scales", "opacities")
 TEXTURE = ("palette", "texels", "sizes", "offsets")
 # What the paper counts, and what we store; every tensor of a model is in one group.
 COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
+RELEASED = 100  # bytes of a surfel in the files of the authors' release, beside its texels
 STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", *MATERIAL), "texture": TEXTURE}
 
 
@@ -23,9 +24,11 @@ def sizes(parameters: Mapping[str, Tensor]) -> dict[str, float]:
     floats of geometry per surfel, 4 of material (or 4 in all where surfels share one) and 3 per texel.
     `stored_geometry_mib` and so on count the bytes of all tensors: colours and harmonics as shading, palette
     and layout as texture. A model file is as large as `stored_total_mib` and a header of about a kilobyte.
+    `files_mib` are the files of the authors' release: 20 floats and 5 numbers of the layout for a surfel.
     """
     counted, stored = _mebibytes(parameters, COUNTED), _mebibytes(parameters, STORED)
-    return counted | {f"stored_{name}": value for name, value in stored.items()}
+    files = RELEASED * len(parameters["means"]) / MIB + counted["texture_mib"]
+    return counted | {"files_mib": files} | {f"stored_{name}": value for name, value in stored.items()}
 
 
 def _mebibytes(parameters: Mapping[str, Tensor], groups: Mapping[str, Collection[str]]) -> dict[str, float]:

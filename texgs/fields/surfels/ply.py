@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from texgs.config.phase import RANGES
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.ply_file import read_vertices
@@ -36,7 +37,7 @@ RELEASE = {  # our name of a factor by the release's, in the order of its files
     "ambient_factor": "ambient",
     "specular_factor": "specular",
 }
-MOST_SPECULAR, MOST_SHININESS = 5.0, 50.0  # of the release
+(_, MOST_SPECULAR), (_, MOST_SHININESS) = RANGES["paper"].values()  # of the release
 
 
 def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:

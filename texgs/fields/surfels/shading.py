@@ -9,14 +9,13 @@ from typing import Literal
 import torch
 from torch import Tensor
 
+from texgs.config.phase import RANGES, require_material
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.raster import Options, Texture
 from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture
 from texgs.raster.spherical_harmonics import spherical_harmonics
 
-SHININESS = (1.0, 100.0)  # range of the bounded exponent
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
 
 
@@ -50,16 +49,20 @@ class ShadingModel:
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
     """Factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
 
-    "bounded": factors in (0, 1), exponent in (1, 100). "paper": k_a and k_d as they are, k_s in (0, 5),
-    exponent in (0, 50), which is what the release does.
+    Those that have a range, see `texgs.config.phase.RANGES`, go through a sigmoid; others are as they are.
     """
-    a, d, s, b = (parameters[name] for name in MATERIAL)
-    if kind == "paper":
-        factors = (a, d, 5 * s.sigmoid(), 50 * b.sigmoid())
-    else:
-        low, high = SHININESS
-        factors = (a.sigmoid(), d.sigmoid(), s.sigmoid(), low + (high - low) * b.sigmoid())
-    return dict(zip(MATERIAL, factors, strict=True))
+    ranges = RANGES[kind]
+    return {
+        name: between(*ranges[name], parameters[name]) if name in ranges else parameters[name]
+        for name in MATERIAL
+    }
+
+
+def between(low: float, high: float, raw: Tensor) -> Tensor:
+    """Values in a range; without an operation for a range from 0, or of 1: these are done in each step."""
+    values = raw.sigmoid()
+    values = values if high - low == 1 else (high - low) * values
+    return values if low == 0 else low + values
 
 
 def raw_material(
@@ -70,16 +73,12 @@ def raw_material(
     Raises:
         ArgumentError: if a factor is outside what the kind can express.
     """
-    low, high = SHININESS
-    given = torch.tensor([ambient, diffuse, specular, shininess])
-    if kind == "paper":
-        linear, shares = given[:2], given[2:] / torch.tensor([5.0, 50.0])
-    else:
-        linear, shares = given[:0], torch.cat([given[:3], (given[3:] - low) / (high - low)])
-    if not ((shares > 0) & (shares < 1)).all():
-        raise ArgumentError(f"material: expected factors that {kind!r} can express, got {given.tolist()}")
-    raw = torch.cat([linear, shares.logit()])
-    return dict(zip(MATERIAL, raw[:, None], strict=True))
+    factors = dict(zip(MATERIAL, (ambient, diffuse, specular, shininess), strict=True))
+    require_material(factors, kind)
+    raw = {name: torch.tensor([factor]) for name, factor in factors.items()}
+    for name, (low, high) in RANGES[kind].items():
+        raw[name] = ((raw[name] - low) / (high - low)).logit()
+    return raw
 
 
 def viewer(camera: Camera, shading: ShadingModel) -> Tensor:

@@ -8,7 +8,10 @@ from dataclasses import replace
 import torch
 from torch import Tensor
 
+from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
+
+EXTENT = 6.0  # standard deviations that a texture spans along each tangent
 
 
 def owners(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
@@ -28,14 +31,51 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
     return (running[offsets + counts] - running[offsets]) / counts[:, None]
 
 
+def footprint(sizes: Tensor) -> Tensor:
+    """Share [T] of each texel in its surfel, which falls off like the Gaussian.
+
+    Args:
+        sizes: texels along u and v [N, 2], one surfel after the other.
+    """
+    counts = sizes.long().prod(dim=1)
+    owner = torch.repeat_interleave(counts)  # [T]
+    place = torch.arange(len(owner), device=owner.device) - (counts.cumsum(dim=0) - counts)[owner]
+    columns, rows = sizes.long().unbind(dim=1)
+    u = EXTENT * ((place % columns[owner]) + 0.5) / columns[owner] - EXTENT / 2
+    v = EXTENT * ((place // columns[owner]) + 0.5) / rows[owner] - EXTENT / 2
+    gaussian = torch.exp(-0.5 * (u.square() + v.square()))
+    total = gaussian.new_zeros(len(sizes)).index_add_(0, owner, gaussian)
+    return gaussian / total[owner]
+
+
 def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
-    """The model with the mean of their texels in all texels of some surfels [N] bool; of all by default."""
+    """The model with the mean colour under their Gaussians for some surfels [N] bool; for all by default."""
     p = model.parameters
     place, surfel = owners(p)
-    texels = p["texels"].clone()
+    texels, weights = p["texels"].clone(), footprint(p["sizes"])[:, None]
+    means = torch.zeros_like(p["colors"]).index_add_(0, surfel, weights * texels[place])
     mine = torch.ones_like(surfel, dtype=torch.bool) if surfels is None else surfels[surfel]
-    texels[place[mine]] = mean_texels(p).to(texels)[surfel[mine]]
+    texels[place[mine]] = means[surfel[mine]]
     return replace(model, parameters={**p, "texels": texels})
+
+
+def lean(field: Field) -> Field:
+    """Surfels whose texels are all the same have one: they look as before. Other fields stay as they are."""
+    if not isinstance(field, Surfels) or field.stage != "texture":
+        return field
+    p = field.parameters
+    place, surfel = owners(p)
+    counts = p["sizes"].long().prod(1)
+    first = counts.cumsum(0) - counts  # [N] in the order of surfels
+    texels = p["texels"][place]
+    differs = (texels != texels[first[surfel]]).any(1)
+    is_plain = torch.ones_like(counts, dtype=torch.bool).index_fill_(0, surfel[differs], False)
+    kept = ~is_plain[surfel]
+    kept[first] = True
+    sizes = torch.where(is_plain[:, None], 1, p["sizes"])
+    counts = sizes.long().prod(1)
+    offsets = (counts.cumsum(0) - counts).to(p["offsets"])
+    return replace(field, parameters={**p, "texels": texels[kept], "sizes": sizes, "offsets": offsets})
 
 
 def bare_colors(model: Surfels) -> Tensor:

@@ -83,7 +83,8 @@ class Voxels:
         x, y, z = grid.size
         counted = {"geometry": 4 * x * y * z + 4 * len(grid), "shading": 2 * values * len(grid)}
         stored = {"geometry": 8 * grid.masks.numel() + 4 * len(grid), "shading": 4 * values * len(grid)}
-        return {**_mebibytes("", counted), **_mebibytes("stored_", stored)}
+        sizes = _mebibytes("", counted)
+        return {**sizes, "files_mib": sizes["total_mib"], **_mebibytes("stored_", stored)}
 
 
 def _mebibytes(prefix: str, groups: Mapping[str, int]) -> dict[str, float]:

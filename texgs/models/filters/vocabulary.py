@@ -57,7 +57,7 @@ def understand(instruction: str) -> tuple[str, Color | None]:
         return f"colour {asked}", color
     raise ArgumentError(
         f"instruction: expected one of {', '.join(vocabulary())}; got {text!r}, which needs "
-        "edit.text.guidance=instruct_pix2pix"
+        "guidance=instruct_pix2pix"
     )
 
 

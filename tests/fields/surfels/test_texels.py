@@ -1,0 +1,47 @@
+"""Texels of surfels: their shares, their means, and models with no more of them than they need."""
+
+import pytest
+import torch
+
+from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.surfels.samples import sample
+from texgs.core.camera import orbit
+from texgs.fields.surfels.texels import footprint, lean, owners, untextured
+
+CAMERA = orbit(30, 20, 4, 40, 48, 48)
+
+
+def test_shares_are_those_of_the_gaussian_over_six_deviations():
+    shares = footprint(torch.tensor([[3, 1], [1, 1]]))
+    side = torch.exp(torch.tensor(-2.0))  # two deviations from the middle
+    expected = torch.tensor([side, 1.0, side]) / (1 + 2 * side)
+    torch.testing.assert_close(shares, torch.cat([expected, torch.ones(1)]))
+
+
+def test_without_texture_each_surfel_has_the_mean_under_its_gaussian():
+    model = sample("texture", n=20)
+    p, plain = model.parameters, untextured(model).parameters["texels"]
+    place, surfel = owners(p)
+    for index in range(20):
+        own = place[surfel == index]
+        weights = footprint(p["sizes"][index : index + 1]).double()
+        mean = (weights[:, None] * p["texels"][own].double()).sum(0)
+        torch.testing.assert_close(plain[own].double(), mean.expand(len(own), 3), atol=1e-6, rtol=0)
+
+
+def test_a_lean_model_looks_the_same_with_a_texel_for_each_plain_surfel():
+    model = sample("texture", n=60)
+    plain = torch.arange(60) % 3 > 0
+    mixed = untextured(model, plain)
+    small = lean(mixed)
+    counts = model.parameters["sizes"].long().prod(1)
+    assert len(small.parameters["texels"]) == int(torch.where(plain, 1, counts).sum())
+    torch.testing.assert_close(small.render(CAMERA).color, mixed.render(CAMERA).color, atol=1e-6, rtol=0)
+    assert small.sizes()["files_mib"] < mixed.sizes()["files_mib"]
+
+
+@pytest.mark.parametrize("model", [sample("texture", n=9), sample("shading", n=9), gaussians(5)])
+def test_what_has_nothing_to_spare_stays_as_it_is(model):
+    assert len(lean(model)) == len(model)
+    for name, x in model.tensors("appearance").items() if hasattr(model, "tensors") else ():
+        assert torch.equal(lean(model).tensors("appearance")[name], x)
