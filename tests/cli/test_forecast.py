@@ -57,7 +57,7 @@ def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, t
     assert re.search(r"left out data set wood: \S*woodbranch\S* is not there", told)
     assert re.search(r"left out edit style: .*weights of vgg16 are not on this machine", told)
     assert re.search(r"jobs +\d+ to do \(.*4 views.*\), 0 done", told)
-    assert re.search(r"time +about \d+\.\d hours: an estimate", told)
+    assert re.search(r"time +about \d+ min: an estimate", told)
     assert not list(tmp_path.iterdir())  # nothing is written
 
 
@@ -66,6 +66,13 @@ def test_a_sweep_and_mistakes_are_those_of_a_run(capsys):
     assert " 4 texture" in capsys.readouterr().out, "two seeds of two basic TFs"
     assert main(["doctor", "dataset=orbital", "fit=plenoxels_quick", "device=cuda"]) == 2
     assert "device: expected cpu for fit=plenoxels_quick" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"), [(5, "1 min"), (3700, "62 min"), (7300, "2 hours"), (180_000, "2 days")]
+)
+def test_times_are_told_as_one_says_them(seconds, words):
+    assert forecast.duration(seconds) == words
 
 
 def test_a_run_that_would_not_start_is_told(capsys):

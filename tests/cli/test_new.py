@@ -36,7 +36,7 @@ def scan(tmp_path):
 def test_a_data_set_with_suggested_tfs(conf, scan, capsys):
     assert main(["new", str(scan), "--name", "my_scan", "up=+z", "spacing=[1,1,2]"]) == 0
     out = capsys.readouterr().out
-    assert "then: texgs run dataset=my_scan\n" in out
+    assert "then: texgs run dataset=my_scan fit=quick\n" in out
     config = compose(("dataset=my_scan",))
     assert config.dataset.volume.up == "+z"
     assert config.dataset.volume.spacing == [1, 1, 2]

@@ -86,6 +86,7 @@ def test_unsaved_edits_are_asked_about(scene_file, monkeypatch, capsys, stdin, i
 
 def test_another_file_is_not_replaced_without_a_word(scene_file, monkeypatch, capsys):  # noqa: F811
     """Scenes of jobs are saved as edited.yaml, which may be there; a name that is none is asked for again."""
+    monkeypatch.chdir(scene_file.parent)
     (scene_file.parent / "metrics.json").write_text("{}")
     (scene_file.parent / "edited.yaml").write_text("mine")
     edits = Server(open_scene(scene_file)).edits

@@ -24,10 +24,16 @@ def test_a_scene_is_saved_in_its_place(scene_file, tmp_path):
     assert open_scene(scene_file, tmp_path / "mine").folder == tmp_path / "mine"
 
 
-def test_a_job_keeps_its_scene(scene_file, tmp_path):
+def test_a_job_keeps_its_scene_and_its_folder(scene_file, tmp_path, monkeypatch):
+    """A job does not replace a folder that holds files of others."""
     (tmp_path / "metrics.json").write_text("{}")
+    (project := tmp_path / "project").mkdir()
+    monkeypatch.chdir(project)
     opened = open_scene(scene_file)
-    assert (opened.name, opened.file) == ("edited.yaml", None)
+    assert (opened.folder, opened.name, opened.file) == (project, "edited.yaml", None)
+    model = write_model(tmp_path / "model.safetensors", ball(1))
+    assert open_scene(model).folder == project
+    assert open_scene(model, tmp_path).folder == tmp_path
 
 
 def test_a_folder_with_one_scene(scene_file, tmp_path):

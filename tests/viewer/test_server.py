@@ -332,7 +332,8 @@ def test_scenes_are_saved_in_their_folder_only(scene_file):
         assert not read_scene(scene_file.parent / name).models["TF02"].edit.visible
 
 
-def test_other_files_are_replaced_after_a_question_only(scene_file):
+def test_other_files_are_replaced_after_a_question_only(scene_file, monkeypatch):
+    monkeypatch.chdir(scene_file.parent)
     (scene_file.parent / "metrics.json").write_text("{}")  # a job wrote the scene
     (earlier := scene_file.parent / "edited.yaml").write_text(scene_file.read_text())
 

@@ -13,7 +13,9 @@ from texgs.cli.probes import PROBES, Finding
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The run to look at, if any."""
     parser.add_argument("--experiment", metavar="NAME", help="file of conf/experiment, such as paper")
-    parser.add_argument("words", nargs="*", metavar="KEY=VALUE", help="of that run, as for `texgs run`")
+    parser.add_argument(
+        "words", nargs="*", metavar="KEY=VALUE", help="configuration of the run, as for `texgs run`"
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:

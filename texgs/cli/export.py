@@ -31,9 +31,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help="one model of a scene, with the textures that it has there; other edits of it only in html",
     )
-    parser.add_argument("--opacity", type=float, default=0.5, help="least of points (%(default)s)")
-    parser.add_argument("--voxel", type=float, default=1 / 256, help="of a mesh, world units (%(default)s)")
-    parser.add_argument("--views", type=int, default=92, help="that a mesh is made from (%(default)s)")
+    parser.add_argument(
+        "--opacity", type=float, default=0.5, help="points: leave out surfels with less opacity (%(default)s)"
+    )
+    parser.add_argument(
+        "--voxel", type=float, default=1 / 256, help="edge of a cell of a mesh, world units (%(default)s)"
+    )
+    parser.add_argument(
+        "--views", type=int, default=92, help="number of views that a mesh is made from (%(default)s)"
+    )
     parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
     parser.add_argument(
         "--drop-unseen", action="store_true", help="compact: no texture for surfels that none of --views sees"

@@ -149,12 +149,18 @@ def show(words: tuple[str, ...]) -> int:
     kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
     print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
     slower = probe() / PROBE_SECONDS
-    hours = expected.seconds * slower / 3600
     print(
-        f"time     about {hours:.1f} hours: an estimate, from speeds measured on other scenes and how "
-        f"fast this machine rasterizes ({1 / slower:.1f} times as fast as two cores)"
+        f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on other "
+        f"scenes and how fast this machine rasterizes ({1 / slower:.1f} times as fast as two cores)"
     )
     return 1 if stops else 0
+
+
+def duration(seconds: float) -> str:
+    """In minutes or hours, as one says it."""
+    if seconds < 2 * 3600:
+        return f"{max(1, round(seconds / 60))} min"
+    return f"{seconds / 3600:.0f} hours" if seconds < 48 * 3600 else f"{seconds / 86400:.0f} days"
 
 
 def source(config: DictConfig) -> str:

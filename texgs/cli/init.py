@@ -22,7 +22,8 @@ Run all commands in this folder:
     conf/edit/NAME.yaml          a new look                             edit=NAME
     conf/experiment/NAME.yaml    values of any keys; see example.yaml   experiment=NAME
 
-`results/` can be removed at any time; `texgs run` makes it again.
+`texgs run` makes its own files in `results/` again. Before you remove the folder, copy what only you have:
+`results/study`, `results/mlflow.db`, and scenes and looks that you saved there.
 """
 EXAMPLE = """\
 # @package _global_

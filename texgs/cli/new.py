@@ -1,4 +1,4 @@
-"""Write conf/dataset/NAME.yaml for a volume of your own, with TFs suggested from its histogram."""
+"""Write conf/dataset/NAME.yaml for a volume of your own, with transfer functions from its histogram."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The file, how to read it, and where TFs come from."""
+    """The file, how to read it, and where transfer functions come from."""
     parser.add_argument("file", type=Path, help="volume, or folder of TIFF slices")
     parser.add_argument(
         "overrides",
@@ -30,10 +30,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--name", help="of the data set (the file's name)")
     parser.add_argument(
-        "--count", type=int, help="number of basic TFs to suggest (as many as the histogram shows)"
+        "--count", type=int, help="number of transfer functions to suggest (as many as the histogram shows)"
     )
     parser.add_argument(
-        "--tf", type=Path, nargs="+", metavar="FILE", help="basic TFs instead: JSON, or ParaView presets"
+        "--tf",
+        type=Path,
+        nargs="+",
+        metavar="FILE",
+        help="transfer functions to take instead: JSON, or ParaView presets",
     )
     parser.add_argument("--force", action="store_true", help="replace a data set of that name")
 
@@ -60,8 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     check_document(text, config)
     write_bytes(target, text.encode())
     picture = Path(config.results, name, "transfer", "transfer.png")
-    print(f"{shown(target)}: {len(basic)} basic TFs to edit; {picture} shows them")
-    print(f"then: texgs run dataset={name}")
+    print(f"{shown(target)}: {len(basic)} transfer functions to edit; {picture} shows them")
+    print(f"then: texgs run dataset={name} fit=quick")
     return 0
 
 

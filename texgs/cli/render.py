@@ -38,10 +38,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--azimuth",
         type=float,
         default=30.0,
-        help="of the camera, degrees (%(default)s); on an orbit of the first; not of path test",
+        help="azimuth of the camera, on an orbit of the first frame, degrees (%(default)s); not for test",
     )
     parser.add_argument(
-        "--polar", type=float, default=20.0, help="above the horizon, degrees (%(default)s); not of path test"
+        "--polar",
+        type=float,
+        default=20.0,
+        help="angle above the horizon, degrees (%(default)s); not for path test",
     )
     parser.add_argument(
         "--radius", type=float, default=LENS.radius, help="distance, world units (%(default)s)"

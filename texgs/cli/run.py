@@ -2,6 +2,7 @@
 
 Words with = choose the configuration, such as dataset=engine fit=quick views.width=400; all other words are
 options and targets of snakemake, such as --dry-run or results/report.html.
+`texgs views --help` lists all keys.
 """
 
 from __future__ import annotations

@@ -69,7 +69,12 @@ def add_clicks(parser: argparse.ArgumentParser) -> None:
 
 def add_views(parser: argparse.ArgumentParser) -> None:
     """The views that vote, and the lens of all views."""
-    parser.add_argument("--views", type=int, default=42, help="that vote, 10 f^2 + 2 (%(default)s)")
+    parser.add_argument(
+        "--views",
+        type=int,
+        default=42,
+        help="number of views that vote, 10 f^2 + 2: 12, 42, 92, 162, ... (%(default)s)",
+    )
     parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
     parser.add_argument("--width", type=int, default=LENS.width, help="of the view clicked on (%(default)s)")
     parser.add_argument("--height", type=int, help="default the width")

@@ -21,9 +21,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
     )
     parser.add_argument("--output", type=Path, default=Path("results/study"), help="folder (%(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the order of clips (%(default)s)")
-    parser.add_argument("--size", type=int, default=384, help="of a clip, pixels (%(default)s)")
-    parser.add_argument("--frames", type=int, default=150, help="of a turn, 25 a second (%(default)s)")
+    parser.add_argument(
+        "--seed", type=int, default=0, help="random seed for the order of clips (%(default)s)"
+    )
+    parser.add_argument(
+        "--size", type=int, default=384, help="width and height of a clip, pixels (%(default)s)"
+    )
+    parser.add_argument("--frames", type=int, default=150, help="frames of a turn, 25 a second (%(default)s)")
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
 
 

@@ -19,7 +19,11 @@ TOKEN = "viewer-token"  # file in the cache folder
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to show, and where to serve it."""
     parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
-    parser.add_argument("--folder", type=Path, help="that scenes are saved in; default that of the scene")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        help="where scenes are saved; default beside the scene, or here for a scene of the workflow",
+    )
     parser.add_argument("--port", type=int, help=f"default {PORT}, or another one where it is taken")
     parser.add_argument(
         "--host",

@@ -30,25 +30,27 @@ class Opened:
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
     """The scene of a path.
 
-    A scene that a job wrote is saved under another name: the job's files stay as they are recorded.
+    A scene that a job wrote is saved under another name in the current folder: jobs do not replace a folder
+    that holds files of others.
 
     Args:
         path: scene.yaml, a folder with one of these in it or below, or a model file.
-        folder: for saving; default that of the scene or the model.
+        folder: for saving; by default that of the scene or the model, or the current one.
 
     Raises:
         ArgumentError: if there is no scene, several, or a damaged one.
     """
     if path.is_dir():
         path = only_scene(path)
+    of_job = (path.parent / OF_JOBS).exists()
+    folder = folder or (Path.cwd() if of_job else path.parent)
     if path.suffix in SCENES:
-        of_job = path.name == SCENE and (path.parent / OF_JOBS).exists()
-        name, file = ("edited.yaml", None) if of_job else (path.name, path)
-        return Opened(read_scene(path), title_of(path), folder or path.parent, name, file)
+        name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)
+        return Opened(read_scene(path), title_of(path), folder, name, file)
     if not path.is_file():
         raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
     scene = Scene({label(str(path), path.stem): SceneModel(path)})
-    return Opened(scene, title_of(path), folder or path.parent, SCENE)
+    return Opened(scene, title_of(path), folder, SCENE)
 
 
 def only_scene(folder: Path) -> Path:
