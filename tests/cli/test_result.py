@@ -153,15 +153,51 @@ def test_fingerprints_know_contents_and_makers_but_no_times(output, tmp_path):
     assert of(volume) != alone
 
 
-def test_fingerprints_of_views_and_slices_from_elsewhere_know_all_files(tmp_path):
+def is_told(path, other, text):
+    """Whether the fingerprint of an input knows of the contents of another file."""
+    before = result.fingerprint(path, Checksums())
+    other.write_text(text)
+    return result.fingerprint(path, Checksums()) != before
+
+
+def test_fingerprints_of_views_from_elsewhere_know_all_that_fits_read(tmp_path):
     (tmp_path / "train").mkdir()
-    (tmp_path / "transforms_train.json").write_text("{}")
-    (tmp_path / "train" / "r_0.png").write_text("one")
-    views, slices = tmp_path / "transforms_train.json", tmp_path / "train"
-    before = [result.fingerprint(path, Checksums()) for path in (views, slices)]
-    (tmp_path / "train" / "r_0.png").write_text("two")
-    after = [result.fingerprint(path, Checksums()) for path in (views, slices)]
-    assert all(one != two for one, two in zip(before, after, strict=True))
+    (views := tmp_path / "transforms_train.json").write_text("{}")
+    assert is_told(views, tmp_path / "train" / "r_0.png", "one")
+    assert is_told(views, tmp_path / "train" / "r_0.png", "two")
+    assert is_told(views, tmp_path / "points3d.ply", "where surfels start")
+    assert not is_told(views, tmp_path / "notes.txt", "mine")
+
+
+def test_fingerprints_of_slices_know_nothing_else_of_their_folder(tmp_path):
+    (tmp_path / "z1.tif").write_text("one")
+    assert is_told(tmp_path, tmp_path / "z1.tif", "two")
+    assert is_told(tmp_path, tmp_path / "z2.TIFF", "more")
+    assert not is_told(tmp_path, tmp_path / ".DS_Store", "of the system")
+
+
+@pytest.mark.parametrize(
+    ("name", "header"),
+    [("a.mhd", "NDims = 3\nElementDataFile = a.raw\n"), ("a.nhdr", "NRRD0004\ndata file: a.raw\n")],
+)
+def test_fingerprints_of_headers_know_their_samples(tmp_path, name, header):
+    (tmp_path / name).write_text(header)
+    (tmp_path / "a.raw").write_text("one")
+    assert is_told(tmp_path / name, tmp_path / "a.raw", "two")
+
+
+def test_fingerprints_of_files_beside_a_result_are_their_own(output):
+    make(output)
+    (output / "mine.yaml").write_text("one")
+    assert is_told(output / "mine.yaml", output / "mine.yaml", "two")
+
+
+def test_a_file_in_the_place_of_a_result_is_told(output):
+    output.parent.mkdir(parents=True, exist_ok=True)
+    output.write_text("mine")
+    result.recover(output)
+    with pytest.raises(ArgumentError, match="expected a folder, got a link or a file"):
+        result.claim(output, MINE)
 
 
 def test_a_damaged_input_names_its_maker_and_is_looked_at_anew(output, monkeypatch, tmp_path):

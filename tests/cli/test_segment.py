@@ -41,7 +41,7 @@ LEFT, RIGHT = pixel((-0.3, 0.0, 0.25)), pixel((0.3, 0.1, 0.35))
 
 def segment(scene, *words, name="red", output="new.yaml"):
     where = ["--name", name, "--output", str(scene.with_name(output))]
-    return main(["segment", str(scene), "--view=-90,0", *LENS, *FAST, *where, *words])
+    return main(["segment", str(scene), "--view", "-90,0", *LENS, *FAST, *where, *words])
 
 
 def colors(scene, output):

@@ -45,6 +45,7 @@ def test_interpolations_are_resolved():
         ("views.shading.ambient=inf", "views.shading.ambient: expected a finite number, got inf"),
         ("dataset.name=../../x", "dataset.name: expected a letter and then letters"),
         ("dataset.name=logs", "dataset.name: logs is a folder of texgs"),
+        ("dataset.name=Logs", "dataset.name: Logs is a folder of texgs"),
         ("dataset=123", "expected the name of a file of conf/"),
         ("tracking=http://x", "an address goes to tracking.uri"),
         ("views.mapper=gpuu", "views.mapper: expected one of cpu, gpu, vtk, got gpuu, did you mean gpu?"),

@@ -54,6 +54,21 @@ def test_a_container_has_what_it_may_have_and_what_files_give_back(tmp_path, mon
     assert memory.free_memory() > 1e6
 
 
+def test_a_group_inside_of_others_has_what_the_tightest_leaves(tmp_path, monkeypatch):
+    """As the jobs of a cluster are in."""
+    (tmp_path / "own").write_text("0::/slurm/job_7\n")
+    (job := tmp_path / "slurm" / "job_7").mkdir(parents=True)
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    monkeypatch.setattr(memory, "GROUP", tmp_path / "own")
+    for folder, most in ((job, 500_000), (job.parent, 300_000)):
+        (folder / "memory.max").write_text(f"{most}\n")
+        (folder / "memory.current").write_text("100000\n")
+        (folder / "memory.stat").write_text("inactive_file 0\n")
+    assert memory.free_memory() == 200_000
+    (job.parent / "memory.max").write_text("max\n")
+    assert memory.free_memory() == 400_000
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="what counts is told by Linux")
 def test_a_limit_of_the_process_counts():
     import resource

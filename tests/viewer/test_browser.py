@@ -105,7 +105,7 @@ def save_as(page, name):
     page.get_by_role("button", name="Save").click()
     page.get_by_label("File name").fill(name)
     page.keyboard.press("Enter")
-    expect(page.get_by_text(f"/{name}")).to_be_visible(timeout=WAIT)
+    expect(page.get_by_text(re.compile(f"^Saved as .*/{name}"))).to_be_visible(timeout=WAIT)
 
 
 def test_what_is_edited_shows_and_is_saved(chromium, scene_file):
@@ -321,7 +321,7 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
         with opened(chromium, address) as page:
             page.get_by_role("checkbox", name="Headlight").uncheck()
             page.get_by_role("checkbox", name="TF02").uncheck()
-            expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
+            expect(page.get_by_role("listitem")).to_have_text(["light azimuth 40°, polar 10°", "TF02 visible off"])
             process.kill()
             lost = page.get_by_text("No connection to texgs view")
             expect(lost).to_be_visible(timeout=WAIT)
@@ -329,5 +329,5 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
                 assert again == address
                 expect(lost).to_be_hidden(timeout=WAIT)
                 page.get_by_role("button", name="Make the other edits again").click()
-                expect(page.get_by_role("listitem")).to_have_text(["light", "TF02 visible"])
+                expect(page.get_by_role("listitem")).to_have_text(["light azimuth 40°, polar 10°", "TF02 visible off"])
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()

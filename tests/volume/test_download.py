@@ -38,6 +38,13 @@ def test_a_file_is_downloaded_once(address, tmp_path):
         require_whole(path, SHA256)
 
 
+def test_an_address_has_a_scheme_and_a_checksum_any_case(address, tmp_path):
+    download(address, SHA256.upper(), tmp_path / "a.raw")
+    require_whole(tmp_path / "a.raw", SHA256.upper())
+    with pytest.raises(ArgumentError, match="expected an address that begins with https:// or http://"):
+        download(address.replace("http://", "htp://"), SHA256, tmp_path / "b.raw")
+
+
 def test_another_file_or_none_is_one_sentence_and_keeps_nothing(address, tmp_path):
     path = tmp_path / "cache" / "a.raw"
     with pytest.raises(ArgumentError, match="got another file"):

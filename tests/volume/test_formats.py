@@ -5,6 +5,7 @@ import nrrd
 import numpy as np
 import pytest
 import tifffile
+from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
 
 from tests.volume.volume_files import HAS_SPACING, SPACING, WRITERS, image_data, sample_values, write_vti
 from texgs.core.errors import ArgumentError, ShapeError
@@ -66,15 +67,104 @@ def test_nrrd_space_directions_and_byte_skip(tmp_path):
     header += "space directions: (3,4,0) (0,0,2) (1,0,0)\nspace origin: (1,2,3)\n"
     (tmp_path / "v.nhdr").write_text(header + "data file: v.bin\nbyte skip: -1\n")
     (tmp_path / "v.bin").write_bytes(b"some header" + values.tobytes())
-    source = open_source(tmp_path / "v.nhdr")
-    assert (source.spacing, source.origin) == ((5, 2, 1), (1, 2, 3))
-    np.testing.assert_array_equal(source.slices(0, 11), values)
+    source, turned = (
+        open_source(tmp_path / "v.nhdr"),
+        values.transpose(1, 2, 0),
+    )  # x is along y, y along z, z along x
+    assert (source.spacing, source.origin) == ((1, 5, 2), (1, 2, 3))
+    np.testing.assert_array_equal(source.slices(0, 12), turned)
     (tmp_path / "v.nhdr").write_text(header + "data file: v.bin\nline skip: 1\nbyte skip: 2\n")
     (tmp_path / "v.bin").write_bytes(b"line\n--" + values.tobytes())
-    np.testing.assert_array_equal(open_source(tmp_path / "v.nhdr").slices(0, 11), values)
+    np.testing.assert_array_equal(open_source(tmp_path / "v.nhdr").slices(0, 12), turned)
     (tmp_path / "v.bin").unlink()
     with pytest.raises(ArgumentError, match=r"no such file with samples: .*v\.bin"):
         open_source(tmp_path / "v.nhdr")
+
+
+def test_nrrd_spacing_by_the_ends_of_axes(tmp_path):
+    values = sample_values("uint8")
+    header = "NRRD0005\ntype: uchar\ndimension: 3\nsizes: 13 12 11\nencoding: raw\n"
+    header += "axis mins: 0 0 5\naxis maxs: 24 22 5.5\n"
+    for centers, expected in (("", (2, 2, 0.05)), ("centers: cell node node\n", (24 / 13, 2, 0.05))):
+        (tmp_path / "v.nrrd").write_bytes((header + centers + "\n").encode() + values.tobytes())
+        np.testing.assert_allclose(open_source(tmp_path / "v.nrrd").spacing, expected)
+
+
+ORIENTATIONS = ("RAS", "LAS", "LPS", "LPI", "SRA", "PIL", "AIR")
+
+
+def stored_as(codes):
+    """An image of right, anterior, superior, as it is stored with other axes, and what NIfTI makes of it."""
+    values = sample_values("int16").T  # [X, Y, Z]
+    affine = np.diag([2.0, 3.0, 4.0, 1.0])
+    affine[:3, 3] = 10, 20, 30
+    turn = nibabel.orientations.ornt_transform(
+        nibabel.orientations.axcodes2ornt("RAS"), nibabel.orientations.axcodes2ornt(codes)
+    )
+    image = nibabel.Nifti1Image(values, affine).as_reoriented(turn)
+    return np.asarray(image.dataobj).T, image.affine, values.T
+
+
+@pytest.mark.parametrize("codes", ORIENTATIONS)
+@pytest.mark.parametrize("space", ["right-anterior-superior", "left-anterior-superior"])
+def test_nrrd_axes_become_those_of_space_and_nothing_is_mirrored(tmp_path, codes, space):
+    """The same image by NIfTI and by NRRD, whichever way it is stored."""
+    stored, affine, expected = stored_as(codes)
+    if space.startswith("left"):
+        affine = np.diag([-1.0, 1, 1, 1]) @ affine
+    directions, origin = affine[:3, :3].T, affine[:3, 3]
+    header = {"space": space, "space directions": directions, "space origin": origin, "encoding": "raw"}
+    for encoding in ("raw", "gzip"):
+        nrrd.write(str(tmp_path / "v.nrrd"), stored, header | {"encoding": encoding}, index_order="C")
+        source = open_source(tmp_path / "v.nrrd")
+        assert (source.spacing, source.origin) == ((2, 3, 4), (10, 20, 30))
+        np.testing.assert_array_equal(source.slices(0, 11), expected)
+
+
+@pytest.mark.parametrize("codes", ORIENTATIONS)
+def test_metaimage_axes_become_those_of_space(tmp_path, codes):
+    """Its space is that of DICOM, left and posterior: a half turn from that of NIfTI, and no mirror of it."""
+    stored, affine, expected = stored_as(codes)
+    affine = np.diag([-1.0, -1, 1, 1]) @ affine
+    steps = np.linalg.norm(affine[:3, :3], axis=0)
+    words = {
+        "DimSize": stored.shape[::-1],
+        "ElementSpacing": steps,
+        "TransformMatrix": (affine[:3, :3] / steps).T.ravel(),
+        "Offset": affine[:3, 3],
+    }
+    lines = [f"{key} = {' '.join(map(str, numbers))}\n" for key, numbers in words.items()]
+    head = "Comment = Schädel\n" + "".join(lines) + "ElementType = MET_SHORT\nElementDataFile = LOCAL\n"
+    (tmp_path / "v.mha").write_bytes(head.encode() + stored.astype("<i2").tobytes())
+    source = open_source(tmp_path / "v.mha")
+    assert (source.spacing, source.dims) == ((2, 3, 4), (13, 12, 11))
+    np.testing.assert_array_equal(source.slices(0, 11), expected[:, ::-1, ::-1])
+
+
+def test_vti_axes_become_those_of_space(tmp_path):
+    values = sample_values("uint8")
+    image = image_data(values)
+    image.SetDirectionMatrix(0, 0, -1, 1, 0, 0, 0, 1, 0)  # in columns: x is along y, y along z, z against x
+    writer = vtkXMLImageDataWriter()
+    writer.SetInputData(image)
+    writer.SetFileName(str(tmp_path / "v.vti"))
+    writer.Write()
+    source = open_source(tmp_path / "v.vti")
+    assert source.spacing == (SPACING[2], SPACING[0], SPACING[1])
+    np.testing.assert_array_equal(source.slices(0, 12), values.transpose(1, 2, 0)[:, :, ::-1])
+
+
+def test_nifti_2_is_read(tmp_path):
+    nibabel.save(nibabel.Nifti2Image(sample_values("int16").T, np.eye(4)), tmp_path / "v.nii")
+    np.testing.assert_array_equal(open_source(tmp_path / "v.nii").slices(0, 11), sample_values("int16"))
+
+
+def test_a_compressed_tiff_that_cannot_be_read_says_so_at_once(tmp_path, monkeypatch):
+    tifffile.imwrite(tmp_path / "v.tif", sample_values("uint8"), compression="zlib")
+    monkeypatch.setattr("texgs.volume.tiff.READABLE", (1,))
+    monkeypatch.setattr("texgs.volume.tiff.find_spec", lambda name: None)
+    with pytest.raises(ArgumentError, match="uncompressed or deflated, got ADOBE_DEFLATE; save them so"):
+        open_source(tmp_path / "v.tif")
 
 
 def test_metaimage_header_size_and_byte_order(tmp_path):
@@ -126,6 +216,9 @@ def test_more_than_one_component_is_refused(tmp_path):
     write_vti(tmp_path / "v.vti", colors)
     tifffile.imwrite(tmp_path / "v.tif", colors, photometric="rgb")
     tifffile.imwrite(tmp_path / "one.tif", colors[0], photometric="rgb")
+    tifffile.imwrite(tmp_path / "channels.tif", colors[..., 0][:3], imagej=True, metadata={"axes": "CYX"})
+    flat = {"kinds": ["RGB-color", "domain", "domain"]}
+    nrrd.write(str(tmp_path / "flat.nrrd"), colors[0], flat, index_order="C")
     nrrd.write(str(tmp_path / "v.nrrd"), colors, {"kinds": ["RGB-color"] + 3 * ["domain"]}, index_order="C")
     pixel = np.dtype([("R", "u1"), ("G", "u1"), ("B", "u1")])
     nibabel.save(nibabel.Nifti1Image(np.zeros((4, 5, 6), pixel), np.eye(4)), tmp_path / "v.nii")

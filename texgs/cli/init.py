@@ -5,6 +5,7 @@ from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
+from texgs.core.reading import is_there
 
 README = """\
 # A project of texgs
@@ -51,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the files of a project, unless it is one already."""
     folder: Path = arguments.folder
-    if (folder / "conf" / "dataset").is_dir():
+    if is_there(folder / "conf" / "dataset"):
         print(f"{folder}: is a project already")
         return 0
     if folder.exists() and not folder.is_dir():

@@ -4,6 +4,7 @@ import argparse
 import importlib
 import io
 import os
+import re
 import signal
 import sys
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import collect_rarely, keep_freed_memory, told
 
+NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
 # the verbs of stages share the module texgs.cli.stage.
 STAGE_VERBS = {
@@ -78,13 +80,24 @@ def parse(argv: Sequence[str]) -> argparse.Namespace:
     top = parser()
     if argv[:1] == ["run"] and argv[1:2] not in (["-h"], ["--help"]):
         argv = ["run", "--", *argv[1:]]  # its options are those of snakemake
-    arguments, rest = top.parse_known_args(argv)
+    arguments, rest = top.parse_known_args(joined(argv))
     overrides: list[str] | None = getattr(arguments, "overrides", None)
     if rest and (overrides is None or any(word.startswith("-") for word in rest)):
         top.error(f"unrecognized arguments: {' '.join(rest)}")
     if rest:
         arguments.overrides = [*(overrides or ()), *rest]
     return arguments
+
+
+def joined(argv: Sequence[str]) -> list[str]:
+    """Options with negative numbers as one word: argparse takes --view -90,20 for two options."""
+    words: list[str] = []
+    for word in argv:
+        if NUMBERS.fullmatch(word) and words and words[-1].startswith("--") and "=" not in words[-1]:
+            words[-1] += f"={word}"
+        else:
+            words.append(word)
+    return words
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -49,12 +49,17 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.config.dataset import BasicTF
     from texgs.config.files import shown
     from texgs.config.project import members, own_folder
+    from texgs.volume.tf_files import read_tf
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
     check_name("--name", name)
     target = own_folder() / "dataset" / f"{name}.yaml"
     if name in members("dataset") and not arguments.force:
         raise ArgumentError(f"{name}: is there already; choose another --name, or replace it with --force")
+    if arguments.count is not None and arguments.count < 1:
+        raise ArgumentError(f"--count: expected at least 1, got {arguments.count}")
+    for path in arguments.tf or ():
+        read_tf(path)  # a mistake in it is told before the volume is read
     config = configuration(name, arguments.file, arguments.overrides)
     ensure("volume", config)
     basic = basic_tfs(config, arguments.tf, arguments.count)
@@ -95,9 +100,9 @@ def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
     blank = "dataset.volume.generator=null"
     config = compose(("tracking=none", blank, *words)).copy()
     OmegaConf.set_readonly(config, False)
-    config.dataset.volume.file = path
+    given = {key: config.dataset.volume[key] for key in {name.split(".")[0] for name in changed(overrides)}}
     fresh = OmegaConf.merge(
-        OmegaConf.structured(Dataset(name=name)), {"title": name, "volume": config.dataset.volume}
+        OmegaConf.structured(Dataset(name=name)), {"title": name, "volume": {**given, "file": path}}
     )
     config.dataset = fresh
     return config

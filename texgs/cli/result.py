@@ -22,8 +22,10 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.detached import samples_of
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
+from texgs.core.names import POINTS, SLICES
 
 STAMP = ".job.json"
 FILES = ".files.json"
@@ -122,6 +124,8 @@ def publish(output: Path) -> None:
 def recover(output: Path) -> None:
     """Finish what a process that was killed while it swapped two results had begun."""
     work, old = work_folder(output), _old(output)
+    if output.exists() and not output.is_dir():
+        return  # it is none of ours
     if not output.exists() or not any(output.iterdir()):
         complete = (folder for folder in (work, old) if (folder / FILES).exists())
         if (folder := next(complete, None)) is not None:
@@ -205,21 +209,25 @@ def require_own(output: Path) -> None:
 def fingerprint(path: Path, checksums: Checksums) -> str:
     """Checksum of an input: of the result that it belongs to, with the identity of the job that made it.
 
-    A file from elsewhere counts with its contents, a folder with those of all its files, and the
-    transforms_train.json of views from elsewhere with all images beside it.
+    A file from elsewhere counts with its contents, a header with its samples, too, a folder with its slices,
+    and the transforms_train.json of views from elsewhere with all images and points beside it.
 
     Raises:
         ArgumentError: if something cannot be read.
     """
     folder = path.parent
-    if (folder / FILES).exists():
-        files = (_content(folder / FILES) or {}).items()
-        made = [(name, checksum) for name, checksum in files if name not in (METRICS, TIMES)]
+    made_files = _content(folder / FILES) or {}
+    is_foreign = path.exists() and path.name not in made_files
+    if (folder / FILES).exists() and not is_foreign:
+        made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
         return combined([*made, (STAMP, json.dumps(stamped(folder), sort_keys=True))])
     if path.name.startswith("transforms_"):
         members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
+        members += [points for points in [folder / POINTS] if points.is_file()]
     elif path.is_dir():
-        members = [each for each in path.rglob("*") if each.is_file()]
+        members = [each for each in path.iterdir() if each.suffix.lower() in SLICES]
+    elif samples := samples_of(path):
+        return combined([(path.name, checksums.of(path)), (samples.name, checksums.of(samples))])
     else:
         return checksums.of(path)
     return combined((each.relative_to(folder).as_posix(), checksums.of(each)) for each in members)

@@ -130,7 +130,7 @@ def check_name(key: str, name: str) -> None:
         raise ConfigError(
             f"{key}: {name} is a word that YAML or Hydra does not read as text; choose another name"
         )
-    if name in RESERVED:
+    if name.lower() in RESERVED:  # also where upper and lower case are one
         raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig
+from yaml import YAMLError
 
 from texgs.config.check import is_scene_file
 from texgs.config.compose import changed, compose
@@ -17,7 +18,8 @@ from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.places import edit_folder, folder_of, made
 from texgs.config.project import members
 from texgs.config.variants import NO_SWEEP, fit_variant
-from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
+from texgs.core.plain_yaml import parse_yaml
 
 
 def volume_inputs(config: DictConfig) -> dict[str, Path]:
@@ -169,14 +171,31 @@ def edited_scene(config: DictConfig) -> dict[str, Path]:
         raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
     views = {f"views.{name}": view_set(config, name)["views"] for name in tf_names(config)}
     method = method_of(config.edit)
-    models = {} if is_scene_file(config.edit.base or "") else models_of_scene(config)
+    scene = scene_before(config)
+    models = files_of_scene(scene) if is_scene_file(config.edit.base or "") else models_of_scene(config)
     looks: dict[str, str | None] = {**looks_of(config)} or {"": None}
     files = {
         f"{key}.{name}" if name else key: path
         for name, look in looks.items()
         for key, path in method.files(method.of(config.edit, look)).items()
     }
-    return {"scene": scene_before(config), **models, **views, **files}
+    return {"scene": scene, **models, **views, **files}
+
+
+def files_of_scene(scene: Path) -> dict[str, Path]:
+    """The files that the file of a scene names, as far as they are there: what else decides what it shows."""
+    try:
+        named: list[object] = [parse_yaml(scene.read_text(encoding="utf-8"))]
+    except (OSError, ValueError, YAMLError, ArgumentError):
+        return {}  # the job tells what is wrong with it
+    files: dict[str, Path] = {}
+    while named:
+        table = named.pop()
+        for key, value in table.items() if isinstance(table, dict) else ():
+            if key in ("file", "texture") and (path := scene.parent / str(value)).is_file():
+                files[f"of_scene.{len(files)}"] = path
+            named.append(value)
+    return files
 
 
 def scene_before(config: DictConfig) -> Path:

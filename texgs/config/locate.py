@@ -9,6 +9,7 @@ from texgs.config.dataset import Volume
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder
 from texgs.core.names import file_name
+from texgs.core.reading import is_there
 
 
 def source_file(config: DictConfig) -> Path | None:
@@ -32,7 +33,7 @@ def source_file(config: DictConfig) -> Path | None:
     if volume.file is None:
         return None
     path = Path(config.data_folder, volume.file)
-    if path.exists():
+    if is_there(path):
         return path
     if volume.url:
         return cached_volume(volume)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from texgs.core.errors import ArgumentError
-from texgs.core.reading import reading
+from texgs.core.reading import is_there, reading
 
 SCRATCH = re.compile(r"\..+\.[a-z0-9_]{8}")  # files beside a target, as mkstemp names them
 
@@ -29,7 +29,7 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
         ArgumentError: if the folder cannot be created or written to, or the disk is full.
     """
     path = Path(path)
-    if path.exists() and not path.is_file() and not path.is_dir():  # it would be replaced by a file
+    if is_there(path) and not path.is_file() and not path.is_dir():  # it would be replaced by a file
         raise ArgumentError(f"{path}: expected the name of a file, got a device or a named pipe")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

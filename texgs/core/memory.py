@@ -13,7 +13,7 @@ from pathlib import Path
 from texgs.core.errors import OutOfMemoryError
 
 STATUS = Path("/proc/self/status")
-CGROUP = Path("/sys/fs/cgroup")
+CGROUP, GROUP = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
 CONTAINER = ("memory.max", "memory.current", "memory.stat")  # what it may have, what it has, and which kinds
 MIB, GIB = 1 << 20, 1 << 30
 SMALL = 64 << 20  # bytes that are there without asking
@@ -30,7 +30,11 @@ def peak_memory() -> int:
         peak = re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())
         if peak:
             return 1024 * int(peak[1])
-    import resource  # not on Windows
+    if sys.platform == "win32":
+        import psutil
+
+        return int(psutil.Process().memory_info().peak_wset)
+    import resource
 
     unit = 1 if sys.platform == "darwin" else 1024
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
@@ -40,15 +44,7 @@ def free_memory() -> int:
     """Bytes that this process may still have: of the machine, of its container, and by its own limits."""
     import psutil
 
-    limits = [int(psutil.virtual_memory().available)]
-    try:
-        most, used, kinds = ((CGROUP / name).read_text() for name in CONTAINER)
-        cached = re.findall(
-            r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE
-        )  # of files, given back on demand
-        limits.append(int(most) - int(used) + sum(map(int, cached)))
-    except (OSError, ValueError):  # no container, or one without a limit: "max"
-        pass
+    limits = [int(psutil.virtual_memory().available), *container_limits()]
     if sys.platform == "linux":
         import resource
 
@@ -58,6 +54,24 @@ def free_memory() -> int:
             if limit != resource.RLIM_INFINITY:
                 limits.append(limit - 1024 * int(used_by_kind[name]))
     return max(0, min(limits))
+
+
+def container_limits() -> Iterator[int]:
+    """Bytes that are left in each of the groups that this process is in, one inside of the other."""
+    try:
+        own = re.search(r"^0::/(.*)$", GROUP.read_text(), re.MULTILINE)
+    except OSError:  # no Linux
+        own = None
+    group = CGROUP / (own[1] if own else "")
+    for folder in (group, *group.parents):
+        try:
+            most, used, kinds = ((folder / name).read_text() for name in CONTAINER)
+            cached = re.findall(r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE)  # given back on demand
+            yield int(most) - int(used) + sum(map(int, cached))
+        except (OSError, ValueError):  # no such group, or one without a limit: "max"
+            pass
+        if folder == CGROUP:
+            return
 
 
 def require_memory(n_bytes: int, what: str, advice: str) -> None:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 
+POINTS = "points3d.ply"  # where fits start, in a folder of views
+SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
 LONGEST = 100  # letters of a name
 LONGEST_PATH = 1000  # letters of a path in a file
 LONGEST_FILE = 250  # bytes of a file's name; file systems take 255, and we put a few before it

@@ -34,6 +34,18 @@ def require_file(path: str | Path, what: str = "a file") -> Path:
     return path
 
 
+def is_there(path: str | Path) -> bool:
+    """Whether there is a file or a folder of this name.
+
+    Raises:
+        ArgumentError: if that cannot be told: others may not look there, or the name is too long.
+    """
+    try:
+        return Path(path).exists()
+    except OSError as error:
+        raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
+
+
 @contextmanager
 def reading(path: str | Path, what: str, advice: str = ADVICE) -> Iterator[Path]:
     """Require a regular file, and report whatever a reader raises over it as one sentence.

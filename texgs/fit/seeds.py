@@ -10,6 +10,7 @@ from torch import Tensor
 
 from texgs.config.phase import SEEDS
 from texgs.core.errors import ArgumentError
+from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
 from texgs.fit.visible import CANDIDATES, most_seen
@@ -19,7 +20,6 @@ from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
 from texgs.volume.voxels import visible_voxels
 
-POINTS = "points3d.ply"  # in a folder of views
 MARGIN = 0.02  # of the box around the data, relative to its longest side
 HALF_SIZE = 0.55  # of the cube around the origin where nothing else is known, world units
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale

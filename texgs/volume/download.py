@@ -14,14 +14,16 @@ def download(url: str, sha256: str, path: Path) -> None:
         path: where it goes.
 
     Raises:
-        ArgumentError: if the address does not answer, or the file differs from its checksum; then nothing is
-            kept.
+        ArgumentError: if the address is none or does not answer, or the file differs from its checksum; then
+            nothing is kept.
     """
     import pooch
 
+    if not url.startswith(("http://", "https://")):
+        raise ArgumentError(f"{url}: expected an address that begins with https:// or http://")
     pooch.get_logger().setLevel("WARNING")
     try:
-        pooch.retrieve(url, f"sha256:{sha256}", path.name, path.parent, progressbar=True)
+        pooch.retrieve(url, f"sha256:{sha256.lower()}", path.name, path.parent, progressbar=True)
     except ValueError as error:
         raise ArgumentError(
             f"{url}: expected the checksum {sha256}, got another file; look at the address"
@@ -40,7 +42,7 @@ def require_whole(path: Path, sha256: str) -> None:
     """
     import pooch
 
-    if pooch.file_hash(str(path)) != sha256:
+    if pooch.file_hash(str(path)) != sha256.lower():
         raise ArgumentError(
             f"{path}: expected the checksum {sha256}, got another; delete the file and run again"
         )

@@ -11,10 +11,9 @@ import numpy as np
 from texgs.core.errors import ArgumentError
 from texgs.core.reading import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of, require_room
+from texgs.volume.oriented import ONES, ZEROS
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
-ONES = (1.0, 1.0, 1.0)
-ZEROS = (0.0, 0.0, 0.0)
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 
@@ -85,7 +84,9 @@ def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> Arr
     from nibabel.imageglobals import LoggingOutputSuppressor
 
     with reading_as("a NIfTI file"), LoggingOutputSuppressor():
-        image = nibabel.Nifti1Image.from_filename(path)
+        image = nibabel.load(path)
+        if not isinstance(image, nibabel.Nifti1Image | nibabel.Nifti2Image):
+            raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
         stored = image.get_data_dtype()
         if stored.fields:
             raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.core.memory import require_memory
 from texgs.volume.grid import Grid, Triple
 from texgs.volume.transfer import TransferFunction
 
+BYTES = 8  # of memory for a sample: what is opaque, in single precision, and the mesh
 FAR_OUTSIDE = 1000.0  # times the largest value, around a volume: its surface ends at the outermost samples
 
 
@@ -74,22 +76,26 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
 
     Raises:
         ArgumentError: if the function stays below this opacity, or none of the volume reaches it.
+        OutOfMemoryError: if the volume is too large.
     """
     least, most = float(grid.values.min()), float(grid.values.max())
     span = max(most - least, 1e-30)
-    signed = np.full(grid.values.shape, -span, np.float32)  # above 0 in what is opaque
+    require_memory(BYTES * grid.values.size, "the surface of the volume", "prepare it with reduce=2")
+    # In a shell of samples so low that the surface ends at the outermost of the volume.
+    shelled = np.full([size + 2 for size in grid.values.shape], -FAR_OUTSIDE * span, np.float32)
+    signed = shelled[1:-1, 1:-1, 1:-1]  # above 0 in what is opaque
+    signed[:] = -span
     for low, high in opaque_ranges(tf, opacity):
         # A range that holds the largest values does not end there, nor does one with the smallest begin.
-        above = grid.values - np.float32(low) if low > least else span
-        below = np.float32(high) - grid.values if high < most else span
-        signed = np.maximum(signed, np.minimum(above, below))
+        for values, slab in zip(grid.values, signed, strict=True):
+            above = values - np.float32(low) if low > least else span
+            below = np.float32(high) - values if high < most else span
+            np.maximum(slab, np.minimum(above, below), out=slab)
     if not (signed > 0).any():
         raise ArgumentError(
             f"mesh.opacity: expected a transfer function that is as opaque as {opacity:g} somewhere in the "
             "volume, got one that lets more light through; choose another basic TF"
         )
-    # In a shell of samples so low that the surface ends at the outermost of the volume.
-    shelled = np.pad(signed, 1, constant_values=-FAR_OUTSIDE * span)
     x, y, z = (grid.scale * step for step in grid.spacing)
     left, bottom, back = grid.aabb[0]
     return isosurface(shelled, 0.0, (x, y, z), (left - x, bottom - y, back - z))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import named_file
 from texgs.core.reading import reading_as
 from texgs.volume.grid import Grid, Triple, byte_count, check_lattice
+from texgs.volume.oriented import ONES, ZEROS, oriented
 from texgs.volume.packed import unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
@@ -33,7 +35,7 @@ MOST_FIELDS = 1000
 def open_metaimage(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
     """Samples are read on demand, or as a whole where they are compressed.
 
-    The direction matrix is not applied: axes stay as they are stored.
+    Axes are turned to the closest ones of space, as the direction matrix says.
 
     Raises:
         ArgumentError: if the file is damaged or no scalar volume.
@@ -49,14 +51,17 @@ def open_metaimage(path: Path, spacing: Triple | None, origin: Triple | None) ->
         if len(dims) != 3:
             raise ArgumentError(f"expected 3 axes, got DimSize {list(dims)}")
         stored = _stored_type(fields)
-        spacing = spacing or _triple(fields, ("ElementSpacing", "ElementSize"), 1.0)
-        origin = origin or _triple(fields, ("Offset", "Position", "Origin"), 0.0)
-        check_lattice(dims, stored, spacing, origin)
+        lattice = (
+            ONES if spacing else _triple(fields, ("ElementSpacing", "ElementSize"), 1.0),
+            ZEROS if origin else _triple(fields, ("Offset", "Position", "Origin"), 0.0),
+        )
+        check_lattice(dims, stored, *lattice)
+        turned = partial(oriented, directions=_directions(fields), spacing=spacing, origin=origin)
         data, offset = _data_file(path, fields, header_size, byte_count(dims, stored))
         if fields.get("CompressedData", "False").lower() == "true":
             values = unpacked(data, offset, dims, stored)
-            return ArraySource(Grid(values, spacing, origin), path.name)
-    return RawSource(data, dims, stored, offset, spacing, origin)
+            return turned(ArraySource(Grid(values, *lattice), path.name))
+    return turned(RawSource(data, dims, stored, offset, *lattice))
 
 
 def _read_fields(path: Path) -> tuple[dict[str, str], int]:
@@ -65,7 +70,7 @@ def _read_fields(path: Path) -> tuple[dict[str, str], int]:
     with path.open("rb") as file:
         while "ElementDataFile" not in fields:
             line = file.readline(LONGEST_LINE)
-            key, equals, value = line.decode("ascii").partition("=")
+            key, equals, value = line.decode("utf-8", "surrogateescape").partition("=")
             if not line or (not equals and key.strip()) or len(fields) == MOST_FIELDS:
                 raise ArgumentError("expected a MetaImage file, found no ElementDataFile in its header")
             fields[key.strip()] = value.strip()
@@ -86,6 +91,15 @@ def _triple(fields: dict[str, str], keys: tuple[str, ...], default: float) -> Tr
     text = next((fields[key] for key in keys if key in fields), None)
     x, y, z = (float(number) for number in text.split()) if text else (default,) * 3
     return x, y, z
+
+
+def _directions(fields: dict[str, str]) -> np.ndarray:
+    """Directions of the axes in the rows of [3, 3]."""
+    text = next(
+        (fields[key] for key in ("TransformMatrix", "Rotation", "Orientation") if key in fields), None
+    )
+    numbers = [float(number) for number in text.split()] if text else np.eye(3)
+    return np.reshape(numbers, (3, 3))
 
 
 def _data_file(path: Path, fields: dict[str, str], header_size: int, n_bytes: int) -> tuple[Path, int]:

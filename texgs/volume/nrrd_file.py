@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from io import BytesIO
 from math import isnan, prod
 from pathlib import Path
@@ -14,9 +15,12 @@ from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.names import named_file
 from texgs.core.reading import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, byte_count, check_lattice
+from texgs.volume.oriented import ONES, ZEROS, oriented
 from texgs.volume.packed import bzip2, deflated, unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
+LEFT_HANDED = ("left-anterior-superior", "las", "3d-left-handed")
+SCALAR = ("domain", "space", "time", "scalar", "stub", "none", "???")  # kinds of axes that hold no components
 LONGEST_HEADER = 1 << 20  # bytes
 # Encodings by the words that NRRD has for them.
 UNPACK = {"gzip": deflated, "gz": deflated, "bzip2": bzip2, "bz2": bzip2}
@@ -61,18 +65,25 @@ class Header:
 def open_nrrd(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
     """Samples are read on demand, or as a whole where they are compressed or text.
 
-    Space directions give the spacing; oblique axes stay as they are stored.
+    Space directions give the spacing, and axes are turned to the closest ones of space.
 
     Raises:
         ArgumentError: if the file is damaged or no scalar volume.
     """
     header = _read_header(path)
-    lattice = (spacing or header.spacing, origin or header.origin)
+    lattice = (ONES if spacing else header.spacing, ZEROS if origin else header.origin)
+    turned = partial(
+        oriented,
+        directions=header.fields.get("space directions", np.eye(3)),
+        spacing=spacing,
+        origin=origin,
+        is_left_handed=str(header.fields.get("space")).lower() in LEFT_HANDED,
+    )
     if header.fields["encoding"] == "raw":
-        return RawSource(header.data, header.dims, header.stored, header.offset, *lattice)
+        return turned(RawSource(header.data, header.dims, header.stored, header.offset, *lattice))
     check_lattice(header.dims, header.stored, *lattice)
     with reading_as("an NRRD file"):
-        return ArraySource(Grid(_decoded(header), *lattice), path.name)
+        return turned(ArraySource(Grid(_decoded(header), *lattice), path.name))
 
 
 def open_grid(path: str | Path) -> Grid:
@@ -181,7 +192,7 @@ def _dims(fields: dict[str, Any]) -> Dims:
     """Samples along x, y, z."""
     sizes = tuple(int(size) for size in fields["sizes"])
     kinds = fields.get("kinds", [])
-    if len(sizes) == 4 and kinds and kinds[0] not in ("domain", "space", "time"):
+    if kinds and kinds[0] not in SCALAR:
         raise ArgumentError(f"expected a scalar volume, got {sizes[0]} components per sample")
     if len(sizes) != 3:
         raise ArgumentError(f"expected 3 axes, got {len(sizes)}: sizes {list(sizes)}")
@@ -226,11 +237,27 @@ def _number(fields: dict[str, Any], key: str) -> int:
 
 
 def _spacing(fields: dict[str, Any]) -> Triple:
-    """Lengths of the space directions, or the spacings; 1 where nothing is said."""
+    """Lengths of the space directions, the spacings, or by the ends of the axes; 1 where nothing is said."""
     directions = fields.get("space directions")
-    steps = fields.get("spacings", [1.0] * 3) if directions is None else np.linalg.norm(directions, axis=1)
+    if directions is not None:
+        steps = np.linalg.norm(directions, axis=1)
+    else:
+        steps = fields.get("spacings", _steps(fields))
     x, y, z = (1.0 if isnan(step) else float(step) for step in steps)
     return x, y, z
+
+
+def _steps(fields: dict[str, Any]) -> list[float]:
+    """Distances of samples by the ends of their axes: places of the first and last, or edges of cells."""
+    nothing = [float("nan")] * 3
+    low = fields.get("axis mins", fields.get("axismins", nothing))
+    high = fields.get("axis maxs", fields.get("axismaxs", nothing))
+    said = fields.get("centerings", fields.get("centers", "node node node"))
+    centers = said.split() if isinstance(said, str) else said
+    gaps = [
+        size - (0 if center == "cell" else 1) for size, center in zip(fields["sizes"], centers, strict=True)
+    ]
+    return [abs(b - a) / gap if gap else 1.0 for a, b, gap in zip(low, high, gaps, strict=True)]
 
 
 def _origin(fields: dict[str, Any]) -> Triple:

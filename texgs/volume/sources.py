@@ -48,10 +48,10 @@ def open_source(
     """Open a volume without reading its samples where the format allows that.
 
     Formats: .raw, .bin, .dat (plain samples, described by the arguments); .nrrd, .nhdr; .mhd, .mha; .slc;
-    .vti and .vtk (image data, first point array); .nii, .nii.gz (turned to the closest axes R, A, S);
-    .tif, .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs in natural order;
-    .npy (an array [Z, Y, X]). x is the fastest axis throughout. Axes that are oblique in physical space
-    are taken as they are stored.
+    .vti and .vtk (image data, first point array); .nii, .nii.gz; .tif, .tiff (one page per z slice, row 0 is
+    y = 0), or a folder of single TIFFs in natural order; .npy (an array [Z, Y, X]). x is the fastest axis
+    throughout. Axes are permuted and flipped to the closest ones of physical space where the format tells
+    about it: R, A, S of NIfTI. They are not resampled where they are oblique.
 
     Args:
         path: file, or folder of TIFFs.

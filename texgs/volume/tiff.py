@@ -7,17 +7,19 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.core.names import SLICES
 from texgs.core.reading import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of, require_room
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
-SUFFIXES = (".tif", ".tiff")
+READABLE = (1, 8, 32773, 32946, 34925)  # none, deflate, packbits and LZMA: others need imagecodecs
 PAGES = 2  # in memory at a time: one as it is decoded, and its place in the slab
 
 
@@ -85,9 +87,9 @@ def _open_folder(path: Path, spacing: Triple, origin: Triple) -> PageSource:
     """Single TIFFs; only the first is opened now."""
     import tifffile
 
-    files = sorted((file for file in path.iterdir() if file.suffix.lower() in SUFFIXES), key=natural_order)
+    files = sorted((file for file in path.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
     if not files:
-        raise ArgumentError(f"expected a folder of TIFFs ({', '.join(SUFFIXES)}), found none in it")
+        raise ArgumentError(f"expected a folder of TIFFs ({', '.join(SLICES)}), found none in it")
     what = f"TIFF files, but {files[0].name} is none"
     with reading_as(what), _complaints(), tifffile.TiffFile(files[0]) as tiff:
         shape, dtype = _page_type(tiff)
@@ -103,6 +105,9 @@ def _open_file(path: Path, spacing: Triple, origin: Triple) -> Source:
     with reading_as("a TIFF file"), _complaints(), tifffile.TiffFile(path) as tiff:
         shape, dtype = _page_type(tiff)
         series = tiff.series[0]
+        for axis, size in zip(series.axes, series.shape, strict=False):
+            if axis in "CS" and size > 1:
+                raise ArgumentError(f"expected a scalar volume, got {size} components per sample")
         if len(tiff.series) == 1 and series.ndim > 2:
             dims = dims_of(series.shape)
             if series.dataoffset is not None:
@@ -120,6 +125,11 @@ def _page_type(tiff: Any) -> tuple[tuple[int, int], np.dtype]:
     page = tiff.pages[0]
     if page.samplesperpixel != 1:
         raise ArgumentError(f"expected a scalar volume, got {page.samplesperpixel} components per sample")
+    if page.compression not in READABLE and find_spec("imagecodecs") is None:
+        raise ArgumentError(
+            f"expected samples that are uncompressed or deflated, got {page.compression.name}; save them so, "
+            "or pip install imagecodecs"
+        )
     require_room((page.imagewidth, page.imagelength, PAGES), np.dtype(page.dtype))
     return (page.imagelength, page.imagewidth), np.dtype(page.dtype)
 

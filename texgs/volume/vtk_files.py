@@ -17,15 +17,18 @@ import numpy as np
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.reading import reading_as
 from texgs.volume.grid import Grid, Triple, require_room
-from texgs.volume.slabs import ArraySource
+from texgs.volume.oriented import ONES, ZEROS, oriented
+from texgs.volume.slabs import ArraySource, Source
 
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
 SECONDS, RATE = 60.0, 1e6  # how long VTK may take: at least, and bytes per second of a large file
 LONGEST_LINE = 1 << 16  # bytes of what the process says before the samples
 
 
-def open_vtk(path: Path, spacing: Triple | None, origin: Triple | None) -> ArraySource:
+def open_vtk(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
     """Image data with its scalars, or its first point array where none are marked as such.
+
+    Axes are turned to the closest ones of space.
 
     Raises:
         ArgumentError: if the file is damaged, or holds another kind of data set or no scalar field.
@@ -51,7 +54,9 @@ def open_vtk(path: Path, spacing: Triple | None, origin: Triple | None) -> Array
     if "error" in said:
         raise (OutOfMemoryError if said["is_memory"] else ArgumentError)(said["error"])
     (dx, dy, dz), (x, y, z) = said["spacing"], said["origin"]
-    return ArraySource(Grid(values, spacing or (dx, dy, dz), origin or (x, y, z)), path.name)
+    lattice = (ONES if spacing else (dx, dy, dz), ZEROS if origin else (x, y, z))
+    stored = ArraySource(Grid(values, *lattice), path.name)
+    return oriented(stored, said["directions"], spacing, origin)
 
 
 def _received(stream: IO[bytes]) -> tuple[dict[str, Any] | None, np.ndarray]:

@@ -82,8 +82,14 @@ def image_of(path: Path) -> tuple[dict[str, Any], np.ndarray]:
     first = [0.0, 0.0, 0.0]
     image.TransformIndexToPhysicalPoint(image.GetExtent()[::2], first)
     values = values.reshape(shape)
-    lattice = {"dims": dims_of(shape), "spacing": image.GetSpacing(), "origin": first}
-    return {**lattice, "dtype": values.dtype.str}, values
+    lattice = {"spacing": image.GetSpacing(), "origin": first, "directions": directions_of(image)}
+    return {**lattice, "dims": dims_of(shape), "dtype": values.dtype.str}, values
+
+
+def directions_of(image: Any) -> list[list[float]]:
+    """Directions of the axes, one after the other."""
+    matrix = image.GetDirectionMatrix()  # in its columns
+    return [[matrix.GetElement(row, axis) for row in range(3)] for axis in range(3)]
 
 
 def reader_of(suffix: str) -> Any:
