@@ -2,7 +2,9 @@
 
 `python -m benchmarks.viewer SCENE OUTPUT.json` needs Playwright, a Chromium, and viser in the environment,
 see benchmarks/viser_viewer.py. The viewers take turns. Frames are counted in a proxy before the browser: a
-page may have its socket in a worker. `texgs view` is measured a second time behind 100 ms of round trip.
+page may have its socket in a worker. `texgs view` is measured a second time behind 100 ms of round trip. The
+browser runs on the same cores, without a GPU: the page of viser then needs WebGL in software, that of texgs
+needs none.
 """
 
 from __future__ import annotations
@@ -21,9 +23,10 @@ import torch
 
 from benchmarks import machine
 from benchmarks.websocket_proxy import Arrivals, proxied
-from tests.viewer.browser import browser
+from tests.viewer.browser import SOFTWARE, browser
 from texgs.scene.scene_file import read_scene
 
+PLAIN = ("--disable-gpu",)  # of a browser whose page needs no WebGL
 PAGE = 800  # pixels of either side of the picture
 PANEL = 310  # pixels beside it, of the page of texgs
 DRAG, STEPS = 5.0, 40  # seconds of a drag, and single moves
@@ -35,16 +38,16 @@ PORT, TRIP = 8790, 0.1  # and seconds of a round trip
 def main(source: str, output: str) -> None:
     """Measure all viewers; write the file."""
     rows: dict[str, list[dict[str, float]]] = {}
-    with browser() as chromium, texgs(source) as ours, viser(source) as other:
+    with texgs(source) as ours, viser(source) as other:
         viewers = {
-            "texgs view": (ours, PANEL, 0.0),
-            "texgs view, 100 ms round trip": (ours, PANEL, TRIP),
-            "viser": (other, 0, 0.0),
+            "texgs view": (ours, PANEL, 0.0, PLAIN),
+            "texgs view, 100 ms round trip": (ours, PANEL, TRIP, PLAIN),
+            "viser": (other, 0, 0.0, SOFTWARE),
         }
         for _ in range(ROUNDS):
-            for name, (address, panel, trip) in viewers.items():
+            for name, (address, panel, trip, args) in viewers.items():
                 arrivals = Arrivals(LEAST)
-                with proxied(address, PORT + 2, arrivals, trip) as near:
+                with browser(args) as chromium, proxied(address, PORT + 2, arrivals, trip) as near:
                     rows.setdefault(name, []).append(measured(chromium, near, panel, arrivals))
     facts = {
         "machine": machine.describe(torch.device("cpu")),
@@ -80,7 +83,6 @@ def measured(chromium: Any, address: str, panel: int, arrivals: Arrivals) -> dic
             first.append(1000 * later[0])
             last.append(1000 * later[-1])
     page.mouse.up()
-    page.close()
     if not first:
         raise SystemExit(f"{address}: no frame came after {STEPS} moves of the pointer")
     return {

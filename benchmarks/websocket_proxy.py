@@ -103,19 +103,24 @@ def proxied(address: str, port: int, arrivals: Arrivals, trip: float = 0.0) -> I
             writer.write(data)
             messages.feed(data)
 
-        both = pass_on(reader, back.write), pass_on(there, answer)
-        await asyncio.wait(map(asyncio.create_task, both), return_when=asyncio.FIRST_COMPLETED)
+        tasks = [asyncio.create_task(each) for each in (pass_on(reader, back.write), pass_on(there, answer))]
+        await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         await asyncio.sleep(trip)  # what is held passes first
         for each in (writer, back):
             each.close()
+        await asyncio.gather(*tasks, return_exceptions=True)
 
-    loop = asyncio.new_event_loop()
-    server = loop.run_until_complete(asyncio.start_server(connect, "127.0.0.1", port))
-    thread = threading.Thread(target=loop.run_forever, daemon=True)
+    async def serve() -> None:
+        async with await asyncio.start_server(connect, "127.0.0.1", port):
+            is_ready.set()
+            await is_over.wait()
+
+    loop, is_ready, is_over = asyncio.new_event_loop(), threading.Event(), asyncio.Event()
+    thread = threading.Thread(target=loop.run_until_complete, args=(serve(),), daemon=True)
     thread.start()
+    is_ready.wait()
     try:
         yield address.replace(f":{url.port}", f":{port}")
     finally:
-        loop.call_soon_threadsafe(server.close)
-        loop.call_soon_threadsafe(loop.stop)
+        loop.call_soon_threadsafe(is_over.set)
         thread.join()

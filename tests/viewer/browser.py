@@ -20,13 +20,13 @@ def found():
 
 
 @contextmanager
-def browser():
-    """A Playwright browser."""
+def browser(args=SOFTWARE):
+    """A Playwright browser, started with these arguments."""
     path = found()
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        launched = playwright.chromium.launch(executable_path=path, args=SOFTWARE)
+        launched = playwright.chromium.launch(executable_path=path, args=args)
         try:
             yield launched
         finally:

@@ -321,7 +321,9 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
         with opened(chromium, address) as page:
             page.get_by_role("checkbox", name="Headlight").uncheck()
             page.get_by_role("checkbox", name="TF02").uncheck()
-            expect(page.get_by_role("listitem")).to_have_text(["light azimuth 40°, polar 10°", "TF02 visible off"])
+            expect(page.get_by_role("listitem")).to_have_text(
+                ["light azimuth 40°, polar 10°", "TF02 visible off"]
+            )
             process.kill()
             lost = page.get_by_text("No connection to texgs view")
             expect(lost).to_be_visible(timeout=WAIT)
@@ -329,5 +331,7 @@ def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
                 assert again == address
                 expect(lost).to_be_hidden(timeout=WAIT)
                 page.get_by_role("button", name="Make the other edits again").click()
-                expect(page.get_by_role("listitem")).to_have_text(["light azimuth 40°, polar 10°", "TF02 visible off"])
+                expect(page.get_by_role("listitem")).to_have_text(
+                    ["light azimuth 40°, polar 10°", "TF02 visible off"]
+                )
                 expect(page.get_by_role("checkbox", name="TF02")).not_to_be_checked()
