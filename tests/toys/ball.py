@@ -61,7 +61,7 @@ class Ball:
 
     def sizes(self):
         parts = {"geometry_mib": 4 / 2**20, "shading_mib": 12 / 2**20, "texture_mib": 0.0}
-        return {**parts, "total_mib": 16 / 2**20}
+        return {**parts, "total_mib": 16 / 2**20, "files_mib": 16 / 2**20}
 
 
 def read(path):
