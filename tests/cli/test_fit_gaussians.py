@@ -92,4 +92,4 @@ def test_seeds_that_need_a_volume_are_one_sentence(results, monkeypatch, capsys)
     monkeypatch.chdir(results.parent)
     words = ["fit.gaussians.seeds.kind=voxels", "fit.name=other"]
     assert main(["gaussians", *TINY, *words]) == 2
-    assert "seeds.kind: expected no voxels, which are for surfels alone; choose visible" in capsys.readouterr().err
+    assert "seeds.kind: expected no voxels, which are for surfels alone" in capsys.readouterr().err
