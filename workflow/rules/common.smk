@@ -32,7 +32,7 @@ if MISSING:
 PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
 MAPPER_GPU, FIT_GPU = PLAN.mapper_gpu, PLAN.fit_gpu
-EVERY = 1024 # threads, of which a job gets as many as there are
+EVERY = 1024  # threads, of which a job gets as many as there are
 
 
 def job(place, wildcards):

@@ -36,7 +36,7 @@ rule edit_metrics:
         writes("edit_metrics"),
     log:
         log_of("edit_metrics"),
-    threads: EVERY # it measures frames, too
+    threads: EVERY  # it measures frames, too
     resources:
         gpu=FIT_GPU,
     params:
