@@ -184,6 +184,9 @@ def test_fingerprints_of_headers_know_their_samples(tmp_path, name, header):
     (tmp_path / name).write_text(header)
     (tmp_path / "a.raw").write_text("one")
     assert is_told(tmp_path / name, tmp_path / "a.raw", "two")
+    (tmp_path / name).unlink()
+    with pytest.raises(ArgumentError, match="a\\."):
+        result.fingerprint(tmp_path / name, Checksums())
 
 
 def test_fingerprints_of_files_beside_a_result_are_their_own(output):

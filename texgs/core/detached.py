@@ -14,8 +14,11 @@ def samples_of(header: Path) -> Path | None:
     key = KEYS.get(header.suffix.lower())
     if key is None:
         return None
-    with header.open("rb") as file:
-        line = re.search(key, file.read(LONGEST), re.MULTILINE)
+    try:
+        with header.open("rb") as file:
+            line = re.search(key, file.read(LONGEST), re.MULTILINE)
+    except OSError:  # not there yet, or not for us: whoever reads it tells
+        return None
     if line is None:
         return None
     path = header.parent / line[1].decode("utf-8", "surrogateescape").strip()
