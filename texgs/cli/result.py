@@ -209,8 +209,8 @@ def require_own(output: Path) -> None:
 def fingerprint(path: Path, checksums: Checksums) -> str:
     """Checksum of an input: of the result that it belongs to, with the identity of the job that made it.
 
-    A file from elsewhere counts with its contents, a header with its samples, too, a folder with its slices,
-    and the transforms_train.json of views from elsewhere with all images and points beside it.
+    A file from elsewhere counts with its contents. A header counts with its samples as well, a folder with
+    its slices, and the transforms_train.json of views from elsewhere with all images and points beside it.
 
     Raises:
         ArgumentError: if something cannot be read.
