@@ -6,8 +6,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import torch
 
 from texgs.cli.main import main
+from texgs.core.morton import z_order_of
 from texgs.fields.surfels.model_file import read_model
 from texgs.volume.view_set import read_views
 
@@ -87,6 +89,14 @@ def test_texture_makes_what_it_needs_first(folder):
     assert texture["notes"]["texels"] == len(models["texture"].parameters["texels"])
     assert texture["sizes"]["total_mib"] > 0
     assert shading["losses"][-1] < 0.1
+
+
+def test_surfels_lie_along_a_curve_with_all_that_is_theirs(finished):
+    folder = finished / "sphere" / "TF01" / "demo"
+    for phase in ("surfels", "shading", "texture"):
+        means = read_model(folder / phase / "model.safetensors").parameters["means"]
+        assert z_order_of(means).equal(torch.arange(400)), phase
+    assert numbers(folder, "shading")["psnr"] > 25, "measured on surfels in this order"
 
 
 def test_harmonics_first_as_in_the_paper(viewed):

@@ -9,10 +9,12 @@ from torch import Tensor
 
 from texgs.config.phase import Phase
 from texgs.core.memory import MIB
+from texgs.core.morton import z_order_of
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit.checkpoint import FOLDER
+from texgs.fit.densify import is_shared
 from texgs.fit.loop import Fit
 from texgs.fit.resumable import run_to_end
 from texgs.metrics.quality import evaluate, mean
@@ -38,12 +40,16 @@ def run_phase(
     """Run the loop from the last checkpoint in the folder, if there is one.
 
     Returns:
-        The model, the seconds of all runs together, and the losses that they looked at.
+        The model, the seconds of all runs together, and the losses that they looked at. Surfels lie along a
+        Z curve: what a tile of a view shows is then mostly together in memory, texels above all.
     """
     fit = Fit(parameters, shading, images, phase, seed)
     seconds = run_to_end(fit, output / FOLDER, title)
-    model = Surfels({name: x.detach() for name, x in fit.parameters.items()}, shading)
-    return model, seconds, fit.losses
+    order = z_order_of(fit.parameters["means"].detach())
+    model = {
+        name: x.detach() if is_shared(name, x) else x.detach()[order] for name, x in fit.parameters.items()
+    }
+    return Surfels(model, shading), seconds, fit.losses
 
 
 def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:

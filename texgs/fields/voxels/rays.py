@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.morton import z_order
 from texgs.volume.images import Images
 
 AROUND = 6  # pixels around what is visible; the visual hull keeps all others empty
@@ -67,9 +68,6 @@ def widened(alpha: Tensor, pixels: int) -> Tensor:
 
 
 def curve(width: int, height: int) -> Tensor:
-    """Places y * width + x of all pixels in the order of a Z curve (Morton 1966)."""
+    """Places y * width + x of all pixels in the order of a Z curve."""
     y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
-    code = torch.zeros(height, width, dtype=torch.long)
-    for bit in range(max(width, height).bit_length()):
-        code |= (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1)
-    return code.flatten().argsort()
+    return z_order(torch.stack([x, y], dim=-1).flatten(0, 1))
