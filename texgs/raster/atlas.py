@@ -27,7 +27,8 @@ def check_texture(texture: Texture, n: int) -> None:
             raise ArgumentError(f"{name}: expected {dtype}, got {x.dtype}; convert it with .to({dtype})")
     check.same_device(**{"texture.texels": texture.texels}, **layout)
     if n and texture.sizes.device.type == "cpu":
-        counts = texture.sizes.long().prod(1)  # [N]
+        columns, rows = texture.sizes.unbind(1)
+        counts = columns.long() * rows  # [N]
         # An offset beyond the texels is wrong by whatever amount; clamped, the sum cannot overflow.
         ends = texture.offsets.clamp(max=len(texture.texels)) + counts
         _check_range(texture, counts, ends)

@@ -74,7 +74,7 @@ def frame(
         camera, light, edits, look=look, background=None if mode in MATERIAL else behind, outputs=outputs
     )
     shown = pixels(render, mode, behind)
-    return shown.clamp(0, 1).mul(255).round().to(torch.uint8).cpu().numpy()
+    return shown.clamp(0, 1).mul_(255).round_().to(torch.uint8).cpu().numpy()
 
 
 def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:

@@ -9,6 +9,7 @@ import struct
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from math import sqrt
 
 import cv2
 import numpy as np
@@ -20,25 +21,30 @@ from texgs.scene.session import Session
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins
 
-SLOW = 0.030  # seconds of a whole frame above which the ones of a moving camera have half as many rows
+SLOW = 0.030  # seconds of a frame above which those of a moving camera have fewer rows and columns
+LEAST = 1 / 3  # part of them that stays
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
 STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 
 
 @dataclass
 class Pace:
-    """How long whole frames of one page take; it decides on the resolution while its camera moves."""
+    """How long frames of one page take; it decides on the resolution while its camera moves."""
 
-    seconds: float = 0.0  # of the latest whole frame
+    part: float = 1.0  # of the sides of a frame
 
     def scale(self, moving: bool) -> float:
         """Part of the sides of a frame to render."""
-        return 0.5 if moving and self.seconds > SLOW else 1.0
+        return self.part if moving else 1.0
 
     def took(self, seconds: float, scale: float) -> None:
-        """Take note of a frame."""
-        if scale == 1:
-            self.seconds = seconds
+        """Take note of a frame; a whole one counts while moving ones are whole too.
+
+        What is off by less than a fifth changes nothing, so that the sharpness of a drag does not waver.
+        """
+        part = min(max(scale * sqrt(SLOW / seconds), LEAST), 1.0)
+        if scale == self.part and (part == 1 or not 0.8 < part / scale < 1.25):
+            self.part = part
 
 
 class Frames:

@@ -27,6 +27,15 @@ NARROW = 1 / sqrt(2 * log(DISC / 0.5))  # scale at which this disc has a radius 
 
 
 @dataclass(frozen=True, eq=False)
+class Edited:
+    """What edits make of a model, from wherever it is seen and under whatever light."""
+
+    colors: Tensor  # [N, 3] c_ind without texels
+    material: tuple[Tensor, Tensor, Tensor, Tensor]  # k_a, k_d, k_s and beta, [N] or [1]
+    opacities: Tensor  # [N]
+
+
+@dataclass(frozen=True, eq=False)
 class Part:
     """What edits and lights change of one model, ready for use.
 
@@ -89,20 +98,22 @@ class Part:
             return self.colors + palettes[0]
         return self.colors + torch.stack(palettes)[self.labels]
 
-    def factors(self, edits: Sequence[PartEdit]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """k_a, k_d, k_s and beta with the edits' factors."""
+    def edited(self, edits: Sequence[PartEdit]) -> Edited:
+        """The model with its edits.
+
+        Raises:
+            ArgumentError: if one cannot be made.
+        """
         a, d, s, b = (
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
             for name in MATERIAL
         )
-        return a, d, s, b
+        return Edited(self.colored(edits), (a, d, s, b), self.opacity(edits))
 
-    def look(
-        self, edits: Sequence[PartEdit], camera: Camera, light: Light, look: Look
-    ) -> tuple[Tensor, Tensor]:
+    def look(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
         """Base [N, 3] and gain [N]: colour of a fragment is base + gain * texel."""
         p, shading, n = self.model.parameters, self.model.shading, len(self.model)
-        colors, (a, d, s, b) = self.colored(edits), self.factors(edits)
+        colors, (a, d, s, b) = edited.colors, edited.material
         if look == "unshaded":
             return colors, torch.ones_like(self.opacities)
         if look == "texture":
@@ -114,7 +125,7 @@ class Part:
         base, gain = blinn_phong_texture(
             colors, a, d, s, b, p["means"], p["quats"], seen_from, direction, facing=shading.facing
         )
-        return base.clamp(0, 1), torch.zeros_like(gain) if look == "discs" else gain
+        return base.clamp_(0, 1), torch.zeros_like(gain) if look == "discs" else gain
 
     def opacity(self, edits: Sequence[PartEdit]) -> Tensor:
         """Opacities [N] with the edits' factors; 0 where surfels are hidden, so that nothing is drawn."""
@@ -148,6 +159,7 @@ class Composition:
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
         self.texels, self.sizes, self.offsets = joined_textures(models)
+        self._latest: tuple[list[PartEdit] | None, list[Edited], Tensor] | None = None
 
     def __len__(self) -> int:
         return len(self.means)
@@ -199,12 +211,12 @@ class Composition:
         """
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
-        pairs = list(zip(self.parts, by_part(self.parts, edits), strict=True))
-        looks = [part.look(own, camera, light, look) for part, own in pairs]
+        edited, opacities = self._edited(edits)
+        looks = [part.look(own, camera, light, look) for part, own in zip(self.parts, edited, strict=True)]
         base, gain = (torch.cat(x) for x in zip(*looks, strict=True))
         if background is None:
             background = self.means.new_full((3,), float(look not in MATERIAL))
-        scales, opacities = self.scales, torch.cat([part.opacity(own) for part, own in pairs])
+        scales = self.scales
         if look == "discs":
             scales, opacities = NARROW * scales, torch.where(opacities > 0, DISC, 0.0)
         return rasterize(
@@ -221,6 +233,16 @@ class Composition:
             outputs=outputs,
             options=self.options,
         )
+
+    def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
+        """All models with their edits, and opacities [N] of the whole; kept while only the camera moves."""
+        own = None if edits is None else list(edits)
+        latest = self._latest  # another thread may put another one there
+        if latest is None or latest[0] != own:
+            pairs = zip(self.parts, by_part(self.parts, own), strict=True)
+            edited = [part.edited(each) for part, each in pairs]
+            self._latest = latest = (own, edited, torch.cat([each.opacities for each in edited]))
+        return latest[1:]
 
 
 def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
