@@ -4,7 +4,7 @@
 see benchmarks/viser_viewer.py. The viewers take turns. Frames are counted in a proxy before the browser: a
 page may have its socket in a worker. `texgs view` is measured a second time behind 100 ms of round trip. The
 browser runs on the same cores, without a GPU: the page of viser then needs WebGL in software, that of texgs
-needs none.
+needs none. A client without a page is measured too: what it gets, a browser elsewhere can show.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from typing import Any
 import torch
 
 from benchmarks import machine
+from benchmarks.viewer_client import turned
 from benchmarks.websocket_proxy import Arrivals, proxied
 from tests.viewer.browser import SOFTWARE, browser
 from texgs.scene.scene_file import read_scene
@@ -45,6 +46,7 @@ def main(source: str, output: str) -> None:
             "viser": (other, 0, 0.0, SOFTWARE),
         }
         for _ in range(ROUNDS):
+            rows.setdefault("texgs view, no browser", []).append(turned(ours, PAGE, DRAG))
             for name, (address, panel, trip, args) in viewers.items():
                 arrivals = Arrivals(LEAST)
                 with browser(args) as chromium, proxied(address, PORT + 2, arrivals, trip) as near:

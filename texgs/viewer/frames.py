@@ -21,7 +21,7 @@ from texgs.scene.session import Session
 from texgs.viewer.messages import View
 from texgs.viewer.origins import Origins
 
-SLOW = 0.030  # seconds of a frame above which those of a moving camera have fewer rows and columns
+SLOW = 0.025  # seconds of a frame above which those of a moving camera have fewer rows and columns
 LEAST = 1 / 3  # part of them that stays
 MOVING = (75, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420)
 STILL = (95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
