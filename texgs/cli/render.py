@@ -104,15 +104,15 @@ def shots_of(arguments: argparse.Namespace, light: "Light", count: int) -> "Iter
     """
     from texgs.core.camera import orbit
     from texgs.core.light import Light
-    from texgs.volume.cameras import spiral
+    from texgs.volume.cameras import orbit_path, spiral
 
     height = arguments.width if arguments.height is None else arguments.height
     lens = (arguments.radius, arguments.fov, arguments.width, height)
     if arguments.path == "test":
         return ((camera, light) for camera in spiral(count, *lens))
     if arguments.path == "orbit":
-        turn = (arguments.azimuth + 360 * i / count for i in range(count))
-        return ((orbit(azimuth, arguments.polar, *lens), light) for azimuth in turn)
+        turn = orbit_path(count, arguments.polar, *lens, start=arguments.azimuth)
+        return ((camera, light) for camera in turn)
     camera = orbit(arguments.azimuth, arguments.polar, *lens)
     if arguments.path == "view":
         return ((camera, light) for _ in range(count))

@@ -70,9 +70,9 @@ def spiral(count: int, radius: float, fov_y: float, width: int, height: int) -> 
 
 
 def orbit_path(
-    count: int, polar: float, radius: float, fov_y: float, width: int, height: int
+    count: int, polar: float, radius: float, fov_y: float, width: int, height: int, start: float = FRONT
 ) -> list[Camera]:
-    """Cameras on one turn around +y that starts at the front (+z, for polar 0) and does not repeat it.
+    """Cameras on one turn around +y that does not repeat its start.
 
     Args:
         count: number of cameras, at least 1.
@@ -81,13 +81,14 @@ def orbit_path(
         fov_y: vertical field of view, degrees.
         width: pixels.
         height: pixels.
+        start: azimuth of the first camera, degrees; by default it is in front (+z, for polar 0).
 
     Raises:
         ArgumentError: if an argument is out of range.
     """
     if count < 1:
         raise ArgumentError(f"count: expected at least 1 camera, got {count}")
-    turn = [FRONT + 360 * index / count for index in range(count)]
+    turn = [start + 360 * index / count for index in range(count)]
     return [orbit(azimuth, polar, radius, fov_y, width, height) for azimuth in turn]
 
 
