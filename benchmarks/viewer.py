@@ -31,7 +31,7 @@ PLAIN = ("--disable-gpu",)  # of a browser whose page needs no WebGL
 PAGE = 800  # pixels of either side of the picture
 PANEL = 310  # pixels beside it, of the page of texgs
 DRAG, STEPS = 5.0, 40  # seconds of a drag, and single moves
-LEAST = 4096  # bytes of a message that is a frame
+LEAST = 2048  # bytes of a message that is a frame: small ones of a moving camera have some 3,500
 ROUNDS = 3
 PORT, TRIP = 8790, 0.1  # and seconds of a round trip
 

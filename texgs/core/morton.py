@@ -25,7 +25,7 @@ def z_order(cells: Tensor) -> Tensor:
 
 
 def z_order_of(places: Tensor) -> Tensor:
-    """The same of places in space [N, D], by the cells of their bounding box."""
+    """Order [N] of places in space [N, D] along a Z curve through the cells of their bounding box."""
     if not len(places):
         return places.new_zeros(0, dtype=torch.long)
     low, high = places.aminmax(dim=0)

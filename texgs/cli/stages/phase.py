@@ -46,10 +46,10 @@ def run_phase(
     fit = Fit(parameters, shading, images, phase, seed)
     seconds = run_to_end(fit, output / FOLDER, title)
     order = z_order_of(fit.parameters["means"].detach())
-    model = {
+    ordered = {
         name: x.detach() if is_shared(name, x) else x.detach()[order] for name, x in fit.parameters.items()
     }
-    return Surfels(model, shading), seconds, fit.losses
+    return Surfels(ordered, shading), seconds, fit.losses
 
 
 def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
