@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 import torch
 from PIL import Image
@@ -31,6 +32,13 @@ def test_round_trip_is_within_rounding(tmp_path):
     # Half a level of the straight colour and half a level of alpha.
     torch.testing.assert_close(color_read, color, atol=1.01 / 255, rtol=0)
     torch.testing.assert_close(alpha_read, alpha, atol=0.51 / 255, rtol=0)
+
+
+def test_grey_of_16_bits_is_rounded(tmp_path):
+    Image.fromarray(np.array([[0, 257 * 100, 65535]], dtype=np.uint16)).save(tmp_path / "x.png")
+    color, alpha = read_png(tmp_path / "x.png")
+    assert (255 * color[0]).round().tolist() == [[0, 0, 0], [100, 100, 100], [255, 255, 255]]
+    assert alpha.tolist() == [[1, 1, 1]]
 
 
 def test_one_channel_is_grey():

@@ -78,8 +78,25 @@ def write_png(path: str | Path, color: Tensor, alpha: Tensor | None = None) -> P
     return write_bytes(path, encoded.tobytes())
 
 
+def with_eight_bits(picture: Image.Image) -> Image.Image:
+    """The picture, its grey values of 16 bits rounded to 8: Pillow's conversion would clip them instead."""
+    if not picture.mode.startswith("I"):
+        return picture
+    return Image.fromarray((np.asarray(picture) / 257).round().clip(0, 255).astype(np.uint8))
+
+
+def read_rgba(path: str | Path) -> np.ndarray:
+    """The pixels of an image as stored: [H, W, 4] uint8, straight alpha; 255 in a file without alpha.
+
+    Raises:
+        ArgumentError: if the file is missing or no image.
+    """
+    with open_picture(path) as picture:
+        return np.array(with_eight_bits(picture).convert("RGBA"))
+
+
 def read_png(path: str | Path) -> tuple[Tensor, Tensor]:
-    """Read an 8-bit image.
+    """Read an image with 8 bits; one with more is taken with 8.
 
     Returns:
         Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; alpha is 1 in a file without it.
@@ -87,8 +104,6 @@ def read_png(path: str | Path) -> tuple[Tensor, Tensor]:
     Raises:
         ArgumentError: if the file is missing or no image.
     """
-    with open_picture(path) as picture:
-        pixels = np.asarray(picture.convert("RGBA"), dtype=np.float32) / 255
-    image = torch.from_numpy(pixels)
+    image = torch.from_numpy(read_rgba(path).astype(np.float32) / 255)
     alpha = image[..., 3]
     return image[..., :3] * alpha[..., None], alpha

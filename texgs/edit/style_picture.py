@@ -14,7 +14,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.core.image import open_picture
+from texgs.core.image import open_picture, with_eight_bits
 
 SMALLEST = 32  # pixels of the shorter side: less holds no pattern
 LARGEST = 2048  # pixels of the longer side that are kept
@@ -129,8 +129,7 @@ def reduced(picture: Image.Image) -> Image.Image:
     scale = min(1.0, max(LARGEST / max(picture.size), SMALLEST / min(picture.size)))
     width, height = (max(1, round(scale * side)) for side in picture.size)
     picture.draft("RGB", (2 * width, 2 * height))  # JPEG files are decoded at a lower resolution
-    if picture.mode.startswith("I"):  # grey values of 16 bits
-        picture = Image.fromarray((np.asarray(picture) / 257).round().clip(0, 255).astype(np.uint8))
+    picture = with_eight_bits(picture)
     if picture.mode in ("P", "1", "PA"):
         picture = picture.convert("RGBA")
     factor = max(1, min(picture.width // (2 * width), picture.height // (2 * height)))

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.image import open_picture, read_png
+from texgs.core.image import open_picture, read_png, read_rgba
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.core.names import named_file
@@ -37,13 +36,8 @@ class View:
     light: Light
 
     def load(self) -> Tensor:
-        """The pixels as stored: [H, W, 4] uint8, straight alpha; 255 in a file without alpha.
-
-        Raises:
-            ArgumentError: if the file is missing or no image.
-        """
-        with open_picture(self.path) as picture:
-            return torch.from_numpy(np.array(picture.convert("RGBA")))
+        """The pixels as stored: [H, W, 4] uint8, straight alpha; see `read_rgba`."""
+        return torch.from_numpy(read_rgba(self.path))
 
     def image(self) -> tuple[Tensor, Tensor]:
         """Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; see `read_png`."""
