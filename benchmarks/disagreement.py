@@ -102,7 +102,8 @@ def measures(edited: Field, field: Field, cameras: list[Any], surfaces: list[Any
         views = field_views(field, [camera], frame.image[None])
         wanted = filters(views, INSTRUCTION, torch.Generator())[0]
         ratios.append(sharpness(frame.image, frame.alpha) / sharpness(wanted, frame.alpha))
-    return consistency(frames, SHORT).rmse, consistency(frames, LONG).rmse, fmean(ratios)
+    pairs = consistency(frames, (SHORT, LONG))
+    return pairs[SHORT].rmse, pairs[LONG].rmse, fmean(ratios)
 
 
 def painted(field: Field, camera: Camera) -> Tensor:

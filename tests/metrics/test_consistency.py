@@ -48,7 +48,7 @@ def plane(view, half=0.4):
 def test_a_textured_plane_is_consistent():
     frames = [plane(camera(0.3 * i - 0.6, 0.1 * i, target=(0.0, 0.0, 0.0))) for i in range(5)]
     for apart in (1, 3):
-        found = consistency(frames, apart)
+        found = consistency(frames, [apart])[apart]
         assert found.rmse < 2e-4, "but for what interpolation between pixels loses"
         assert found.covered > 0.85
         assert found.pairs == 5 - apart
@@ -59,8 +59,18 @@ def test_colours_that_change_with_the_view_are_measured():
     """An offset of one view shows in both pairs that it is in: (0.1, 0.1, 0)."""
     frames = [plane(camera(0.02 * i)) for i in range(4)]
     frames[1] = replace(frames[1], image=frames[1].image + 0.1)
-    assert consistency(frames).rmse == pytest.approx(0.1 * sqrt(2 / 3), abs=1e-4)
-    assert consistency(frames, 2).rmse == pytest.approx(0.1 * sqrt(1 / 2), abs=1e-4)
+    assert consistency(frames)[1].rmse == pytest.approx(0.1 * sqrt(2 / 3), abs=1e-4)
+    assert consistency(frames, [2])[2].rmse == pytest.approx(0.1 * sqrt(1 / 2), abs=1e-4)
+
+
+def test_as_many_pairs_are_compared_near_as_far():
+    """The second of four views is off: near are the pairs (0, 1) and (1, 2), far are (0, 2) and (1, 3)."""
+    frames = [plane(camera(0.02 * i)) for i in range(4)]
+    frames[1] = replace(frames[1], image=frames[1].image + 0.1)
+    both = consistency(frames, [1, 2])
+    assert {apart: measured.pairs for apart, measured in both.items()} == {1: 2, 2: 2}
+    assert both[1].rmse == pytest.approx(0.1, abs=1e-4)
+    assert both[2] == consistency(frames, [2])[2]
 
 
 def test_noise_of_views_is_measured():
@@ -72,8 +82,8 @@ def test_noise_of_views_is_measured():
         replace(frame, image=frame.image + 0.05 * torch.randn(SIZE, SIZE, 3, generator=generator))
         for frame in frames
     ]
-    assert consistency(frames).rmse < 1e-5
-    assert consistency(noisy).rmse == pytest.approx(0.05 * sqrt(2), rel=0.02)
+    assert consistency(frames)[1].rmse < 1e-5
+    assert consistency(noisy)[1].rmse == pytest.approx(0.05 * sqrt(2), rel=0.02)
 
 
 def test_what_is_hidden_is_not_compared():
@@ -91,18 +101,20 @@ def test_what_is_hidden_is_not_compared():
 
 
 def test_a_perceptual_distance_sees_only_what_is_compared():
-    seen = []
+    prepared, seen = [], []
 
-    def distance(image, target):
-        seen.append((image, target))
-        return float((image - target).abs().max())
+    def to(target):
+        prepared.append(target)
+        return lambda image: seen.append(image) or float((image - target).abs().max())
 
-    frames = [plane(camera(0.2 * i)) for i in range(2)]
-    found = consistency(frames, perceptual=distance)
-    same = warp(frames[1], frames[0])[1]
-    image, target = seen[0]
-    assert torch.equal(image[~same], target[~same])
-    assert found.perceptual == pytest.approx(float((image - target)[same].abs().max()))
+    frames = [plane(camera(0.1 * i)) for i in range(3)]
+    measured = consistency(frames, [1, 2], to)
+    assert len(prepared) == 1, "both pairs have the same first view"
+    for apart, image in zip([1, 2], seen, strict=True):
+        same = warp(frames[apart], frames[0])[1]
+        difference = (image - frames[0].image).abs()
+        assert difference[~same].max() == 0
+        assert measured[apart].perceptual == pytest.approx(float(difference[same].max()))
 
 
 def test_rendered_views_of_surfels_are_consistent_with_themselves():
@@ -110,7 +122,7 @@ def test_rendered_views_of_surfels_are_consistent_with_themselves():
     view = Camera(scene.viewmat, scene.K, scene.width, scene.height)
     depth = torch.full((scene.height, scene.width), 2.0)
     frame = SeenFrame(torch.rand(scene.height, scene.width, 3), depth, torch.ones_like(depth), view)
-    found = consistency([frame, frame])
+    found = consistency([frame, frame])[1]
     assert found.rmse < 1e-5
     assert found.covered > 0.9
 
@@ -120,8 +132,8 @@ def test_a_scene_is_consistent_without_light_and_less_so_under_a_light_that_move
     scene = Composition([two_balls(opacity=0.999)[0]])
     views = [orbit(-90 + 6 * i, 10, 4.0, 22.0, 96, 96) for i in range(4)]
     light = Light("headlight")
-    flat = consistency(list(frames_of(scene, views, light, look="unshaded")), tolerance=0.005)
-    lit = consistency(list(frames_of(scene, views, light)), tolerance=0.005)
+    flat = consistency(list(frames_of(scene, views, light, look="unshaded")), tolerance=0.005)[1]
+    lit = consistency(list(frames_of(scene, views, light)), tolerance=0.005)[1]
     assert flat.covered > 0.5
     assert flat.rmse < 0.03
     assert lit.rmse > flat.rmse
@@ -130,7 +142,8 @@ def test_a_scene_is_consistent_without_light_and_less_so_under_a_light_that_move
 def test_voxels_are_compared_by_their_mean_depth():
     scene = VoxelScene([voxel_ball(density=500.0)])
     views = [orbit(-90 + 3 * i, 10, 2.0, 22.0, 64, 64) for i in range(4)]
-    measured = consistency(list(frames_of(scene, views, Light("headlight"), depth="depth")), tolerance=0.02)
+    frames = list(frames_of(scene, views, Light("headlight"), depth="depth"))
+    measured = consistency(frames, tolerance=0.02)[1]
     assert measured.covered > 0.5
     assert measured.rmse < 0.01
     with pytest.raises(ArgumentError, match="median"):
@@ -140,9 +153,8 @@ def test_voxels_are_compared_by_their_mean_depth():
 def test_frames_that_cannot_be_compared():
     frames = [plane(camera(0.0)), plane(camera(0.02))]
     with pytest.raises(ArgumentError, match="frames: expected more than 7 for pairs so far apart, got 2"):
-        consistency(frames, 7)
+        consistency(frames, [1, 7])
     away = plane(camera(5.0, target=(5.0, 0.0, 0.0)))
-    with pytest.raises(ArgumentError, match="frames: expected pairs that see the same, got none"):
-        consistency([frames[0], away])
+    assert consistency([frames[0], away]) == {}, "they see nothing that is the same"
     with pytest.raises(ShapeError, match=r"depth: expected \[64, 64\], got \[64, 63\]"):
         consistency([frames[0], replace(frames[1], depth=frames[1].depth[:, 1:])])

@@ -47,7 +47,8 @@ def test_the_distance_is_the_published_one(files):
     lpips = Lpips.load(folder / "vgg.pth", folder / "heads.pth")
     assert float(lpips.distance(image, other)) == pytest.approx(defined(image, other, heads), rel=1e-4)
     assert float(lpips.distance(image, image)) == 0
-    with pytest.raises(ShapeError, match=r"other: expected \[1, 32, 40, 3\]"):
+    assert lpips.to(image)(other) == float(lpips.distance(image, other))
+    with pytest.raises(ShapeError, match=r"other: expected \[32, 40, 3\]"):
         lpips.distance(image, other[:20])
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from statistics import fmean
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
@@ -22,7 +22,8 @@ SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised sce
 OPAQUE = 0.5  # least alpha of a pixel that has a depth
 TOLERANCE = 0.01  # of the depth, by which two views of the same point may differ
 
-Perceptual = Callable[[Tensor, Tensor], float]  # of two images [H, W, 3], such as LPIPS
+# How far other images are from this one [H, W, 3], such as by LPIPS; it is looked at once.
+Perceptual = Callable[[Tensor], Callable[[Tensor], float]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,14 @@ class SeenFrame:
     depth: Tensor  # [H, W] camera z, world units
     alpha: Tensor  # [H, W]
     camera: Camera
+
+
+class Difference(NamedTuple):
+    """How much a pair of views differs where both see the same."""
+
+    square: float  # mean squared difference of colours
+    share: float  # of the pixels of the object in the first view
+    distance: float | None  # perceptual; None where it is not measured
 
 
 @dataclass(frozen=True)
@@ -47,43 +56,60 @@ class ViewConsistency:
     """Mean share of the pixels of an object that a pair compares."""
     pairs: int
 
+    @classmethod
+    def of(cls, pairs: Sequence[Difference]) -> ViewConsistency:
+        """The means of one pair or more."""
+        squares, shares, distances = zip(*pairs, strict=True)
+        mean_distance = None if distances[0] is None else fmean(distances)
+        return cls(sqrt(fmean(squares)), mean_distance, fmean(shares), len(pairs))
+
 
 def consistency(
     frames: Sequence[SeenFrame],
-    apart: int = SHORT,
+    apart: Sequence[int] = (SHORT,),
     perceptual: Perceptual | None = None,
     tolerance: float = TOLERANCE,
-) -> ViewConsistency:
-    """Compare each view with the one `apart` views later, warped into it.
+) -> dict[int, ViewConsistency]:
+    """Compare views with those some views later, warped into them.
 
     What depends on the place of the viewer counts as inconsistent, highlights and headlights too: render
     without light to measure textures alone.
 
     Args:
         frames: along a path of cameras.
-        apart: 1 for short-range consistency, 7 for long-range.
-        perceptual: distance of two images; it sees the first view with the compared pixels exchanged.
+        apart: how many views; as many pairs are compared for each, so that the largest decides.
+        perceptual: distance of images; it sees the first view with the compared pixels exchanged.
         tolerance: of depths, relative.
 
+    Returns:
+        For each of `apart`, but those at which no pair sees the same.
+
     Raises:
-        ArgumentError, ShapeError: if there is no pair, no pair sees the same, or a frame does not fit itself.
+        ArgumentError, ShapeError: if there is no pair, or a frame does not fit itself.
     """
-    if apart < 1 or len(frames) <= apart:
-        raise ArgumentError(f"frames: expected more than {apart} for pairs so far apart, got {len(frames)}")
-    squares, distances, shares = [], [], []
-    for first, second in zip(frames, frames[apart:], strict=False):
-        warped, same = warp(second, first, tolerance)
-        if not bool(same.any()):
-            continue
-        squares.append(float((warped - first.image)[same].double().square().mean()))
-        shares.append(float(same.sum() / (first.alpha >= OPAQUE).sum()))
-        if perceptual is not None:
-            exchanged = torch.where(same[..., None], warped, first.image)
-            distances.append(float(perceptual(exchanged, first.image)))
-    if not squares:
-        raise ArgumentError("frames: expected pairs that see the same, got none; use views closer together")
-    mean_distance = fmean(distances) if distances else None
-    return ViewConsistency(sqrt(fmean(squares)), mean_distance, fmean(shares), len(squares))
+    if min(apart) < 1 or len(frames) <= max(apart):
+        raise ArgumentError(
+            f"frames: expected more than {max(apart)} for pairs so far apart, got {len(frames)}"
+        )
+    pairs: dict[int, list[Difference]] = {each: [] for each in apart}
+    for place, first in enumerate(frames[: len(frames) - max(apart)]):
+        distance = perceptual(first.image) if perceptual else None
+        for each, differences in pairs.items():
+            differences += difference(first, frames[place + each], distance, tolerance)
+    return {each: ViewConsistency.of(differences) for each, differences in pairs.items() if differences}
+
+
+def difference(
+    first: SeenFrame, second: SeenFrame, distance: Callable[[Tensor], float] | None, tolerance: float
+) -> list[Difference]:
+    """Of one pair; empty where the two see nothing that is the same."""
+    warped, same = warp(second, first, tolerance)
+    if not bool(same.any()):
+        return []
+    square = float((warped - first.image)[same].double().square().mean())
+    share = float(same.sum() / (first.alpha >= OPAQUE).sum())
+    exchanged = torch.where(same[..., None], warped, first.image)
+    return [Difference(square, share, None if distance is None else distance(exchanged))]
 
 
 def frames_of(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +47,25 @@ class Lpips:
             check.shape(f"{heads}: {name}", weight, f"{len(backbone.biases[backbone.names.index(layer)])}")
         return cls(backbone, weights)
 
+    def features(self, images: Tensor) -> list[Tensor]:
+        """Features [N, C, H/s, W/s] of length 1 that images are compared by, s = 1, 2, 4 ...; differentiable.
+
+        Args:
+            images: [H, W, 3] in [0, 1], at least 16 pixels each way; or [N, H, W, 3].
+        """
+        if images.ndim == 3:
+            images = images[None]
+        check.shape("image", images, "N H W 3")
+        return [unit(layer) for layer in self.vgg.layers(images.permute(0, 3, 1, 2))]
+
+    def between(self, ours: Sequence[Tensor], others: Sequence[Tensor]) -> Tensor:
+        """How different images look [], by their features: 0 for equal ones; differentiable in both."""
+        total = ours[0].new_zeros(())
+        for a, b, head in zip(ours, others, self.heads, strict=True):
+            difference = (a - b).square()  # [N, C, h, w]
+            total = total + (difference * head[:, None, None]).sum(dim=1).mean()
+        return total
+
     def distance(self, image: Tensor, other: Tensor) -> Tensor:
         """How different two images look []: 0 for equal ones; differentiable in both.
 
@@ -56,16 +76,14 @@ class Lpips:
         Raises:
             ShapeError: if the shapes do not fit.
         """
-        if image.ndim == 3:
-            image, other = image[None], other[None]
-        size = check.shape("image", image, "N H W 3")
-        check.shape("other", other, "N H W 3", **size)
-        ours, others = (self.vgg.layers(x.permute(0, 3, 1, 2)) for x in (image, other))
-        total = image.new_zeros(())
-        for a, b, head in zip(ours, others, self.heads, strict=True):
-            difference = (unit(a) - unit(b)).square()  # [N, C, h, w]
-            total = total + (difference * head[:, None, None]).sum(dim=1).mean()
-        return total
+        sizes = dict(zip("HWC" if image.ndim == 3 else "NHWC", image.shape, strict=True))
+        check.shape("other", other, " ".join(sizes), **sizes)
+        return self.between(self.features(image), self.features(other))
+
+    def to(self, image: Tensor) -> Callable[[Tensor], float]:
+        """The distance of images [H, W, 3] to this one, whose features are computed once."""
+        features = self.features(image)
+        return lambda other: float(self.between(features, self.features(other)))
 
 
 def unit(features: Tensor) -> Tensor:

@@ -18,7 +18,6 @@ from texgs.config.methods import method_of
 from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
-from texgs.core.errors import ArgumentError
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.edit.parts import parts_of
@@ -109,8 +108,8 @@ def agreement(
 ) -> dict[str, Any]:
     """Consistency of views in the middle of the path, near and far, as they look with the scene's light.
 
-    As many pairs near as far. Fields that have light in their colours can be compared with others so. None
-    where no two views see the same, as of a scene that is nowhere opaque.
+    Fields that have light in their colours can be compared with others so. Nothing where no two views see the
+    same, as of a scene that is nowhere opaque.
     """
     start = max(0, (len(cameras) - count - LONG) // 2)
     some = cameras[start : start + count + LONG]
@@ -120,17 +119,12 @@ def agreement(
     frames = list(frames_of(composition, some, scene.light, scene.edits, shown, depth))
     perceptual = None
     if weights["vgg16"] and weights["lpips_vgg"]:
-        lpips = Lpips.load(device=composition.device)
-        perceptual = lambda one, two: float(lpips.distance(one, two))  # noqa: E731
-    measures: dict[str, float | None] = {}
-    for name, apart in (("short", SHORT), ("long", LONG)):
-        if len(frames) > apart:
-            try:
-                measured = consistency(frames[: count + apart], apart, perceptual)
-            except ArgumentError:
-                measures |= {f"{name}_rmse": None, f"{name}_lpips": None}
-                continue
-            measures |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
+        perceptual = Lpips.load(device=composition.device).to
+    apart = [each for each in (SHORT, LONG) if each < len(frames)]
+    measures: dict[str, Any] = {}
+    for each, measured in consistency(frames, apart, perceptual).items():
+        name = "short" if each == SHORT else "long"
+        measures |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
     return measures
 
 
