@@ -11,6 +11,7 @@ def test_psnr_of_a_constant_error():
     target = torch.full((4, 5, 3), 0.5)
     assert psnr(target + 0.1, target) == pytest.approx(20, abs=1e-4)
     assert psnr(target, target) == 100
+    assert math.isnan(psnr(target * math.nan, target)), "not the best value"
 
 
 def test_values_are_clamped_before_they_are_compared():

@@ -47,7 +47,6 @@ def test_fields_of_two_kinds_make_no_scene(grid, tmp_path):
     [
         (lambda s, grid: s.set_texture("TF01", grid), "models.TF01: .*expected surfels, got voxels"),
         (lambda s, grid: s.add_segment("TF01/part", grid), "models.TF01: .*expected surfels, got voxels"),
-        (lambda s, grid: s.pick(CAMERA, 20, 20), "pick: expected a scene of surfels"),
     ],
 )
 def test_what_only_surfels_can(grid, change, message):

@@ -92,45 +92,6 @@ def test_a_new_segment_looks_as_its_model_does(session, tmp_path):
     assert not np.array_equal(session.frame(CAMERA), before)
 
 
-def test_a_pixel_shows_the_surfel_that_most_of_its_colour_is_from(session, tmp_path):
-    session.set("v1.2/right", "visible", False)
-    session.add_segment("left/shell", half(tmp_path))
-    model = session.composition.parts[0].model
-    ids = torch.arange(len(model)).float()[:, None]
-    y, x = CAMERA.height // 2, CAMERA.width // 2
-    picked = session.pick(CAMERA, x, y)
-    pixel = CAMERA.crop(x, y, x + 1, y + 1)
-    from texgs.fields.surfels.model import geometry
-    from texgs.raster import rasterize
-
-    one_hot = (ids == ids.T).float()  # the share of each surfel, by brute force
-    shares = torch.cat(
-        [
-            rasterize(
-                *geometry(model.parameters),
-                pixel.viewmat,
-                pixel.K,
-                1,
-                1,
-                features=chunk.contiguous(),
-                options=model.shading.options,
-            ).color[0, 0]
-            for chunk in one_hot.split(32, dim=1)
-        ]
-    )
-    assert picked.surfel == int(shares.argmax())
-    assert picked.share == pytest.approx(float(shares.max()), abs=1e-6)
-    assert picked.part == ("left/shell" if picked.surfel % 2 == 0 else "left")
-    assert session.pick(CAMERA, 0, 0) is None
-
-
-def test_surfels_of_the_second_model_have_its_name(session):
-    session.set("left", "visible", False)
-    picked = session.pick(CAMERA, CAMERA.width // 2, CAMERA.height // 2)
-    assert picked.part == "v1.2/right"
-    assert picked.surfel < len(session.composition.parts[1].model)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -148,7 +109,6 @@ def test_surfels_of_the_second_model_have_its_name(session):
         ),
         (lambda s: s.add_segment("left/a.b", s.scene.models["left"].file), "expected a name without"),
         (lambda s: s.remove_segment("left"), "expected a segment to remove, got the model left"),
-        (lambda s: s.pick(CAMERA, 10_000, 0), "pixel: expected one of a frame of"),
     ],
 )
 def test_a_change_that_cannot_be_made_leaves_the_scene(session, change, message):

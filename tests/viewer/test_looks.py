@@ -1,6 +1,7 @@
 """New looks on a page: previews, textures that are kept, what is refused, and how one is cancelled."""
 
 import asyncio
+import json
 import threading
 from dataclasses import asdict
 
@@ -8,12 +9,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from tests.fields.surfels.test_composition import ball
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
 from tests.viewer.test_server import TOKEN, origin, page, with_page
 from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
-from texgs.viewer.looks import Looks
+from texgs.viewer.jobs import Jobs, Stopped, Watch
+from texgs.viewer.looks import Looks, Offered, Recent
+from texgs.viewer.messages import Look
+from texgs.viewer.styles import Styles
 
 SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
 
@@ -33,6 +38,11 @@ async def picture(browser, **view):
     return (await browser.next("frame"))[1]
 
 
+async def still(client, **query):
+    async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
+        return await answer.read()
+
+
 def look(**values):
     return {"type": "look", "parts": [], "style": "", "instruction": "", "preview": False, **values}
 
@@ -48,6 +58,9 @@ def test_a_preview_shows_on_its_page_alone_and_changes_nothing(scene_file):
             assert np.abs(await picture(browser) - before).mean() > 3
             assert (await picture(browser, before=True) == before).all()
             assert (await picture(other) == before).all()
+            query = {"view": json.dumps({"camera": SHOT["camera"], "mode": "shaded"})}
+            stills = [await still(client, **query, page=number) for number in ("1", "2", "none")]
+            assert stills[0] != stills[1] == stills[2], "the other page and strangers see what all share"
             assert client.server_side.edits.state()["past"] == []
             await browser.send(type="cancel")
             assert (await browser.next("trial"))["parts"] == []
@@ -91,6 +104,34 @@ def test_textures_on_their_way_are_shown(scene_file, monkeypatch):
         assert client.server_side.edits.state()["past"] == ["TF02 dots"]
 
     with_page(scene_file, work)
+
+
+def test_the_newest_texture_of_each_part_stays(tmp_path, monkeypatch):
+    monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
+    monkeypatch.setattr("texgs.viewer.looks.KEPT", 2)
+    shown = {}
+    offered = Offered(shown.__setitem__, Recent(tmp_path))
+    for part in ("TF01", *5 * ["TF02/core"]):
+        offered(part, lambda: ball(1))
+    assert [file.is_file() for file in shown.values()] == [True, True]
+    assert len(list(tmp_path.rglob("*.safetensors"))) == 3, "older ones are gone"
+
+
+def test_a_look_that_fails_leaves_folders_that_were_there(scene_file, tmp_path):
+    (tmp_path / "here").mkdir()
+    jobs, styles = Jobs(), Styles()
+    looks = Looks(jobs, styles)
+    edit = looks.edit_of(Look(parts=("TF01",), style="dots", instruction="", is_preview=False))
+    stop = threading.Event()
+    stop.set()
+    watch = Watch(lambda *_: None, stop)
+    for folder in ("here", "not"):
+        with pytest.raises(Stopped):
+            asyncio.run(
+                looks.make(read_scene(scene_file), edit, tmp_path / folder / "look", watch, lambda *_: None)
+            )
+    assert [path.name for path in tmp_path.iterdir() if path.name in ("here", "not")] == ["here"]
+    looks.close(), styles.close(), jobs.close()
 
 
 def test_a_picture_of_the_user_is_taken_in(scene_file, tmp_path):

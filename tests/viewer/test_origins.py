@@ -119,6 +119,12 @@ def test_transfer_functions_come_with_their_histogram(scene):
     assert transfer["histogram"] == [10] * 256
 
 
+@pytest.mark.parametrize("text", ["{", "[]", '{"minimum": 0, "maximum": 1, "histogram": []}'])
+def test_a_damaged_summary_of_the_volume_is_left_out(scene, tmp_path, text):
+    (tmp_path / "volume/volume.json").write_text(text)
+    assert origins(scene).transfer is None
+
+
 def test_a_scene_by_itself_has_nothing(tmp_path):
     file = write_model(tmp_path / "a/b/c/d/e/f/model.safetensors", ball(1))
     found = origins(Scene({"TF01": SceneModel(file)}))

@@ -16,6 +16,7 @@ from tests.viewer.test_server import page, served
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import lift
 from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.models.grabcut import GrabCut
 from texgs.scene.scene import Scene, SceneModel
@@ -90,6 +91,24 @@ def test_clicks_show_their_mask(balls):
         assert mask.sum() == pytest.approx(
             np.pi * radius**2, rel=0.15
         )  # its surfels reach beyond its outline
+
+    with_page(scene_file, work)
+
+
+def test_clicks_see_a_model_that_was_written_again(balls):
+    scene_file, _ = balls
+
+    async def work(browser):
+        async def covered():
+            await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
+            png = base64.b64decode((await browser.next("mask"))["picture"].split(",")[1])
+            return int((np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0).sum())
+
+        before = await covered()
+        model = two_balls()[0]
+        smaller = {**model.parameters, "means": model.parameters["means"] * 0.9}
+        write_model(scene_file.with_name("balls.safetensors"), Surfels(smaller, model.shading))
+        assert await covered() != before
 
     with_page(scene_file, work)
 

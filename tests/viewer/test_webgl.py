@@ -124,6 +124,12 @@ def test_edits_are_those_of_the_rasterizer(page, packed, description, scene, edi
     assert difference(page, packed, description, scene, CAMERAS[1], light=SIDE, edits=edits) <= LEVELS
 
 
+def test_depths_of_what_is_faint_everywhere(page, packed, description, scene):
+    """No pixel says where the nearest and the farthest point is."""
+    edits = [PartEdit(opacity=0.02)] * 5
+    assert difference(page, packed, description, scene, CAMERAS[0], "depth", edits=edits) <= 1
+
+
 def test_faint_scenes_that_no_pixel_ends_early_in_agree_within_a_level(page, packed, description, scene):
     edits = [PartEdit(opacity=0.1)] * 5
     edits[3] = PartEdit(opacity=0.1, palette=(0.2, 0.2, 0.9))

@@ -5,6 +5,7 @@ import json
 import os
 import re
 import tempfile
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -12,6 +13,7 @@ from typing import Any, BinaryIO
 from texgs.core.errors import ArgumentError
 from texgs.core.reading import is_there, reading
 
+ASKING = threading.Lock()
 SCRATCH = re.compile(r"\..+\.[a-z0-9_]{8}")  # files beside a target, as mkstemp names them
 
 
@@ -96,6 +98,7 @@ def read_json(path: str | Path) -> Any:
 
 def _umask() -> int:
     """The process's file mode mask; mkstemp ignores it and makes private files."""
-    mask = os.umask(0)
-    os.umask(mask)
+    with ASKING:  # there is no way but to change it for a moment
+        mask = os.umask(0)
+        os.umask(mask)
     return mask

@@ -18,7 +18,7 @@ def psnr(image: Tensor, target: Tensor) -> float:
     """
     from kornia.metrics import psnr as of_unit_range
 
-    return min(BEST, of_unit_range(image.clamp(0, 1), target, 1.0).item())
+    return min(of_unit_range(image.clamp(0, 1), target, 1.0).item(), BEST)  # NaN stays NaN
 
 
 def ssim(image: Tensor, target: Tensor) -> float:

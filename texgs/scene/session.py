@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -21,10 +22,11 @@ from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, place_of, replaced, require_new, split, with_textures
-from texgs.scene.pick import Picked, pick
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+
+KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
 
 
 class Session:
@@ -41,7 +43,7 @@ class Session:
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
         self._past, self._future = [scene], list[Scene]()
         self._device = device
-        self._opened: tuple[list[object], Composed] | None = None
+        self._opened = deque[tuple[list[object], Composed]](maxlen=KEPT)
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
@@ -237,10 +239,6 @@ class Session:
         composition = self._composition_of(scene)
         return frame(composition, camera, scene.light, scene.edits, mode, scene.background)
 
-    def pick(self, camera: Camera, x: int, y: int) -> Picked | None:
-        """What a pixel of a frame shows most of; see `texgs.scene.pick.pick`."""
-        return pick(self.scene, self.composition, camera, x, y)
-
     def save(self, path: str | Path) -> Path:
         """Write the scene file in one step; files in it are relative to its folder.
 
@@ -251,11 +249,11 @@ class Session:
 
     def _composition_of(self, scene: Scene) -> Composed:
         states: list[object] = [state_of(file) for file in files_of(scene)]
-        opened = self._opened  # another thread may put another one there
-        if opened is not None and opened[0] == states:
-            return opened[1]
+        for each, composition in tuple(self._opened):  # another thread may put another one there
+            if each == states:
+                return composition
         composition = scene.open(self._device)
-        self._opened = (states, composition)
+        self._opened.append((states, composition))
         return composition
 
     # ---- History ------------------------------------------------------------

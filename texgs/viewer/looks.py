@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -34,7 +35,7 @@ from texgs.volume.view_set import View
 LENS = Lens().square(400)  # of the views that parts learn from
 VIEWS = 92
 BETWEEN = 2.0  # seconds between textures on their way that are shown
-KEPT = 20  # of these, and of previews: several parts show theirs at a time, and frames may be on their way
+KEPT = 20  # of those of each part, and of previews: frames may be on their way
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
 GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
@@ -60,9 +61,7 @@ class Looks:
     def __init__(self, jobs: Jobs, styles: Styles, device: torch.device | str = "cpu") -> None:
         self._jobs, self._styles, self._device = jobs, styles, torch.device(device)
         self._folder = TemporaryDirectory(prefix="texgs-looks-")
-        self._previews, self._on_the_way = (
-            Recent(Path(self._folder.name, kind)) for kind in ("preview", "on-the-way")
-        )
+        self._recent = Recent(Path(self._folder.name))
 
     def edit_of(self, asked: Look) -> Any:
         """The edit, as conf/edit has it, with a recipe whose weights are on this machine.
@@ -109,7 +108,7 @@ class Looks:
 
     def preview_folder(self) -> Path:
         """A new folder for a preview; it is removed when there are many, and in the end."""
-        return self._previews.new()
+        return self._recent.new("preview")
 
     def close(self) -> None:
         """Remove what was not kept."""
@@ -124,33 +123,35 @@ class Looks:
 
     def _make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
         method = method_of(edit)
-        settings, offered = method.of(edit), Offered(show, self._on_the_way)
+        settings, offered = method.of(edit), Offered(show, self._recent)
         task = Around(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=offered)
+        is_alone = not output.parent.exists()
         output.mkdir(parents=True)
         try:
             return method.run(task)
         except BaseException:
             rmtree(output)
-            with suppress(OSError):  # others may be in it
-                output.parent.rmdir()
+            if is_alone:
+                with suppress(OSError):  # others may be in it by now
+                    output.parent.rmdir()
             raise
 
 
 class Recent:
-    """Folders with files that frames may be reading: when there are many, the oldest is removed.
+    """Folders with files that frames may be reading: when there are many of a kind, the oldest is removed.
 
     Args:
         parent: folder that they are in.
     """
 
     def __init__(self, parent: Path) -> None:
-        self._parent, self._count = parent, 0
+        self._parent, self._counts = parent, Counter[str]()
 
-    def new(self) -> Path:
+    def new(self, kind: str) -> Path:
         """A place for a folder."""
-        self._count += 1
-        rmtree(self._parent / f"{self._count - KEPT}", ignore_errors=True)
-        return self._parent / f"{self._count}"
+        self._counts[kind] += 1
+        rmtree(self._parent / kind / f"{self._counts[kind] - KEPT}", ignore_errors=True)
+        return self._parent / kind / f"{self._counts[kind]}"
 
 
 class Offered:
@@ -168,8 +169,8 @@ class Offered:
         """Show a part, unless one was shown a moment ago."""
         if monotonic() - self._latest < BETWEEN:
             return
-        file = self._folders.new() / part_file("look", part)
-        self._show(part, write_texture(file, model()))
+        name = part_file("look", part)
+        self._show(part, write_texture(self._folders.new(Path(name).stem) / name, model()))
         self._latest = monotonic()
 
 

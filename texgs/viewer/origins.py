@@ -127,12 +127,24 @@ class Origins:
     def transfer(self) -> dict[str, Any] | None:
         """The histogram of the volume and the transfer functions of models, where both are known."""
         functions = [tf for each in self._origins.values() if (tf := each.transfer)]
-        summary = read_json(self._volume) if self._volume else {}
+        summary = summary_of(self._volume) if self._volume else {}
         low, high, counts = (summary.get(key) for key in ("minimum", "maximum", "histogram"))
-        if not functions or not isinstance(counts, list) or not all(map(is_number, (low, high, *counts))):
+        if not functions or not isinstance(counts, list) or not counts:
+            return None
+        if not all(map(is_number, (low, high, *counts))):
             return None
         merged = [int(part.sum()) for part in np.array_split(counts, min(BINS, len(counts)))]
         return {"minimum": low, "maximum": high, "histogram": merged, "functions": functions}
+
+
+def summary_of(file: Path) -> dict[str, Any]:
+    """What a volume.json says; nothing where it is damaged, which is said in the log."""
+    try:
+        summary = read_json(file)
+    except TexgsError as error:
+        log.warning("%s", error)
+        return {}
+    return summary if isinstance(summary, dict) else {}
 
 
 def origins_of(scene: Scene) -> list[Origin]:

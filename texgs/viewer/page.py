@@ -32,11 +32,18 @@ class Page:
         edits: that all pages share.
         frames: renders.
         segmenter: finds what clicks select.
+        number: no other page has had it.
     """
 
     def __init__(
-        self, socket: web.WebSocketResponse, edits: SharedEdits, frames: Frames, segmenter: Segmenter
+        self,
+        socket: web.WebSocketResponse,
+        edits: SharedEdits,
+        frames: Frames,
+        segmenter: Segmenter,
+        number: int,
     ) -> None:
+        self.number = number
         self._socket, self._edits, self._frames, self._segmenter = socket, edits, frames, segmenter
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest

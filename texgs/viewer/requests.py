@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from pathlib import Path
 
 from aiohttp import web
 
 from texgs.core.errors import TexgsError
+from texgs.scene.scene import Scene
 from texgs.scene.scene_file import known
 from texgs.viewer.frames import Frames
+from texgs.viewer.messages import View
 from texgs.viewer.reading import view_of
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import thumbnail
@@ -27,10 +30,13 @@ class Requests:
         edits: that all pages share.
         frames: renders.
         work: has the pictures of styles, and files that were written.
+        shown: what a view shows on the page of a number.
     """
 
-    def __init__(self, edits: SharedEdits, frames: Frames, work: Work) -> None:
-        self._edits, self._frames, self._work = edits, frames, work
+    def __init__(
+        self, edits: SharedEdits, frames: Frames, work: Work, shown: Callable[[View, str], Scene]
+    ) -> None:
+        self._edits, self._frames, self._work, self._shown = edits, frames, work, shown
 
     def routes(self, token: str) -> list[web.RouteDef]:
         """What is answered, below the token."""
@@ -56,12 +62,12 @@ class Requests:
         return web.FileResponse(path)
 
     async def still(self, request: web.Request) -> web.StreamResponse:
-        """A PNG file of the view in the query, as `texgs render` writes it."""
+        """A PNG file of the view in the query on its page, as `texgs render` writes it."""
         try:
             values = parse_json(request.query.get("view", ""))
             known(values, None, "view")
             view = view_of(values)
-            png = await self._frames.still(view, self._edits.shown(view))
+            png = await self._frames.still(view, self._shown(view, request.query.get("page", "")))
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
         return web.Response(

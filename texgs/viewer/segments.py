@@ -23,7 +23,8 @@ from texgs.fields.surfels.model import Surfels
 from texgs.models.by_name import mask_model
 from texgs.models.masks import MaskModel
 from texgs.scene.parts import entry_of, split
-from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene import Scene
+from texgs.scene.session import state_of
 from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.messages import Clicked, Mask, Segment
 from texgs.volume.cameras import icosphere_of
@@ -45,7 +46,7 @@ class Segmenter:
     def __init__(self, jobs: Jobs, device: torch.device | str = "cpu") -> None:
         self._jobs, self._device = jobs, torch.device(device)
         self._masks: MaskModel | None = None
-        self._opened: tuple[SceneModel, Surfels] | None = None
+        self._opened: tuple[list[object], Surfels] | None = None  # states of its files
 
     async def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
         """The mask of a view as a message with a PNG picture, which is transparent elsewhere.
@@ -99,8 +100,9 @@ class Segmenter:
         """A model with its textures, kept for the next click."""
         entry_of(scene, name)
         model = scene.models[split(scene, name)[0]]
-        if self._opened is None or self._opened[0].files != model.files:
-            self._opened = (model, clicked_model(scene, name, self._device))
+        states: list[object] = [state_of(file) for file in model.files]
+        if self._opened is None or self._opened[0] != states:
+            self._opened = (states, clicked_model(scene, name, self._device))
         return self._opened[1]
 
     def _mask_model(self) -> MaskModel:

@@ -86,7 +86,7 @@ class Server:
         """
         app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_FILE)
         app.router.add_get(f"/{token}/socket", self.socket)
-        app.router.add_routes(Requests(self.edits, self.frames, self.work).routes(token))
+        app.router.add_routes(Requests(self.edits, self.frames, self.work, self._shown).routes(token))
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
         return app
@@ -101,14 +101,13 @@ class Server:
             max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
         await socket.prepare(request)
-        page = Page(socket, self.edits, self.frames, self.work.segmenter)
         self._count += 1
-        number = self._count
+        page = Page(socket, self.edits, self.frames, self.work.segmenter, self._count)
+        page.tell_scene({**self.greeting(), "page": page.number})
         self._pages[page] = socket
-        page.tell_scene(self.greeting())
         sending = asyncio.create_task(page.send())
         try:
-            await self._listen(socket, page, number)
+            await self._listen(socket, page)
         finally:
             del self._pages[page]
             self.work.stop(page)
@@ -118,17 +117,17 @@ class Server:
 
     # ---- Messages -----------------------------------------------------------
 
-    async def _listen(self, socket: web.WebSocketResponse, page: Page, number: int) -> None:
+    async def _listen(self, socket: web.WebSocketResponse, page: Page) -> None:
         async for received in socket:
             try:
                 if received.type != WSMsgType.TEXT:
                     raise ArgumentError("message: expected text, got bytes")
-                await self._answer(parse(received.data), page, number)
+                await self._answer(parse(received.data), page)
             except Exception as error:  # whatever a page sends, the server goes on
                 page.tell_error(error, refused=True)
                 page.tell_scene(self.scene_message())  # it shows what it has asked for already
 
-    async def _answer(self, message: Message, page: Page, number: int) -> None:
+    async def _answer(self, message: Message, page: Page) -> None:
         if isinstance(message, View):
             page.show(message)
         elif isinstance(message, Mask):
@@ -136,7 +135,7 @@ class Server:
         elif isinstance(message, Segment):
             self.work.begin_segment(message, page)
         elif isinstance(message, Look):
-            self.work.begin_look(message, page)
+            await self.work.begin_look(message, page)
         elif isinstance(message, Export):
             self.work.begin_export(message, page)
         elif isinstance(message, Cancel):
@@ -146,16 +145,16 @@ class Server:
         else:
             try:
                 async with self._changing:
-                    await self._change(message, page, number)
+                    await self._change(message, page)
             finally:
                 page.answered += 1
             self._tell_all()
 
-    async def _change(self, message: Change, page: Page, number: int) -> None:
+    async def _change(self, message: Change, page: Page) -> None:
         if isinstance(message, Save):
             await self._save(message, page)
         elif isinstance(message, Edit):
-            self.edits.edit(message, number)
+            self.edits.edit(message, page.number)
         elif isinstance(message, Rename):
             self.edits.rename_segment(message.part, message.name)
         elif isinstance(message, Remove):
@@ -177,6 +176,11 @@ class Server:
             return
         path = await asyncio.to_thread(self.edits.save, message.name)
         page.tell(f"Saved as {path}", level="info")
+
+    def _shown(self, view: View, number: str) -> Scene:
+        """What a view shows on the page of a number; on none, what all pages share."""
+        page = next((page for page in self._pages if str(page.number) == number), None)
+        return self.edits.shown(view) if page is None else page.shown(view)
 
     def scene_message(self) -> dict[str, Any]:
         """What changes of the scene, and its history, for all pages."""

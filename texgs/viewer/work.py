@@ -68,8 +68,8 @@ class Work:
         require_name(split(self._edits.scene, asked.part)[1], "segment")
         self._begin(page, partial(self._segment, asked, page))
 
-    def begin_look(self, asked: Look, page: Page) -> None:
-        """Begin to make a new look, or a preview of one.
+    async def begin_look(self, asked: Look, page: Page) -> None:
+        """Begin to make a new look, or a preview of one; its picture and the weights are looked at first.
 
         Raises:
             ArgumentError: if a job is at work, there is no such part or picture, or the instruction is none
@@ -77,7 +77,8 @@ class Work:
         """
         for part in asked.parts:
             entry_of(self._edits.scene, part)
-        self._begin(page, partial(self._look, asked, self._looks.edit_of(asked), page))
+        edit = await asyncio.to_thread(self._looks.edit_of, asked)
+        self._begin(page, partial(self._look, asked, edit, page))
 
     def begin_export(self, asked: Export, page: Page) -> None:
         """Begin to write a file.

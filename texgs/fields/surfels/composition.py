@@ -72,10 +72,6 @@ class Part:
             model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid(), len(masks), labels
         )
 
-    def label_of(self, surfel: int) -> int:
-        """Number of the segment that holds a surfel, 0 for none."""
-        return 0 if self.labels is None else int(self.labels[surfel])
-
     def per_surfel(self, values: Sequence[float]) -> float | Tensor:
         """The value of each surfel's edit [N]; a plain number where all are the same."""
         if self.labels is None or all(value == values[0] for value in values):
@@ -174,14 +170,6 @@ class Composition:
         """The palette of each model as fitted; black for a model without one."""
         given = (part.palette for part in self.parts)
         return [(0.0, 0.0, 0.0) if palette is None else tuple(palette.tolist()) for palette in given]
-
-    def place_of(self, surfel: int) -> tuple[int, int]:
-        """Number of the part that has a surfel of the whole, and the surfel's place in it."""
-        for number, part in enumerate(self.parts):
-            if surfel < len(part.model):
-                return number, surfel
-            surfel -= len(part.model)
-        raise ArgumentError(f"surfel: expected one of {len(self)}, got one beyond them")
 
     @torch.no_grad()
     def render(

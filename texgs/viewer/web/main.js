@@ -26,6 +26,7 @@ class Page extends ScenePage {
     renderer.open(connection, scene);
     super(new SharedState(greeting, connection), renderer, () => this.segments.isLocked);
     this.run = run;
+    this.number = greeting.page;
     this.connection = connection;
     this.notices = notices;
     this.job = new Job(connection);
@@ -99,6 +100,7 @@ class Page extends ScenePage {
     if (isAnother) this.state.original = message.original;
     const lost = isAnother ? difference(message.scene, this.state.scene) : [];
     this.run = message.run ?? this.run;
+    this.number = message.page ?? this.number;
     this.state.adopt(message);
     if (lost.length) this.#offerAgain(lost);
   }

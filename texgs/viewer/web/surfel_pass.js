@@ -5,6 +5,8 @@ import { makeProgram, makeTexture } from "./program.js";
 import { SURFEL_FRAGMENT, SURFEL_VERTEX } from "./shaders.js";
 import { LAYERS, WIDTH } from "./surfels.js";
 
+const BEYOND = 1e9; // a depth that nothing has
+
 export const NEAR = 0.2; // camera z, world units, as the rasterizer has it
 
 export class SurfelPass {
@@ -77,7 +79,7 @@ export class SurfelPass {
     return this._picture;
   }
 
-  /** The least and the largest mean depth of pixels that are not faint, where depth was blended; 0 where none is. */
+  /** The least and the largest mean depth of pixels that are not faint, where depth was blended; BEYOND if none is. */
   depths() {
     const gl = this._gl, [width, height] = this._size;
     const pixels = new Float32Array(4 * width * height);
@@ -89,7 +91,7 @@ export class SurfelPass {
       const alpha = pixels[i + 3], depth = pixels[i] / alpha;
       if (alpha > 0.5) [low, high] = [Math.min(low, depth), Math.max(high, depth)];
     }
-    return high ? [low, high] : [0, 0];
+    return high ? [low, high] : [BEYOND, BEYOND];
   }
 
   /** A quad for each surfel, of which only its number comes from a buffer. */

@@ -68,9 +68,9 @@ export class Toolbar {
 
   /** Save a picture of the view, in the pixels of the screen. */
   async #still() {
-    const { notices, state } = this.#page, view = JSON.stringify(this.#view());
+    const { notices, number, state } = this.#page, view = JSON.stringify(this.#view());
     try {
-      const answer = await fetch(`still.png?${new URLSearchParams({ view })}`);
+      const answer = await fetch(`still.png?${new URLSearchParams({ view, page: number })}`);
       if (!answer.ok) throw new Error(await answer.text());
       download(await answer.blob(), `${state.file.replace(/\.ya?ml$/, "")}.png`);
     } catch (error) {
