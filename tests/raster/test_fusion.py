@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
 
 LOW, VOXEL, BLOCKS, TRUNCATION = torch.tensor([-0.4, -0.3, -0.5]), 0.03, (3, 2, 4), 0.15
@@ -78,6 +78,8 @@ def test_what_does_not_fit_is_refused():
     lattice = Lattice(BLOCKS, LOW, VOXEL)
     with pytest.raises(ArgumentError, match=r"blocks: expected numbers below \(3, 2, 4\), got others"):
         lattice.add(view, torch.tensor([[0, 2, 0]]), TRUNCATION)
+    with pytest.raises(ShapeError, match=r"blocks: expected \[N, 3\], got \[3\]"):
+        lattice.add(view, torch.tensor([0, 0, 0]), TRUNCATION)
     with pytest.raises(ArgumentError, match="truncation: expected a length above 0"):
         lattice.add(view, CHOSEN, 0.0)
     with pytest.raises(ArgumentError, match=r"view: expected depth .* got \(20, 24\) and \(24, 20, 3\)"):

@@ -106,3 +106,26 @@ def test_one_bad_surfel_does_not_spoil_the_others(device, drawn, name, value):
     torch.testing.assert_close(
         scene.render(rasterize).color, alone.render(rasterize).color, rtol=0, atol=1e-6
     )
+
+
+@pytest.mark.parametrize("scale", [1e-18, 1e-20, 1e-22, 1e-23, 1e-24, 1e-26])
+def test_surfels_of_no_size_have_finite_gradients(device, scale):
+    """Squares of such lengths are smaller than the smallest floats."""
+    scene = random_scene(n=50).to(device)
+    scene = replace(scene, scales=torch.full_like(scene.scales, scale))
+    found = gradients(rasterize, scene, random_cotangents(scene, ("color",)))
+    assert all(bool(gradient.isfinite().all()) for gradient in found.values())
+
+
+def test_a_gain_that_is_not_finite_leaves_other_textures_their_gradients(device):
+    """As of a surfel without a direction, which is not drawn."""
+    scene = textured(random_scene(n=50))
+    quats, gain = scene.quats.clone(), scene.texture.gain.clone()
+    quats[7], gain[7] = 0.0, float("nan")
+    scene = replace(scene, quats=quats, texture=replace(scene.texture, gain=gain)).to(device)
+    texels = gradients(rasterize, scene, random_cotangents(scene, ("color",)))["texels"]
+    own = torch.zeros(len(texels), dtype=torch.bool, device=device)
+    first, count = int(scene.texture.offsets[7]), int(scene.texture.sizes[7].prod())
+    own[first : first + count] = True
+    assert bool(texels[~own].isfinite().all())
+    assert bool((texels[~own] != 0).any())

@@ -33,6 +33,15 @@ def test_points_are_on_their_rays_front_to_back():
     assert bool((distance.diff()[same] > 0.49 * SPACING).all())
 
 
+def test_rays_may_be_a_view_with_gaps():
+    scene = voxel_scene(degree=0)
+    found, expected = (
+        ray_points(scene.grid, rays, March()) for rays in (scene.rays[::2], scene.rays[::2].clone())
+    )
+    assert len(expected.points) > 0
+    assert all(map(torch.equal, found, expected))
+
+
 def test_threads():
     scene = voxel_scene(degree=0, size=(64, 40, 36), n_rays=5000)
     alone = with_threads(1, ray_points, scene.grid, scene.rays, March())

@@ -4,9 +4,16 @@ import pytest
 import torch
 
 from tests.raster.voxel_scenes import voxel_scene
-from texgs.core.errors import ArgumentError, ShapeError
-from texgs.raster.voxel_optimizer import EPSILON, VoxelOptimizer, VoxelRates, add_total_variation
-from texgs.raster.voxels import RowGradient
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from texgs.raster.voxel_grid import voxel_grid
+from texgs.raster.voxel_optimizer import (
+    EPSILON,
+    VoxelOptimizer,
+    VoxelRates,
+    add_total_variation,
+    add_variation_of_some,
+)
+from texgs.raster.voxels import RowGradient, render_rays
 
 RATES = VoxelRates(density=3.0, base=0.2, sh=0.05)
 
@@ -107,6 +114,23 @@ def test_total_variation(degree, device):
     assert not (changed & ~into.touched.bool().cpu()).any()
 
 
+def test_a_backward_pass_after_a_step_is_refused():
+    scene = voxel_scene(degree=0)
+    grid = scene.grid.with_rows(scene.grid.rows.clone().requires_grad_())
+    optimizer = VoxelOptimizer(grid)
+    color = render_rays(grid, scene.rays).color
+    optimizer.step(RATES)
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        color.sum().backward()
+
+
+def test_a_grid_without_voxels_has_no_variation():
+    grid = voxel_grid(torch.zeros(8, 8, 8, dtype=torch.bool), (0.0, 0.0, 0.0), 1.0, 0)
+    into = RowGradient(grid)
+    add_variation_of_some(grid, 1.0, 1.0, torch.Generator(), into)
+    assert not into.rows.any()
+
+
 def test_errors_name_the_argument():
     grid = voxel_scene().grid
     with pytest.raises(ArgumentError, match="optimizer: expected rmsprop or adam, got 'sgd'"):
@@ -116,5 +140,7 @@ def test_errors_name_the_argument():
     other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
     with pytest.raises(ShapeError, match=r"into: expected the gradient of .* make a new one for each grid"):
         add_total_variation(grid, torch.tensor([0]), 1.0, 1.0, other)
+    with pytest.raises(DeviceError, match="blocks: expected device cpu as rows, got meta"):
+        add_total_variation(grid, torch.tensor([0]).to("meta"), 1.0, 1.0, RowGradient(grid))
     with pytest.raises(ArgumentError, match="blocks: expected places from 0 to"):
         add_total_variation(grid, torch.tensor([-1]), 1.0, 1.0, RowGradient(grid))

@@ -257,6 +257,12 @@ def test_errors_name_the_argument():
         samples.add_gradient(None, rays[:, 0].double(), RowGradient(grid))
     with pytest.raises(ShapeError, match=r"weights: expected \[\d+\], got \[3\]"):
         samples.mark(torch.zeros(3))
+    with pytest.raises(ArgumentError, match="weights: expected float32, got float64"):
+        samples.mark(torch.zeros(len(grid.rows)).double())
+    with pytest.raises(ArgumentError, match="weights: expected a dense tensor"):
+        samples.mark(torch.zeros(2 * len(grid.rows))[::2])
+    with pytest.raises(DeviceError, match="rows: expected device cpu as masks, got meta"):
+        grid.with_rows(grid.rows.to("meta"))
     with pytest.raises(ShapeError, match=r"rows: expected \[\d+, K\], got \[3, 32\]"):
         grid.with_rows(torch.zeros(3, 32))
     with pytest.raises(ShapeError, match="rows: expected 4, 16 or 32 floats"):

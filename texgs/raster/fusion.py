@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import torch
 from torch import Tensor
 
+from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster import native
@@ -99,8 +100,9 @@ class Lattice:
             truncation: world units.
 
         Raises:
-            ArgumentError: if a block is none of the lattice's.
+            ArgumentError, ShapeError: if a block is none of the lattice's.
         """
+        check.shape("blocks", blocks, "N 3")
         if len(blocks) and not bool(((blocks >= 0) & (blocks < torch.tensor(self.blocks))).all()):
             raise ArgumentError(f"blocks: expected numbers below {self.blocks}, got others")
         matrices = [matrix.float().contiguous() for matrix in (view.camera.viewmat, view.camera.K)]

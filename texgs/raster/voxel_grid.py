@@ -86,10 +86,12 @@ class VoxelGrid:
         """The same voxels with other rows, [n, 4, 16 or 32].
 
         Raises:
-            ShapeError, ArgumentError: if they are not as many, of another length or not float32.
+            ShapeError, ArgumentError, DeviceError: if they are not as many, of another length, not float32 or
+                elsewhere.
         """
         check.shape("rows", rows, "n K", n=len(self.rows))
         check.floating("rows", rows)
+        check.same_device(masks=self.masks, rows=rows)
         if rows.shape[1] not in DEGREES:
             raise ShapeError(f"rows: expected 4, 16 or 32 floats, got {list(rows.shape)}")
         grid = replace(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.raster import grid_abi
 from texgs.raster.voxel_grid import VoxelGrid
@@ -59,6 +60,7 @@ class VoxelOptimizer:
         rule = grid_abi.Rule(rates.density, rates.base, rates.sh, *self.betas, EPSILON)
         state = (self.gradient.rows, self.gradient.touched, self.first, self.second)
         grid_abi.call("texgs_grid_step", self.grid.structure(), rule, *state, device=self.grid.rows.device)
+        torch.autograd.graph.increment_version(self.grid.rows)  # autograd sees no writes of the library
 
 
 def add_total_variation(
@@ -77,9 +79,10 @@ def add_total_variation(
         into: where the gradient is added.
 
     Raises:
-        ArgumentError, ShapeError: naming the argument at fault.
+        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
     """
     into.check(grid)
+    check.same_device(rows=grid.rows, blocks=blocks)
     blocks = blocks.int().contiguous()
     if len(blocks) and not 0 <= int(blocks.min()) <= int(blocks.max()) < grid.masks.numel():
         raise ArgumentError(f"blocks: expected places from 0 to {grid.masks.numel() - 1}, got others")
@@ -120,6 +123,8 @@ def add_variation_of_some(
         ShapeError: as `add_total_variation`.
     """
     blocks = grid.masks.flatten().nonzero()[:, 0]
+    if not len(blocks):
+        return
     count = max(round(share * len(blocks)), 1)
     drawn = blocks[torch.randint(len(blocks), (count,), generator=generator)]
     voxels = count * len(grid) / len(blocks)

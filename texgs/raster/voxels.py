@@ -12,7 +12,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ShapeError
+from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster import grid_abi, native
 from texgs.raster.voxel_grid import VoxelGrid
 
@@ -83,9 +83,9 @@ class Samples:
     """
 
     def __init__(self, grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None = None) -> None:
-        self.grid, self.march, self.rays = grid, march, rays
+        self.grid, self.march, self.rays = grid, march, rays.contiguous()
         handle = ctypes.c_void_p()
-        _march(grid, march, rays, out, ctypes.addressof(handle))
+        _march(grid, march, self.rays, out, ctypes.addressof(handle))
         self.handle = handle.value
         weakref.finalize(self, native.library(rays.device.type).texgs_grid_release, handle.value)
 
@@ -100,9 +100,14 @@ class Samples:
         """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel.
 
         Raises:
-            ShapeError: if there are not as many weights as rows.
+            ShapeError, ArgumentError, DeviceError: if there are not as many weights as rows, or they are not
+                float32, dense and where the rows are.
         """
         check.shape("weights", weights, "n", n=len(self.grid.rows))
+        check.floating("weights", weights)
+        check.same_device(weights=weights, rows=self.grid.rows)
+        if not weights.is_contiguous():
+            raise ArgumentError("weights: expected a dense tensor, which is written to; got a view with gaps")
         self._call("texgs_grid_mark", weights)
 
     def _call(self, name: str, *arguments: Tensor | None) -> None:

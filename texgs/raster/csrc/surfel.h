@@ -89,7 +89,7 @@ TEXGS_MATHS SurfelProjection<F> project(const View& view, const Surfel<F>& s, co
     r.C = cross(r.M.u, r.M.v);
     // Below this ratio of the sides of its image, W is rounding error: only the low-pass disc is left of the surfel.
     const F sides = r.M.u.x * r.M.u.x + r.M.u.y * r.M.u.y + r.M.v.x * r.M.v.x + r.M.v.y * r.M.v.y;
-    const auto edge_on = abs(r.C.z) <= F(1e-6f) * sides;
+    const auto edge_on = abs(r.C.z) <= max(F(1e-6f) * sides, F(1e-36f));  // 1 / C.z stays finite
     r.scale = select(edge_on, F(0.0f), F(1.0f) / r.C.z);
     return r;
 }

@@ -9,7 +9,7 @@
  * - A NULL output is not computed; a NULL gradient input counts as zero.
  * - Gradients are written, not accumulated.
  * - Functions return 0, or a texgs_status; texgs_error() then holds one sentence about it (per thread).
- * - Nothing here keeps a pointer to a caller's memory after it returns.
+ * - Nothing here keeps a pointer to a caller's memory after it returns; on a GPU, after the stream has passed.
  */
 #ifndef TEXGS_H
 #define TEXGS_H

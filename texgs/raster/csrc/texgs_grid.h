@@ -4,7 +4,7 @@
  * rays and differentiated; the conventions are those of texgs.h.
  *
  * Voxels are the points of a lattice. Blocks of 4 x 4 x 4 of them have a mask each, one bit a voxel; the row of a voxel
- * is that of its block's first one plus the number of bits below its own. So a grid of any size costs 20 bytes a block
+ * is that of its block's first one plus the number of bits below its own. So a grid of any size costs 21 bytes a block
  * and its rows. A point's density is max(0, trilinear density), its colour max(0, 0.5 + Y(direction) . trilinear
  * coefficients); voxels without a row have the first one. Nothing is outside of the lattice.
  *

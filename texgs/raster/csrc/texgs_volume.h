@@ -35,7 +35,7 @@ typedef struct {
 
 /* The colour of values, and their opacity over a unit of length, linear between points [n, 5] of value, opacity, red,
  * green and blue, ascending by value. The second of two points at one value holds there. Beyond all points nothing
- * shows. n: 2 to 1024. */
+ * shows. n: 2 to 65536. */
 typedef struct {
     int32_t n;
     const float* points;

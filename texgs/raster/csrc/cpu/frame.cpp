@@ -19,12 +19,12 @@ constexpr int64_t kMostPairs = UINT32_MAX;  // they are counted in 32 bits
 
 thread_local double pass_seconds[TEXGS_PASSES];
 
-// Records how long its scope took.
+// Adds up how long its scopes of a frame took.
 class PassTimer {
 public:
     explicit PassTimer(texgs_pass pass) : pass_(pass) {}
     ~PassTimer() {
-        pass_seconds[pass_] = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
+        pass_seconds[pass_] += std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     }
 
 private:
@@ -93,9 +93,7 @@ void texgs_frame::bin_tiles(const uint32_t* order, int64_t visible, int64_t most
     const int tiles = tiles_of(raster);
     const int64_t n = raster.surfels.n;
     const int parts = static_cast<int>(std::clamp<int64_t>(visible / 4096, 1, 2 * threads()));
-    const int64_t bytes = most_candidates * static_cast<int64_t>(sizeof(Candidate) + sizeof(Pair));
-    if (most_candidates > kMostPairs) throw OutOfMemory{bytes};
-    require_memory(bytes);
+    if (most_candidates > kMostPairs) throw OutOfMemory{most_candidates * int64_t(sizeof(Candidate) + sizeof(Pair))};
     // A part writes one candidate past its last.
     Candidate* candidates = candidates_.ensure<Candidate>(most_candidates + parts);
     Candidate** part_begin = part_begin_.ensure<Candidate*>(2 * parts);
@@ -149,6 +147,7 @@ const uint32_t* texgs_frame::sort(int64_t& visible) {
 
 void texgs_frame::bin(const texgs_surfels& surfels, const texgs_camera& camera, const texgs_options& options,
                       const texgs_image& image) {
+    std::fill(pass_seconds, pass_seconds + TEXGS_PASSES, 0.0);
     raster = {};
     attach(surfels, camera, options);
     raster.image = image;
@@ -201,6 +200,7 @@ void texgs_frame::ensure_slots(int floats) {
 }
 
 void texgs_frame::differentiate(const texgs_image& image, const texgs_image& grad, const texgs_gradients& out) {
+    pass_seconds[TEXGS_BACKWARD] = pass_seconds[TEXGS_REDUCE] = 0;
     raster.image = image;
     raster.grad = grad;
     raster.out = out;

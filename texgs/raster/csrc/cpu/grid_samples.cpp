@@ -102,6 +102,7 @@ void texgs_grid_samples::sum_counts(const GridJob& job) {
             sum += std::exchange(cursors[group * bricks + brick], static_cast<uint32_t>(sum));
     }
     slabs[job.bricks[0]] = n_records_ = sum;
+    if (sum > UINT32_MAX) throw OutOfMemory{sum * static_cast<int64_t>(sizeof(GridRecord))};
 }
 
 void texgs_grid_samples::place(const GridJob& job) {

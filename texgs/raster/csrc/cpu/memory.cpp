@@ -23,13 +23,13 @@ constexpr int64_t kHugePages = int64_t(4) << 20;  // from here on 2 MiB pages sa
 std::atomic<int64_t> held{0}, peak{0};
 
 #if defined(__linux__)
-// The number in the first line of a file that `format` finds, or the largest one.
-int64_t read_number(const char* path, const char* format) {
-    long long value = INT64_MAX;
+// The number in the first line of a file that `format` finds, or `otherwise`.
+int64_t read_number(const char* path, const char* format, int64_t otherwise) {
+    long long value = otherwise;
     if (FILE* file = std::fopen(path, "r")) {
         char line[128];
-        while (value == INT64_MAX && std::fgets(line, sizeof line, file))
-            if (std::sscanf(line, format, &value) != 1) value = INT64_MAX;
+        while (std::fgets(line, sizeof line, file))
+            if (std::sscanf(line, format, &value) == 1) break;
         std::fclose(file);
     }
     return value;
@@ -39,12 +39,13 @@ int64_t read_number(const char* path, const char* format) {
 // Memory that can be had without swapping, or the largest number where the system does not say.
 int64_t available_memory() {
 #if defined(__linux__)
-    const int64_t kib = read_number("/proc/meminfo", "MemAvailable: %lld kB");
-    const int64_t machine = kib < (INT64_MAX >> 10) ? kib << 10 : INT64_MAX;
-    // a container or a batch job may get less than the machine has
-    const int64_t limit = read_number("/sys/fs/cgroup/memory.max", "%lld");
+    const int64_t machine = read_number("/proc/meminfo", "MemAvailable: %lld kB", INT64_MAX >> 10) << 10;
+    // a container or a batch job may get less than the machine has; pages of files are given back on demand
+    const int64_t limit = read_number("/sys/fs/cgroup/memory.max", "%lld", INT64_MAX);
     if (limit == INT64_MAX) return machine;
-    const int64_t left = limit - read_number("/sys/fs/cgroup/memory.current", "%lld");
+    const int64_t cached = read_number("/sys/fs/cgroup/memory.stat", "active_file %lld", 0) +
+                           read_number("/sys/fs/cgroup/memory.stat", "inactive_file %lld", 0);
+    const int64_t left = limit - read_number("/sys/fs/cgroup/memory.current", "%lld", 0) + cached;
     return left < machine ? (left > 0 ? left : 0) : machine;
 #elif defined(_WIN32)
     MEMORYSTATUSEX status{};

@@ -106,7 +106,8 @@ void project_lanes(const Raster& r, const View& view, float diagonal, int64_t fi
         if constexpr (!P::kAffine)
             if (behind >> i & 1) {
                 box = cut_box(r, view, q, c, seen.cut, i);
-                foot.xx = foot.xy = foot.yy = 0;  // no ellipse: every block of the box
+                foot.ex = foot.cx, foot.ey = foot.cy;  // they may not be finite
+                foot.xx = foot.xy = foot.yy = 0;       // no ellipse: every block of the box
             }
         if (!cover_tiles(box, r.tiles_x, r.tiles_y, foot)) continue;
         std::memcpy(&r.depth_keys[id], &record.zp, sizeof(float));  // positive floats sort as integers

@@ -55,7 +55,8 @@ void texgs_frame::count_pairs(cudaStream_t stream) {
 }
 
 // Room for the pairs of this view, as far as they are known (with `wait`: exactly), and a quarter more. What was seen
-// of earlier views counts as long as this one is of their size.
+// of earlier views counts for those that are not larger, until memory is trimmed: sizes change from view to view where
+// views are cropped to their content, and to wait each time would cost more than room that is not used.
 int64_t texgs_frame::room_for_pairs(bool wait) {
     const int64_t n = raster.surfels.n;
     const bool larger = 4 * n > 5 * most_surfels_ || raster.tiles > most_tiles_;
@@ -139,8 +140,8 @@ void texgs_frame::texel_gradients(cudaStream_t stream) {
     raster.magnitudes = magnitudes;
     zero(raster.texel_sums, floats * static_cast<int64_t>(sizeof(int64_t)), stream);
     zero(magnitudes, 2 * sizeof *magnitudes, stream);
-    largest_magnitude(raster.grad.color, 3 * raster.plane, magnitudes, stream);
-    largest_magnitude(raster.surfels.gain, raster.surfels.n, magnitudes + 1, stream);
+    largest_magnitude(raster.grad.color, 3 * raster.plane, false, magnitudes, stream);
+    largest_magnitude(raster.surfels.gain, raster.surfels.n, true, magnitudes + 1, stream);
     texgs::cuda::texel_gradients(raster, stream);
 }
 

@@ -69,7 +69,8 @@ __device__ void shade(const texgs_grid& grid, const Sample& s, const float (&bas
         if (K == 32 && q == 2) color.y = fma(basis[11], sum.w, color.y);
         if (K == 32 && q == 3) color.z = fma(basis[15], sum.w, color.z);
     }
-    out[0] = fmaxf(color.x, 0.0f), out[1] = fmaxf(color.y, 0.0f), out[2] = fmaxf(color.z, 0.0f);
+    const float sums[3] = {color.x, color.y, color.z};
+    for (int c = 0; c < 3; ++c) out[c] = sums[c] < 0.0f ? 0.0f : sums[c];  // a NaN is not hidden
 }
 
 template <int K, bool Keep>
@@ -93,6 +94,10 @@ __global__ __launch_bounds__(kThreads) void render_kernel(const GridJob job) {
                 pack(s.point.cell), static_cast<uint32_t>(i), {s.point.f[0], s.point.f[1], s.point.f[2]}, s.weight,
                 s.behind,           {own[0], own[1], own[2]}};
     });
+    // nor fewer: the rest counts for nothing
+    if (Keep)
+        for (; next < job.samples + job.begin[i + 1]; ++next)
+            *next = {0, static_cast<uint32_t>(i), {}, 0.0f, light, {}};
     const float alpha = 1.0f - light;
     if (job.color)
         for (int c = 0; c < 3; ++c) job.color[3 * i + c] = color[c] + light * job.how.background[c];

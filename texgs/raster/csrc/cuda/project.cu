@@ -43,6 +43,7 @@ __device__ bool project_primitive(const Raster& r, const View& view, const P& s,
     if constexpr (!P::kAffine)
         if (b.behind) {
             b.box = clipped_box(view, x, y, {q.pose.p, q.a, q.b}, cx, cy, seen.cut, o);
+            b.ex = cx, b.ey = cy;    // they may not be finite
             b.xx = b.xy = b.yy = 0;  // no ellipse: every block of the box
         }
     foot = {b.ex, b.ey, b.xx, b.xy, b.yy, cx, cy, b.disc, 0, 0, 0, 0};

@@ -12,14 +12,15 @@ namespace {
 constexpr int kBlock = 256;
 constexpr int kSmall = 16;  // textures of so few texels are summed over a warp first
 
-// 2^exponent * (sum of a texel) is its fixed-point sum. Gradients are NaN where an input is not finite.
+// 2^exponent * (sum of a texel) is its fixed-point sum. All are NaN if the gradient of any pixel is not finite; a
+// surfel whose gain is not finite has none.
 struct FixedPoint {
     int exponent;
     bool finite;
 
     __device__ explicit FixedPoint(const Raster& r) {
         const float gradient = __uint_as_float(r.magnitudes[0]), gain = __uint_as_float(r.magnitudes[1]);
-        finite = isfinite(gradient) && isfinite(gain);
+        finite = isfinite(gradient);
         const int bits = 64 - __clzll(r.plane) + above(gradient) + above(gain);
         exponent = max(-126, min(126, 62 - bits));
     }
@@ -95,7 +96,7 @@ __global__ __launch_bounds__(kThreads) void texel_kernel(const Raster r) {
     }
     const auto visit = [&](int place) {
         const TextureTable& texture = chunk.textures[place];
-        const bool known = !isnan(texture.gain);
+        const bool known = isfinite(texture.gain);
         Given given{};
         bool seen = false;
 #pragma unroll
@@ -136,11 +137,11 @@ __global__ __launch_bounds__(kBlock) void convert_kernel(const Raster r) {
     if (i < 3 * r.surfels.n_texels) r.out.texels[i] = FixedPoint(r).value(r.texel_sums[i]);
 }
 
-// Positive floats are ordered as their bits are, NaN above all.
-__global__ __launch_bounds__(kBlock) void largest_kernel(const float* values, int64_t n, uint32_t* bits) {
+// Positive floats are ordered as their bits are, infinity and NaN above all. `known`: of those that are finite.
+__global__ __launch_bounds__(kBlock) void largest_kernel(const float* values, int64_t n, bool known, uint32_t* bits) {
     uint32_t most = 0;
     for (int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x; i < n; i += int64_t(gridDim.x) * kBlock)
-        most = max(most, __float_as_uint(fabsf(values[i])));
+        if (!known || isfinite(values[i])) most = max(most, __float_as_uint(fabsf(values[i])));
 #pragma unroll
     for (int step = kWarp / 2; step >= 1; step /= 2) most = max(most, __shfl_xor_sync(kAllLanes, most, step));
     if (lane_index() == 0 && most) atomicMax(bits, most);
@@ -148,9 +149,9 @@ __global__ __launch_bounds__(kBlock) void largest_kernel(const float* values, in
 
 }  // namespace
 
-void largest_magnitude(const float* values, int64_t n, uint32_t* bits, cudaStream_t stream) {
+void largest_magnitude(const float* values, int64_t n, bool known, uint32_t* bits, cudaStream_t stream) {
     const int64_t blocks = blocks_for(n, kBlock);
-    launch(largest_kernel, blocks < 1024 ? blocks : 1024, kBlock, stream, values, n, bits);
+    launch(largest_kernel, blocks < 1024 ? blocks : 1024, kBlock, stream, values, n, known, bits);
 }
 
 void texel_gradients(const Raster& r, cudaStream_t stream) {
