@@ -287,7 +287,7 @@ def test_voxels_of_the_volume_that_views_show():
     at = np.linspace(-0.5, 0.5, 48)
     z, y, x = np.meshgrid(at, at, at, indexing="ij")
     inside = (x**2 + y**2 + z**2 < RADIUS**2).astype(np.float32)
-    tf = {"opacity": [[0.5, 0.0], [1.0, 1.0], [2.0, 1.0]], "color": [[0, 0.8, 0.4, 0.2]]}
+    tf = {"name": "TF01", "opacity": [[0.5, 0.0], [1.0, 1.0], [2.0, 1.0]], "color": [[0, 0.8, 0.4, 0.2]]}
     options = {"kind": "voxels", "metadata": {"tf": tf}, "volume": Grid(inside), "count": 200}
     surfels, colors = seeds(**options)
     radius = surfels["means"].norm(dim=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -98,7 +99,9 @@ def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> 
             f"{views.folder}: seeds.kind=voxels needs a volume and views that name their transfer function; "
             "seeds.kind=visible needs neither"
         )
-    tf = TransferFunction.from_dict(views.metadata["tf"])
+    named = views.metadata["tf"]
+    points = {key: named[key] for key in named if key != "name"} if isinstance(named, Mapping) else named
+    tf = TransferFunction.from_dict(points)
     points, colors = visible_voxels(volume, tf, count, seed)
     return torch.from_numpy(points), torch.from_numpy(colors)
 
