@@ -48,8 +48,10 @@ def test_the_distance_is_the_published_one(files):
     assert float(lpips.distance(image, other)) == pytest.approx(defined(image, other, heads), rel=1e-4)
     assert float(lpips.distance(image, image)) == 0
     assert lpips.to(image)(other) == float(lpips.distance(image, other))
-    with pytest.raises(ShapeError, match=r"other: expected \[32, 40, 3\]"):
+    with pytest.raises(ShapeError, match=r"other: expected \[1, 32, 40, 3\]"):
         lpips.distance(image, other[:20])
+    with pytest.raises(ShapeError, match=r"image: expected \[N, H, W, 3\], got \[32, 40\]"):
+        lpips.distance(image[..., 0], other[..., 0])
 
 
 def test_heads_of_another_backbone_are_refused(files, tmp_path):

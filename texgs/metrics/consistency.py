@@ -22,7 +22,7 @@ SHORT, LONG = 1, 7  # views between those compared, as is usual for stylised sce
 OPAQUE = 0.5  # least alpha of a pixel that has a depth
 TOLERANCE = 0.01  # of the depth, by which two views of the same point may differ
 
-# How far other images are from this one [H, W, 3], such as by LPIPS; it is looked at once.
+# For an image [H, W, 3], a function that says how far others are from it, such as by LPIPS.
 Perceptual = Callable[[Tensor], Callable[[Tensor], float]]
 
 
@@ -102,7 +102,7 @@ def consistency(
 def difference(
     first: SeenFrame, second: SeenFrame, distance: Callable[[Tensor], float] | None, tolerance: float
 ) -> list[Difference]:
-    """Of one pair; empty where the two see nothing that is the same."""
+    """Compare one pair; empty where the two see nothing that is the same."""
     warped, same = warp(second, first, tolerance)
     if not bool(same.any()):
         return []

@@ -76,8 +76,10 @@ class Lpips:
         Raises:
             ShapeError: if the shapes do not fit.
         """
-        sizes = dict(zip("HWC" if image.ndim == 3 else "NHWC", image.shape, strict=True))
-        check.shape("other", other, " ".join(sizes), **sizes)
+        if image.ndim == 3:
+            image, other = image[None], other[None]
+        size = check.shape("image", image, "N H W 3")
+        check.shape("other", other, "N H W 3", **size)
         return self.between(self.features(image), self.features(other))
 
     def to(self, image: Tensor) -> Callable[[Tensor], float]:
