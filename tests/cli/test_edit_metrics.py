@@ -1,5 +1,6 @@
 """Measures of scenes that leave some of them undefined, and of fields that have another one's surfaces."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -8,6 +9,7 @@ import torch
 from tests.fields.surfels.test_composition import ball
 from tests.models.clips import write_clip
 from texgs.cli.stages.edit_metrics import agreement, clip_numbers
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.clip import clip_scores
@@ -49,6 +51,21 @@ def test_surfaces_are_those_of_the_geometry_that_is_given(scenes):
     clear, faint = (measured(scenes[name], scenes["clear"]) for name in ("clear", "faint"))
     assert 0 < faint["short_rmse"] < 0.2 * clear["short_rmse"]
     assert measured(scenes["clear"], scenes["faint"]) == {}
+
+
+def test_surfaces_of_hidden_models_do_not_count(scenes, tmp_path):
+    """Opaque surfels in front of a part of the ball."""
+    alone = read_scene(scenes["clear"])
+    write_model(tmp_path / "other.safetensors", ball(2, middle=0.3))
+    both = {**alone.models, "other": SceneModel(tmp_path / "other.safetensors")}
+    write_scene(tmp_path / "both.yaml", Scene(both))
+    hidden = {**both, "other": replace(both["other"], edit=PartEdit(visible=False))}
+    write_scene(tmp_path / "hidden.yaml", Scene(hidden))
+    shown = {"hidden": tmp_path / "hidden.yaml", "alone": scenes["clear"]}
+    expected = measured(scenes["clear"], scenes["clear"])["short_rmse"]
+    of_both = {name: measured(file, tmp_path / "both.yaml")["short_rmse"] for name, file in shown.items()}
+    assert of_both["hidden"] == pytest.approx(expected, rel=1e-4)
+    assert of_both["alone"] != pytest.approx(expected, rel=0.05)
 
 
 def test_clip_sees_the_edited_scene_and_the_one_before(scenes, tmp_path):

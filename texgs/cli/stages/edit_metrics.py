@@ -1,7 +1,7 @@
 """Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
 from statistics import fmean
@@ -97,6 +97,13 @@ def is_geometry_kept(after: Composed, before: Composed, cameras: Sequence[Camera
     )
 
 
+def without_hidden(geometry: Scene, scene: Scene) -> Scene:
+    """The models of the geometry but those that the scene hides; all of them where it hides everything."""
+    hidden = {name for name, model in scene.models.items() if not model.edit.visible}
+    shown = {name: model for name, model in geometry.models.items() if name not in hidden}
+    return replace(geometry, models=shown or geometry.models)
+
+
 @torch.no_grad()
 def agreement(
     composition: Composed,
@@ -113,7 +120,7 @@ def agreement(
     """
     start = max(0, (len(cameras) - count - LONG) // 2)
     some = cameras[start : start + count + LONG]
-    surfaces = read_scene(geometry)
+    surfaces = without_hidden(read_scene(geometry), scene)
     depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
     shown = surfaces.open(composition.device)
     frames = list(frames_of(composition, some, scene.light, scene.edits, shown, depth))
