@@ -57,12 +57,12 @@ def computed():
     """Everything of each scene and volume; bits must not depend on the number of threads."""
     makers = {name: partial(everything, scene) for name, scene in SCENES.items()}
     makers |= {name: partial(cast_volume, *of) for name, of in VOLUMES.items()}
-    found = {}
+    results = {}
     for name, make in makers.items():
-        found[name] = with_threads(1, make)
+        results[name] = with_threads(1, make)
         for quantity, value in with_threads(3, make).items():
-            assert torch.equal(value, found[name][quantity]), quantity
-    return found
+            assert torch.equal(value, results[name][quantity]), quantity
+    return results
 
 
 def run(instruction_set, folder):
@@ -93,13 +93,13 @@ def test_instruction_set(instruction_set, tmp_path_factory):
     if "this machine does not have it" in child.stderr:
         pytest.skip(f"this machine has no {instruction_set}")
     assert child.returncode == 0, child.stderr
-    used, found = torch.load(file)
+    used, results = torch.load(file)
     assert used == instruction_set
     for name, expected in portable(folder).items():
         for quantity, value in expected.items():
             # thresholds fall the other way here and there; test_forward.py and test_gradients.py bound them
             scale = value.abs().max().clamp(min=1)
-            same = (found[name][quantity] - value).abs() <= 1e-3 * scale
+            same = (results[name][quantity] - value).abs() <= 1e-3 * scale
             assert same.double().mean() > 0.995, (name, quantity)
 
 

@@ -47,15 +47,15 @@ def combinations(over: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
     Raises:
         ConfigError: if a key has not several values, or two combinations have one name.
     """
-    found: dict[str, tuple[str, ...]] = {}
+    overrides: dict[str, tuple[str, ...]] = {}
     for choice in product(*map(values, over)):
         name = "-".join(map(label, choice))
-        if name in found:
+        if name in overrides:
             raise ConfigError(f"sweep.over: expected different variants, got {name} twice")
-        found[name] = tuple(
+        overrides[name] = tuple(
             f"{word.partition('=')[0]}={value}" for word, value in zip(over, choice, strict=True)
         )
-    return found
+    return overrides
 
 
 def values(word: str) -> list[str]:

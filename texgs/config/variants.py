@@ -37,9 +37,9 @@ def changes(config: DictConfig) -> Mapping[str, tuple[str, ...]]:
 
 def is_of_edits(config: DictConfig) -> bool:
     """Whether the variants of the sweep have edits that differ."""
-    found = changes(config)
-    named = any(changes_edits(change) for listed in found.values() for change in listed)
-    return bool(found) and (named or len(config.sweep.edit_seeds) > 1)
+    variants = changes(config)
+    named = any(changes_edits(change) for listed in variants.values() for change in listed)
+    return bool(variants) and (named or len(config.sweep.edit_seeds) > 1)
 
 
 def changes_edits(change: str) -> bool:
