@@ -58,6 +58,8 @@ class Kind(Generic[Settings]):
     """What `texgs export` writes of it."""
     depth: Literal["", "median", "depth"] = ""
     """Which of its outputs meshes are made of, "median" or "depth"; empty where it has neither."""
+    film_size: int = 320
+    """Pixels of a side of its films of edits; fewer where a frame takes seconds."""
     devices: frozenset[str] = frozenset({"cpu", "cuda"})
     """Where it is fitted."""
 

@@ -72,5 +72,6 @@ FIELD = Kind(
     check=PaletteKeys.check,
     exports=("mesh",),
     depth="depth",  # the mean
+    film_size=128,
     devices=frozenset({"cpu"}),
 )

@@ -152,7 +152,7 @@ def picture(path: Path) -> np.ndarray:
 
     scene = read_scene(path)
     cameras = orbit_path(1, POLAR, *Lens().square(PIXELS))
-    return pictures(scene, cameras, [scene.light], torch.device("cpu"))[0]
+    return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))
 
 
 def draw_pictures(

@@ -11,6 +11,7 @@ import numpy as np
 from texgs.cli.stages.outcome import Outcome
 from texgs.cli.stages.settings import Distance, FitLabel, OfDataset
 from texgs.config.edit import Edit
+from texgs.config.fields import kinds
 from texgs.config.methods import method_of
 from texgs.core.device import torch_device
 from texgs.edit.parts import parts_of
@@ -22,7 +23,7 @@ from texgs.scene.scene_file import read_scene, write_scene
 
 FALLEN = "How the loss of the edit fell, term by term."
 POINTS = 100  # of a curve of losses at most
-SHOWN = "Before and after the edit, under the light of the scene and under another one."
+SHOWN = "Before and after the edit; what can be relit, under another light too."
 VIEWS = "views."  # before the name of a model, in the names of inputs
 
 
@@ -66,7 +67,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     write_scene(output / "scene.yaml", edited.scene)
     pictures = dict(edited.pictures)
     if method.is_look:
-        write_before_and_after(before, edited.scene, settings.lens.lens, output, device, title)
+        kind = kinds()[settings.fit.field]
+        write_before_and_after(before, edited.scene, kind, settings.lens.lens, output, device, title)
         pictures["edit.png"] = SHOWN
     if edited.losses:
         write_convergence(output / "convergence.png", edited.losses)
