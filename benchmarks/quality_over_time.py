@@ -2,7 +2,7 @@
 
 `python -m benchmarks.quality_over_time OUTPUT RECIPE,RECIPE... KEY=VALUE...` fits with each recipe in a
 folder of its own and writes OUTPUT.csv and OUTPUT.png; words with = choose the data set and its basic TF, as
-for `texgs texture`. The clock stands still while a model is looked at. Views, seeds and starts are not counted.
+for `texgs texture`. The clock stands still while a model is looked at; views, seeds and starts do not count.
 """
 
 from __future__ import annotations

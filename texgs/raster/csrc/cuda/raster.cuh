@@ -88,7 +88,7 @@ int backward_slot_width(const Raster&);
 void backward(const Raster&, cudaStream_t);
 void sum_slots(const Raster&, int maximum, cudaStream_t);  // `maximum`: place to take the largest of, or -1
 void surfel_gradients(const Raster&, cudaStream_t);
-void largest_magnitude(const float*, int64_t n, bool known, uint32_t* bits, cudaStream_t);
+void largest_magnitude(const float*, int64_t n, bool finite_only, uint32_t* bits, cudaStream_t);
 void texel_gradients(const Raster&, cudaStream_t);
 int contribute_slot_width(const Raster&);
 void contribute(const Raster&, cudaStream_t);

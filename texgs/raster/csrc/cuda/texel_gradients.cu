@@ -96,7 +96,7 @@ __global__ __launch_bounds__(kThreads) void texel_kernel(const Raster r) {
     }
     const auto visit = [&](int place) {
         const TextureTable& texture = chunk.textures[place];
-        const bool known = isfinite(texture.gain);
+        const bool gain_is_finite = isfinite(texture.gain);
         Given given{};
         bool seen = false;
 #pragma unroll
@@ -104,7 +104,7 @@ __global__ __launch_bounds__(kThreads) void texel_kernel(const Raster r) {
             if (!(chunk.masks[place] & at.blocks[p])) continue;
             const Fragment f = evaluate<Surfel<float>>(chunk.records[place], at.x(), at.y(p), r.options);
             const float w = blend(f.alpha, limit, transmittance[p]);
-            if (!(w > 0.0f && known)) continue;
+            if (!(w > 0.0f && gain_is_finite)) continue;
             seen = true;
             const TexelCoordinates coordinates(texture, f.u, f.v);
             given.x[p] = coordinates.x, given.y[p] = coordinates.y;
@@ -137,11 +137,12 @@ __global__ __launch_bounds__(kBlock) void convert_kernel(const Raster r) {
     if (i < 3 * r.surfels.n_texels) r.out.texels[i] = FixedPoint(r).value(r.texel_sums[i]);
 }
 
-// Positive floats are ordered as their bits are, infinity and NaN above all. `known`: of those that are finite.
-__global__ __launch_bounds__(kBlock) void largest_kernel(const float* values, int64_t n, bool known, uint32_t* bits) {
+// Positive floats are ordered as their bits are, infinity and NaN above all. `finite_only`: of those that are finite.
+__global__ __launch_bounds__(kBlock) void largest_kernel(const float* values, int64_t n, bool finite_only,
+                                                         uint32_t* bits) {
     uint32_t most = 0;
     for (int64_t i = int64_t(blockIdx.x) * kBlock + threadIdx.x; i < n; i += int64_t(gridDim.x) * kBlock)
-        if (!known || isfinite(values[i])) most = max(most, __float_as_uint(fabsf(values[i])));
+        if (!finite_only || isfinite(values[i])) most = max(most, __float_as_uint(fabsf(values[i])));
 #pragma unroll
     for (int step = kWarp / 2; step >= 1; step /= 2) most = max(most, __shfl_xor_sync(kAllLanes, most, step));
     if (lane_index() == 0 && most) atomicMax(bits, most);
@@ -149,9 +150,9 @@ __global__ __launch_bounds__(kBlock) void largest_kernel(const float* values, in
 
 }  // namespace
 
-void largest_magnitude(const float* values, int64_t n, bool known, uint32_t* bits, cudaStream_t stream) {
+void largest_magnitude(const float* values, int64_t n, bool finite_only, uint32_t* bits, cudaStream_t stream) {
     const int64_t blocks = blocks_for(n, kBlock);
-    launch(largest_kernel, blocks < 1024 ? blocks : 1024, kBlock, stream, values, n, known, bits);
+    launch(largest_kernel, blocks < 1024 ? blocks : 1024, kBlock, stream, values, n, finite_only, bits);
 }
 
 void texel_gradients(const Raster& r, cudaStream_t stream) {
