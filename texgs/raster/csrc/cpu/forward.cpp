@@ -5,7 +5,7 @@
 // other; the second carries the transmittance from one to the next; the third blends.
 #include "isa.h"
 #include "replay.h"
-#include "texture.h"
+#include "texel_pairs.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
@@ -23,6 +23,9 @@ struct alignas(64) ForwardScratch {
     float weight[kBatch][kLanes], depth[kBatch][kLanes], u[kBatch][kLanes], v[kBatch][kLanes];
     int32_t texel[kBatch][kLanes];
     int32_t list[kChunk + 16];
+#if defined(TEXGS_AVX512)
+    TexelPairs pairs;
+#endif
 };
 
 // A batch of surfels, by their place in the chunk.
@@ -137,13 +140,27 @@ TEXGS_INLINE void blend_texture(ForwardScratch& s, Batch batch, int pixel) {
     }
     vf sum[3];
     for (int c = 0; c < 3; ++c) sum[c] = load(s.color[c] + pixel);
+#if defined(TEXGS_AVX512)
+    s.pairs.clear();
+#endif
     for (int j = 0; j < batch.n; ++j) {
         const TextureTable& table = s.textures.of[batch.list[j]];
-        const vf w = load(s.weight[j]) * vf(table.gain);
+        const vf weight = load(s.weight[j]), w = weight * vf(table.gain), fx = load(s.u[j]), fy = load(s.v[j]);
+        const vi first = load(s.texel[j]);
+#if defined(TEXGS_AVX512)
+        if (!table.planes) {
+            if (any(weight > vf(0.0f))) s.pairs.add(table, first, fx, fy, w);
+            continue;
+        }
+#endif
         vf texel[3];
-        sample(table, load(s.texel[j]), load(s.u[j]), load(s.v[j]), texel);
+        sample(table, first, fx, fy, texel);
         for (int c = 0; c < 3; ++c) sum[c] = fma(w, texel[c], sum[c]);
     }
+#if defined(TEXGS_AVX512)
+    if (s.pairs.is_used)
+        for (int c = 0; c < 3; ++c) sum[c] += s.pairs.sum_of(c);
+#endif
     for (int c = 0; c < 3; ++c) store(s.color[c] + pixel, sum[c]);
 }
 

@@ -17,11 +17,18 @@ struct Touches {
     float x[kTilePixels + 16], y[kTilePixels + 16], g[3][kTilePixels + 16];
 };
 
+// Where pixels fall in a part, and their bilinear weights times the gradient's.
+struct Places {
+    int32_t texel[kTilePixels + 16];  // the first float of the upper left one of four
+    float weight[4][kTilePixels + 16];
+};
+
 struct alignas(64) TextureScratch {
     Chunk chunk;
     TextureTables textures;
     Group group;
     Touches touches;
+    Places places;
     float gradient[3][kTilePixels];
     float transmittance[kTilePixels];
     float alpha[kVectors][kLanes], x[kVectors][kLanes], y[kVectors][kLanes];
@@ -67,8 +74,9 @@ TEXGS_INLINE void blend_surfel(TextureScratch& s, const Limits& limits, int begi
             for (int c = 0; c < 3; ++c) store_chosen(t.g[c] + n, w * load(s.gradient[c] + pixel), hit);
             n += count(hit);
         }
-    t.x[n] = t.y[n] = t.g[0][n] = t.g[1][n] = t.g[2][n] = 0.0f;  // pixels may be taken in pairs
     t.n = n;
+    store(t.x + n, t.x[0]), store(t.y + n, t.y[0]);  // pixels are taken in groups, of which the last may go on here
+    for (int c = 0; c < 3; ++c) store(t.g[c] + n, 0.0f);
 }
 
 #if defined(TEXGS_AVX512)
@@ -100,38 +108,54 @@ TEXGS_INLINE void add_to_registers(const Touches& t, const TextureTable& table, 
 #endif
 
 // Bounds of the texels that the surfel's pixels in this tile touch.
-TexelPart touched_part(const Touches& t, const TextureTable& table) {
-    float low_x = t.x[0], low_y = t.y[0], high_x = t.x[0], high_y = t.y[0];
-    for (int i = 1; i < t.n; ++i) {
-        low_x = t.x[i] < low_x ? t.x[i] : low_x, high_x = t.x[i] > high_x ? t.x[i] : high_x;
-        low_y = t.y[i] < low_y ? t.y[i] : low_y, high_y = t.y[i] > high_y ? t.y[i] : high_y;
+TEXGS_INLINE TexelPart touched_part(const Touches& t, const TextureTable& table) {
+    vf low_x = t.x[0], low_y = t.y[0], high_x = low_x, high_y = low_y;
+    for (int i = 0; i < t.n; i += kLanes) {
+        const vf x = load(t.x + i), y = load(t.y + i);
+        low_x = min(low_x, x), high_x = max(high_x, x), low_y = min(low_y, y), high_y = max(high_y, y);
     }
     const int columns = static_cast<int>(table.columns), rows = static_cast<int>(table.rows);
-    const int right = static_cast<int>(high_x) + 2, bottom = static_cast<int>(high_y) + 2;
+    const int right = static_cast<int>(largest(high_x)) + 2, bottom = static_cast<int>(largest(high_y)) + 2;
     TexelPart part{};
-    part.column = static_cast<int>(low_x), part.row = static_cast<int>(low_y);
+    part.column = static_cast<int>(-largest(-low_x)), part.row = static_cast<int>(-largest(-low_y));
     part.columns = (right < columns ? right : columns) - part.column;
     part.rows = (bottom < rows ? bottom : rows) - part.row;
     return part;
 }
 
-// Larger ones are scattered to memory: four floats a texel.
-void add_to_memory(const Touches& t, const TexelPart& part) {
-    std::memset(part.sums, 0, sizeof(float) * 4 * part.columns * part.rows);
-    for (int i = 0; i < t.n; ++i) {
-        const float x = t.x[i] - part.column, y = t.y[i] - part.row;
-        const int column = static_cast<int>(x), row = static_cast<int>(y);
-        const float fx = x - column, fy = y - row;
-        const float g[4] = {t.g[0][i], t.g[1][i], t.g[2][i], 0.0f};
-        const auto add = [&](int right, int down, float weight) {
-            float* texel = part.sums + 4 * ((row + down) * part.columns + column + right);
-            for (int c = 0; c < 4; ++c) texel[c] += weight * g[c];
-        };
-        // at the border there is no neighbour, and its weight is 0
-        const int right = column + 1 < part.columns, down = row + 1 < part.rows;
-        add(0, 0, (1 - fx) * (1 - fy)), add(right, 0, fx * (1 - fy));
-        add(0, down, (1 - fx) * fy), add(right, down, fx * fy);
+TEXGS_INLINE void find_places(const Touches& t, const TexelPart& part, Places& places) {
+    const vf column = float(part.column), row = float(part.row), columns = float(part.columns);
+    const vf last_column = float(part.columns > 1 ? part.columns - 2 : 0),
+             last_row = float(part.rows > 1 ? part.rows - 2 : 0);
+    for (int i = 0; i < t.n + 3; i += kLanes) {
+        const vf x = load(t.x + i) - column, y = load(t.y + i) - row;
+        const vf cx = min(floor(x), last_column), cy = min(floor(y), last_row);
+        const vf fx = x - cx, fy = y - cy, one = 1.0f;
+        store(places.texel + i, truncate(vf(4.0f) * fma(cy, columns, cx)));
+        store(places.weight[0] + i, (one - fx) * (one - fy));
+        store(places.weight[1] + i, fx * (one - fy));
+        store(places.weight[2] + i, (one - fx) * fy);
+        store(places.weight[3] + i, fx * fy);
     }
+}
+
+// Larger ones are scattered to memory: four floats a texel. Neighbouring pixels share texels, and each would wait for
+// the one before; so pixels are taken from four places in turn.
+void add_to_memory(const Touches& t, const TexelPart& part, Places& places) {
+    std::memset(part.sums, 0, sizeof(float) * 4 * part.columns * part.rows);
+    find_places(t, part, places);
+    const int right = part.columns > 1 ? 4 : 0, down = part.rows > 1 ? 4 * part.columns : 0;
+    const int steps[4] = {0, right, down, right + down};
+    const int quarter = (t.n + 3) / 4;
+    for (int k = 0; k < quarter; ++k)
+        for (int i = k; i < 4 * quarter; i += quarter) {
+            const float g[4] = {t.g[0][i], t.g[1][i], t.g[2][i], 0.0f};
+            for (int corner = 0; corner < 4; ++corner) {
+                float* texel = part.sums + places.texel[i] + steps[corner];
+                const float weight = places.weight[corner][i];
+                for (int c = 0; c < 4; ++c) texel[c] += weight * g[c];
+            }
+        }
 }
 
 void add_surfel(const Raster& r, TextureScratch& s, const Limits& limits, TexelArena& arena, int k) {
@@ -144,7 +168,7 @@ void add_surfel(const Raster& r, TextureScratch& s, const Limits& limits, TexelA
     if (!registers) part = touched_part(s.touches, table);
     part.sums = take(arena, registers ? 48 * registers : 4 * part.columns * part.rows);
     if (!part.sums) return;
-    if (!registers) add_to_memory(s.touches, part);
+    if (!registers) add_to_memory(s.touches, part, s.places);
 #if defined(TEXGS_AVX512)
     if (registers == 1) add_to_registers<1>(s.touches, table, part.sums);
     if (registers == 2) add_to_registers<2>(s.touches, table, part.sums);
