@@ -21,8 +21,8 @@ RESULTS, DOCS = Path("results/orbital"), Path("docs")
 SCENES = RESULTS / "scene" / "demo"
 LOOKS = {  # title: scene file below SCENES
     "as fitted": "compose/scene.yaml",
-    "recoloured": "pse/pse-3.yaml",
-    "relit": "pse/pse-5.yaml",
+    "recoloured": "pse/pse-2.yaml",
+    "relit": "pse/pse-4.yaml",
     "stained glass": "edits/glass/scene.yaml",
     "gold": "edits/gold/scene.yaml",
     "painted": "edits/painted/scene.yaml",

@@ -48,6 +48,12 @@ def test_the_jobs_of_a_run_are_counted_each_once():
     assert expected.seconds == pytest.approx(by_hand)
 
 
+def test_of_a_sweep_the_jobs_are_counted_that_a_run_goes_through():
+    stages = forecast.forecast(("dataset=orbital", "fit=demo", "fit.texture.sweeps=1,2")).to_do
+    assert stages["texture"] == 4
+    assert not {"figure", "compose", "pse", "timing", "page"} & set(stages)
+
+
 def test_the_doctor_tells_what_a_run_finds_and_about_how_long_it_takes(capsys, tmp_path):
     words = ["datasets=[engine,wood,orbital]", "views=small", "fit=quick", "missing=skip", "edits=[style]"]
     assert main(["doctor", *words]) == 0

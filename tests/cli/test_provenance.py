@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from texgs.cli.provenance import device
+from texgs.cli.provenance import device, seed
 
 
 class Cuda:
@@ -33,3 +33,9 @@ class Cuda:
 def test_the_device_is_what_showed_the_scene(monkeypatch, settings, is_used, expected):
     monkeypatch.setitem(sys.modules, "torch", SimpleNamespace(cuda=Cuda(is_used)))
     assert device(settings).split()[-1] == expected
+
+
+def test_the_seed_of_a_page_is_that_of_its_look():
+    page = {"look_seed": 3, "fit": {"seed": 1}}
+    assert seed({**page, "look": "gold"}) == 3
+    assert seed({**page, "look": "none"}) == 1

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import shutil
 import time
 
 import pytest
@@ -86,6 +87,17 @@ def test_a_damaged_result_is_where_its_repair_begins(output):
     assert sorted(files(result.claim(output, MINE))) == [result.STAMP, "good.png"]
 
 
+def test_a_job_that_is_to_begin_anew_takes_nothing_and_keeps_the_result_until_it_is_done(output):
+    make(output)
+    before = files(output)
+    (result.claim(output, OTHER) / "half.png").write_text("half")
+    for _ in range(2):
+        work = result.claim(output, MINE, is_fresh=True)
+        assert sorted(files(work)) == [result.STAMP]
+        assert files(output) == before
+        (work / "half.png").write_text("half")
+
+
 @pytest.mark.parametrize("killed_after", ["the first rename", "the second"])
 def test_a_swap_that_was_killed_is_finished(output, killed_after):
     make(output, OTHER, "old")
@@ -93,7 +105,7 @@ def test_a_swap_that_was_killed_is_finished(output, killed_after):
     make_beside = output.with_name("other")
     make(make_beside, MINE, "new")
     work, old = result.work_folder(output), output.with_name(".views.old")
-    result.discard_work(output)
+    shutil.rmtree(work)
     output.rename(old)
     make_beside.rename(work if killed_after == "the first rename" else output)
     result.recover(output)

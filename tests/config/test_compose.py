@@ -26,6 +26,17 @@ def test_groups_combine():
     )
 
 
+def test_a_copied_file_does_not_take_the_place_of_its_original(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "conf" / "fit").mkdir(parents=True)
+    (tmp_path / "conf" / "fit" / "mine.yaml").write_text("defaults: [quick]\ntexture: {sweeps: 1}\n")
+    with pytest.raises(
+        ConfigError, match=r"fit=mine: expected `name: mine` in its file, got quick; change it"
+    ):
+        compose(("fit=mine",))
+    assert compose(("fit=mine", "fit.name=other")).fit.name == "other"
+
+
 def test_interpolations_are_resolved():
     config = compose(("dataset.image=300", "results=elsewhere"))
     assert (config.views.width, config.views.height) == (300, 300)

@@ -194,6 +194,15 @@ def test_edits_that_lack_something_go_with_all_that_start_from_them():
     assert [each.what for each in selection.left_out] == ["edit lobe"]
 
 
+def test_a_sweep_of_edits_without_any_has_no_fits_either():
+    """Its table would be promised, and nothing would be in it."""
+    words = ("dataset=orbital", "fit=demo", "sweep=lambda_s", "missing=skip")
+    selection = selected(words, lambda config: ["no weights"] if config.edit.name == "style" else [])
+    assert not selection.by_sweep.get("lambda_s")
+    assert {entry.why for entry in selection.left_out} == {"no weights"}
+    assert selected(words, nothing).by_sweep["lambda_s"]
+
+
 def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
     """Each shipped union, with all data and weights there: the same folder is always the same job."""
     files = (ROOT / "conf" / "experiment").glob("*.yaml")

@@ -24,6 +24,19 @@ def test_only_what_a_stage_reads_changes_its_digest():
     assert digest("volume", "dataset.volume.size=64") != digest("volume")
 
 
+def test_a_phase_is_not_changed_by_what_later_ones_read():
+    """From a recipe as its file has it: the first change of any key must not count for all phases."""
+    of_tf = ("tf=TF01", "fit=quick")
+    before = {name: digest(name, *of_tf) for name in ("surfels", "shading", "texture", "compose")}
+    for change, changed in {
+        "fit.texture.sweeps=1": {"texture", "compose"},
+        "fit.shading.iterations=10": {"shading", "texture", "compose"},
+        "fit.materials=surfel": {"shading", "texture", "compose"},
+        "fit.low_pass=3": set(before),
+    }.items():
+        assert {name for name in before if digest(name, *of_tf, change) != before[name]} == changed, change
+
+
 def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     config = compose(("dataset=turbulence", "tf=TF01"))

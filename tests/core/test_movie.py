@@ -24,6 +24,14 @@ def test_a_folder_of_pictures(tmp_path):
     assert np.asarray(Image.open(tmp_path / "turn" / "0002.png"))[0, 0, 0] == 120
 
 
+@pytest.mark.parametrize("fps", [15, 24, 30, 40, 50])
+def test_a_gif_takes_as_long_as_it_should(tmp_path, fps):
+    """It counts in hundredths of a second, of which a frame may not have a whole number."""
+    grey = [np.full((8, 8, 3), index, dtype=np.uint8) for index in range(fps)]
+    with Image.open(write_frames(tmp_path / "a.gif", grey, fps=fps)) as gif:
+        assert sum(frame.info["duration"] for frame in ImageSequence.Iterator(gif)) == 1000
+
+
 def test_gif_and_mp4_hold_the_frames_at_their_rate(tmp_path):
     av = pytest.importorskip("av")
     write_frames(tmp_path / "a.gif", frames(), fps=20)
@@ -43,6 +51,7 @@ def test_gif_and_mp4_hold_the_frames_at_their_rate(tmp_path):
 @pytest.mark.parametrize(
     ("name", "given", "fps", "message"),
     [
+        ("a.gif", 2, 51, "fps: expected at most 50 in a GIF, got 51; write an MP4 film"),
         ("a.avi", 2, 25, r"expected \.png, \.gif, \.mp4 or a folder, got \.avi"),
         ("a.png", 2, 25, "expected one frame, got several"),
         ("a.mp4", 0, 25, "expected at least one frame, got none"),

@@ -69,6 +69,17 @@ def test_a_group_inside_of_others_has_what_the_tightest_leaves(tmp_path, monkeyp
     assert memory.free_memory() == 400_000
 
 
+def test_a_group_of_the_first_version_counts(tmp_path, monkeypatch):
+    (tmp_path / "own").write_text("12:pids:/a\n4:cpu,memory:/slurm/job_7\n1:name=systemd:/b\n")
+    (job := tmp_path / "memory" / "slurm" / "job_7").mkdir(parents=True)
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    monkeypatch.setattr(memory, "GROUP", tmp_path / "own")
+    (job / "memory.limit_in_bytes").write_text("500000\n")
+    (job / "memory.usage_in_bytes").write_text("300000\n")
+    (job / "memory.stat").write_text("cache 9\ninactive_file 100000\ntotal_inactive_file 100000\n")
+    assert memory.free_memory() == 300_000
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="what counts is told by Linux")
 def test_a_limit_of_the_process_counts():
     import resource

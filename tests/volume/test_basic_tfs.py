@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.volume.functions import GREY, STEPS, TENT, functions
 from texgs.core.errors import ArgumentError
-from texgs.volume.basic_tfs import check_disjoint, combine, split
+from texgs.volume.basic_tfs import check_disjoint, combine, just_above, split
 from texgs.volume.transfer import TransferFunction
 
 
@@ -80,3 +80,11 @@ def test_functions_that_overlap_are_not_combined():
         combine({"a": TENT, "b": TENT})
     with pytest.raises(ArgumentError, match="transfer functions: expected at least one, got none"):
         combine({})
+
+
+@pytest.mark.parametrize("value", [0.0, -0.0, 1e-45, -1e-40, 3e-33, 1.0, -255.0, 1e30])
+def test_what_is_just_above_a_value_is_so_for_the_caster(value):
+    """Which multiplies with the inverse of the difference, in single precision."""
+    difference = np.float32(just_above(value)) - np.float32(value)
+    assert 0 < difference <= max(1e-6 * abs(value), 2e-38)
+    assert np.isfinite(np.float32(1) / difference)

@@ -52,3 +52,8 @@ def test_another_file_or_none_is_one_sentence_and_keeps_nothing(address, tmp_pat
     with pytest.raises(ArgumentError, match="cannot be downloaded"):
         download(f"{address}.not-there", SHA256, path)
     assert not path.exists()
+
+
+def test_an_address_that_is_none_is_no_wrong_checksum(tmp_path):
+    with pytest.raises(ArgumentError, match=r"https:///a\.raw: cannot be downloaded"):
+        download("https:///a.raw", SHA256, tmp_path / "a.raw")

@@ -1,3 +1,4 @@
+import contextlib
 import subprocess
 
 import pytest
@@ -49,3 +50,11 @@ def test_without_vtk_every_problem_is_told(monkeypatch):
         opengl.probe()
     monkeypatch.setattr(opengl.sys, "platform", "darwin")
     assert opengl.probe() == "provided by the system, not tried without VTK"
+
+
+def test_nothing_of_the_folder_is_run(tmp_path, monkeypatch):
+    (tmp_path / "ctypes.py").write_text("from pathlib import Path; Path('was-run').touch()")
+    monkeypatch.chdir(tmp_path)
+    with contextlib.suppress(DeviceError):  # where nothing renders
+        opengl.offscreen_opengl()
+    assert not (tmp_path / "was-run").exists()

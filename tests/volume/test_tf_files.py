@@ -102,10 +102,14 @@ class TestParaView:
         first, second = {"Name": "a", "RGBPoints": RED_TO_BLUE}, {"Name": "b", "RGBPoints": [0, 0, 1, 0] * 2}
         second["RGBPoints"][4] = 7
         path.write_text(json.dumps([first, second]))
-        assert read_tf(path).support == (0, 1)
+        assert read_tf(path, "a").support == (0, 1)
         assert read_tf(path, "b").support == (0, 7)
         with pytest.raises(ArgumentError, match="expected a name in the file, got 'c'; it holds a, b"):
             read_tf(path, "c")
+        with pytest.raises(
+            ArgumentError, match=r"two\.json: expected one preset, got 2: a, b; export the one"
+        ):
+            read_tf(path)
 
 
 @pytest.mark.parametrize(

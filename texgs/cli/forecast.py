@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import statistics
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
@@ -71,28 +71,33 @@ def forecast(words: tuple[str, ...]) -> Forecast:
 
 
 def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
-    """All jobs of a selection, each once, with their configurations; not those whose files are not there.
+    """The jobs that a run goes through, with their configurations; not those whose files are not there.
 
     Raises:
         ConfigError, ArgumentError: for what would stop the run, as `texgs.cli.plan.add_jobs`.
     """
     from texgs.cli.fits import check_fit
     from texgs.cli.job import Job
+    from texgs.cli.plan import made
     from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.stages import jobs
     from texgs.core.checksum import Checksums
 
-    checksums, seen = Checksums.load(), set()
-    for config in (each for some in selection.by_sweep.values() for each in some):
+    checksums, configs, sweeps = Checksums.load(), dict[str, DictConfig](), defaultdict[str, list[str]](list)
+    by_folder: dict[str, Job] = {}
+    for sweep, config in ((name, each) for name, some in selection.by_sweep.items() for each in some):
         check_basic_tfs(config.dataset)
         check_fit(config)
         try:
             for stage, each in jobs(config):
-                if (folder := stage.output(each)) not in seen:
-                    seen.add(folder)
-                    yield Job.of(stage, each, checksums), each
+                folder = stage.output(each).as_posix()
+                if folder not in by_folder:
+                    by_folder[folder], configs[folder] = Job.of(stage, each, checksums), each
+                sweeps[sweep].append(folder)
         except MissingDataError:  # told where the selection is shown
             continue
+    run = made(sweeps, by_folder)
+    yield from ((job, configs[folder]) for folder, job in by_folder.items() if folder in run)
 
 
 def iterations(settings: Any) -> int:

@@ -64,6 +64,11 @@ class Job:
             "inputs": files,
         }
 
+    def made_from(self) -> dict[str, Path]:
+        """The inputs that are files of other results."""
+        files = self.inputs.items()
+        return {name: path for name, path in files if path.name in result.recorded(path.parent)}
+
     def is_done(self) -> bool:
         """Whether the folder holds the whole result of exactly this job."""
         if not result.is_complete(self.output, self.checksums):
@@ -91,15 +96,13 @@ def execute(job: Job, tracking: Tracking, *, force: bool = False) -> bool:
     """
     with result.alone(job.output):
         result.recover(job.output)
-        if force:
-            result.discard_work(job.output)
-        elif job.is_done():
+        if not force and job.is_done():
             return False
-        _execute(job, tracking)
+        _execute(job, tracking, is_fresh=force)
     return True
 
 
-def _execute(job: Job, tracking: Tracking) -> None:
+def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
     for name, path in job.inputs.items():
         if not path.exists():
             raise ArgumentError(
@@ -110,7 +113,7 @@ def _execute(job: Job, tracking: Tracking) -> None:
     module = importlib.import_module(job.stage.module)
     settings = _typed(module.Settings, job)
     identity = job.identity()
-    work = result.claim(job.output, identity)
+    work = result.claim(job.output, identity, is_fresh=is_fresh)
     with track.run(
         tracking.uri,
         experiment=tracking.experiment,
@@ -122,7 +125,7 @@ def _execute(job: Job, tracking: Tracking) -> None:
         outcome: Outcome = module.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         metrics = {
-            **record(job.settings, identity, seconds),
+            **record(job.settings, identity, job.made_from(), seconds),
             "run": run.id,
             "result": type(outcome.result).__name__,
             "numbers": plain(outcome.result),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import sys
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -118,13 +119,20 @@ def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -
 
     from texgs.core.io import read_json
     from texgs.volume.basic_tfs import check_disjoint
-    from texgs.volume.suggest import suggest
+    from texgs.volume.suggest import looks_like_labels, suggest
     from texgs.volume.tf_files import read_tf
 
     summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     low, high = summary["minimum"], summary["maximum"]
     if not files:
-        suggested = suggest(np.array(summary["histogram"]), low, high, count)
+        histogram = np.array(summary["histogram"])
+        suggested = suggest(histogram, low, high, count)
+        if looks_like_labels(histogram) and np.dtype(summary["dtype"]).kind == "f":
+            sys.stderr.write(
+                f"{config.dataset.name}: values are in {np.count_nonzero(histogram)} of {len(histogram)} parts "
+                f"of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing samples, "
+                "write NaN in its place and add nan_value=...\n"
+            )
         return {name: rounded(tf, low, high) for name, tf in suggested.items()}
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}
     check_disjoint(basic)

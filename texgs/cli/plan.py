@@ -102,6 +102,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
 def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
     from texgs.cli.absent import lacking, left_out, missing_weights
+    from texgs.cli.earlier import earlier
     from texgs.config.compose import compose
     from texgs.config.experiments import apart, selected
     from texgs.config.places import edit_folder, fit_folder
@@ -111,16 +112,21 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     checksums, selection = Checksums.load(), selected(words, lacking)
     configs = [each for some in selection.by_sweep.values() for each in some]
     config = compose(apart(words)[0])
+    results = Path(config.results).as_posix()  # as the folders of the jobs have it
     jobs: dict[str, Job] = {}
     missing: list[str] = []
     sweeps = {sweep: add_jobs(some, checksums, jobs, missing) for sweep, some in selection.by_sweep.items()}
+    run = {folder: jobs[folder] for folder in made(sweeps, jobs)}
+    others, outdated = earlier(results, run, checksums)
+    plain_jobs = {folder: plain(job, results) for folder, job in jobs.items()}
+    note_results(jobs.values(), [each["settings"] for each in plain_jobs.values()])
     plan = Plan(
-        config.results,
+        results,
         config.tracking.uri,
         config.tracking.experiment,
         int(any(each.views.mapper == "gpu" for each in configs)),
         int(any(each.device.name == "cuda" for each in configs)),
-        {folder: plain(job, config.results) for folder, job in jobs.items()},
+        plain_jobs,
         sweeps,
         downloads(configs),
         {
@@ -132,8 +138,8 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
             "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
         },
         {module: code_digest(module) for module in OTHER_CODE},
-        left_out(selection.left_out, config.results),
-        earlier(config.results, made(sweeps, jobs), checksums),
+        left_out({**selection.left_out, **outdated}, results),
+        others,
     )
     checksums.save()
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
@@ -188,31 +194,11 @@ def made(sweeps: Mapping[str, Iterable[str]], jobs: Mapping[str, Job]) -> set[st
     return folders
 
 
-def earlier(results: str, jobs: Iterable[str], checksums: Checksums) -> dict[str, str]:
-    """The metrics files of whole results that none of these jobs makes, with digests of their contents."""
-    from texgs.cli.result import METRICS, is_complete
-    from texgs.report.metrics_files import below
-
-    others = {path.parent.as_posix() for path in below(results)} - set(jobs)
-    return {
-        f"{folder}/{METRICS}": checksums.of(Path(folder, METRICS))
-        for folder in sorted(others)
-        if is_complete(Path(folder), checksums)
-    }
-
-
 def plain(job: Job, results: str) -> dict[str, Any]:
-    """A job in plain values; its settings file is written, with a note where its result is not of this job.
-
-    Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the
-    result before it in place, it learns by this: it takes a file for changed where its contents are.
-    """
-    from texgs.cli.result import METRICS
-    from texgs.config.stage import note_result, settings_file
+    """A job in plain values; its settings file is written."""
+    from texgs.config.stage import settings_file
 
     settings = settings_file(job.settings, results)
-    if (job.output / METRICS).exists():
-        note_result(settings, None if job.is_done() else f"{job.output}: not whole, or of another job")
     inputs = {name: path.as_posix() for name, path in job.inputs.items()}
     return {
         "stage": job.stage.name,
@@ -222,6 +208,23 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "inputs": inputs,
         "swept": dict(job.swept),
     }
+
+
+def note_results(jobs: Iterable[Job], settings: Iterable[str]) -> None:
+    """Note in the settings files of jobs whether a result that is there is not theirs; several may share one.
+
+    Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the
+    result before it in place, it learns by this: it takes a file for changed where its contents are.
+    """
+    from texgs.cli.result import METRICS
+    from texgs.config.stage import note_result
+
+    wrong: dict[str, list[str]] = {}
+    for job, file in zip(jobs, settings, strict=True):
+        if (job.output / METRICS).exists():
+            wrong.setdefault(file, []).extend([] if job.is_done() else [str(job.output)])
+    for file, outputs in wrong.items():
+        note_result(file, f"{', '.join(outputs)}: not whole, or of another job" if outputs else None)
 
 
 def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:

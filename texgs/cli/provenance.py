@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from texgs import __version__
+from texgs.config.methods import NO_METHOD
 from texgs.core.memory import MIB, peak_memory
 
 PACKAGES = (  # whose code decides results
@@ -21,12 +22,15 @@ PACKAGES = (  # whose code decides results
 )
 
 
-def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: float) -> dict[str, Any]:
+def record(
+    settings: Mapping[str, Any], identity: Mapping[str, Any], made_from: Mapping[str, Path], seconds: float
+) -> dict[str, Any]:
     """Where and how the result of a job came about.
 
     Args:
         settings: of the job.
         identity: digests of its settings and code, checksums of its inputs.
+        made_from: its inputs that are files of other results, by name.
         seconds: that its work took.
     """
     return {
@@ -41,6 +45,7 @@ def record(settings: Mapping[str, Any], identity: Mapping[str, Any], seconds: fl
         "code_sha": identity["code"],
         "git_sha": git_revision(),
         "inputs": identity["inputs"],
+        "made_from": {name: path.as_posix() for name, path in made_from.items()},
         "weights": settings.get("weights", {}),
         "versions": versions(),
         "machine": machine(),
@@ -76,6 +81,8 @@ def device(settings: Mapping[str, Any]) -> str:
 
 def seed(settings: Mapping[str, Any]) -> int | None:
     """The seed of the stage's random numbers, where it has one."""
+    if settings.get("look", NO_METHOD) != NO_METHOD:
+        return int(settings["look_seed"])
     parts = [settings.get(name, {}) for name in ("edit", "fit", "volume")]
     return next((part["seed"] for part in parts if "seed" in part), None)
 

@@ -82,19 +82,24 @@ def work_folder(output: Path) -> Path:
     return output.with_name(f".{output.name}.work")
 
 
-def claim(output: Path, identity: dict[str, Any]) -> Path:
+def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> Path:
     """The folder for a job to work in: empty, or with what an interrupted run of the same job left there.
 
     A damaged result of the same job is a start, too: its good files are kept.
+
+    Args:
+        output: folder of the result.
+        identity: of the job.
+        is_fresh: whether to begin from nothing; then the result stays in any case until it is replaced.
 
     Raises:
         ArgumentError: if the result's folder holds files that are not of texgs, or is no folder.
     """
     require_own(output)
     work = work_folder(output)
-    if stamped(work) != identity:
+    if is_fresh or stamped(work) != identity:
         shutil.rmtree(work, ignore_errors=True)
-        if stamped(output) == identity:
+        if not is_fresh and stamped(output) == identity:
             _take_back(output, work)
     write_json(work / STAMP, identity)
     remove_scratch(work)
@@ -131,11 +136,6 @@ def recover(output: Path) -> None:
         if (folder := next(complete, None)) is not None:
             folder.rename(output)
     shutil.rmtree(old, ignore_errors=True)
-
-
-def discard_work(output: Path) -> None:
-    """Forget what an interrupted run has left."""
-    shutil.rmtree(work_folder(output), ignore_errors=True)
 
 
 def stamped(folder: Path) -> Any:

@@ -20,6 +20,7 @@ from texgs.config.slips import sentence
 from texgs.config.typed import Written
 from texgs.core.errors import ConfigError
 
+NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
 ALONE = ("fit", "edit")  # groups that depend on no other one but the experiment
 
 # What Hydra and OmegaConf raise for values and files that they do not understand.
@@ -65,7 +66,25 @@ def _assembled(overrides: Words, places: Places) -> DictConfig:
         made = {**composition(rest, places), **nodes}
         config = configuration(composition(overrides, places) if refers(made, nodes) else made)
     check(config)
+    check_named(overrides, config)
     return config
+
+
+def check_named(overrides: Words, config: DictConfig) -> None:
+    """Require of chosen files that they have their own names: results would go to the folder of another.
+
+    Raises:
+        ConfigError: naming the file and what to write there.
+    """
+    for group in NAMED:
+        chosen = [word.partition("=")[2].strip("'\"") for word in overrides if word.startswith(f"{group}=")]
+        if any(re.match(rf"[+]*{group}\.name=", word) for word in overrides) or not chosen:
+            continue
+        if (name := config[group].name) != chosen[-1]:
+            raise ConfigError(
+                f"{group}={chosen[-1]}: expected `name: {chosen[-1]}` in its file, got {name}; "
+                f"change it there, or add {group}.name={name}"
+            )
 
 
 def refers(made: dict[str, Any], nodes: dict[str, Any]) -> bool:

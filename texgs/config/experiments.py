@@ -19,7 +19,7 @@ from texgs.config.schema import Config
 from texgs.config.slips import close
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
-from texgs.config.variants import changes
+from texgs.config.variants import changes, is_of_edits
 from texgs.core.errors import ConfigError
 
 Words = tuple[str, ...]
@@ -66,6 +66,8 @@ class Selection:
         listed = self.by_sweep[config.sweep.name if changes(config) else ""]
         for each in variants(words):
             edited, left = self.edited(each, several)
+            if is_of_edits(config) and not edited:
+                continue  # the fits alone are no variant of it
             own: Words = ()
             if left != list(compose(each).edits):  # a gallery then shows what is left
                 own = f"edits=[{','.join(left)}]", "gallery.grids=[]"

@@ -1,6 +1,6 @@
 """Which files and settings the stages of the workflow read."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -99,8 +99,13 @@ def lens(config: DictConfig) -> dict[str, float]:
     return {"radius": config.views.radius, "fov_y": config.views.fov_y}
 
 
-def fit_label(config: DictConfig) -> dict[str, Any]:
-    """Which fit this is, and what it runs on. One that variants of a sweep share is of none of them."""
+def fit_label(config: DictConfig, later: Sequence[str] = ()) -> dict[str, Any]:
+    """Which fit this is, and what it runs on. One that variants of a sweep share is of none of them.
+
+    Args:
+        config: of a job.
+        later: keys of the recipe that only later jobs read.
+    """
     variant = fit_variant(config)
     return {
         "fit": {
@@ -110,17 +115,17 @@ def fit_label(config: DictConfig) -> dict[str, Any]:
             "sweep": config.sweep.name if variant else NO_SWEEP,
             "variant": variant,
             "device": config.device.name,
-            "changed": is_changed(config.fit),
+            "changed": is_changed(config.fit, later),
         }
     }
 
 
-def is_changed(fit: DictConfig) -> bool:
-    """Whether a recipe is not that of the file with its name, but for its seed."""
+def is_changed(fit: DictConfig, later: Sequence[str] = ()) -> bool:
+    """Whether a recipe is not that of the file with its name, but for its seed and for some keys."""
     if fit.name not in members("fit"):
         return True
     file = compose((f"fit={fit.name}",)).fit
-    return any(fit[key] != file[key] for key in file if key != "seed")
+    return any(fit[key] != file[key] for key in file if key not in ("seed", *later))
 
 
 def view_settings(config: DictConfig) -> dict[str, Any]:
@@ -152,10 +157,10 @@ def with_recipe(config: DictConfig, name: str) -> DictConfig:
     return changed(config, fit=changed(config.fit, name=recipe.name, field=recipe.field))
 
 
-def recipe(*parts: str) -> Callable[[DictConfig], dict[str, Any]]:
-    """What a stage of the fit reads: what holds for all of them, and its own parts."""
+def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[DictConfig], dict[str, Any]]:
+    """What a stage of the fit reads: what holds for all, and its own parts; `later`: parts of later ones."""
     return lambda config: {
-        "fit": {**fit_label(config)["fit"], **{part: config.fit[part] for part in ("reduce", *parts)}}
+        "fit": {**fit_label(config, later)["fit"], **{part: config.fit[part] for part in ("reduce", *parts)}}
     }
 
 

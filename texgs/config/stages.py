@@ -41,6 +41,8 @@ from texgs.config.stage import Stage, for_tf
 
 LAST_PHASES = tuple(kind.phases[-1] for kind in kinds().values())  # which need those before
 EDITS = tuple(method.stage for method in methods().values())
+AFTER_SHADING = ("texture",)  # keys of a recipe that jobs read after a phase
+AFTER_SURFELS = ("materials", "first_material", "shading", *AFTER_SHADING)
 
 
 def edit_stage(method: Method) -> Stage:
@@ -114,7 +116,7 @@ ROWS = (
         "surfels",
         "texgs.cli.stages.surfels",
         select=lambda config: {
-            **recipe("low_pass", "facing", "material_range", "seeds")(config),
+            **recipe("low_pass", "facing", "material_range", "seeds", later=AFTER_SURFELS)(config),
             "phase": config.fit.surfels,
         },
         inputs=seeded,
@@ -126,7 +128,7 @@ ROWS = (
         "shading",
         "texgs.cli.stages.shading",
         select=lambda config: {
-            **recipe("material_range", "materials", "first_material")(config),
+            **recipe("material_range", "materials", "first_material", later=AFTER_SHADING)(config),
             "phase": config.fit.shading,
         },
         inputs=model_of("surfels"),
@@ -216,6 +218,7 @@ ROWS = (
         "texgs.cli.stages.page",
         select=lambda config: {
             "look": config.edit.name,
+            "look_seed": config.edit.seed,
             "embedded": config.page.embedded,
             **fit_label(config),
         },

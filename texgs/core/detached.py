@@ -6,7 +6,8 @@ import re
 from pathlib import Path
 
 LONGEST = 1 << 16  # bytes of such a header that are looked at
-KEYS = {".mhd": rb"^ElementDataFile\s*=(.*)$", ".nhdr": rb"^data ?file:(.*)$"}  # by suffix
+META, NRRD = rb"^\s*ElementDataFile\s*=(.*)$", rb"^data ?file:(.*)$"
+KEYS = {".mhd": META, ".mha": META, ".nhdr": NRRD, ".nrrd": NRRD}  # by suffix
 
 
 def samples_of(header: Path) -> Path | None:

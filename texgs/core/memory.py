@@ -14,7 +14,15 @@ from texgs.core.errors import OutOfMemoryError
 
 STATUS = Path("/proc/self/status")
 CGROUP, GROUP = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
-CONTAINER = ("memory.max", "memory.current", "memory.stat")  # what it may have, what it has, and which kinds
+CONTAINERS = (  # for each version of cgroups the line that names a group, its root, and the files with what
+    # it may have, what it has, and which kinds
+    (r"^0::/(.*)$", "", ("memory.max", "memory.current", "memory.stat")),
+    (
+        r"^\d+:(?:.*,)?memory(?:,.*)?:/(.*)$",
+        "memory",
+        ("memory.limit_in_bytes", "memory.usage_in_bytes", "memory.stat"),
+    ),
+)
 MIB, GIB = 1 << 20, 1 << 30
 SMALL = 64 << 20  # bytes that are there without asking
 NEW_OBJECTS = 50_000  # before the garbage collector looks at them
@@ -59,19 +67,21 @@ def free_memory() -> int:
 def container_limits() -> Iterator[int]:
     """Bytes that are left in each of the groups that this process is in, one inside of the other."""
     try:
-        own = re.search(r"^0::/(.*)$", GROUP.read_text(), re.MULTILINE)
+        groups = GROUP.read_text()
     except OSError:  # no Linux
-        own = None
-    group = CGROUP / (own[1] if own else "")
-    for folder in (group, *group.parents):
-        try:
-            most, used, kinds = ((folder / name).read_text() for name in CONTAINER)
-            cached = re.findall(r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE)  # given back on demand
-            yield int(most) - int(used) + sum(map(int, cached))
-        except (OSError, ValueError):  # no such group, or one without a limit: "max"
-            pass
-        if folder == CGROUP:
-            return
+        return
+    for line, root, names in CONTAINERS:
+        own = re.search(line, groups, re.MULTILINE)
+        group = CGROUP / root / (own[1] if own else "")
+        for folder in (group, *group.parents):
+            try:
+                most, used, kinds = ((folder / name).read_text() for name in names)
+                cached = re.findall(r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE)  # given back on demand
+                yield int(most) - int(used) + sum(map(int, cached))
+            except (OSError, ValueError):  # no such group, or one without a limit: "max"
+                pass
+            if folder == CGROUP:
+                break
 
 
 def require_memory(n_bytes: int, what: str, advice: str) -> None:
@@ -92,8 +102,13 @@ def require_memory(n_bytes: int, what: str, advice: str) -> None:
     free = free_memory()
     if n_bytes > free:
         raise OutOfMemoryError(
-            f"{what}: needs {n_bytes / GIB:.3g} GiB of memory, but {free / GIB:.3g} GiB are free; {advice}"
+            f"{what}: needs {_gib(n_bytes)} GiB of memory, but {_gib(free)} GiB are free; {advice}"
         )
+
+
+def _gib(n_bytes: int) -> str:
+    """A number of bytes in GiB, to three digits or a whole number."""
+    return f"{n_bytes / GIB:.3g}" if n_bytes < 1000 * GIB else f"{n_bytes / GIB:.0f}"
 
 
 @contextmanager

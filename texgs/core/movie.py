@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from functools import partial
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
 from typing import IO, Any
 
@@ -17,7 +17,7 @@ from texgs.core.io import write_atomic
 from texgs.core.memory import require_memory
 
 KINDS = (".png", ".gif", ".mp4")
-MOST_FPS = 240.0
+MOST_FPS, MOST_GIF_FPS = 240.0, 50.0  # browsers slow down shorter frames of a GIF
 FINE = 18  # constant rate factor of H.264 that looks like the frames
 
 
@@ -35,13 +35,16 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
         The path.
 
     Raises:
-        ArgumentError: if the ending is another one, there is no frame, or several where one is expected.
+        ArgumentError: if the ending is another one, frames follow each other too fast, there is no frame, or
+            several where one is expected.
     """
     path = Path(path)
     if path.suffix not in ("", *KINDS):
         raise ArgumentError(f"{path}: expected {', '.join(KINDS)} or a folder, got {path.suffix}")
     if not 0 < fps <= MOST_FPS:
         raise ArgumentError(f"fps: expected more than 0 and at most {MOST_FPS:g}, got {fps}")
+    if path.suffix == ".gif" and fps > MOST_GIF_FPS:
+        raise ArgumentError(f"fps: expected at most {MOST_GIF_FPS:g} in a GIF, got {fps}; write an MP4 film")
     left = iter(frames)
     first = next(left, None)
     if first is None:
@@ -76,9 +79,9 @@ def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> Non
         require_memory(n_bytes, "GIF: a copy of all frames, which Pillow makes,", "write an MP4 film")
         kept.append(Image.fromarray(frame))
     first, *rest = kept
-    first.save(
-        file, format="GIF", save_all=True, append_images=rest, duration=max(20, round(1000 / fps)), loop=0
-    )
+    ends = [round(100 * index / fps) for index in range(len(kept) + 1)]  # in hundredths of a second
+    durations = [10 * (end - start) for start, end in pairwise(ends)]
+    first.save(file, format="GIF", save_all=True, append_images=rest, duration=durations, loop=0)
 
 
 def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float, crf: int) -> None:

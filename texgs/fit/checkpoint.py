@@ -52,13 +52,13 @@ def latest(folder: str | Path) -> dict[str, Tensor] | None:
     Raises:
         ArgumentError: if the file cannot be read or is no checkpoint.
     """
-    from safetensors.torch import load
+    from safetensors.torch import load_file
 
     path = Path(folder) / NAME
     if not path.exists():
         return None
     with reading(path, "a checkpoint", "remove it to start from the beginning"):
-        state: dict[str, Tensor] = load(path.read_bytes())
+        state: dict[str, Tensor] = load_file(path)
     if "iteration" not in state:
         raise ArgumentError(f"{path}: expected a checkpoint, found no iteration in it; remove it")
     return state

@@ -42,6 +42,8 @@ class Fit:
         seed: of the order of views and of splits; with the same one, machine and versions results are equal.
     """
 
+    unit = "view"
+
     def __init__(
         self,
         parameters: Mapping[str, Tensor],

@@ -61,6 +61,8 @@ class PaletteFit:
         ArgumentError: if settings do not fit each other, or the views show nothing.
     """
 
+    unit = "step"
+
     def __init__(self, images: Images, settings: PaletteKeys, seed: int = 0) -> None:
         settings.check()
         self.settings = settings

@@ -19,6 +19,7 @@ class Resumable(checkpoint.Stateful, Protocol):
     """A fit that can stop and go on."""
 
     seconds: float  # that earlier runs have taken
+    unit: str  # what an iteration is of, for the progress bar
 
     @property
     def iterations(self) -> int:
@@ -51,15 +52,20 @@ def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
         FitError: if the loss or a parameter is no longer finite.
         ArgumentError: if the checkpoint cannot be read, or none be written.
     """
-    if (state := checkpoint.latest(folder)) is not None:
-        fit.restore(state)
+    restore(fit, folder)
     saved = time.monotonic()
     start = saved - fit.seconds
     steps = fit.iterations - fit.iteration
     run = fit.run()  # to its end even where no steps are left: something may follow the last one
-    for _ in progress(run, steps, title=title, unit="view") if steps else run:
+    for _ in progress(run, steps, title=title, unit=fit.unit) if steps else run:
         if time.monotonic() - saved > SAVED_EVERY:
             fit.seconds = time.monotonic() - start
             checkpoint.save(folder, fit)
             saved = time.monotonic()
     return time.monotonic() - start
+
+
+def restore(fit: Resumable, folder: Path) -> None:
+    """Go on from the last checkpoint, if there is one; only the fit's own copy of it stays in memory."""
+    if (state := checkpoint.latest(folder)) is not None:
+        fit.restore(state)

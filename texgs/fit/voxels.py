@@ -42,6 +42,8 @@ class VoxelFit:
         ArgumentError: if settings do not fit each other, or the views show nothing.
     """
 
+    unit = "step"
+
     def __init__(self, images: Images, settings: VoxelKeys, seed: int = 0) -> None:
         settings.check()
         self.settings = settings

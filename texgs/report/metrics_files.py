@@ -93,7 +93,7 @@ def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
 def below(folder: str | Path) -> list[Path]:
     """The metrics files of all results in a folder, but for jobs at work and the copies of tracked runs."""
     paths = Path(folder).rglob("metrics.json")
-    return sorted(path for path in paths if not any(is_aside(part) for part in path.parts))
+    return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))
 
 
 def is_aside(folder: str) -> bool:

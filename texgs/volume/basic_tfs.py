@@ -63,8 +63,12 @@ def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
 
 
 def just_above(value: float) -> float:
-    """The next number in single precision: a function whose opacity ends above 0 holds at its end."""
-    return float(np.nextafter(np.float32(value), np.float32(np.inf)))
+    """The next number in single precision: a function whose opacity ends above 0 holds at its end.
+
+    Next to 0 it is one whose difference has a finite inverse, which the caster multiplies with.
+    """
+    single, least = np.float32(value), np.finfo(np.float32).tiny
+    return float(max(np.nextafter(single, np.float32(np.inf)), single + least))
 
 
 def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:

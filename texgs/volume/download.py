@@ -24,13 +24,13 @@ def download(url: str, sha256: str, path: Path) -> None:
     pooch.get_logger().setLevel("WARNING")
     try:
         pooch.retrieve(url, f"sha256:{sha256.lower()}", path.name, path.parent, progressbar=True)
-    except ValueError as error:
-        raise ArgumentError(
-            f"{url}: expected the checksum {sha256}, got another file; look at the address"
-        ) from error
     except OSError as error:
         raise ArgumentError(
             f"{url}: cannot be downloaded ({error}); get the file elsewhere and put it into data_folder"
+        ) from error
+    except ValueError as error:
+        raise ArgumentError(
+            f"{url}: expected the checksum {sha256}, got another file; look at the address"
         ) from error
 
 

@@ -85,15 +85,22 @@ def byte_count(dims: Dims, dtype: np.dtype) -> int:
     return prod(dims) * dtype.itemsize
 
 
-def require_room(dims: Dims, dtype: np.dtype) -> None:
+def require_room(dims: Dims, dtype: np.dtype, beside: int = 0) -> None:
     """Require that all samples fit into memory, for formats that are read as a whole.
+
+    Args:
+        dims: samples along x, y, z.
+        dtype: of a sample.
+        beside: bytes that reading takes besides.
 
     Raises:
         OutOfMemoryError: naming the size that the header claims.
     """
     what = f"{' x '.join(map(str, dims))} samples of {dtype.name}"
     require_memory(
-        byte_count(dims, dtype), what, "is the header damaged? Else store it as .nrrd, not compressed"
+        byte_count(dims, dtype) + beside,
+        what,
+        "is the header damaged? Else store it as .nrrd, not compressed",
     )
 
 

@@ -22,7 +22,7 @@ def offscreen_opengl() -> str:
     Raises:
         DeviceError: if nothing does; says which packages to install.
     """
-    command = [sys.executable, "-m", "texgs.volume.opengl"]
+    command = [sys.executable, "-P", "-m", "texgs.volume.opengl"]
     try:
         child = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     except subprocess.TimeoutExpired as error:

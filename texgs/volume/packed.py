@@ -57,7 +57,8 @@ def unpacked(
         OutOfMemoryError: if the samples do not fit into memory.
     """
     n_bytes = byte_count(dims, stored)
-    require_room(dims, stored)
+    # The stream is in memory beside what it unpacks to, which zlib and bzip2 copy once from their own blocks.
+    require_room(dims, stored, path.stat().st_size - offset + n_bytes)
     with path.open("rb") as file:
         file.seek(offset)
         # One byte more than there should be makes zlib go to the end of its stream, and compare its checksum.

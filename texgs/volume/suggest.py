@@ -39,8 +39,8 @@ def suggest(
 
     The background, the most frequent value and what is around it, is left out. What remains is cut at the
     valleys of the smoothed log histogram; where it has too few, as in simulations whose histogram only
-    falls, at thresholds of least variance (Otsu 1979) on the log histogram. A histogram of at most 32
-    distinct values is taken for labels, the lowest for background. Higher values are more opaque.
+    falls, at thresholds of least variance (Otsu 1979) on the log histogram. Where values are in at most 32
+    of the bins they are taken for labels, the lowest for background. Higher values are more opaque.
 
     Args:
         histogram: [n] counts of voxels in equal bins over [minimum, maximum].
@@ -58,7 +58,7 @@ def suggest(
     counts = _checked(histogram, minimum, maximum, count)
     values = minimum + (np.arange(len(counts)) + 0.5) * (maximum - minimum) / len(counts)
     present = counts > 0
-    if present.sum() <= FEW:
+    if looks_like_labels(counts):
         values, counts = values[present], counts[present]
         classes = _labels(counts, count)
     else:
@@ -69,6 +69,11 @@ def suggest(
         f"TF{i + 1:02d}": _trapezoid(edges[start], edges[stop], opacities[i], i, (minimum, maximum))
         for i, (start, stop) in enumerate(classes)
     }
+
+
+def looks_like_labels(counts: Array) -> bool:
+    """Whether so few bins of a histogram hold voxels that the values are taken for labels."""
+    return int(np.count_nonzero(counts)) <= FEW
 
 
 def _checked(histogram: ArrayLike, minimum: float, maximum: float, count: int | None) -> Array:

@@ -32,7 +32,7 @@ def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
 
     Args:
         path: the file.
-        preset: name of one of ParaView's presets in the file; the first by default.
+        preset: name of one of ParaView's presets in the file; it may be left out where there is one.
 
     Returns:
         The transfer function, in the values of the file.
@@ -88,13 +88,17 @@ def _from_ours(data: dict[str, Any]) -> TransferFunction:
 
 
 def _chosen(presets: list[dict[str, Any]], name: str | None) -> dict[str, Any]:
-    """The preset of that name, or the first."""
-    if name is None:
+    """The preset of that name, or the only one."""
+    if name is None and len(presets) == 1:
         return presets[0]
     for preset in presets:
         if preset.get("Name") == name:
             return preset
     names = ", ".join(str(preset.get("Name")) for preset in presets[:10])
+    if name is None:
+        raise ArgumentError(
+            f"expected one preset, got {len(presets)}: {names}; export the one that you mean alone"
+        )
     raise ArgumentError(f"preset: expected a name in the file, got {name!r}; it holds {names}")
 
 

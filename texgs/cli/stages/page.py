@@ -20,6 +20,7 @@ class Settings(OfDataset):
 
     fit: FitLabel
     look: str  # name of the edit, or "none"
+    look_seed: int  # its seed
     embedded: float  # MiB of the largest page that the report holds
 
 
