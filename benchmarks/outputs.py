@@ -17,7 +17,7 @@ VARIANTS = {  # outputs and channels
     "normal, depth, 4 more channels": (("normal", "depth"), 3 + SHADING),
     "all outputs": (("normal", "depth", "median", "distortion", "statistics"), 3),
 }
-TEXELS = {"texture 4x4": (4, 4), "texture 2..8 x 2..8": (2, 8)}
+TEXELS = {"texture 4x4": (4, 4), "texture 2..8 x 2..8": (2, 8), "texture 9..16 x 9..16": (9, 16)}
 RATIOS = ("forward", "forward+backward")
 
 

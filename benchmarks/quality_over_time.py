@@ -1,8 +1,9 @@
 """How good a fit is after how many seconds: test views of one basic scene, for several recipes.
 
 `python -m benchmarks.quality_over_time OUTPUT RECIPE,RECIPE... KEY=VALUE...` fits with each recipe in a
-folder of its own and writes OUTPUT.csv and OUTPUT.png; words with = choose the data set and its basic TF, as
-for `texgs texture`. The clock stands still while a model is looked at; views, seeds and starts do not count.
+folder of its own and writes OUTPUT.csv and OUTPUT.png after each; words with = choose the data set and its
+basic TF, as for `texgs texture`. The clock stands still while a model is looked at; views, seeds and starts
+do not count. Rows that OUTPUT.csv has of other recipes stay, so that recipes can be measured one by one.
 """
 
 from __future__ import annotations
@@ -88,10 +89,31 @@ class Watch:
 def main(output: str, recipes: str, *words: str) -> None:
     """Fit with all recipes; write the table and the figure."""
     keep_freed_memory()
-    looks = [look for recipe in recipes.split(",") for look in looks_of(recipe, words)]
-    with Path(f"{output}.csv").open("w", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows([Look._fields, *looks])
-    draw(looks, Path(f"{output}.png"))
+    table = Path(f"{output}.csv")
+    for recipe in recipes.split(","):
+        others = [look for look in known(table) if look.recipe != recipe]
+        looks = [*others, *looks_of(recipe, words)]
+        with table.open("w", newline="") as file:
+            csv.writer(file, lineterminator="\n").writerows([Look._fields, *looks])
+        draw(looks, Path(f"{output}.png"))
+
+
+def known(table: Path) -> list[Look]:
+    """The rows of a table of earlier; none where there is none."""
+    if not table.exists():
+        return []
+    with table.open(newline="") as file:
+        return [
+            Look(
+                row["recipe"],
+                row["phase"],
+                float(row["seconds"]),
+                float(row["psnr"]),
+                int(row["surfels"]),
+                row["is_final"] == "True",
+            )
+            for row in csv.DictReader(file)
+        ]
 
 
 def looks_of(recipe: str, words: tuple[str, ...]) -> Iterator[Look]:

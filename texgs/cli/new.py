@@ -129,9 +129,9 @@ def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -
         suggested = suggest(histogram, low, high, count)
         if looks_like_labels(histogram) and np.dtype(summary["dtype"]).kind == "f":
             sys.stderr.write(
-                f"{config.dataset.name}: values are in {np.count_nonzero(histogram)} of {len(histogram)} parts "
-                f"of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing samples, "
-                "write NaN in its place and add nan_value=...\n"
+                f"{config.dataset.name}: values are in {np.count_nonzero(histogram)} of {len(histogram)} "
+                f"parts of [{low:g}, {high:g}], and are taken for labels; if one of them stands for missing "
+                "samples, write NaN in its place and add nan_value=...\n"
             )
         return {name: rounded(tf, low, high) for name, tf in suggested.items()}
     basic = {f"TF{index + 1:02}": read_tf(path) for index, path in enumerate(files)}

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from statistics import fmean
 
 import torch
 
+from texgs.core.ahead import ahead
 from texgs.core.progress import progress
 from texgs.fields.field import Field
 from texgs.metrics.image import psnr, ssim
@@ -28,8 +30,9 @@ def evaluate(
     """
     measured: dict[str, list[float]] = {"psnr": [], "ssim": []}
     device = model.device
-    for view in progress(views, title=title, unit="view"):
-        target = over_white(view, reduce)[:3].permute(1, 2, 0).to(device)
+    read = partial(over_white, reduce=reduce)
+    for view, planes in progress(ahead(read, views), len(views), title=title, unit="view"):
+        target = planes[:3].permute(1, 2, 0).to(device)
         image = model.render(smaller(view.camera, reduce).to(device), view.light).color
         measured["psnr"].append(psnr(image, target))
         measured["ssim"].append(ssim(image, target))

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.image import open_picture, read_png, read_rgba
+from texgs.core.image import open_picture, read_rgba
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.core.names import named_file
@@ -38,10 +38,6 @@ class View:
     def load(self) -> Tensor:
         """The pixels as stored: [H, W, 4] uint8, straight alpha; see `read_rgba`."""
         return torch.from_numpy(read_rgba(self.path))
-
-    def image(self) -> tuple[Tensor, Tensor]:
-        """Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; see `read_png`."""
-        return read_png(self.path)
 
 
 @dataclass(frozen=True, eq=False)
