@@ -35,6 +35,17 @@ def test_terms_are_the_losses_times_their_weights(vgg):
     assert float(terms["patches"]) == pytest.approx(3 * float(distance), rel=1e-5)
 
 
+@pytest.mark.parametrize(("height", "width", "reduce"), [(3, 40, 1), (48, 1, 1), (8, 8, 3)])
+def test_a_part_too_small_for_features_has_no_distance(vgg, height, width, reduce):
+    """A view may show a sliver of the model alone, or nothing of it."""
+    objective = Objective.of(preset("default", patches=0.0), STYLE, reduce, vgg, None)
+    image = torch.rand(3, height, width).requires_grad_()
+    terms = objective.terms(image, torch.ones(height, width), 0)
+    assert {name: float(value.detach()) for name, value in terms.items()} == {"nnfm": 0, "distribution": 0}
+    sum(terms.values()).backward()
+    assert not image.grad.any()
+
+
 def test_at_lower_resolution_image_and_style_are_both_reduced(vgg):
     recipe = preset("default", patches=0.0, **EXACT)
     small = STYLE.scaled(32)

@@ -53,14 +53,14 @@ def test_a_region_is_cut_out_and_what_is_around_it_filled(tmp_path):
     disc = (x - 40) ** 2 + (y - 40) ** 2 < 24**2
     values[disc] = (0, 0, 128)
     Image.fromarray(values).save(tmp_path / "x.png")
-    style = read_style(tmp_path / "x.png", torch.from_numpy(disc))
+    style = read_style(tmp_path / "x.png", lambda _: torch.from_numpy(disc))
     assert style.image.shape == (3, 47, 47)
     assert not style.region.all()
     assert style.image.max() <= 128 / 255 + 1e-6, "white around it has gone"
     with pytest.raises(ShapeError, match=r"region: expected \[80, 80\]"):
-        read_style(tmp_path / "x.png", torch.from_numpy(disc[:70]))
+        read_style(tmp_path / "x.png", lambda _: torch.from_numpy(disc[:70]))
     with pytest.raises(ArgumentError, match=r"x\.png: region: expected a part of the style"):
-        read_style(tmp_path / "x.png", torch.zeros(80, 80, dtype=torch.bool))
+        read_style(tmp_path / "x.png", lambda _: torch.zeros(80, 80, dtype=torch.bool))
 
 
 def test_filling_takes_the_nearest_colour():
@@ -107,3 +107,31 @@ def test_a_vivid_style_has_its_greys_and_twice_its_differences_from_them():
     vivid = StylePicture.of(image).vivid(2.0).image
     assert torch.equal(vivid[:, :, :20], image[:, :, :20])
     torch.testing.assert_close(vivid[:, 0, 30], torch.tensor([0.0, 0.2, 1.0]))
+
+
+def test_a_photograph_is_turned_upright(tmp_path):
+    values = np.zeros((40, 60, 3), np.uint8)
+    values[:, :30] = (255, 0, 0)  # left as stored; the camera was held upright
+    picture = Image.fromarray(values)
+    picture.getexif()[0x0112] = 6  # stored turned by 90 degrees to the left
+    picture.save(tmp_path / "x.jpg", exif=picture.getexif(), quality=95)
+    style = read_style(tmp_path / "x.jpg")
+    assert style.image.shape == (3, 60, 40)
+    assert style.image[0, :28].min() > 0.9
+    assert style.image[0, 32:].max() < 0.1
+
+
+def test_a_part_is_sought_in_the_whole_picture(tmp_path):
+    """Not in the box around what is visible: clicks are shares of the file."""
+    values = pixels(64, 96, 4)
+    values[..., 3] = 255
+    values[:, :48, 3] = 0
+    Image.fromarray(values).save(tmp_path / "x.png")
+    seen = []
+
+    def find(image):
+        seen.append(image.shape)
+        return torch.ones(image.shape[:2], dtype=torch.bool)
+
+    assert read_style(tmp_path / "x.png", find).image.shape == (3, 64, 48)
+    assert seen == [(64, 96, 3)]

@@ -1,5 +1,7 @@
 """The loop of views, guidance and texels: what it changes, what it leaves, and what it refuses."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 from torch.testing import assert_close
@@ -20,6 +22,7 @@ BLUE = (0.2, 0.3, 0.8)
 QUICK = Policy(opacities=(1.0, 0.5), sweeps=2)
 ADAM = Policy(opacities=(1.0, 0.5), iterations=150, rate=0.05)
 CHANGES = {"texels", "colors"}
+TURNED = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0]))  # half a turn about the upright axis
 
 
 @pytest.fixture(scope="module")
@@ -232,6 +235,12 @@ def broken(views):
 def test_bad_edits_are_reported(model, images, error, message):
     with pytest.raises(error, match=message):
         update(model, around(2), Returns(images), "x", QUICK)
+
+
+def test_a_part_that_no_view_shows_is_told_and_not_made_black(model):
+    away = [replace(camera, viewmat=TURNED @ camera.viewmat) for camera in around(2)]
+    with pytest.raises(ArgumentError, match="expected some that show what is to change, but none of 2 does"):
+        update(model, away, Tint(BLUE), "x", QUICK)
 
 
 def test_bad_arguments(model):

@@ -10,7 +10,7 @@ from torch import Tensor
 
 from texgs.edit.exposures import Exposure
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import owners
+from texgs.fields.surfels.texels import bare_colors, owners
 
 FAINT = 1e-4  # gain times alpha below which a pixel says nothing
 HARDLY = 0.01  # of the mean weight: what is seen less than that is hardly seen
@@ -67,7 +67,8 @@ def fill_unseen(sums: BackProjection, model: Surfels) -> Tensor:
 
     That is the mean of the texels of the same surfel, weighted by how much they are seen; where the whole
     surfel hardly is, that of the nearest one (by its mean) that is seen. So a side that nobody edited shows
-    what is around: neither the old colours, nor black, nor what shines through from the other side.
+    what is around: neither the old colours, nor black, nor what shines through from the other side. Where
+    nothing at all is seen, all texels keep their colours.
 
     Args:
         sums: of all exposures.
@@ -77,7 +78,7 @@ def fill_unseen(sums: BackProjection, model: Surfels) -> Tensor:
     weight = sums.weights[place]
     of_surfel = weight.new_zeros(len(model)).index_add_(0, surfel, weight)
     if not bool((of_surfel > 0).any()):
-        return sums.colors
+        return bare_colors(model)
     totals = sums.colors.new_zeros(len(model), 3).index_add_(0, surfel, sums.colors[place] * weight[:, None])
     tiny = torch.finfo(weight.dtype).tiny
     mean = totals / of_surfel.clamp_min(tiny)[:, None]

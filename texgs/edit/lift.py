@@ -65,7 +65,7 @@ def lift(
         cameras: of the other views, on the model's device.
         masks: finds the object in a view.
         light: in all views.
-        vote: how masks become surfels; "centre" is the paper's way.
+        vote: how masks become surfels; "centre" is the paper's way, of the masks that have a vote here.
         threshold: of the votes; by default 0.5 of contributions, 0.7 of views.
         connected: whether only the connected pieces that hold a positive click are kept.
         title: of the progress bar.

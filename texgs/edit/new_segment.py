@@ -80,7 +80,9 @@ def new_segment(
 
 
 def clicked_model(scene: Scene, name: str, device: torch.device) -> Surfels:
-    """A model of a scene with the textures that it has there, as `texgs render` shows it alone.
+    """A model of a scene with the textures that it has there, alone, and without other edits of the scene.
+
+    Clicks are on this: what an edit makes faint or hides is opaque and in front.
 
     Raises:
         ArgumentError, ShapeError: naming the file that is not as it should be.

@@ -99,6 +99,9 @@ class Objective:
         recipe = self.recipe
         if self.style is None or self.vgg is None:
             return {}
+        if min(image.shape[1:]) < STRIDE * self.reduce:  # a sliver has no features
+            nothing = 0 * image.sum()
+            return {"nnfm": nothing, **({"distribution": nothing} if self.distributions else {})}
         maps = self.vgg.blocks(self.small(image), wanted_layers(recipe))
         on: dict[int, Tensor | None] = dict.fromkeys(maps)
         if recipe.foreground:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
+from PIL import ExifTags, Image, ImageOps
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -18,6 +19,7 @@ from texgs.core.image import open_picture, with_eight_bits
 
 SMALLEST = 32  # pixels of the shorter side: less holds no pattern
 LARGEST = 2048  # pixels of the longer side that are kept
+Find = Callable[[Tensor], Tensor]
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,21 +89,23 @@ class StylePicture:
         return StylePicture(self.image.to(device), self.region.to(device))
 
 
-def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
+def read_style(path: str | Path, find: Find | None = None) -> StylePicture:
     """Read a style picture: PNG, JPEG, WebP, GIF, TIFF, BMP and more; what is transparent does not count.
 
     Args:
-        path: of the file. A picture of more than 2,048 pixels along its longer side is reduced to that.
-        region: [h, w] bool in the file's own pixels, such as the mask of an object in it; by default all.
+        path: of the file. A picture of more than 2,048 pixels along its longer side is reduced to that, and
+            one of a camera is turned as its file says.
+        find: returns the part that counts, [h, w] bool, of the whole picture [h, w, 3], such as the mask of
+            an object in it; by default all.
 
     Raises:
-        ArgumentError: if the file is missing, no picture, too large or too small, or the region does not fit.
+        ArgumentError: if the file is missing, no picture, too large or too small, or the part is empty.
+        ShapeError: if `find` returns another size.
     """
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             with open_picture(path, "a picture") as picture:
-                width, height = picture.size
                 small = reduced(picture)
     except ArgumentError as error:
         if isinstance(error.__cause__, Image.DecompressionBombError):
@@ -111,10 +115,10 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
         raise
     pixels = torch.from_numpy(np.asarray(small, dtype=np.float32) / 255).permute(2, 0, 1)
     visible = pixels[3] > 0.5
-    if region is not None:
-        check.shape("region", region, "h w", h=height, w=width)
-        inside = F.interpolate(region[None, None].float(), visible.shape, mode="area")[0, 0] > 0.5
-        visible = visible & inside
+    if find is not None:
+        region = find(pixels[:3].permute(1, 2, 0))
+        check.shape("region", region, "h w", h=visible.shape[0], w=visible.shape[1])
+        visible = visible & region
     try:
         return StylePicture.of(pixels[:3].contiguous(), None if bool(visible.all()) else visible)
     except ArgumentError as error:
@@ -122,10 +126,11 @@ def read_style(path: str | Path, region: Tensor | None = None) -> StylePicture:
 
 
 def reduced(picture: Image.Image) -> Image.Image:
-    """A picture as red, green, blue and alpha with 2,048 pixels along its longer side at most.
+    """A picture, upright, as red, green, blue and alpha with 2,048 pixels along its longer side at most.
 
     One so narrow that its shorter side would hold no pattern then keeps more.
     """
+    turned = picture.getexif().get(ExifTags.Base.Orientation, 1)
     scale = min(1.0, max(LARGEST / max(picture.size), SMALLEST / min(picture.size)))
     width, height = (max(1, round(scale * side)) for side in picture.size)
     picture.draft("RGB", (2 * width, 2 * height))  # JPEG files are decoded at a lower resolution
@@ -134,7 +139,9 @@ def reduced(picture: Image.Image) -> Image.Image:
         picture = picture.convert("RGBA")
     factor = max(1, min(picture.width // (2 * width), picture.height // (2 * height)))
     coarse = picture.reduce(factor) if factor > 1 else picture  # before it is converted, to save memory
-    return coarse.convert("RGBA").resize((width, height), Image.Resampling.LANCZOS)
+    small = coarse.convert("RGBA").resize((width, height), Image.Resampling.LANCZOS)
+    small.getexif()[ExifTags.Base.Orientation] = turned
+    return ImageOps.exif_transpose(small)
 
 
 def filled(image: Tensor, region: Tensor) -> Tensor:

@@ -105,8 +105,8 @@ def update(
 
     Raises:
         OutOfMemoryError: if the views would not fit into memory.
-        ArgumentError, ShapeError: if the model has no texture, no surfel may change, the instruction is
-            empty, or what the guidance returned is not finite or of another size.
+        ArgumentError, ShapeError: if the model has no texture, no surfel may change, no view shows one that
+            may, the instruction is empty, or what the guidance returned is not finite or of another size.
     """
     require_texture(model)
     instruction = require_instruction(instruction)
@@ -131,6 +131,11 @@ def update(
         colors = torch.where(moving, follower.follow(targets.rows, name), own)
     colors, weights = follower.finish(targets.rows)
     share = _share(weights, model, changing)
+    if share == 0:
+        raise ArgumentError(
+            f"views: expected some that show what is to change, but none of {len(cameras)} does; choose "
+            "other views (edit.text.views), or edit something that is less faint"
+        )
     return Edited(recolored(model, colors, changing), targets.views, targets.images, share)
 
 

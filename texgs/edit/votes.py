@@ -123,7 +123,7 @@ class CentreVotes:
 
     Args:
         model: of any stage.
-        threshold: share of all views that must say 1, exceeded.
+        threshold: share of the views counted that must say 1, exceeded.
     """
 
     def __init__(self, model: Surfels, threshold: float = 0.7) -> None:

@@ -47,7 +47,7 @@ def formats(path: Path) -> set[str]:
                 header = json.loads(start + file.readline(LONGEST_HEADER))
             else:
                 length = min(int.from_bytes(start[:8], "little"), LONGEST_HEADER)
-                header = json.loads(start[8:] + file.read(length - 1)).get("__metadata__", {})
+                header = json.loads(start[8:] + file.read(max(length - 1, 0))).get("__metadata__", {})
     except (OSError, ValueError, AttributeError, RecursionError):
         return set()
     return set(header) if isinstance(header, dict) else set()

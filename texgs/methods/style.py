@@ -13,8 +13,10 @@ from texgs.core.errors import ArgumentError
 from texgs.methods.shares import MASKS, mask_weights, shares
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from texgs.edit.recipe import Recipe
-    from texgs.edit.style_picture import StylePicture
+    from texgs.edit.style_picture import Find, StylePicture
     from texgs.edit.task import EditedScene, Task
     from texgs.models.vgg import Vgg
     from texgs.scene.scene import Scene
@@ -165,8 +167,13 @@ def weights(settings: StyleKeys) -> dict[str, str]:
     return mask_weights(settings.masks) if settings.region else {}
 
 
-def picture_of(name: str, key: str) -> StylePicture:
+def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
     """The picture of texgs that has this name, or of a file; `key` is where it stands: edit.image.style.
+
+    Args:
+        name: or path.
+        key: that it is the value of.
+        find: returns the part that counts, see `read_style`; by default all.
 
     Raises:
         ArgumentError: if there is neither, or the file holds no picture that can be used.
@@ -175,12 +182,13 @@ def picture_of(name: str, key: str) -> StylePicture:
     from texgs.edit.style_picture import StylePicture, read_style
 
     if name in PICTURES:
-        return StylePicture.of(picture(name))
+        image = picture(name)
+        return StylePicture.of(image, None if find is None else find(image.permute(1, 2, 0)))
     if not Path(name).exists():
         raise ArgumentError(
             f"{key}: expected the file of a picture, or one of {', '.join(PICTURES)}; got {name!r}"
         )
-    return read_style(name)
+    return read_style(name, find)
 
 
 def check(settings: StyleKeys, where: str) -> None:
@@ -204,14 +212,12 @@ def style_of(settings: StyleKeys, where: str) -> StylePicture:
     """
     import torch
 
-    from texgs.edit.style_picture import StylePicture
     from texgs.models.by_name import mask_model
 
-    style = picture_of(settings.style, f"{where}.style")
-    if not settings.region:
-        return style
-    height, width = style.region.shape
-    points = torch.tensor(shares(f"{where}.region", settings.region)) * torch.tensor([width, height])
-    positive = torch.ones(len(points), dtype=torch.bool)
-    masks = mask_model(settings.masks, torch.device("cpu"))
-    return StylePicture.of(style.image, masks(style.image.permute(1, 2, 0), points, positive) & style.region)
+    def find(image: Tensor) -> Tensor:
+        height, width = image.shape[:2]
+        points = torch.tensor(shares(f"{where}.region", settings.region)) * torch.tensor([width, height])
+        masks = mask_model(settings.masks, torch.device("cpu"))
+        return masks(image, points, torch.ones(len(points), dtype=torch.bool))
+
+    return picture_of(settings.style, f"{where}.style", find if settings.region else None)

@@ -101,14 +101,14 @@ CATALOGUE: dict[str, Single | Snapshot] = {
         "openai/clip-vit-base-patch32",
         "3d74acf9a28c67741b2f4f2ea7635f0aaf6f0268",
         605,
-        (("config.json",), ("model.safetensors", "pytorch_model.bin")),
+        (("config.json",), ("model.safetensors", "pytorch_model.bin"), ("tokenizer.json", "vocab.json")),
         (*TEXT_FILES, "pytorch_model.bin"),
     ),
     "clip-vit-large-patch14": Snapshot(
         "openai/clip-vit-large-patch14",
         "32bd64288804d66eefd0ccbe215aa642df71cc41",
         1710,
-        (("config.json",), ("model.safetensors", "pytorch_model.bin")),
+        (("config.json",), ("model.safetensors", "pytorch_model.bin"), ("tokenizer.json", "vocab.json")),
         (*TEXT_FILES, "model.safetensors"),
     ),
     "instruct-pix2pix": Snapshot(
@@ -117,6 +117,9 @@ CATALOGUE: dict[str, Single | Snapshot] = {
         4270,
         (
             ("model_index.json",),
+            *((f"{part}/config.json",) for part in ("unet", "vae", "text_encoder")),
+            ("scheduler/scheduler_config.json",),
+            ("tokenizer/tokenizer.json", "tokenizer/vocab.json"),
             ("unet/diffusion_pytorch_model.safetensors",),
             ("vae/diffusion_pytorch_model.safetensors",),
             ("text_encoder/model.safetensors",),
