@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from texgs.cli.parents import WHOLE, of_sweep, owner
-from texgs.cli.plan import made, make, words_of
+from texgs.cli.plan import made, make, note_results, words_of
 from texgs.core.errors import ConfigError
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
@@ -91,3 +91,28 @@ def test_a_gallery_of_a_sweep_of_edits_shows_the_edits_of_its_variants(planned):
     plan = planned(f'{words} "gallery.grids=[{grid}]"')
     (gallery,) = (job for job in plan.jobs.values() if job["stage"] == "gallery")
     assert {path.split("/")[-2] for path in gallery["inputs"].values()} == {"gold-64-s5", "gold-128-s5"}
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_damaged_result_is_noted_where_a_whole_one_has_the_same_settings(tmp_path, order):
+    """As the views of a variant that has their default number."""
+    file, jobs = tmp_path / "views.yaml", []
+    file.write_text("width: 400\n")
+    for name, is_whole in (("views", False), ("views-92", True)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "metrics.json").touch()
+        jobs.append(SimpleNamespace(output=tmp_path / name, is_done=lambda is_whole=is_whole: is_whole))
+    note_results(jobs[::order], [str(file)] * 2)
+    settings, note = file.read_text().splitlines()
+    assert settings == "width: 400"
+    assert note.endswith(f" {tmp_path / 'views'}: not whole, or of another job")
+    jobs[0].is_done = lambda: True
+    note_results(jobs[::order], [str(file)] * 2)
+    assert file.read_text() == "width: 400\n"
+
+
+def test_results_may_be_written_with_a_slash_at_the_end(planned):
+    plan = planned("results=./out/ edits=[gold]")
+    assert plan.results == "out"
+    assert all(folder.startswith("out/") for folder in plan.jobs)
+    assert all(job["settings"].startswith("out/.conf/") for job in plan.jobs.values())

@@ -83,8 +83,10 @@ def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
     from texgs.config.stages import jobs
     from texgs.core.checksum import Checksums
 
-    checksums, configs, sweeps = Checksums.load(), dict[str, DictConfig](), defaultdict[str, list[str]](list)
+    checksums = Checksums.load()
     by_folder: dict[str, Job] = {}
+    configs: dict[str, DictConfig] = {}
+    sweeps: dict[str, list[str]] = defaultdict(list)
     for sweep, config in ((name, each) for name, some in selection.by_sweep.items() for each in some):
         check_basic_tfs(config.dataset)
         check_fit(config)
