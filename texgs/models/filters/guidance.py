@@ -36,8 +36,9 @@ class ProceduralFilters:
     """Edits views by filters that are anchored to the surface: no weights, milliseconds to seconds.
 
     Every filter is a solid texture, a function of the place in the world that a pixel shows and of light
-    that is fixed there, so that all views agree and a texture lifted from them is crisp. It answers the
-    entries of `vocabulary` only. It wants to see bare colours: what it paints is what light falls on.
+    that is fixed there, so that all views of a call agree and a texture lifted from them is crisp; the size
+    of patterns and the brightest and the mean colour are those of these views. It answers the entries of
+    `vocabulary` only. It wants to see bare colours: what it paints is what light falls on.
 
     Args:
         scale: factor on the size of patterns; 1 gives about 26 of them along the scene.

@@ -63,7 +63,7 @@ def luminance(colors: Tensor) -> Tensor:
 
 
 def _side(points: Tensor) -> float:
-    """About the longest side of what is seen, world units: a power of sqrt 2, the same for other views."""
+    """About the longest side of what is seen, world units: a power of sqrt 2, mostly that of other views."""
     side = float((points.amax(dim=0) - points.amin(dim=0)).max()) if len(points) else 1.0
     return float(2 ** (round(2 * log2(max(side, 1e-6))) / 2))
 
