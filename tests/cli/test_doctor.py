@@ -59,6 +59,8 @@ def test_weights_are_listed(monkeypatch, tmp_path):
     folder.mkdir()
     for name in ("config.json", "model.safetensors"):
         (folder / name).touch()
+    assert probes.weights().state == "missing", "without its tokenizer it is of no use"
+    (folder / "vocab.json").touch()
     finding = probes.weights()
     assert finding.state == "ok"
     assert finding.found.startswith("clip-vit-base-patch32; not vgg16, ")

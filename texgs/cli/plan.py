@@ -105,8 +105,6 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     from texgs.cli.earlier import earlier
     from texgs.config.compose import compose
     from texgs.config.experiments import apart, selected
-    from texgs.config.places import edit_folder, fit_folder
-    from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
 
     checksums, selection = Checksums.load(), selected(words, lacking)
@@ -129,20 +127,29 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         plain_jobs,
         sweeps,
         downloads(configs),
-        {
-            "dataset": sorted({each.dataset.name for each in configs}),
-            "views": sorted({each.views.name for each in configs}),
-            "fit": sorted({fit_folder(each) for each in configs}),
-            "edit": sorted({edit_folder(each) for each in configs}),
-            "gallery": sorted({each.gallery.name for each in configs}),
-            "phase": sorted({stage.name for stage in STAGES.values() if stage.place == "phase"}),
-        },
+        wildcards(configs),
         {module: code_digest(module) for module in OTHER_CODE},
         left_out({**selection.left_out, **outdated}, results),
         others,
     )
     checksums.save()
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
+
+
+def wildcards(configs: Iterable[DictConfig]) -> dict[str, list[str]]:
+    """What the wildcards of rules stand for in these configurations."""
+    from texgs.config.places import edit_folder, fit_folder
+    from texgs.config.stages import STAGES
+
+    values = {
+        "dataset": {each.dataset.name for each in configs},
+        "views": {each.views.name for each in configs},
+        "fit": {fit_folder(each) for each in configs},
+        "edit": {edit_folder(each) for each in configs},
+        "gallery": {each.gallery.name for each in configs},
+        "phase": {stage.name for stage in STAGES.values() if stage.place == "phase"},
+    }
+    return {name: sorted(own) for name, own in values.items()}
 
 
 def add_jobs(

@@ -131,11 +131,6 @@ def update(
         colors = torch.where(moving, follower.follow(targets.rows, name), own)
     colors, weights = follower.finish(targets.rows)
     share = _share(weights, model, changing)
-    if share == 0:
-        raise ArgumentError(
-            f"views: expected some that show what is to change, but none of {len(cameras)} does; choose "
-            "other views (edit.text.views), or edit something that is less faint"
-        )
     return Edited(recolored(model, colors, changing), targets.views, targets.images, share)
 
 
@@ -219,5 +214,15 @@ def _changing(model: Surfels, surfels: Tensor | None) -> Tensor:
 
 
 def _share(weights: Tensor, model: Surfels, changing: Tensor) -> float:
-    """Share of the texels that may change that are seen."""
-    return float(seen_texels(weights)[changing_texels(model, changing)].double().mean())
+    """Share of the texels that may change that are seen.
+
+    Raises:
+        ArgumentError: if none is.
+    """
+    share = float(seen_texels(weights)[changing_texels(model, changing)].double().mean())
+    if share == 0:
+        raise ArgumentError(
+            "views: expected some that show what is to change, got none; choose other views "
+            "(edit.text.views), or edit something that is less faint"
+        )
+    return share
