@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -136,7 +136,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
 
 
-def wildcards(configs: Iterable[DictConfig]) -> dict[str, list[str]]:
+def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
     """What the wildcards of rules stand for in these configurations."""
     from texgs.config.places import edit_folder, fit_folder
     from texgs.config.stages import STAGES
