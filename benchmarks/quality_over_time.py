@@ -151,6 +151,7 @@ def draw(looks: list[Look], path: Path) -> None:
             place = row.seconds, row.psnr
             axes.annotate(row.phase, place, (4, -10), textcoords="offset points", fontsize=7)
     axes.set(xlabel="seconds of fitting", ylabel="PSNR of test views, dB", xscale="log")
+    axes.margins(x=0.1)  # of which labels beside the dots need some
     axes.grid(which="both", alpha=0.2)
     axes.legend()
     figure.savefig(path)
