@@ -48,7 +48,9 @@ onsuccess:
         program = Path(sys.executable).with_name("texgs")
         print("View:", shlex.join([str(program), "view", str(scenes[0])]))
     if (PLAN.tracking or "").startswith("sqlite"):
-        print(f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {shlex.quote(PLAN.tracking)}")
+        print(
+            f"Runs: {shlex.quote(sys.executable)} -m mlflow ui --backend-store-uri {shlex.quote(PLAN.tracking)}"
+        )
 
 
 onerror:
