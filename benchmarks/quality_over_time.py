@@ -99,7 +99,7 @@ def main(output: str, recipes: str, *words: str) -> None:
 
 
 def known(table: Path) -> list[Look]:
-    """The rows of a table of earlier; none where there is none."""
+    """The rows that a table has already; none where there is no table."""
     if not table.exists():
         return []
     with table.open(newline="") as file:

@@ -23,8 +23,8 @@ def earlier(
     """The whole results that none of these jobs makes.
 
     Returns:
-        Their metrics files with digests of the contents; and those of them that come from results which are
-        others now or after this run, with their places.
+        Their metrics files with digests of the contents, but for results made from others that have been
+        replaced since, or will be by this run; and these results, with their places.
     """
     known: dict[str, bool] = {}
     digests: dict[str, str] = {}

@@ -130,7 +130,7 @@ def reduced(picture: Image.Image) -> Image.Image:
 
     One so narrow that its shorter side would hold no pattern then keeps more.
     """
-    turned = picture.getexif().get(ExifTags.Base.Orientation, 1)
+    orientation = picture.getexif().get(ExifTags.Base.Orientation, 1)
     scale = min(1.0, max(LARGEST / max(picture.size), SMALLEST / min(picture.size)))
     width, height = (max(1, round(scale * side)) for side in picture.size)
     picture.draft("RGB", (2 * width, 2 * height))  # JPEG files are decoded at a lower resolution
@@ -140,7 +140,7 @@ def reduced(picture: Image.Image) -> Image.Image:
     factor = max(1, min(picture.width // (2 * width), picture.height // (2 * height)))
     coarse = picture.reduce(factor) if factor > 1 else picture  # before it is converted, to save memory
     small = coarse.convert("RGBA").resize((width, height), Image.Resampling.LANCZOS)
-    small.getexif()[ExifTags.Base.Orientation] = turned
+    small.getexif()[ExifTags.Base.Orientation] = orientation
     return ImageOps.exif_transpose(small)
 
 
