@@ -8,7 +8,6 @@
 namespace texgs {
 
 inline void check_volume(const texgs_volume& volume) {
-    constexpr int kBytes[] = {1, 1, 2, 2, 4, 4, 8, 8, 4, 8};
     require(volume.type >= TEXGS_U8 && volume.type <= TEXGS_F64, "volume: expected a known type of samples");
     int64_t bricks = 1;
     for (int a = 0; a < 3; ++a) {
@@ -18,8 +17,6 @@ inline void check_volume(const texgs_volume& volume) {
         bricks *= (volume.size[a] + TEXGS_BRICK - 2) / TEXGS_BRICK;
     }
     require(bricks < (int64_t(1) << 31) - 4, "volume: expected fewer samples");
-    const int64_t slice = int64_t(volume.size[0]) * volume.size[1] * kBytes[volume.type];
-    require(slice < 1 << 28, "volume: expected slices of less than 256 MiB");
 }
 
 inline void check_points(const texgs_transfer& transfer) {

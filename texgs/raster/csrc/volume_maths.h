@@ -33,7 +33,8 @@ TEXGS_MATHS Lattice lattice_of(const texgs_volume& volume) {
 
 // Sample k is at entry + (k + 0.5) * step, and its camera z at near + (k + 0.5) * z.
 struct CastRay {
-    float entry[3], step[3], direction[3];  // the last in the world, with z 1 in the camera
+    float entry[3], step[3], ahead[3];  // the last: 1 or -1, where it goes along each axis
+    float direction[3];                 // in the world, with z 1 in the camera
     float near, z;
     int32_t samples;
 };
@@ -63,6 +64,7 @@ TEXGS_MATHS CastRay cast_ray(const Lattice& lattice, const texgs_cast_view& view
     for (int a = 0; a < 3; ++a) {
         ray.entry[a] = static_cast<float>(origin[a] + near * along[a]);
         ray.step[a] = static_cast<float>(along[a] * z);
+        ray.ahead[a] = ray.step[a] < 0.0f ? -1.0f : 1.0f;
     }
     ray.near = static_cast<float>(near), ray.z = static_cast<float>(z);
     ray.samples = samples > 0.0 ? static_cast<int32_t>(samples < 1e9 ? samples : 1e9) : 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rays through a volume. Samples in bricks where something may show wait until there is a vector of them; so do those
-// among them that show something, which are shaded: no lane is empty but at the end of a ray.
+// Rays through a volume. Samples in bricks where something may show wait until there are some vectors of them; so do
+// those among them that show something, which are shaded: no lane is empty but at the end of a ray.
 #include "simd.h"
 
 #include "../volume_maths.h"
@@ -10,67 +10,66 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-// Samples of a ray that wait for a vector to be full, by their numbers.
+// Samples of a ray that are taken at once, in vectors: what one vector waits for, others fill.
+constexpr int kVectors = 4, kSamples = kVectors * kLanes;
+
+// Samples of a ray that wait until there are kSamples of them, by their numbers.
 struct Queue {
     int n = 0;
-    float k[2 * kLanes], value[2 * kLanes], weight[2 * kLanes];
+    float k[kSamples + kLanes], value[kSamples + kLanes], weight[kSamples + kLanes];
 
-    // Takes the first samples away.
-    void drop(int count) {
-        n = n > count ? n - count : 0;
-        for (int i = 0; i < n; ++i) k[i] = k[count + i], value[i] = value[count + i], weight[i] = weight[count + i];
+    bool is_full() const { return n >= kSamples; }
+    // Vectors that hold the first kSamples samples, or all of them; other lanes repeat the last one.
+    int vectors() {
+        if (!is_full()) store(k + n, vf(k[n - 1]));
+        return is_full() ? kVectors : (n + kLanes - 1) / kLanes;
     }
-    // The numbers of the first `used` samples; other lanes repeat the last one.
-    vf numbers(int used) const {
-        float lanes[kLanes];
-        for (int i = 0; i < kLanes; ++i) lanes[i] = k[i < used ? i : used - 1];
-        return load(lanes);
+    // Takes these samples away.
+    void drop() {
+        n = is_full() ? n - kSamples : 0;
+        float* const arrays[] = {k, value, weight};
+        for (float* of : arrays) store(of, load(of + kSamples));
     }
-};
-
-// Samples of few bytes in rows that are shorter than the words they would be loaded by.
-template <class T>
-struct Short {
-    T value;
-    explicit operator float() const { return static_cast<float>(value); }
 };
 
 // The intervals of a transfer function that values are in, and how far.
 struct Intervals {
-    vi first;  // points
+    bool is_short;  // the table fits in registers
+    vi first;       // points
     vf place;
 
-    TEXGS_INLINE Intervals(const CastTable& t, vf value) {
+    TEXGS_INLINE Intervals(const CastTable& t, vf value) : is_short(t.length == kTablePoints) {
         vf passed = 0.0f;
-        for (int i = 1; i < t.n - 1; ++i) passed = add_where(vf(t.value[i]) <= value, passed, 1.0f);
-        first = truncate(passed);
-        place = (value - gather(t.value, first)) * gather(t.per_width, first);
+        for (int step = t.length / 2; step; step /= 2) {
+            const vf next = passed + vf(static_cast<float>(step));
+            passed = select(at(t.value, truncate(next)) <= value, next, passed);
+        }
+        first = truncate(min(passed, static_cast<float>(t.n - 2)));
+        place = (value - at(t.value, first)) * at(t.per_width, first);
+    }
+    TEXGS_INLINE vf at(const float* column, vi point) const {
+        return is_short ? table_lookup<1>(column, point) : gather(column, point);
     }
     TEXGS_INLINE vf mixed(const float* column) const {
-        return mix(gather(column, first), gather(column, first + splat(1)), place);
+        return mix(at(column, first), at(column, first + splat(1)), place);
     }
 };
 
 // What a ray gathers.
 struct Sums {
-    vf color[3], normal[3];
-    float depth = 0.0f, median = 0.0f, light = 1.0f;
+    vf color[3], normal[3], depth = 0.0f;
+    float median = 0.0f, light = 1.0f;
 };
 
 template <class T>
 class Caster {
 public:
-    Caster(const CastJob& job)
-        : job_(job),
-          lattice_(lattice_of(job.volume)),
-          lamp_(lamp_of(job.view)),
-          values_(static_cast<const T*>(job.volume.values)) {
+    Caster(const CastJob& job) : job_(job), lattice_(lattice_of(job.volume)), lamp_(lamp_of(job.view)) {
+        for (auto& blocks : blocks_) blocks = Blocks<T>(static_cast<const T*>(job.volume.values), job.volume.size);
         for (int a = 0; a < 3; ++a) box_.lower[a] = job.lower[a], box_.upper[a] = job.upper[a];
         const CastTable& t = job.table;
         for (int a = 0; a < 3; ++a)
             slope_[a] = static_cast<float>(lattice_.per_unit[a] / (t.value[t.n - 1] - t.value[0]));
-        const int64_t bytes = int64_t(sizeof(T)) * job.volume.size[0] * job.volume.size[1];
-        most_slices_ = static_cast<int32_t>((int64_t(1) << 31) / bytes) - 4;
     }
 
     void cast(int x, int y) {
@@ -91,11 +90,11 @@ public:
             const vm chosen = are_visible(ray, next) & (next < vf(static_cast<float>(end)));
             store_chosen(waiting.k + waiting.n, next, chosen);
             waiting.n += count(chosen);
-            if (waiting.n >= kLanes) weigh(ray, waiting, kLanes, seen, sums);
+            if (waiting.is_full()) weigh(ray, waiting, seen, sums);
             k += kLanes;
         }
-        if (waiting.n && sums.light >= kOpaque) weigh(ray, waiting, waiting.n, seen, sums);
-        if (seen.n) shade(ray, seen, seen.n, sums);
+        if (waiting.n && sums.light >= kOpaque) weigh(ray, waiting, seen, sums);
+        if (seen.n) shade(ray, seen, sums);
         write(int64_t(y) * job_.view.width + x, sums);
     }
 
@@ -117,7 +116,7 @@ private:
         for (int a = 0; a < 3; ++a) {
             const vf place = max(fma(k + vf(0.5f), ray.step[a], ray.entry[a]), 0.0f);
             const float last = static_cast<float>(lattice_.bricks[a] - 1);
-            brick[a] = truncate(min(place * vf(1.0f / TEXGS_BRICK), last));
+            brick[a] = truncate(min(place * vf(1.0f / float(TEXGS_BRICK)), last));
         }
         const vi row = brick[2] * splat(lattice_.bricks[1]) + brick[1];
         const vi distance = gather_bytes(job_.distance, row * splat(lattice_.bricks[0]) + brick[0]) & splat(255);
@@ -134,73 +133,78 @@ private:
         }
     }
 
-    // The first of the slices that `used` samples need; below 0 where these are too far apart for 32-bit offsets.
-    int32_t first_slice(vf cell_z, int used) const {
-        float lanes[kLanes];
-        store(lanes, cell_z);
-        const int32_t one = static_cast<int32_t>(lanes[0]), other = static_cast<int32_t>(lanes[used - 1]);
-        const int32_t low = one < other ? one : other, high = one < other ? other : one;
-        return high - low > most_slices_ ? -1 : low > 0 ? low - 1 : 0;
-    }
-
     // Finds what the first samples weigh, and lets those that show something wait.
-    void weigh(const CastRay& ray, Queue& waiting, int used, Queue& seen, Sums& sums) {
-        vf cell[3], inside[3];
-        locate(ray, waiting.numbers(used), cell, inside);
-        const int32_t first = first_slice(cell[2], used);
-        if (first < 0) return one_by_one(ray, waiting, used, seen, sums);
+    void weigh(const CastRay& ray, Queue& waiting, Queue& seen, Sums& sums) {
         const CastTable& t = job_.table;
-        const vf value = values_in(slices(first), Cells(job_.volume.size, cell, first), inside);
-        const vf opacity = Intervals(t, value).mixed(t.opacity);
-        const vm visible = (vf(t.value[0]) <= value) & (value <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
-        float alpha[kLanes], values[kLanes];
-        store(alpha, zero_unless(visible, step_opacity(opacity, job_.view.step / job_.view.opacity_unit)));
-        store(values, value);
-        for (int lane = 0; lane < used && sums.light >= kOpaque; ++lane) {
-            const float weight = sums.light * alpha[lane], z = ray.near + (waiting.k[lane] + 0.5f) * ray.z;
-            if (!(weight > 0.0f)) continue;
-            seen.k[seen.n] = waiting.k[lane], seen.value[seen.n] = values[lane], seen.weight[seen.n++] = weight;
-            const float left = sums.light - weight;
-            if (sums.light > 0.5f && left <= 0.5f) sums.median = z;
-            sums.light = left;
-            sums.depth += weight * z;
+        const int vectors = waiting.vectors();
+        vf inside[kVectors][3], value[kVectors], alpha[kVectors];
+        load_blocks(ray, waiting, vectors, Rows::of_cell, inside);
+        for (int i = 0; i < vectors; ++i) {
+            value[i] = values_in(blocks_[i], inside[i]);
+            const vf opacity = Intervals(t, value[i]).mixed(t.opacity);
+            const vm visible = (vf(t.value[0]) <= value[i]) & (value[i] <= vf(t.value[t.n - 1])) & (vf(0.0f) < opacity);
+            const vm is_used = to_float(iota()) < vf(static_cast<float>(waiting.n - i * kLanes));
+            const float lengths = job_.view.step / job_.view.opacity_unit;
+            alpha[i] = zero_unless(visible & is_used, step_opacity(opacity, lengths));
         }
-        waiting.drop(used);
-        if (seen.n >= kLanes) shade(ray, seen, kLanes, sums);
+        for (int i = 0; i < vectors && sums.light >= kOpaque; ++i) {
+            absorb(ray, waiting.k + i * kLanes, value[i], alpha[i], seen, sums);
+            if (seen.is_full()) shade(ray, seen, sums);
+        }
+        waiting.drop();
     }
 
-    void one_by_one(const CastRay& ray, Queue& waiting, int used, Queue& seen, Sums& sums) {
-        for (; used > 0 && sums.light >= kOpaque; --used) weigh(ray, waiting, 1, seen, sums);
+    // Takes light away where samples of some opacity show something.
+    TEXGS_INLINE void absorb(const CastRay& ray, const float* k, vf value, vf alpha, Queue& seen, Sums& sums) const {
+        const vf behind = running_product(vf(1.0f) - alpha) * vf(sums.light);
+        float light[kLanes + 1];  // before each sample and behind it
+        light[0] = sums.light;
+        store(light + 1, behind);
+        const vf before = load(light), weight = before * alpha;
+        const vm is_seen = (vf(0.0f) < weight) & (vf(kOpaque) <= before);
+        if (sums.light > 0.5f && light[kLanes] <= 0.5f)
+            sums.median = ray.near + (k[count(vf(0.5f) < behind)] + 0.5f) * ray.z;
+        sums.light = light[count(vf(kOpaque) <= before)];
+        sums.depth = fma_where(is_seen, weight, fma(load(k) + vf(0.5f), ray.z, ray.near), sums.depth);
+        store_chosen(seen.k + seen.n, load(k), is_seen);
+        store_chosen(seen.value + seen.n, value, is_seen);
+        store_chosen(seen.weight + seen.n, weight, is_seen);
+        seen.n += count(is_seen);
     }
 
     // Adds what the first samples that show something look like.
-    void shade(const CastRay& ray, Queue& seen, int used, Sums& sums) {
-        vf cell[3], inside[3], slope[3];
-        locate(ray, seen.numbers(used), cell, inside);
-        const int32_t first = first_slice(cell[2], used);
-        if (first < 0) {
-            for (; used > 0; --used) shade(ray, seen, 1, sums);
-            return;
-        }
-        differences_in(slices(first), Cells(job_.volume.size, cell, first), inside, slope);
-        const Vec3<vf> n = unit(Vec3<vf>{slope[0] * vf(slope_[0]), slope[1] * vf(slope_[1]), slope[2] * vf(slope_[2])});
+    void shade(const CastRay& ray, Queue& seen, Sums& sums) {
         const CastTable& t = job_.table;
-        const vf weight = load_part(seen.weight, used);
-        const Intervals intervals(t, load(seen.value));
-        const Vec3<vf> color{intervals.mixed(t.color[0]), intervals.mixed(t.color[1]), intervals.mixed(t.color[2])};
-        const Vec3<vf> shown = lit(color, n, lamp_);
-        const Vec3<vf> against = turned(n, vf(0.0f) - along(n, ray.direction));
-        const vf looks[3] = {shown.x, shown.y, shown.z}, normals[3] = {against.x, against.y, against.z};
-        const vm is_used = vf(0.0f) < weight;  // other lanes may hold anything
-        for (int c = 0; c < 3; ++c) {
-            sums.color[c] = fma_where(is_used, weight, looks[c], sums.color[c]);
-            sums.normal[c] = fma_where(is_used, weight, normals[c], sums.normal[c]);
+        const int vectors = seen.vectors();
+        vf inside[kVectors][3];
+        load_blocks(ray, seen, vectors, Rows::around, inside);
+        for (int i = 0; i < vectors; ++i) {
+            vf slope[3];
+            differences_in(blocks_[i], inside[i], slope);
+            const Vec3<vf> n =
+                unit(Vec3<vf>{slope[0] * vf(slope_[0]), slope[1] * vf(slope_[1]), slope[2] * vf(slope_[2])});
+            const Intervals intervals(t, load(seen.value + i * kLanes));
+            const Vec3<vf> color{intervals.mixed(t.color[0]), intervals.mixed(t.color[1]), intervals.mixed(t.color[2])};
+            const Vec3<vf> shown = lit(color, n, lamp_);
+            const Vec3<vf> against = turned(n, vf(0.0f) - along(n, ray.direction));
+            const vf looks[3] = {shown.x, shown.y, shown.z}, normals[3] = {against.x, against.y, against.z};
+            const vm is_used = to_float(iota()) < vf(static_cast<float>(seen.n - i * kLanes));
+            for (int c = 0; c < 3; ++c) {
+                sums.color[c] = fma_where(is_used, load(seen.weight + i * kLanes), looks[c], sums.color[c]);
+                sums.normal[c] = fma_where(is_used, load(seen.weight + i * kLanes), normals[c], sums.normal[c]);
+            }
         }
-        seen.drop(used);
+        seen.drop();
     }
 
-    const T* slices(int32_t first) const {
-        return values_ + int64_t(first) * job_.volume.size[0] * job_.volume.size[1];
+    // Loads the blocks around the first samples, and where these are in their cells.
+    TEXGS_INLINE void load_blocks(const CastRay& ray, const Queue& samples, int vectors, Rows rows,
+                                  vf (&inside)[kVectors][3]) {
+        for (int i = 0; i < vectors; ++i) {
+            vf cell[3];
+            locate(ray, load(samples.k + i * kLanes), cell, inside[i]);
+            blocks_[i].fetch(cell, ray.ahead, rows);
+        }
     }
 
     void write(int64_t pixel, const Sums& sums) const {
@@ -208,7 +212,7 @@ private:
         const float alpha = 1.0f - sums.light, per_alpha = alpha > 0.0f ? 1.0f / alpha : 0.0f;
         for (int c = 0; c < 3; ++c) v.rgba[4 * pixel + c] = sum(sums.color[c]);
         v.rgba[4 * pixel + 3] = alpha;
-        if (v.depth) v.depth[pixel] = sums.depth * per_alpha;
+        if (v.depth) v.depth[pixel] = sum(sums.depth) * per_alpha;
         if (v.median) v.median[pixel] = sums.median;
         if (v.normal)
             for (int c = 0; c < 3; ++c) v.normal[3 * pixel + c] = sum(sums.normal[c]) * per_alpha;
@@ -218,9 +222,8 @@ private:
     const Lattice lattice_;
     const Lamp lamp_;
     Extent box_;
-    const T* values_;
+    Blocks<T> blocks_[kVectors];
     float slope_[3];
-    int32_t most_slices_;
 };
 
 template <class T>
@@ -231,18 +234,11 @@ void cast_row(const CastJob& job, int y, int begin, int end) {
 
 void cast(const CastJob& job, int y, int begin, int end) {
     using Cast = void (*)(const CastJob&, int, int, int);
-    static constexpr Cast kShort[] = {
-        cast_row<Short<uint8_t>>,
-        cast_row<Short<int8_t>>,
-        cast_row<Short<uint16_t>>,
-        cast_row<Short<int16_t>>,
-    };
     static constexpr Cast kCast[] = {
         cast_row<uint8_t>, cast_row<int8_t>,   cast_row<uint16_t>, cast_row<int16_t>, cast_row<uint32_t>,
         cast_row<int32_t>, cast_row<uint64_t>, cast_row<int64_t>,  cast_row<float>,   cast_row<double>,
     };
-    const bool is_short = job.volume.size[0] < 4 && job.volume.type <= TEXGS_I16;
-    (is_short ? kShort : kCast)[job.volume.type](job, y, begin, end);
+    kCast[job.volume.type](job, y, begin, end);
 }
 
 }  // namespace

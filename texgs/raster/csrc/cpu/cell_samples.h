@@ -1,142 +1,107 @@
 // SPDX-License-Identifier: Apache-2.0
-// Samples of a volume at the corners of cells and beside them, a vector of cells at a time, as floats.
+// Samples of a volume around the cells that a ray goes through, as floats. Rays take several samples in a cell, so
+// that what surrounds it is loaded once for all of these, and lanes look it up.
 #pragma once
 #include "simd.h"
 
 namespace texgs::TEXGS_ISA {
 namespace {
 
-// Columns of samples: those before, at, behind and two behind the lower corner of a cell, none outside of the volume.
-struct Columns {
-    vi first;     // of four in a row that hold them all
-    vi place[4];  // of each among these
-};
+// Which rows of a block are loaded: those that hold the cell, or also those beside them.
+enum class Rows { of_cell, around };
 
-// One of four values, by numbers 0 to 3.
-TEXGS_INLINE vf one_of(const vf (&s)[4], vi place) {
-    const vf p = to_float(place);
-    return select(p < vf(1.5f), select(p < vf(0.5f), s[0], s[1]), select(p < vf(2.5f), s[2], s[3]));
-}
-
-// How samples of a type are loaded: lane by lane, whatever they are.
+// Blocks of four columns, rows and slices of samples, of which the middle two hold a cell. Samples outside of the
+// volume are the nearest ones inside.
 template <class T>
-struct Loader {
-    // Those in columns c.first + place of rows that begin at some samples of `base`.
-    static TEXGS_INLINE vf one(const T* base, vi row, const Columns& c, int j) {
-        int32_t at[kLanes];
-        float lanes[kLanes];
-        store(at, row + c.first + c.place[j]);
-        for (int i = 0; i < kLanes; ++i) lanes[i] = static_cast<float>(base[at[i]]);
-        return load(lanes);
+class Blocks {
+public:
+    Blocks() = default;
+    Blocks(const T* values, const int32_t (&size)[3]) : values_(values), size_{size[0], size[1], size[2]} {
+        std::memset(rows_, 0, sizeof rows_);
     }
-    static TEXGS_INLINE void two(const T* base, vi row, const Columns& c, vf& a, vf& b) {
-        a = one(base, row, c, 1), b = one(base, row, c, 2);
-    }
-    static TEXGS_INLINE void four(const T* base, vi row, const Columns& c, vf (&s)[4]) {
-        for (int j = 0; j < 4; ++j) s[j] = one(base, row, c, j);
-    }
-};
 
-template <>
-struct Loader<float> {
-    static TEXGS_INLINE void two(const float* base, vi row, const Columns& c, vf& a, vf& b) {
-        a = gather(base, row + c.first + c.place[1]), b = gather(base, row + c.first + c.place[2]);
-    }
-    static TEXGS_INLINE void four(const float* base, vi row, const Columns& c, vf (&s)[4]) {
-        for (int j = 0; j < 4; ++j) s[j] = gather(base, row + c.first + c.place[j]);
-    }
-};
-
-// Whole numbers of Bytes bytes, four of which in a row are one or two words.
-template <class T, int Bytes>
-struct WordLoader {
-    static constexpr float kHalf = Bytes == 1 ? 127.5f : 32767.5f, kRange = 2.0f * kHalf + 1.0f;
-    static TEXGS_INLINE vf number(vi bits) {
-        const vf x = to_float(bits);
-        return T(-1) < T(0) ? select(vf(kHalf) < x, x - vf(kRange), x) : x;
-    }
-    static TEXGS_INLINE void two(const T* base, vi row, const Columns& c, vf& a, vf& b) {
-        if constexpr (Bytes == 1) {
-            const vi word = gather_bytes(base, row + c.first);
-            a = number(byte_of(word, c.place[1])), b = number(byte_of(word, c.place[2]));
-        } else {
-            const vi word = gather_bytes(base, (row + c.first + c.place[1]) * splat(2));
-            a = number(word & splat(0xffff)), b = number(word >> 16);
+    // Loads the blocks of cells on a ray, which are given by their lower corners, in the order of the ray. `ahead`: 1
+    // or -1 along each axis, where the ray goes.
+    TEXGS_INLINE void fetch(const vf (&cell)[3], const float (&ahead)[3], Rows rows) {
+        float crossed[kLanes + 1];  // faces of cells, up to the lane before: more of them mean another cell
+        crossed[0] = -1e9f;
+        const vf faces = fma(cell[0], ahead[0], fma(cell[1], ahead[1], cell[2] * vf(ahead[2]))),
+                 lane = to_float(iota());
+        store(crossed + 1, faces);
+        const vm is_new = load(crossed) < faces;
+        float corner[3][kLanes], begin[kLanes];
+        for (int a = 0; a < 3; ++a) store_chosen(corner[a], cell[a], is_new);
+        store_chosen(begin, lane, is_new);
+        n_ = count(is_new);
+        vf first = -4.0f;
+        for (int i = 0; i < n_; ++i) {
+            first = add_where(vf(begin[i]) <= lane, first, 4.0f);
+            const int32_t at[3] = {int32_t(corner[0][i]), int32_t(corner[1][i]), int32_t(corner[2][i])};
+            copy(at, i, rows);
         }
+        first_ = truncate(first);
     }
-    static TEXGS_INLINE void four(const T* base, vi row, const Columns& c, vf (&s)[4]) {
-        if constexpr (Bytes == 1) {
-            const vi word = gather_bytes(base, row + c.first);
-            for (int j = 0; j < 4; ++j) s[j] = number(byte_of(word, c.place[j]));
-        } else {
-            const vi at = (row + c.first) * splat(2);
-            const vi low = gather_bytes(base, at), high = gather_bytes(base, at + splat(4));
-            const vf all[4] = {number(low & splat(0xffff)), number(low >> 16), number(high & splat(0xffff)),
-                               number(high >> 16)};
-            for (int j = 0; j < 4; ++j) s[j] = one_of(all, c.place[j]);
-        }
-    }
-};
-template <>
-struct Loader<uint8_t> : WordLoader<uint8_t, 1> {};
-template <>
-struct Loader<int8_t> : WordLoader<int8_t, 1> {};
-template <>
-struct Loader<uint16_t> : WordLoader<uint16_t, 2> {};
-template <>
-struct Loader<int16_t> : WordLoader<int16_t, 2> {};
 
-// Rows and columns of the samples around some cells, counted from the slice `first` of the volume on.
-struct Cells {
-    Columns columns;
-    vi row[4], slice[4];  // offsets of the four rows and slices that hold a cell and what is beside it
-
-    // Lower corners `at`, as whole numbers.
-    TEXGS_INLINE Cells(const int32_t (&size)[3], const vf (&at)[3], int32_t first) {
-        vi index[3][4];
-        for (int a = 0; a < 3; ++a)
-            for (int j = 0; j < 4; ++j)
-                index[a][j] = truncate(min(max(at[a] + vf(float(j - 1)), 0.0f), static_cast<float>(size[a] - 1)));
-        columns.first = truncate(min(max(at[0] - vf(1.0f), 0.0f), static_cast<float>(size[0] > 4 ? size[0] - 4 : 0)));
-        for (int j = 0; j < 4; ++j) {
-            columns.place[j] = index[0][j] + columns.first * splat(-1);
-            row[j] = index[1][j] * splat(size[0]);
-            slice[j] = (index[2][j] + splat(-first)) * splat(size[0] * size[1]);
-        }
+    // Column x of row (y, z) of each lane's block.
+    TEXGS_INLINE vf at(int x, int y, int z) const {
+        constexpr int kPlanes = kTableTexels >= 32 ? 2 : 1;
+        const vi place = first_ + splat(x);
+        return n_ <= 4 * kPlanes ? table_lookup<kPlanes>(rows_[z][y], place) : gather(rows_[z][y], place);
     }
+
+private:
+    TEXGS_INLINE void copy(const int32_t (&at)[3], int block, Rows rows) {
+        const bool is_inside =
+            at[0] > 0 && at[1] > 0 && at[2] > 0 && at[0] < size_[0] - 2 && at[1] < size_[1] - 2 && at[2] < size_[2] - 2;
+        if (!is_inside) return copy_clamped(at, block);
+        const int64_t row = size_[0], slice = row * size_[1];
+        const T* from = values_ + (at[2] - 1) * slice + (at[1] - 1) * row + at[0] - 1;
+        const auto copy_row = [&](int y, int z) { copy_quad(rows_[z][y] + 4 * block, from + z * slice + y * row); };
+        for (int z = 1; z < 3; ++z)
+            for (int y = 1; y < 3; ++y) copy_row(y, z);
+        if (rows == Rows::of_cell) return;
+        for (int i = 1; i < 3; ++i) copy_row(0, i), copy_row(3, i), copy_row(i, 0), copy_row(i, 3);
+    }
+
+    void copy_clamped(const int32_t (&at)[3], int block) {
+        const auto clamped = [&](int axis, int i) {
+            const int32_t place = at[axis] + i - 1, last = size_[axis] - 1;
+            return place < 0 ? 0 : place < last ? place : last;
+        };
+        for (int z = 0; z < 4; ++z)
+            for (int y = 0; y < 4; ++y) {
+                const T* row = values_ + (int64_t(clamped(2, z)) * size_[1] + clamped(1, y)) * size_[0];
+                for (int x = 0; x < 4; ++x) rows_[z][y][4 * block + x] = static_cast<float>(row[clamped(0, x)]);
+            }
+    }
+
+    const T* values_;
+    int32_t size_[3];
+    float rows_[4][4][4 * kLanes];  // [z][y]: four columns of each block
+    int n_ = 0;                     // blocks
+    vi first_;                      // place of each lane's block in a row
 };
 
 // Values at places f inside of cells.
 template <class T>
-TEXGS_INLINE vf values_in(const T* base, const Cells& c, const vf (&f)[3]) {
+TEXGS_INLINE vf values_in(const Blocks<T>& blocks, const vf (&f)[3]) {
     vf v[8];
-    for (int i = 0; i < 4; ++i)
-        Loader<T>::two(base, c.row[1 + (i & 1)] + c.slice[1 + (i >> 1)], c.columns, v[2 * i], v[2 * i + 1]);
+    for (int i = 0; i < 8; ++i) v[i] = blocks.at(1 + (i & 1), 1 + (i >> 1 & 1), 1 + (i >> 2));
     return trilinear(v, f);
 }
 
 // Differences of values one cell before and behind, along each axis: those of the corners, trilinear.
 template <class T>
-TEXGS_INLINE void differences_in(const T* base, const Cells& c, const vf (&f)[3], vf (&gradient)[3]) {
-    vf x[8], y[8], z[8], inner[4][2];
-    for (int i = 0; i < 4; ++i) {
-        vf s[4];
-        Loader<T>::four(base, c.row[1 + (i & 1)] + c.slice[1 + (i >> 1)], c.columns, s);
-        x[2 * i] = s[2] - s[0], x[2 * i + 1] = s[3] - s[1];
-        inner[i][0] = s[1], inner[i][1] = s[2];
-    }
-    for (int i = 0; i < 4; ++i) {  // corner (y, z) of the cell: i & 1, i >> 1
-        const bool upper_y = i & 1, upper_z = i >> 1;
-        vf beside[2], beyond[2];
-        Loader<T>::two(base, c.row[upper_y ? 3 : 0] + c.slice[1 + upper_z], c.columns, beside[0], beside[1]);
-        Loader<T>::two(base, c.row[1 + upper_y] + c.slice[upper_z ? 3 : 0], c.columns, beyond[0], beyond[1]);
-        for (int e = 0; e < 2; ++e) {
-            const vf across_y = inner[i ^ 1][e], across_z = inner[i ^ 2][e];
-            y[2 * i + e] = upper_y ? beside[e] - across_y : across_y - beside[e];
-            z[2 * i + e] = upper_z ? beyond[e] - across_z : across_z - beyond[e];
+TEXGS_INLINE void differences_in(const Blocks<T>& blocks, const vf (&f)[3], vf (&gradient)[3]) {
+    for (int a = 0; a < 3; ++a) {
+        const int dx = a == 0, dy = a == 1, dz = a == 2;
+        vf v[8];
+        for (int i = 0; i < 8; ++i) {
+            const int x = 1 + (i & 1), y = 1 + (i >> 1 & 1), z = 1 + (i >> 2);
+            v[i] = blocks.at(x + dx, y + dy, z + dz) - blocks.at(x - dx, y - dy, z - dz);
         }
+        gradient[a] = trilinear(v, f);
     }
-    gradient[0] = trilinear(x, f), gradient[1] = trilinear(y, f), gradient[2] = trilinear(z, f);
 }
 
 }  // namespace

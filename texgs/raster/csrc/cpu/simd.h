@@ -61,6 +61,33 @@ TEXGS_INLINE void store_chosen(float* p, vf a, vm m) {
 #endif
 }
 
+// Copies four numbers as floats.
+template <class T>
+TEXGS_INLINE void copy_quad(float* to, const T* from) {
+    const float quad[4] = {float(from[0]), float(from[1]), float(from[2]), float(from[3])};
+    std::memcpy(to, quad, sizeof quad);
+}
+#if defined(TEXGS_AVX512) || defined(TEXGS_AVX2)  // compilers convert small numbers one by one
+TEXGS_INLINE __m128i load_word(const void* p) {
+    int32_t word;
+    std::memcpy(&word, p, sizeof word);
+    return _mm_cvtsi32_si128(word);
+}
+TEXGS_INLINE __m128i load_two_words(const void* p) { return _mm_loadl_epi64(static_cast<const __m128i*>(p)); }
+TEXGS_INLINE void copy_quad(float* to, const uint8_t* from) {
+    _mm_storeu_ps(to, _mm_cvtepi32_ps(_mm_cvtepu8_epi32(load_word(from))));
+}
+TEXGS_INLINE void copy_quad(float* to, const int8_t* from) {
+    _mm_storeu_ps(to, _mm_cvtepi32_ps(_mm_cvtepi8_epi32(load_word(from))));
+}
+TEXGS_INLINE void copy_quad(float* to, const uint16_t* from) {
+    _mm_storeu_ps(to, _mm_cvtepi32_ps(_mm_cvtepu16_epi32(load_two_words(from))));
+}
+TEXGS_INLINE void copy_quad(float* to, const int16_t* from) {
+    _mm_storeu_ps(to, _mm_cvtepi32_ps(_mm_cvtepi16_epi32(load_two_words(from))));
+}
+#endif
+
 TEXGS_INLINE void prefetch(const void* p) { TEXGS_PREFETCH(p); }
 
 TEXGS_INLINE vf operator-(vf a) { return vf(0.0f) - a; }

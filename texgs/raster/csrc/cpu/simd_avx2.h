@@ -105,6 +105,13 @@ TEXGS_INLINE vf mantissa(vf a) {
     return _mm256_castsi256_ps(_mm256_or_si256(m, _mm256_set1_epi32(0x3f800000)));
 }
 
+TEXGS_INLINE vf running_product(vf a) {
+    const __m256 one = _mm256_set1_ps(1.0f);
+    a = a * vf(_mm256_blend_ps(_mm256_permutevar8x32_ps(a.v, _mm256_setr_epi32(0, 0, 1, 2, 3, 4, 5, 6)), one, 0x01));
+    a = a * vf(_mm256_blend_ps(_mm256_permutevar8x32_ps(a.v, _mm256_setr_epi32(0, 0, 0, 1, 2, 3, 4, 5)), one, 0x03));
+    return a * vf(_mm256_blend_ps(_mm256_permutevar8x32_ps(a.v, _mm256_setr_epi32(0, 0, 0, 0, 0, 1, 2, 3)), one, 0x0f));
+}
+
 // -- Tables in registers: up to kTableTexels floats, 16 to a plane ---------------------------------------------------
 
 constexpr int kTableTexels = 16;

@@ -91,6 +91,15 @@ TEXGS_INLINE vf scale_by_power(vf x, vf k) { return _mm512_scalef_ps(x.v, k.v); 
 TEXGS_INLINE vf exponent(vf a) { return _mm512_getexp_ps(a.v); }
 TEXGS_INLINE vf mantissa(vf a) { return _mm512_getmant_ps(a.v, _MM_MANT_NORM_1_2, _MM_MANT_SIGN_src); }
 
+// Lane i: the product of lanes 0 to i.
+TEXGS_INLINE vf running_product(vf a) {
+    const __m512i one = _mm512_castps_si512(_mm512_set1_ps(1.0f));
+    a = a * vf(_mm512_castsi512_ps(_mm512_alignr_epi32(_mm512_castps_si512(a.v), one, 15)));
+    a = a * vf(_mm512_castsi512_ps(_mm512_alignr_epi32(_mm512_castps_si512(a.v), one, 14)));
+    a = a * vf(_mm512_castsi512_ps(_mm512_alignr_epi32(_mm512_castps_si512(a.v), one, 12)));
+    return a * vf(_mm512_castsi512_ps(_mm512_alignr_epi32(_mm512_castps_si512(a.v), one, 8)));
+}
+
 // -- Tables in registers: up to kTableTexels floats, 16 to a plane ---------------------------------------------------
 
 constexpr int kTableTexels = 64;

@@ -112,6 +112,7 @@ TEXGS_INLINE float largest(vf a) {
     TEXGS_EACH r = a.v[i] > r ? a.v[i] : r;
     return r;
 }
+TEXGS_INLINE vf running_product(vf a) { for (int i = 1; i < kLanes; ++i) a.v[i] = a.v[i] * a.v[i - 1]; return a; }
 // Lanes as integers of the same bits, and back.
 TEXGS_INLINE int4 as_int(vf a) { int4 r; std::memcpy(&r, &a.v, sizeof r); return r; }
 TEXGS_INLINE vf as_float(int4 a) { vf r; std::memcpy(&r.v, &a, sizeof a); return r; }

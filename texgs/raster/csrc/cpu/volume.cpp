@@ -75,17 +75,21 @@ struct Table {
     std::vector<float> numbers;
     CastTable view;
 
-    explicit Table(const texgs_transfer& transfer) : numbers(6 * size_t(transfer.n), 0.0f) {
+    explicit Table(const texgs_transfer& transfer) {
         const int n = transfer.n;
+        int length = kTablePoints;
+        while (length < n) length *= 2;
+        numbers.resize(6 * size_t(length), 0.0f);
         float* column[6];
-        for (int c = 0; c < 6; ++c) column[c] = numbers.data() + c * n;
+        for (int c = 0; c < 6; ++c) column[c] = numbers.data() + c * length;
+        std::fill_n(column[0], length, std::numeric_limits<float>::infinity());
         for (int i = 0; i < n; ++i) {
             const float* p = transfer.points + 5 * i;
             column[0][i] = p[0], column[2][i] = p[1];
             if (i + 1 < n && p[5] > p[0]) column[1][i] = 1.0f / (p[5] - p[0]);
             for (int c = 0; c < 3; ++c) column[3 + c][i] = p[2 + c];
         }
-        view = {n, column[0], column[1], column[2], {column[3], column[4], column[5]}};
+        view = {n, length, column[0], column[1], column[2], {column[3], column[4], column[5]}};
     }
 };
 

@@ -7,9 +7,11 @@
 
 namespace texgs {
 
-// Points of a transfer function, one array for each number, with the width of the interval behind each.
+// Points of a transfer function, one array for each number, with the width of the interval behind each. The arrays
+// are as long as a power of two, at least kTablePoints; values of points behind the last are infinite.
+constexpr int kTablePoints = 16;
 struct CastTable {
-    int32_t n;
+    int32_t n, length;
     const float *value, *per_width, *opacity, *color[3];
 };
 

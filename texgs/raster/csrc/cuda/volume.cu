@@ -109,9 +109,15 @@ struct Interval {
     float place;
 
     __device__ Interval(const texgs_transfer& t, float value) {
-        int i = 0;
-        for (int j = 1; j < t.n - 1; ++j) i += t.points[5 * j] <= value;
-        from = t.points + 5 * i, to = from + 5;
+        int first = 0;
+        for (int end = t.n - 1; end - first > 1;) {
+            const int middle = (first + end) / 2;
+            if (t.points[5 * middle] <= value)
+                first = middle;
+            else
+                end = middle;
+        }
+        from = t.points + 5 * first, to = from + 5;
         place = to[0] > from[0] ? (value - from[0]) / (to[0] - from[0]) : 0.0f;
     }
     __device__ float column(int c) const { return mix(from[c], to[c], place); }
