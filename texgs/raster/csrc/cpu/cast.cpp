@@ -10,7 +10,7 @@
 namespace texgs::TEXGS_ISA {
 namespace {
 
-// Samples of a ray that are taken at once, in vectors: what one vector waits for, others fill.
+// Samples of a ray go through each stage in several vectors: the processor works on one while another waits.
 constexpr int kVectors = 4, kSamples = kVectors * kLanes;
 
 // Samples of a ray that wait until there are kSamples of them, by their numbers.
@@ -65,7 +65,6 @@ template <class T>
 class Caster {
 public:
     Caster(const CastJob& job) : job_(job), lattice_(lattice_of(job.volume)), lamp_(lamp_of(job.view)) {
-        for (auto& blocks : blocks_) blocks = Blocks<T>(static_cast<const T*>(job.volume.values), job.volume.size);
         for (int a = 0; a < 3; ++a) box_.lower[a] = job.lower[a], box_.upper[a] = job.upper[a];
         const CastTable& t = job.table;
         for (int a = 0; a < 3; ++a)
@@ -203,7 +202,7 @@ private:
         for (int i = 0; i < vectors; ++i) {
             vf cell[3];
             locate(ray, load(samples.k + i * kLanes), cell, inside[i]);
-            blocks_[i].fetch(cell, ray.ahead, rows);
+            blocks_[i].fetch(static_cast<const T*>(job_.volume.values), job_.volume.size, cell, ray.ahead, rows);
         }
     }
 
@@ -222,7 +221,7 @@ private:
     const Lattice lattice_;
     const Lamp lamp_;
     Extent box_;
-    Blocks<T> blocks_[kVectors];
+    Blocks blocks_[kVectors];
     float slope_[3];
 };
 

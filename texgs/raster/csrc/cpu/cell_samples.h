@@ -12,17 +12,13 @@ enum class Rows { of_cell, around };
 
 // Blocks of four columns, rows and slices of samples, of which the middle two hold a cell. Samples outside of the
 // volume are the nearest ones inside.
-template <class T>
 class Blocks {
 public:
-    Blocks() = default;
-    Blocks(const T* values, const int32_t (&size)[3]) : values_(values), size_{size[0], size[1], size[2]} {
-        std::memset(rows_, 0, sizeof rows_);
-    }
-
     // Loads the blocks of cells on a ray, which are given by their lower corners, in the order of the ray. `ahead`: 1
     // or -1 along each axis, where the ray goes.
-    TEXGS_INLINE void fetch(const vf (&cell)[3], const float (&ahead)[3], Rows rows) {
+    template <class T>
+    TEXGS_INLINE void fetch(const T* values, const int32_t (&size)[3], const vf (&cell)[3], const float (&ahead)[3],
+                            Rows rows) {
         float crossed[kLanes + 1];  // faces of cells, up to the lane before: more of them mean another cell
         crossed[0] = -1e9f;
         const vf faces = fma(cell[0], ahead[0], fma(cell[1], ahead[1], cell[2] * vf(ahead[2]))),
@@ -37,7 +33,7 @@ public:
         for (int i = 0; i < n_; ++i) {
             first = add_where(vf(begin[i]) <= lane, first, 4.0f);
             const int32_t at[3] = {int32_t(corner[0][i]), int32_t(corner[1][i]), int32_t(corner[2][i])};
-            copy(at, i, rows);
+            copy(values, size, at, i, rows);
         }
         first_ = truncate(first);
     }
@@ -50,12 +46,13 @@ public:
     }
 
 private:
-    TEXGS_INLINE void copy(const int32_t (&at)[3], int block, Rows rows) {
+    template <class T>
+    TEXGS_INLINE void copy(const T* values, const int32_t (&size)[3], const int32_t (&at)[3], int block, Rows rows) {
         const bool is_inside =
-            at[0] > 0 && at[1] > 0 && at[2] > 0 && at[0] < size_[0] - 2 && at[1] < size_[1] - 2 && at[2] < size_[2] - 2;
-        if (!is_inside) return copy_clamped(at, block);
-        const int64_t row = size_[0], slice = row * size_[1];
-        const T* from = values_ + (at[2] - 1) * slice + (at[1] - 1) * row + at[0] - 1;
+            at[0] > 0 && at[1] > 0 && at[2] > 0 && at[0] < size[0] - 2 && at[1] < size[1] - 2 && at[2] < size[2] - 2;
+        if (!is_inside) return copy_clamped(values, size, at, block);
+        const int64_t row = size[0], slice = row * size[1];
+        const T* from = values + (at[2] - 1) * slice + (at[1] - 1) * row + at[0] - 1;
         const auto copy_row = [&](int y, int z) { copy_quad(rows_[z][y] + 4 * block, from + z * slice + y * row); };
         for (int z = 1; z < 3; ++z)
             for (int y = 1; y < 3; ++y) copy_row(y, z);
@@ -63,36 +60,33 @@ private:
         for (int i = 1; i < 3; ++i) copy_row(0, i), copy_row(3, i), copy_row(i, 0), copy_row(i, 3);
     }
 
-    void copy_clamped(const int32_t (&at)[3], int block) {
+    template <class T>
+    void copy_clamped(const T* values, const int32_t (&size)[3], const int32_t (&at)[3], int block) {
         const auto clamped = [&](int axis, int i) {
-            const int32_t place = at[axis] + i - 1, last = size_[axis] - 1;
+            const int32_t place = at[axis] + i - 1, last = size[axis] - 1;
             return place < 0 ? 0 : place < last ? place : last;
         };
         for (int z = 0; z < 4; ++z)
             for (int y = 0; y < 4; ++y) {
-                const T* row = values_ + (int64_t(clamped(2, z)) * size_[1] + clamped(1, y)) * size_[0];
+                const T* row = values + (int64_t(clamped(2, z)) * size[1] + clamped(1, y)) * size[0];
                 for (int x = 0; x < 4; ++x) rows_[z][y][4 * block + x] = static_cast<float>(row[clamped(0, x)]);
             }
     }
 
-    const T* values_;
-    int32_t size_[3];
-    float rows_[4][4][4 * kLanes];  // [z][y]: four columns of each block
-    int n_ = 0;                     // blocks
-    vi first_;                      // place of each lane's block in a row
+    float rows_[4][4][4 * kLanes] = {};  // [z][y]: four columns of each block
+    int n_ = 0;                          // blocks
+    vi first_;                           // place of each lane's block in a row
 };
 
 // Values at places f inside of cells.
-template <class T>
-TEXGS_INLINE vf values_in(const Blocks<T>& blocks, const vf (&f)[3]) {
+TEXGS_INLINE vf values_in(const Blocks& blocks, const vf (&f)[3]) {
     vf v[8];
     for (int i = 0; i < 8; ++i) v[i] = blocks.at(1 + (i & 1), 1 + (i >> 1 & 1), 1 + (i >> 2));
     return trilinear(v, f);
 }
 
 // Differences of values one cell before and behind, along each axis: those of the corners, trilinear.
-template <class T>
-TEXGS_INLINE void differences_in(const Blocks<T>& blocks, const vf (&f)[3], vf (&gradient)[3]) {
+TEXGS_INLINE void differences_in(const Blocks& blocks, const vf (&f)[3], vf (&gradient)[3]) {
     for (int a = 0; a < 3; ++a) {
         const int dx = a == 0, dy = a == 1, dz = a == 2;
         vf v[8];
