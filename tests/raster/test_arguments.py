@@ -240,6 +240,7 @@ def test_unknown_output():
     "wrong",
     [
         {"alpha_min": -0.1},
+        {"alpha_min": 1e-38},
         {"alpha_min": 1.5},
         {"transmittance_min": 1.0},
         {"transmittance_min": -1e-3},

@@ -80,6 +80,10 @@ def test_what_does_not_fit_is_refused():
         lattice.add(view, torch.tensor([[0, 2, 0]]), TRUNCATION)
     with pytest.raises(ShapeError, match=r"blocks: expected \[N, 3\], got \[3\]"):
         lattice.add(view, torch.tensor([0, 0, 0]), TRUNCATION)
+    with pytest.raises(ArgumentError, match="blocks: expected each one once, got some twice"):
+        lattice.add(view, CHOSEN[[1, 0, 1]], TRUNCATION)
+    with pytest.raises(ArgumentError, match=r"blocks: expected whole numbers, got torch\.float32"):
+        lattice.add(view, CHOSEN.float(), TRUNCATION)
     with pytest.raises(ArgumentError, match="truncation: expected a length above 0"):
         lattice.add(view, CHOSEN, 0.0)
     with pytest.raises(ArgumentError, match=r"view: expected depth .* got \(20, 24\) and \(24, 20, 3\)"):
@@ -88,3 +92,5 @@ def test_what_does_not_fit_is_refused():
         DepthView(view.camera, view.depth, view.color.float())
     with pytest.raises(DeviceError, match="view: expected tensors on cpu, got meta"):
         DepthView(view.camera, view.depth.to("meta"), view.color)
+    with pytest.raises(DeviceError, match="view: expected tensors on cpu, got meta"):
+        DepthView(view.camera.to("meta"), view.depth, view.color)

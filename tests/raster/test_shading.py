@@ -235,6 +235,13 @@ def test_any_number_of_threads_gives_the_same_bits(light, facing):
         assert all(torch.equal(a, b) for a, b in zip(with_threads(n, everything), expected, strict=True))
 
 
+def test_a_shininess_that_is_not_finite_is_seen(device):
+    color, ambient, diffuse, specular, _, means, quats = surfels(3, device=device)
+    shininess = torch.tensor([5.0, float("nan"), 5.0], device=device)
+    lit = blinn_phong(color, ambient, diffuse, specular, shininess, means, quats, CAMERA.to(device))
+    assert lit.isnan().any(1).tolist() == [False, True, False]
+
+
 def test_no_surfels(device):
     values, found = gradients(blinn_phong_texture, surfels(0, ("ambient",), device), CAMERA.to(device))
     assert [len(x) for x in values] == [0, 0]

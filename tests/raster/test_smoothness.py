@@ -74,6 +74,12 @@ def test_a_constant_attribute_inside_costs_nothing(device):
     assert not gradient.any()
 
 
+def test_a_guide_that_is_not_finite_is_seen(device):
+    guide = torch.full((8, 9, 3), float("nan"), device=device)
+    attribute, alpha = torch.rand(8, 9, device=device), torch.ones(8, 9, device=device)
+    assert bilateral_smoothness(attribute, guide, alpha).isnan()
+
+
 def test_any_number_of_threads_gives_the_same_bits():
     inputs = maps(359, 641, 2)
     value, gradient = with_threads(1, evaluate, bilateral_smoothness, *inputs)

@@ -140,6 +140,16 @@ def test_a_retained_graph_can_be_used_again(device):
     torch.testing.assert_close(image.grad, 3 * gradient)
 
 
+def test_a_retained_graph_cannot_be_used_after_its_target_has_changed(device):
+    image, target = pair(20, 30, 3, device)
+    target = target.permute(2, 0, 1).contiguous().permute(1, 2, 0)  # planar memory is not copied
+    value = l1_dssim(image.requires_grad_(), target)
+    value.backward(retain_graph=True)
+    target.zero_()
+    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
+        value.backward()
+
+
 def test_value_does_not_depend_on_the_gradient(device):
     image, target = pair(150, 300, 3, device)
     assert l1_dssim(image, target) == evaluate(l1_dssim, image, target)[0]

@@ -114,6 +114,17 @@ def test_largest_weights(device):
     assert torch.equal(weights, alone)
 
 
+def test_weights_may_start_anywhere(device):
+    scene = voxel_scene(n_rays=40).to(device)
+    samples = Samples(scene.grid, scene.march, scene.rays)
+    weights = torch.zeros(len(scene.grid.rows), device=device)
+    lower = weights - 1
+    samples.mark(weights)
+    samples.mark(lower)
+    assert torch.equal(lower.clamp_min(0), weights)
+    assert lower.max() > 0 > lower.min()
+
+
 def test_largest_weight_of_a_single_cell():
     mask = torch.zeros(8, 8, 8, dtype=torch.bool)
     mask[3:5, 3:5, 3:5] = True
@@ -253,6 +264,10 @@ def test_errors_name_the_argument():
         samples.add_gradient(None, None, other)
     with pytest.raises(ShapeError, match=r"color: expected \[300, 3\], got \[299, 3\]"):
         samples.add_gradient(rays[1:, :3], None, RowGradient(grid))
+    with pytest.raises(DeviceError, match="color: expected device cpu as rays, got meta"):
+        samples.add_gradient(rays[:, :3].to("meta"), None, RowGradient(grid))
+    with pytest.raises(DeviceError, match="into: expected device cpu as rows, got meta"):
+        render_rays(grid, rays, into=RowGradient(grid.to("meta")))
     with pytest.raises(ArgumentError, match="alpha: expected float32, got float64"):
         samples.add_gradient(None, rays[:, 0].double(), RowGradient(grid))
     with pytest.raises(ShapeError, match=r"weights: expected \[\d+\], got \[3\]"):

@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -319,12 +320,19 @@ def test_points_hold_the_function_at_every_value(tf):
     np.testing.assert_allclose(found[:, [1, 2, 3, 0]], tf(values), atol=1e-5)
 
 
-def test_values_that_single_precision_cannot_tell_apart():
-    tf = TransferFunction(((16777216, 0.5), (16777217, 0.5)), ((0, 1, 1, 1),))
-    with pytest.raises(
-        ArgumentError, match="values that differ in single precision, got 16777216 to 16777217"
-    ):
+@pytest.mark.parametrize(("low", "high"), [(16777216, 16777217), (0, 1e39), (-3e38, 3e38), (0, 1e-39)])
+def test_values_that_single_precision_cannot_tell_apart(low, high):
+    tf = TransferFunction(((low, 0.5), (high, 0.5)), ((0, 1, 1, 1),))
+    with pytest.raises(ArgumentError, match=f"values that differ in single precision, got {low:.9g} to"):
         points_of(tf)
+
+
+def test_an_interval_may_be_narrower_than_single_precision_can_divide_by(device):
+    tf = TransferFunction(((0, 0.5), (1e-39, 1), (1, 1)), ((0, 1, 1, 1),))
+    picture = Caster(Grid(np.zeros((4, 4, 4), np.float32)), Appearance(), device).render(
+        tf, orbit(0, 0, 3, 30, 8, 8), HEADLIGHT
+    )
+    assert picture[..., 3].max() > 0.99
 
 
 def test_another_shading_is_that_of_a_caster_that_has_it(device):
@@ -337,14 +345,21 @@ def test_another_shading_is_that_of_a_caster_that_has_it(device):
     np.testing.assert_array_equal(found, Caster(grid, dark, device).render(SHELLS, camera, HEADLIGHT))
 
 
+SKEWED = torch.tensor([[9.0, 1.0, 4.0], [0.0, 9.0, 4.0], [0.0, 0.0, 1.0]])
+
+
 @pytest.mark.parametrize(("change", "message"), [
     ({"outputs": ("colour",)}, "outputs: expected some of depth, median, normal, got colour"),
     ({"values": np.zeros((4, 4, 4), np.float16)}, "expected samples of uint8, .* or bool, got float16"),
+    ({"camera": {"K": SKEWED}}, r"K: expected no skew, got K\[0, 1\] = 1"),
+    ({"camera": {"viewmat": torch.eye(4).requires_grad_()}}, "camera: not differentiable here"),
+    ({"step": 1e-7}, "step: expected at most 16777216 samples along a ray, got up to 1.21e[+]08"),
 ])  # fmt: skip
 def test_mistakes_are_named(change, message):
+    camera = replace(orbit(0, 0, 3, 30, 8, 8), **change.get("camera", {}))
     with pytest.raises(ArgumentError, match=message):
-        Caster(Grid(change.get("values", ball(8).values)), Appearance()).cast(
-            SHELLS, orbit(0, 0, 3, 30, 8, 8), HEADLIGHT, change.get("outputs", ())
+        Caster(Grid(change.get("values", ball(8).values)), Appearance(step=change.get("step", 0.25))).cast(
+            SHELLS, camera, HEADLIGHT, change.get("outputs", ())
         )
 
 

@@ -61,7 +61,8 @@ class DepthView:
                 f"view: expected depth of float32 and color of uint8, got {self.depth.dtype} and "
                 f"{self.color.dtype}"
             )
-        if devices := {x.device.type for x in (self.depth, self.color)} - {"cpu"}:
+        tensors = (self.depth, self.color, self.camera.viewmat, self.camera.K)
+        if devices := {x.device.type for x in tensors} - {"cpu"}:
             raise DeviceError(f"view: expected tensors on cpu, got {devices.pop()}; move them")
 
 
@@ -100,11 +101,15 @@ class Lattice:
             truncation: world units.
 
         Raises:
-            ArgumentError, ShapeError: if a block is none of the lattice's.
+            ArgumentError, ShapeError: if a block is none of the lattice's, or twice there.
         """
         check.shape("blocks", blocks, "N 3")
+        if blocks.is_floating_point():
+            raise ArgumentError(f"blocks: expected whole numbers, got {blocks.dtype}")
         if len(blocks) and not bool(((blocks >= 0) & (blocks < torch.tensor(self.blocks))).all()):
             raise ArgumentError(f"blocks: expected numbers below {self.blocks}, got others")
+        if len(blocks.unique(dim=0)) < len(blocks):
+            raise ArgumentError("blocks: expected each one once, got some twice")
         matrices = [matrix.float().contiguous() for matrix in (view.camera.viewmat, view.camera.K)]
         depth, color = view.depth.contiguous(), view.color.contiguous()
         chosen = blocks.to(torch.int32).contiguous()

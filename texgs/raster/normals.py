@@ -66,21 +66,13 @@ def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Te
     check.same_device(depth=depth, normal=normal, alpha=alpha)
     constants = (alpha.detach().contiguous(), viewmat.contiguous(), K.contiguous())
 
-    def evaluate(inputs: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
+    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
         value = depth.new_empty(())
-        gradients = [torch.empty_like(x) if want else None for x, want in zip(inputs, wanted, strict=True)]
-        call(
-            "texgs_normal_consistency",
-            *inputs,
-            *constants,
-            *depth.shape,
-            value,
-            *gradients,
-            device=depth.device,
-        )
+        gradients = [torch.empty_like(x) if want else None for x, want in zip(tensors, wanted, strict=False)]
+        call("texgs_normal_consistency", *tensors, *depth.shape, value, *gradients, device=depth.device)
         return value, gradients
 
-    return fused_loss(evaluate, planar(normal), depth.contiguous())
+    return fused_loss(evaluate, [planar(normal), depth.contiguous()], constants)
 
 
 def _check(depth: Tensor, viewmat: Tensor, K: Tensor) -> dict[str, int]:

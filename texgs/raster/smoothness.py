@@ -43,13 +43,12 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
         check.floating(name, tensor)
     check.same_device(attribute=attribute, guide=guide, alpha=alpha)
     check.constant(guide=guide, alpha=alpha)
-    constants = (planar(guide), alpha.contiguous())
 
-    def evaluate(inputs: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
-        (x,) = inputs
+    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
+        x, *constants = tensors
         value = x.new_empty(())
         gradient = torch.empty_like(x) if wanted[0] else None
         call("texgs_bilateral_smoothness", x, *constants, *x.shape, value, gradient, device=x.device)
         return value, [gradient]
 
-    return fused_loss(evaluate, planar(attribute))
+    return fused_loss(evaluate, [planar(attribute)], [planar(guide), alpha.contiguous()])

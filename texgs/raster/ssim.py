@@ -73,13 +73,12 @@ def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
     check.floating("target", target)
     check.same_device(image=image, target=target)
     check.constant(target=target)
-    dense_target = planar(target)
 
-    def evaluate(inputs: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
-        (x,) = inputs
+    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
+        x, dense_target = tensors
         value = x.new_empty(())
         gradient = torch.empty_like(x) if wanted[0] else None
         call("texgs_l1_dssim", x, dense_target, *x.shape, l1, dssim, value, gradient, device=x.device)
         return value, [gradient]
 
-    return fused_loss(evaluate, planar(image))
+    return fused_loss(evaluate, [planar(image)], [planar(target)])

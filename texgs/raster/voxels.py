@@ -53,11 +53,12 @@ class RowGradient:
         self.touched = torch.zeros_like(grid.distance).flatten()  # blocks with a gradient
 
     def check(self, grid: VoxelGrid) -> None:
-        """Require a grid of the same layout.
+        """Require a grid of the same layout, on the same device.
 
         Raises:
-            ShapeError: naming both sizes.
+            ShapeError, DeviceError: naming both sizes, or both devices.
         """
+        check.same_device(rows=grid.rows, into=self.rows)
         given, expected = (
             (list(self.rows.shape), len(self.touched)),
             (list(grid.rows.shape), grid.masks.numel()),
@@ -119,6 +120,7 @@ def _gradient(name: str, gradient: Tensor, spec: str, rays: Tensor) -> Tensor:
     """A dense gradient of what rays brought back, checked."""
     check.shape(name, gradient, spec, N=len(rays))
     check.floating(name, gradient)
+    check.same_device(**{"rays": rays, name: gradient})
     return gradient.contiguous()
 
 
@@ -147,8 +149,8 @@ def render_rays(
 
     Args:
         grid: its density and occupancy up to date, see `VoxelGrid.refresh`.
-        rays: [N, 6] origin and direction of any length but zero, world units; neighbours one after the other
-            are faster.
+        rays: [N, 6] origin and direction, world units, directions of a length from 1e-15 to 1e15; neighbours
+            one after the other are faster.
         march: how rays are sampled.
         into: where the backward pass adds its gradient, in place of `grid.rows.grad`.
         keep: the samples, 36 bytes each, for the backward pass; False: it marches piece by piece again

@@ -16,6 +16,7 @@ from copy import copy
 from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 from functools import cache
+from math import hypot, inf
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.raster import native
+from texgs.raster.arguments import pinhole
 from texgs.volume.appearance import Appearance
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction, right_limit
@@ -36,6 +38,8 @@ from texgs.volume.vtk_camera import directions
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 OUTPUTS = ("depth", "median", "normal")
 BYTES = 64  # of memory for a pixel
+LEAST_WIDTH = torch.finfo(torch.float32).tiny  # of a transfer function, in data values
+MOST_SAMPLES = 2**24  # along a ray; their numbers are floats
 PADDING = 3  # bytes behind the distances of bricks, which are loaded as words
 
 
@@ -97,8 +101,10 @@ class Caster:
         if kind not in TYPES:
             raise ArgumentError(f"volume: expected samples of {', '.join(TYPES)} or bool, got {kind}")
         half = [float(side) for side in grid.aabb[1]]
+        self._diagonal = 2 * hypot(*half)
         self._voxel = min(2 * side / (size - 1) for side, size in zip(half, grid.dims, strict=True))
         self._values = bytes_of(values).to(self._device)
+        self._device = self._values.device  # with the number of the GPU, whichever is the current one later
         self._volume = NativeVolume(
             self._values.data_ptr(), TYPES.index(kind), (c_int32 * 3)(*grid.dims), (c_float * 3)(*half)
         )
@@ -129,15 +135,17 @@ class Caster:
         """A view, with what else is wanted of OUTPUTS, in one pass.
 
         Raises:
-            ArgumentError: if an output is unknown.
+            ArgumentError: if an output is unknown, the camera has skew or requires a gradient, or rays would
+                take more than 2^24 samples.
             OutOfMemoryError: if the view needs more memory than there is.
         """
         if unknown := sorted(set(outputs) - set(OUTPUTS)):
             raise ArgumentError(f"outputs: expected some of {', '.join(OUTPUTS)}, got {unknown[0]}")
         height, width = camera.height, camera.width
         require_memory(BYTES * height * width, f"a view of {width} x {height} pixels", "choose a smaller one")
+        self._check(camera)
         points, distance = self._prepare(tf)
-        matrices = [x.detach().float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
+        matrices = [x.float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
         planes = {"rgba": [4], "normal": [3]}
         seen = {
             name: torch.empty(height, width, *planes.get(name, []), device=self._device)
@@ -155,16 +163,29 @@ class Caster:
         self._call("texgs_cast", byref(transfer), distance.data_ptr(), byref(view))
         return Cast(**seen)
 
+    def _check(self, camera: Camera) -> None:
+        """Refuse cameras and steps that the library would take for others."""
+        if camera.viewmat.requires_grad or camera.K.requires_grad:
+            raise ArgumentError("camera: not differentiable here, but it requires a gradient; detach it")
+        pinhole(camera.viewmat.cpu(), camera.K.cpu())
+        samples = self._diagonal / (self._appearance.step * self._voxel)
+        if samples > MOST_SAMPLES:
+            raise ArgumentError(
+                f"step: expected at most {MOST_SAMPLES} samples along a ray, got up to {samples:.3g}; take a "
+                "larger one"
+            )
+
     def _prepare(self, tf: TransferFunction) -> tuple[Tensor, Tensor]:
         """Points of a transfer function, and how far each brick is from one in which it shows something."""
-        if self._prepared is None or self._prepared[0] != tf:
+        prepared = self._prepared  # another thread may prepare another function
+        if prepared is None or prepared[0] != tf:
             points = points_of(tf).to(self._device)
             distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8, device=self._device)
             transfer = NativeTransfer(len(points), points.data_ptr())
             addresses = self._extremes.data_ptr(), byref(transfer), distance.data_ptr()
             self._call("texgs_volume_distance", *addresses)
-            self._prepared = tf, points, distance
-        return self._prepared[1:]
+            prepared = self._prepared = tf, points, distance
+        return prepared[1:]
 
     def _call(self, name: str, *arguments: Any) -> None:
         native.call(name, byref(self._volume), *arguments, device=self._device)
@@ -192,7 +213,7 @@ def points_of(tf: TransferFunction) -> Tensor:
         if is_step and value == high:
             rows.append(rows[-1])  # the last interval has no width: values at its start have those of its end
     points = torch.tensor(np.array(rows), dtype=torch.float32)
-    if not points[0, 0] < points[-1, 0]:
+    if not LEAST_WIDTH <= points[-1, 0] - points[0, 0] < inf:
         raise ArgumentError(
             "transfer function: expected values that differ in single precision, got "
             f"{low:.9g} to {high:.9g}; scale or shift the data"

@@ -116,6 +116,7 @@ T __ldg(const T* address) {
 inline int __ffs(int a) { return a ? std::countr_zero(static_cast<unsigned>(a)) + 1 : 0; }
 inline int __clzll(long long a) { return std::countl_zero(static_cast<unsigned long long>(a)); }
 inline uint32_t __float_as_uint(float a) { return std::bit_cast<uint32_t>(a); }
+inline int32_t __float_as_int(float a) { return std::bit_cast<int32_t>(a); }
 inline float __uint_as_float(uint32_t a) { return std::bit_cast<float>(a); }
 inline long long __float2ll_rn(float a) { return llrintf(a); }
 inline float __fmul_rn(float a, float b) { return a * b; }

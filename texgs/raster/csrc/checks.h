@@ -30,7 +30,7 @@ inline void check_options(const texgs_options& o) {
     require(o.low_pass > 0, "low_pass: expected above 0");
     require(o.filter_sigma >= 0, "filter_sigma: expected 0 or more");
     require(o.dilation > 0, "dilation: expected above 0");
-    require(o.alpha_min > 0 && o.alpha_min < 1, "alpha_min: expected between 0 and 1, without them");
+    require(o.alpha_min >= 1e-30f && o.alpha_min < 1, "alpha_min: expected 1e-30 to 1, without 1");
     require(o.transmittance_min >= 0 && o.transmittance_min < 1, "transmittance_min: expected 0 to 1, without 1");
     require(o.near_plane > 0 && o.far_plane > o.near_plane, "near, far: expected 0 < near < far");
 }

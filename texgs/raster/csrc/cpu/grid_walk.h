@@ -57,8 +57,8 @@ TEXGS_INLINE vf empty_samples(const texgs_grid& g, const Bundle& bundle, float s
         vf points[3], leave = 1e6f;
         for (int a = 0; a < 3; ++a) points[a] = fma((k + vf(0.5f)) * vf(step), load(direction[a]), load(entry[a]));
         const Cells c = cells_of(g, points);
-        const vi bytes = gather(reinterpret_cast<const int32_t*>(g.distance), c.block >> 2);
-        const vf distance = to_float(byte_of(bytes, c.block & splat(3)));
+        const vi word = truncate(max(to_float(c.block) - vf(3.0f), 0.0f));  // whose last byte is no later
+        const vf distance = to_float(byte_of(gather_bytes(g.distance, word), c.block + word * splat(-1)));
         const vm empty = (distance > vf(0.0f)) & (passed < count);
         if (!any(empty)) return passed;
         for (int a = 0; a < 3; ++a) {

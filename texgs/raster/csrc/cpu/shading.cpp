@@ -83,7 +83,7 @@ Lit light_surfels(const BlinnPhongJob& job, const Material& m, int64_t i, int n)
     }
     s.n_l = dot(s.normal, s.light);
     s.n_h = dot(s.normal, s.half);
-    s.lobe = exp2(m.shininess * log2(max(abs(s.n_h), kSmallest)));
+    s.lobe = exp2_or_nan(m.shininess * log2(max(abs(s.n_h), kSmallest)));
     if (job.facing) cast_shadow(s);
     return s;
 }

@@ -98,8 +98,9 @@ TEXGS_INLINE vm operator>(vf a, vf b) { return b < a; }
 TEXGS_INLINE vm operator>=(vf a, vf b) { return b <= a; }
 TEXGS_INLINE bool any(vm m) { return bits(m) != 0; }
 
-// 2^x, relative error below 3e-7 for x in [-126, 127]; below that 2^-126. The polynomial (degree 5, least relative
-// error on an interval of length 1) is evaluated in pairs: its latency, not its operations, is what a loop waits for.
+// 2^x, relative error below 3e-7 for x in [-126, 127]; below that and for NaN 2^-126. The polynomial (degree 5, least
+// relative error on an interval of length 1) is evaluated in pairs: its latency, not its operations, is what a loop
+// waits for.
 TEXGS_INLINE vf polynomial(vf x, vf c0, vf c1, vf c2, vf c3, vf c4, vf c5) {
     const vf x2 = x * x;
     return fma(fma(fma(c5, x, c4), x2, fma(c3, x, c2)), x2, fma(c1, x, c0));
@@ -111,6 +112,7 @@ TEXGS_INLINE vf exp2(vf x) {
                             9.675541334449414e-3f, 1.327647199285195e-3f);
     return scale_by_power(p, k);
 }
+TEXGS_INLINE vf exp2_or_nan(vf x) { return select(x <= x, exp2(x), x); }
 
 // log2(x) for normal x > 0, absolute error below 4e-7.
 TEXGS_INLINE vf log2(vf x) {

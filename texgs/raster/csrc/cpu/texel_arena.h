@@ -33,6 +33,8 @@ private:
             arena.end = arena.next + size;
         } catch (const OutOfMemory& e) {
             arena.missing = e.bytes;
+        } catch (const std::bad_alloc&) {
+            arena.missing = 4 * size;
         }
     }
 

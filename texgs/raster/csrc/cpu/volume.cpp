@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -86,7 +87,8 @@ struct Table {
         for (int i = 0; i < n; ++i) {
             const float* p = transfer.points + 5 * i;
             column[0][i] = p[0], column[2][i] = p[1];
-            if (i + 1 < n && p[5] > p[0]) column[1][i] = 1.0f / (p[5] - p[0]);
+            const float per_width = i + 1 < n && p[5] > p[0] ? 1.0f / (p[5] - p[0]) : 0.0f;
+            column[1][i] = std::isfinite(per_width) ? per_width : 0.0f;  // too narrow to mix: a step
             for (int c = 0; c < 3; ++c) column[3 + c][i] = p[2 + c];
         }
         view = {n, length, column[0], column[1], column[2], {column[3], column[4], column[5]}};

@@ -6,6 +6,7 @@
 #include "frame.cuh"
 #include "grid.cuh"
 #include "pool.cuh"
+#include "workspace.cuh"
 
 using namespace texgs;
 using namespace texgs::cuda;
@@ -85,5 +86,5 @@ void texgs_release(texgs_frame* frame) {
 }
 
 void texgs_trim(void) {
-    guarded([] { pool<texgs_frame>().clear(), clear_grid_pool(); });
+    guarded([] { pool<texgs_frame>().clear(), pool<Workspace>().clear(), clear_grid_pool(); });
 }

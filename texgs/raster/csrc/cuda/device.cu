@@ -7,8 +7,9 @@
 namespace texgs::cuda {
 
 void check(cudaError_t status, const char* what) {
-    if (status != cudaSuccess)
-        throw std::runtime_error(std::string("CUDA, ") + what + ": " + cudaGetErrorString(status));
+    if (status == cudaSuccess) return;
+    cudaGetLastError();  // the exception tells of it; later calls must not report it again
+    throw std::runtime_error(std::string("CUDA, ") + what + ": " + cudaGetErrorString(status));
 }
 
 DeviceScope::DeviceScope(int device) : device_(device) {

@@ -37,8 +37,7 @@ void launch(void (*kernel)(Parameters...), int64_t blocks, int threads, cudaStre
     config.gridDim = static_cast<unsigned>(blocks);
     config.blockDim = threads;
     config.stream = stream;
-    cudaLaunchKernelEx(&config, kernel, arguments...);
-    check(cudaGetLastError(), "launching a kernel");
+    check(cudaLaunchKernelEx(&config, kernel, arguments...), "launching a kernel");
 }
 
 }  // namespace texgs::cuda

@@ -59,9 +59,9 @@ __global__ __launch_bounds__(kThreads) void mark_kernel(const GridJob job, int64
     const int64_t i = thread_index();
     if (i >= samples) return;
     const Corners corners = corners_of(job.grid, unpack(job.samples[i].cell));
-    auto* weights = reinterpret_cast<uint32_t*>(job.row_weight);  // ordered as the floats are: none is negative
+    auto* weights = reinterpret_cast<int32_t*>(job.row_weight);  // positive ones are ordered as the floats are
     for (int corner = 0; corner < 8; ++corner)
-        if (corners.row[corner]) atomicMax(weights + corners.row[corner], __float_as_uint(job.samples[i].weight));
+        if (corners.row[corner]) atomicMax(weights + corners.row[corner], __float_as_int(job.samples[i].weight));
 }
 
 }  // namespace
