@@ -323,7 +323,7 @@ def test_points_hold_the_function_at_every_value(tf):
 @pytest.mark.parametrize(("low", "high"), [(16777216, 16777217), (0, 1e39), (-3e38, 3e38), (0, 1e-39)])
 def test_values_that_single_precision_cannot_tell_apart(low, high):
     tf = TransferFunction(((low, 0.5), (high, 0.5)), ((0, 1, 1, 1),))
-    with pytest.raises(ArgumentError, match=f"values that differ in single precision, got {low:.9g} to"):
+    with pytest.raises(ArgumentError, match="expected values that differ in single precision, got"):
         points_of(tf)
 
 

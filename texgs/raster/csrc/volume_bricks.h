@@ -40,8 +40,10 @@ TEXGS_MATHS bool shows(const texgs_transfer& transfer, float low, float high) {
         const float *p = transfer.points + 5 * i, *q = p + 5;
         const float from = low > p[0] ? low : p[0], to = high < q[0] ? high : q[0];
         if (from > to) continue;
-        const float slope = q[0] > p[0] ? (q[1] - p[1]) / (q[0] - p[0]) : 0.0f, start = q[0] > p[0] ? p[1] : q[1];
-        if (start + slope * (from - p[0]) > 0.0f || start + slope * (to - p[0]) > 0.0f) return true;
+        const float width = q[0] - p[0], start = width > 0.0f ? p[1] : q[1], rise = q[1] - start;
+        const float divisor = width > 0.0f ? width : 1.0f;  // not its inverse, which may be infinite
+        if (start + rise * ((from - p[0]) / divisor) > 0.0f || start + rise * ((to - p[0]) / divisor) > 0.0f)
+            return true;
     }
     return false;
 }
