@@ -88,9 +88,12 @@ def some_images(folder):
     return found if len(found) >= 3 else {}
 
 
-def job_of(slurm, rule):
-    """Number of the running job whose first rule this is."""
-    return next((job for job, comment in slurm.jobs("running").items() if rule in comment), None)
+def text_of(log):
+    """What a log says; Snakemake removes it before a job begins."""
+    try:
+        return log.read_text()
+    except FileNotFoundError:
+        return ""
 
 
 def test_a_cancelled_job_goes_on_in_a_run_to_the_first_fit(slurm, work, start):
@@ -141,16 +144,15 @@ def test_a_job_outlives_the_login_process_and_is_adopted(slurm, work, start):
     slurm.call("scontrol", "suspend", survivor)  # so that it still holds its folder when the next job comes
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    said, kept = log.read_text(), views_b()
+    kept = views_b()
     assert 3 <= len(kept) < 42
 
     again = start(target, overrides=other)
-    wait_for(lambda: "another job works there; waiting for it to end" in log.read_text(), again)
+    wait_for(lambda: "another job works there; waiting for it to end" in text_of(log), again)
     slurm.call("scontrol", "resume", survivor)
     assert again.wait(timeout=400) == 0, again.said.read_text()
     assert len(views_b()) == 42
     assert kept.items() <= views_b().items(), "the views of the job that outlived its run are made again"
-    assert log.read_text().startswith(said)
     states = slurm.call("squeue", "--noheader", "--states=all", "--format=%A %T").splitlines()
     ends = dict(line.split() for line in states)
     assert {ends[job] for job in set(ends) - already} == {"COMPLETED"}

@@ -126,8 +126,8 @@ shell.prefix(
     "set -euo pipefail; "
     f'texgs() {{{{ {SETTING} {shlex.quote(sys.executable)} -PSE {shlex.quote(CLIENT)} "$@"; }}}}; '
 )
-# One command for all stages. A second attempt adds to the log of the first.
-RUN = "texgs {params.words:q} 2>&1 | tee --append {log:q}"
+# One command for all stages. Snakemake removes the log of an earlier attempt.
+RUN = "texgs {params.words:q} 2>&1 | tee {log:q}"
 
 
 # What is there stays until the job has made something better: it swaps its files in at the end.

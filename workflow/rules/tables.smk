@@ -29,7 +29,7 @@ rule tables:
         ballots=sorted(map(str, STUDY.glob("votes/*.csv"))),
     shell:
         "texgs tables {input:q} {params.earlier:q} --missing {params.left_out:q} --study {params.study:q} "
-        "--output {params.folder:q} 2>&1 | tee --append {log:q}"
+        "--output {params.folder:q} 2>&1 | tee {log:q}"
 
 
 rule report:
@@ -48,4 +48,4 @@ rule report:
         ballots=sorted(map(str, STUDY.glob("votes/*.csv"))),
     shell:
         "texgs report {input:q} {params.earlier:q} --missing {params.left_out:q} --study {params.study:q} "
-        "--output {output:q} 2>&1 | tee --append {log:q}"
+        "--output {output:q} 2>&1 | tee {log:q}"

@@ -25,7 +25,7 @@ rule download:
         source=lambda wildcards, output: PLAN.downloads[output[0]],
     shell:
         "texgs download {params.source[0]:q} --sha256 {params.source[1]:q} --output {output:q} "
-        "2>&1 | tee --append {log:q}"
+        "2>&1 | tee {log:q}"
 
 
 rule volume:
