@@ -1,6 +1,8 @@
 import pytest
 import torch
 
+from texgs.core import memory
+from texgs.core.errors import OutOfMemoryError
 from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.objective import Objective, pooled
 from texgs.edit.pictures import picture
@@ -33,6 +35,12 @@ def test_terms_are_the_losses_times_their_weights(vgg):
     assert float(terms["clip"]) == pytest.approx(2 * 0.25 * float(image[0, 0, 0]))
     distance = sliced_wasserstein(image, PatchStatistics.of(STYLE.image), share, bank=5, seed=5)
     assert float(terms["patches"]) == pytest.approx(3 * float(distance), rel=1e-5)
+
+
+def test_features_larger_than_memory_are_refused(vgg, monkeypatch):
+    monkeypatch.setattr(memory, "free_memory", lambda: 2**20)
+    with pytest.raises(OutOfMemoryError, match="features of a style of 300 x 300 pixels"):
+        Objective.of(preset("default"), STYLE.scaled(300), 1, vgg, None)
 
 
 @pytest.mark.parametrize(("height", "width", "reduce"), [(3, 40, 1), (48, 1, 1), (8, 8, 3)])

@@ -3,7 +3,7 @@ import pytest
 import torch
 from PIL import Image
 
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ArgumentError, OutOfMemoryError, ShapeError
 from texgs.edit.style_picture import StylePicture, filled, mirrored_crop, read_style
 
 
@@ -99,6 +99,11 @@ def test_a_crop_is_one_of_the_mirrored_plane():
     image = torch.rand(3, 5, 4)
     plane = torch.from_numpy(np.pad(image.numpy(), ((0, 0), (0, 30), (0, 30)), mode="symmetric"))
     assert torch.equal(mirrored_crop(image, 7, 3, 12, 20), plane[:, 7:19, 3:23])
+
+
+def test_a_pattern_larger_than_memory_is_refused():
+    with pytest.raises(OutOfMemoryError, match=r"a style of 1000000 x 1000000 pixels: .* edit.image.pattern"):
+        StylePicture.of(torch.rand(3, 40, 40)).scaled(1e6)
 
 
 def test_a_vivid_style_has_its_greys_and_twice_its_differences_from_them():

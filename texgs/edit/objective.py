@@ -11,6 +11,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError, FitError
+from texgs.core.memory import require_memory
 from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.recipe import Recipe
 from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
@@ -22,6 +23,7 @@ FeatureTerm = Callable[[Tensor], Tensor]  # image [H, W, 3] in [0, 1] to a loss 
 FINE_LAYERS = ("relu1_2", "relu2_2")  # whose distributions are compared beside that of the style's layers
 STRIDE = 4  # pixels between the positions of the features that NNFM compares
 ON_OBJECT = 0.5  # of alpha, from which a feature or a patch counts
+STYLE_FEATURES = 1100  # bytes of memory for the features of a pixel
 LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
 
 
@@ -143,6 +145,9 @@ def style_maps(
     style: StylePicture, recipe: Recipe, vgg: Vgg
 ) -> tuple[dict[int, Tensor], dict[int, Tensor | None]]:
     """Features [C, h, w] of a style by their stride, and which [h, w] of them count; None: all."""
+    height, width = style.region.shape
+    what = f"features of a style of {width} x {height} pixels"
+    require_memory(STYLE_FEATURES * height * width, what, "make edit.image.pattern smaller")
     maps = vgg.blocks(style.image, wanted_layers(recipe))
     regions: dict[int, Tensor | None] = {}
     for stride, features in maps.items():

@@ -16,9 +16,11 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.core.image import open_picture, with_eight_bits
+from texgs.core.memory import require_memory
 
 SMALLEST = 32  # pixels of the shorter side: less holds no pattern
 LARGEST = 2048  # pixels of the longer side that are kept
+SCALED = 32  # bytes of memory for a pixel of a scaled style
 Find = Callable[[Tensor], Tensor]
 
 
@@ -69,12 +71,18 @@ class StylePicture:
         return self.image.permute(1, 2, 0)[self.region]
 
     def scaled(self, long_side: float) -> StylePicture:
-        """The style with its longer side at so many pixels, its aspect kept; smaller ones by averaging."""
+        """The style with its longer side at so many pixels, its aspect kept; smaller ones by averaging.
+
+        Raises:
+            OutOfMemoryError: if it does not fit into memory.
+        """
         height, width = self.region.shape
         factor = long_side / max(height, width)
         size = [max(SMALLEST // 2, round(factor * x)) for x in (height, width)]
         if size == [height, width]:
             return self
+        what = f"a style of {size[1]} x {size[0]} pixels"
+        require_memory(SCALED * size[0] * size[1], what, "make edit.image.pattern smaller")
         image = F.interpolate(self.image[None], size, mode="bicubic", antialias=True)[0].clamp(0, 1)
         region = F.interpolate(self.region[None, None].float(), size, mode="area")[0, 0] > 0.5
         return StylePicture(image, region if bool(region.any()) else torch.ones_like(region))
