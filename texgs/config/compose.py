@@ -124,6 +124,19 @@ def _checked(part: Written) -> DictConfig:
     return config
 
 
+class Same:
+    """A configuration as the key of a cache, equal to itself alone: comparing two of them takes long."""
+
+    def __init__(self, config: DictConfig) -> None:
+        self.config = config  # kept, so that no other one is at its address
+
+    def __hash__(self) -> int:
+        return id(self.config)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Same) and other.config is self.config
+
+
 def changed(config: DictConfig, **values: Any) -> DictConfig:
     """The same configuration, or node of one, with other values of some keys; read only."""
     return together({str(name): values.get(str(name), config[name]) for name in config})

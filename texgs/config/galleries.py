@@ -3,12 +3,13 @@
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, cast
 
 from omegaconf import DictConfig, OmegaConf
 
-from texgs.config.compose import compose
+from texgs.config.compose import Same, compose
 from texgs.config.gallery import AS_FITTED, GalleryKeys, GridKeys, ShotKeys
 from texgs.config.gallery_scenes import check_changes, fit_of, takers
 from texgs.config.inputs import prepared_volume, scene_settings, sibling
@@ -64,9 +65,17 @@ def picture(place: Place) -> dict[str, Any]:
 def places_of(config: DictConfig) -> list[tuple[GridKeys, list[list[Place]]]]:
     """The grids of a gallery, each with the places of its rows; rows and columns without any are left out.
 
+    Cached, because a large one takes a second, and its inputs and its settings need them.
+
     Raises:
         ConfigError: naming what is not there, or has another form.
     """
+    return _places_of(Same(config))
+
+
+@lru_cache(maxsize=256)
+def _places_of(same: Same) -> list[tuple[GridKeys, list[list[Place]]]]:
+    config = same.config
     gallery = cast(GalleryKeys, OmegaConf.to_object(config.gallery))
     grids = gallery.grids or [all_looks(config)]
     names = [grid.name for grid in grids]

@@ -71,7 +71,12 @@ def takers(config: DictConfig, edit: str, where: str) -> list[str]:
         expected = ", ".join([AS_FITTED, *known])
         raise ConfigError(f"{where}.edit: expected one of {expected}, got {edit}{close(edit, known)}")
     method = method_of(compose((f"edit={edit}",)).edit)
-    return [name for name in recipes if method.takes(with_fit(config, name).fit.field)]
+    return [name for name in recipes if method.takes(field_of(config, name))]
+
+
+def field_of(config: DictConfig, name: str) -> str:
+    """The kind of field that one of the recipes of an experiment fits."""
+    return str(compose((f"fit={name}",)).fit.field if config.fits else config.fit.field)
 
 
 def ancestry(name: str) -> list[DictConfig]:

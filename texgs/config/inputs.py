@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ from omegaconf import DictConfig
 from yaml import YAMLError
 
 from texgs.config.check import is_scene_file
-from texgs.config.compose import changed, compose
+from texgs.config.compose import Same, changed, compose
 from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
 from texgs.config.locate import source_file, tf_names, views_folder
@@ -125,6 +126,8 @@ def is_changed(fit: DictConfig, later: Sequence[str] = ()) -> bool:
     if fit.name not in members("fit"):
         return True
     file = compose((f"fit={fit.name}",)).fit
+    if fit is file:
+        return False
     return any(fit[key] != file[key] for key in file if key not in ("seed", *later))
 
 
@@ -153,8 +156,13 @@ def compared_models(config: DictConfig) -> dict[str, Path]:
 
 def with_recipe(config: DictConfig, name: str) -> DictConfig:
     """The same configuration with the name and field of another recipe: what decides where its models are."""
+    return _with_recipe(Same(config), name)
+
+
+@lru_cache(maxsize=1024)
+def _with_recipe(same: Same, name: str) -> DictConfig:
     recipe = compose((f"fit={name}",)).fit
-    return changed(config, fit=changed(config.fit, name=recipe.name, field=recipe.field))
+    return changed(same.config, fit=changed(same.config.fit, name=recipe.name, field=recipe.field))
 
 
 def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[DictConfig], dict[str, Any]]:
