@@ -8,9 +8,11 @@ import pytest
 import yaml
 from PIL import Image
 
+from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.test_composition import ball
 from tests.scene.balls import write_balls
 from texgs.cli.main import main
+from texgs.fields.gaussians.model_file import write_gaussians
 from texgs.fields.surfels.texture_file import write_texture
 from texgs.scene.scene_file import read_scene
 
@@ -19,6 +21,16 @@ from texgs.scene.scene_file import read_scene
 def scene(tmp_path):
     """scene.yaml with two models."""
     return write_balls(tmp_path)
+
+
+def test_a_model_that_does_not_go_with_the_others_is_refused_before_a_file_is_written(
+    scene, tmp_path, capsys
+):
+    other = write_gaussians(tmp_path / "g.safetensors", gaussians())
+    words = [f"TF01.file={other}", "--output", str(tmp_path / "mix.yaml")]
+    assert main(["edit", str(scene), *words]) == 2
+    assert "expected fields of one kind, got gaussians and surfels" in capsys.readouterr().err
+    assert not (tmp_path / "mix.yaml").exists()
 
 
 def render(scene, output, *words):

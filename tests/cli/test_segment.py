@@ -85,6 +85,18 @@ def test_a_second_segment_gets_what_the_first_left(scene, tmp_path, capsys):
     assert list(model.segments) == ["red", "blue"]
 
 
+def test_a_segment_made_again_leaves_that_of_other_scenes(scene, tmp_path):
+    assert segment(scene, "--point", LEFT, "--not", RIGHT) == 0
+    edited = tmp_path / "edited.yaml"
+    assert main(["edit", str(tmp_path / "new.yaml"), "balls/red.opacity=0.5", "--output", str(edited)]) == 0
+    before = read_scene(edited).models["balls"].segments["red"].file.read_bytes()
+    assert segment(scene, "--point", RIGHT, "--not", LEFT) == 0
+    other = read_scene(tmp_path / "new.yaml").models["balls"].segments["red"].file
+    assert other.name == "new-balls-red-2.safetensors"
+    kept = read_scene(edited).models["balls"].segments["red"].file
+    assert kept.read_bytes() == before != other.read_bytes()
+
+
 def test_a_new_segment_starts_as_the_model_is(scene, tmp_path):
     half = tmp_path / "half.yaml"
     assert main(["edit", str(scene), "balls.opacity=0.8", "--output", str(half)]) == 0
@@ -134,6 +146,8 @@ def test_a_preview_writes_no_scene(scene, tmp_path):
             "masks: expected mobile_sam, sam_vit_h, grabcut or a folder with a SAM",
         ),
         (["--point", LEFT, "--threshold", "2"], "expected surfels that most masks"),
+        (["--point", LEFT, "--output", "."], "--output: expected a file that ends in .yaml, got ."),
+        (["--point", LEFT, "--view", "inf,0"], "azimuth: expected degrees, got inf"),
     ],
 )
 def test_a_mistake_writes_nothing(scene, tmp_path, capsys, words, message):

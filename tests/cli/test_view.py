@@ -49,6 +49,10 @@ def test_a_port_that_is_taken(monkeypatch):
     [
         (["--port", "70000"], "--port: expected 0 to 65535, got 70000"),
         (
+            ["--host", "a..b"],
+            "--host: expected a name or an address of this machine, got a..b",
+        ),
+        (
             ["--host", "none.invalid"],
             "--host: expected a name or an address of this machine, got none.invalid",
         ),

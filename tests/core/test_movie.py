@@ -51,7 +51,8 @@ def test_gif_and_mp4_hold_the_frames_at_their_rate(tmp_path):
 @pytest.mark.parametrize(
     ("name", "given", "fps", "message"),
     [
-        ("a.gif", 2, 51, "fps: expected at most 50 in a GIF, got 51; write an MP4 film"),
+        ("a.gif", 2, 51, "fps: expected 0.01 to 50 in a GIF, got 51; write an MP4 film"),
+        ("a.gif", 2, 0.001, "fps: expected 0.01 to 50 in a GIF, got 0.001; write an MP4 film"),
         ("a.avi", 2, 25, r"expected \.png, \.gif, \.mp4 or a folder, got \.avi"),
         ("a.png", 2, 25, "expected one frame, got several"),
         ("a.mp4", 0, 25, "expected at least one frame, got none"),
@@ -80,7 +81,9 @@ def test_a_higher_rate_factor_makes_a_smaller_film(tmp_path):
     assert coarse.stat().st_size < 0.5 * fine.stat().st_size
 
 
-def test_a_shorter_film_leaves_no_pictures_of_a_longer_one(tmp_path):
+def test_a_folder_with_pictures_of_another_film_stays_as_it_is(tmp_path):
     write_frames(tmp_path / "turn", frames(4))
-    write_frames(tmp_path / "turn", frames(2))
-    assert sorted(path.name for path in (tmp_path / "turn").iterdir()) == ["0000.png", "0001.png"]
+    before = [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())]
+    with pytest.raises(ArgumentError, match="expected a folder without numbered pictures, got 0000"):
+        write_frames(tmp_path / "turn", frames(2))
+    assert [path.read_bytes() for path in sorted((tmp_path / "turn").iterdir())] == before

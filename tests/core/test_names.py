@@ -37,6 +37,7 @@ def test_what_cannot_be_shown_is_no_label(name):
 def test_labels_and_paths():
     assert label("where", 42) == "42"
     assert named_file("where", Path("a"), "../b c.png") == Path("a/../b c.png")
+    assert named_file("where", Path("a"), "b\u00a0c.png") == Path("a/b\u00a0c.png")
     for path in (None, 3, "", "a\0", "x" * 1001, ["a"] * 10**6):
         with pytest.raises(ArgumentError, match="where: expected the path of a model, got") as caught:
             named_file("where", Path("a"), path, "a model")

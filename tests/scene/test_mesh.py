@@ -101,8 +101,10 @@ def test_what_lets_light_through_has_no_surface():
 
 
 def test_a_voxel_is_a_length():
-    with pytest.raises(ArgumentError, match="voxel: expected a length above 0, got 0"):
+    with pytest.raises(ArgumentError, match="voxel: expected a length of 1e-06 or more, got 0"):
         fuse(show(ball()), VIEWS, 0)
+    with pytest.raises(ArgumentError, match="voxel: expected a length of 1e-06 or more, got inf"):
+        fuse(show(ball()), VIEWS, float("inf"))
 
 
 def test_renders_without_depth_are_refused():

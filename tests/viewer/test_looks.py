@@ -271,3 +271,29 @@ def test_only_a_segment_gets_another_name(scene_file):
         assert "expected a segment to rename, got the model TF01" in (await browser.next("notice"))["text"]
 
     with_page(scene_file, work)
+
+
+def test_many_previews_of_one_part_leave_that_of_another(scene_file, monkeypatch):
+    monkeypatch.setattr("texgs.viewer.looks.KEPT", 1)
+
+    async def work(browser, client):
+        for part in ("TF01", "TF02", "TF02"):
+            await browser.send(**look(parts=[part], style="glass", preview=True))
+            await ended(browser)
+        (own,) = client.server_side._pages
+        assert all(texture.is_file() for texture in own._trial.values())
+        assert sorted(own._trial) == ["TF01", "TF02"]
+
+    with_page(scene_file, work)
+
+
+def test_a_folder_that_cannot_be_written_is_a_sentence(scene_file):
+    async def work(browser, client):
+        client.server_side.edits.new_folder = lambda kind: scene_file / kind
+        await browser.send(**look(style="glass"))
+        notice = await browser.next("notice")
+        while notice["level"] == "info":
+            notice = await browser.next("notice")
+        assert "cannot be written (Not a directory); start texgs view with another --folder" in notice["text"]
+
+    with_page(scene_file, work)

@@ -352,6 +352,19 @@ def test_other_files_are_replaced_after_a_question_only(scene_file, monkeypatch)
     assert read_scene(scene_file).models["TF02"].edit.visible
 
 
+def test_a_file_that_others_have_written_since_is_replaced_after_a_question_only(scene_file):
+    async def work(browser, client):
+        await browser.send(type="edit", part="TF02", key="visible", value=False)
+        await browser.send(type="save", name="scene.yaml")
+        assert (await browser.next("notice"))["level"] == "info"
+        assert main(["edit", str(scene_file), "TF01.opacity=0.25", "--output", str(scene_file)]) == 0
+        await browser.send(type="save", name="scene.yaml")
+        assert (await browser.next("notice"))["level"] == "question"
+        assert read_scene(scene_file).models["TF01"].edit.opacity == 0.25
+
+    with_page(scene_file, work)
+
+
 def test_a_thousand_malformed_messages(scene_file, caplog):
     rng = np.random.default_rng(0)
     whole = json.dumps(VIEW)

@@ -4,6 +4,7 @@ import base64
 import io
 import json
 import re
+import shlex
 
 import numpy as np
 import pytest
@@ -162,8 +163,8 @@ def test_edits_and_lights_show_and_can_be_undone(page, file):
     other.get_by_title("Visible").uncheck()
     page.get_by_label("Headlight").uncheck()
     page.get_by_label("Polar of the light, degrees", exact=True).fill("50")
-    words = f"light=30,50 {HOSTILE}.palette=#ff2040 {HOSTILE}.opacity=0.5 B.visible=false"
-    assert page.locator("#words textarea").input_value() == words
+    words = ["light=30,50", f"{HOSTILE}.palette=#ff2040", f"{HOSTILE}.opacity=0.5", "B.visible=false"]
+    assert shlex.split(page.locator("#words textarea").input_value()) == words
     steps = [
         Edit(HOSTILE, "palette", [1, 32 / 255, 64 / 255], 0),
         Edit(HOSTILE, "opacity", 0.5, 0),

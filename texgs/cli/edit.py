@@ -30,6 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     session = Session.open(arguments.scene)
     apply_all(session, arguments.overrides)
+    if any(word.partition("=")[0].endswith(".file") for word in arguments.overrides):
+        _ = session.composition  # which the new model may not go into
     print(session.save(arguments.output))
     return 0
 

@@ -5,11 +5,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.core.names import SCENES
+
 if TYPE_CHECKING:
     from texgs.scene.scene import Scene, SceneModel
 
 KINDS = ("3dgs", "2dgs", "release", "points", "mesh", "compact", "html")
-SCENES = (".yaml", ".yml")
 ENDINGS = {"compact": ".texgs", "html": ".html"}  # of kinds that are not .ply
 DEFAULTS = {".ply": "3dgs", **{ending: kind for kind, ending in ENDINGS.items()}}
 NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # arguments that `Export` has, too

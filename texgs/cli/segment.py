@@ -97,7 +97,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the preview, or the segment and the scene that has it."""
     from texgs.core.device import torch_device
     from texgs.core.image import write_png
-    from texgs.core.names import part_file
+    from texgs.core.names import new_part_file
     from texgs.edit.new_segment import clicked_model, model_name, new_segment
     from texgs.edit.preview import preview
     from texgs.models.by_name import mask_model
@@ -113,7 +113,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(write_png(arguments.preview, preview(model, clicks, masks, scene.light)[1]))
         return 0
     lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
-    file = arguments.output.with_name(part_file("--name", arguments.output.stem, name, arguments.name))
+    output = arguments.output
+    file = new_part_file("--name", output.parent, output.stem, name, arguments.name)
     keys = ("view", "point", "other", "masks", "vote", "connected")
     made = new_segment(
         *(scene, f"{name}/{arguments.name}", clicks),
@@ -154,13 +155,15 @@ def require_output(arguments: argparse.Namespace) -> None:
     """Require a name and a file for the segment and its scene, unless there is a preview only.
 
     Raises:
-        ArgumentError: if the name cannot be one, or there is no file.
+        ArgumentError: if the name cannot be one, or there is no file of scenes.
     """
     from texgs.core.errors import ArgumentError
-    from texgs.core.names import require_name
+    from texgs.core.names import SCENES, require_name
 
     if arguments.preview:
         return
     require_name(arguments.name, "--name")
     if not arguments.output:
         raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
+    if arguments.output.suffix not in SCENES or arguments.output.is_dir():
+        raise ArgumentError(f"--output: expected a file that ends in .yaml, got {arguments.output}")

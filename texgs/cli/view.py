@@ -74,7 +74,7 @@ def listen(host: str, port: int | None) -> socket.socket:
         raise ArgumentError(f"--port: expected 0 to 65535, got {port}")
     try:
         family = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0][0]
-    except OSError as error:
+    except (OSError, UnicodeError) as error:
         raise ArgumentError(f"--host: expected a name or an address of this machine, got {host}") from error
     for choice in (PORT, 0) if port is None else (port,):
         try:

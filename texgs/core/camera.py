@@ -169,6 +169,8 @@ def orbit(
     Raises:
         ArgumentError: if an argument is out of range.
     """
+    if not isfinite(azimuth):
+        raise ArgumentError(f"azimuth: expected degrees, got {azimuth}")
     if not abs(polar) <= 90:
         raise ArgumentError(f"polar: expected degrees from -90 to 90, got {polar}")
     if not radius > 0:

@@ -18,6 +18,7 @@ from texgs.core.memory import require_memory
 
 KINDS = (".png", ".gif", ".mp4")
 MOST_FPS, MOST_GIF_FPS = 240.0, 50.0  # browsers slow down shorter frames of a GIF
+LEAST_GIF_FPS = 0.01  # a GIF counts hundredths of a second in 16 bits
 FINE = 18  # constant rate factor of H.264 that looks like the frames
 
 
@@ -35,29 +36,31 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
         The path.
 
     Raises:
-        ArgumentError: if the ending is another one, frames follow each other too fast, there is no frame, or
-            several where one is expected.
+        ArgumentError: if the ending is another one, the folder has pictures of another film, frames follow
+            each other too fast or too slowly, there is no frame, or several where one is expected.
     """
     path = Path(path)
     if path.suffix not in ("", *KINDS):
         raise ArgumentError(f"{path}: expected {', '.join(KINDS)} or a folder, got {path.suffix}")
     if not 0 < fps <= MOST_FPS:
         raise ArgumentError(f"fps: expected more than 0 and at most {MOST_FPS:g}, got {fps}")
-    if path.suffix == ".gif" and fps > MOST_GIF_FPS:
-        raise ArgumentError(f"fps: expected at most {MOST_GIF_FPS:g} in a GIF, got {fps}; write an MP4 film")
+    if path.suffix == ".gif" and not LEAST_GIF_FPS <= fps <= MOST_GIF_FPS:
+        raise ArgumentError(
+            f"fps: expected {LEAST_GIF_FPS:g} to {MOST_GIF_FPS:g} in a GIF, got {fps}; write an MP4 film"
+        )
+    if path.suffix == "" and (path / "0000.png").exists():
+        raise ArgumentError(
+            f"{path}: expected a folder without numbered pictures, got 0000.png in it; remove them, or "
+            "choose another folder"
+        )
     left = iter(frames)
     first = next(left, None)
     if first is None:
         raise ArgumentError(f"{path}: expected at least one frame, got none")
     every = chain([first], left)
     if path.suffix == "":
-        count = 0
-        for frame in every:
-            _write_png(path / f"{count:04}.png", frame)
-            count += 1
-        while (earlier := path / f"{count:04}.png").exists():  # of a longer film
-            earlier.unlink()
-            count += 1
+        for number, frame in enumerate(every):
+            _write_png(path / f"{number:04}.png", frame)
     elif path.suffix == ".png":
         if next(left, None) is not None:
             raise ArgumentError(f"{path}: expected one frame, got several; use .gif, .mp4 or a folder")

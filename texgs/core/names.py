@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
+from unicodedata import category
 
 from texgs.core.errors import ArgumentError
 
+SCENES = (".yaml", ".yml")  # suffixes of scene files
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
 LONGEST = 100  # letters of a name
 LONGEST_PATH = 1000  # letters of a path in a file
 LONGEST_FILE = 250  # bytes of a file's name; file systems take 255, and we put a few before it
 RESERVED = "/.="  # not in names of segments: they address MODEL/SEGMENT.KEY=VALUE
+SPACES = "Zs"  # Unicode's category of all spaces; folders of macOS have some that do not break
 SEPARATORS = frozenset("/\\")  # of folders, on one system or another
 
 
@@ -72,6 +76,16 @@ def part_file(where: str, *names: str) -> str:
     return file_name(where, f"{'-'.join(names)}.safetensors".replace("/", "-"))
 
 
+def new_part_file(where: str, folder: Path, *names: str) -> Path:
+    """The file of a part, with a number where there is one already: scenes that were saved may name it.
+
+    Raises:
+        ArgumentError: as `file_name`.
+    """
+    files = (folder / part_file(where, *names, *([str(n)] if n > 1 else [])) for n in count(1))
+    return next(file for file in files if not file.exists())
+
+
 def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> Path:
     """The file that another file names, in its folder or elsewhere; it is only read.
 
@@ -84,6 +98,7 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
     Raises:
         ArgumentError: if it is no text, empty, too long, or has control characters.
     """
-    if not isinstance(path, str) or not path or len(path) > LONGEST_PATH or not path.isprintable():
+    is_path = isinstance(path, str) and 0 < len(path) <= LONGEST_PATH
+    if not is_path or not all(each.isprintable() or category(each) == SPACES for each in str(path)):
         raise ArgumentError(f"{where}: expected the path of {kind}, got {path!r:.100}")
-    return folder / path
+    return folder / str(path)

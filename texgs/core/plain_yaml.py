@@ -23,11 +23,14 @@ class PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
         """A node of the text.
 
         Raises:
-            ArgumentError: if it is an alias, or too deep below others.
+            ArgumentError: if it is an alias, has a tag, or is too deep below others.
         """
         if self.check_event(yaml.AliasEvent):
             line = self.peek_event().start_mark.line + 1
             raise ArgumentError(f"expected values, got an alias (*name) in line {line}; write them out")
+        if tag := getattr(self.peek_event(), "tag", None):
+            line = self.peek_event().start_mark.line + 1
+            raise ArgumentError(f"expected values, got the tag {tag} in line {line}; leave it out")
         self.depth += 1
         if self.depth > DEEPEST:
             raise ArgumentError(f"expected at most {DEEPEST} tables and lists in one another, got more")
@@ -43,7 +46,7 @@ def parse_yaml(text: str) -> Any:
     """The values of a text.
 
     Raises:
-        ArgumentError: if it has aliases, or values in one another without end.
+        ArgumentError: if it has aliases, tags, or values in one another without end.
         yaml.YAMLError: if it is no YAML.
         ValueError: if a value is none, such as the date 2001-99-99.
     """

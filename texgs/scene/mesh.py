@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ TRUNCATION = (
     5.0  # voxels on each side of a surface that know their distance from it, as in 2DGS; at most BLOCK
 )
 LEAST_VIEWS = 1  # more views than this must have seen a voxel
+LEAST_VOXEL = 1e-6  # world units; the longest side of a volume is 1
 CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
@@ -87,8 +89,8 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
         ArgumentError: if the voxel is no length, or no view sees a surface.
         OutOfMemoryError: if there are too many voxels.
     """
-    if not voxel > 0:
-        raise ArgumentError(f"voxel: expected a length above 0, got {voxel}")
+    if not LEAST_VOXEL <= voxel < inf:
+        raise ArgumentError(f"voxel: expected a length of {LEAST_VOXEL:g} or more, got {voxel}")
     views = [depth_view(show(camera), camera) for camera in progress(cameras, title="render", unit="view")]
     boxes = [points(view).aminmax(dim=0) for view in views if bool(view.depth.any())]
     if not boxes:

@@ -17,6 +17,7 @@ import torch
 
 from texgs.config.edit import Edit
 from texgs.config.methods import method_of
+from texgs.config.sources import digest
 from texgs.config.typed import typed
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
@@ -106,9 +107,9 @@ class Looks:
         """
         return await self._jobs.run(partial(self._make, scene, edit, output, show), watch)
 
-    def preview_folder(self) -> Path:
-        """A new folder for a preview; it is removed when there are many, and in the end."""
-        return self._recent.new("preview")
+    def preview_folder(self, page: int, parts: Sequence[str]) -> Path:
+        """A new folder for a preview; removed when a page has many of the same parts, and in the end."""
+        return self._recent.new(f"preview-{page}-{digest(repr(parts))}")
 
     def close(self) -> None:
         """Remove what was not kept."""
@@ -126,7 +127,12 @@ class Looks:
         settings, offered = method.of(edit), Offered(show, self._recent)
         task = Around(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=offered)
         is_alone = not output.parent.exists()
-        output.mkdir(parents=True)
+        try:
+            output.mkdir(parents=True)
+        except OSError as error:
+            raise ArgumentError(
+                f"{output}: cannot be written ({error.strerror}); start texgs view with another --folder"
+            ) from error
         try:
             return method.run(task)
         except BaseException:

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import label
+from texgs.core.names import SCENES, label
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene
 
 SCENE = "scene.yaml"  # as jobs write it
-SCENES = (".yaml", ".yml")
 OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
 MOST_LISTED = 5
 

@@ -11,13 +11,13 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT
-from texgs.core.names import file_name, part_file
+from texgs.core.names import SCENES, file_name, new_part_file
 from texgs.scene.parts import part_names, with_textures
 from texgs.scene.scene import WHITE, Scene
 from texgs.scene.scene_file import known, light_of, write_scene
-from texgs.scene.session import Session
+from texgs.scene.session import Session, state_of
 from texgs.viewer.messages import Edit, View
-from texgs.viewer.opening import SCENES, Opened, title_of
+from texgs.viewer.opening import Opened, title_of
 from texgs.viewer.segments import alone
 
 
@@ -32,7 +32,8 @@ class SharedEdits:
     def __init__(self, session: Session, opened: Opened) -> None:
         self._session, self._folder = session, opened.folder
         self.name, self._title = opened.name, opened.title
-        self._own = {file.resolve() for file in (opened.file,) if file}  # replaced without a question
+        files = [opened.file.resolve()] if opened.file else []
+        self._own = {file: state_of(file) for file in files}  # replaced without a question, while they are so
         self.original = self._saved = session.scene
         self._past, self._future = list[str](), list[str]()
         self._latest: tuple[object, ...] | None = None  # author and number of a step that may go on
@@ -101,7 +102,8 @@ class SharedEdits:
         Raises:
             ArgumentError: if it is there already, or other segments have all of its surfels.
         """
-        self._session.make_segment(part, mask, self._new_file(part), facts)
+        file = new_part_file("segment", self._folder, Path(self.name).stem, part)
+        self._session.make_segment(part, mask, file, facts)
         self._step(f"{part} new")
 
     def give_textures(self, textures: Mapping[str, Path | None], look: str) -> None:
@@ -157,13 +159,13 @@ class SharedEdits:
         return self._folder / name
 
     def would_replace(self, name: str) -> bool:
-        """Whether saving replaces a file that is neither the opened one nor was saved before.
+        """Whether saving replaces a file that is neither the opened one nor was saved before, or has changed.
 
         Raises:
             ArgumentError: as `path_of`.
         """
         path = self.path_of(name)
-        return path.exists() and path.resolve() not in self._own
+        return path.exists() and self._own.get(path.resolve()) != state_of(path.resolve())
 
     def save(self, name: str) -> Path:
         """Write the scene file in one step.
@@ -174,7 +176,7 @@ class SharedEdits:
         path, scene = self.path_of(name), self.scene
         write_scene(path, scene)
         self.name, self._title, self._saved = name, title_of(path), scene
-        self._own.add(path.resolve())
+        self._own[path.resolve()] = state_of(path.resolve())
         return path
 
     def _step(self, name: str) -> None:
@@ -187,12 +189,6 @@ class SharedEdits:
         stem = Path(self.name).stem
         folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
-
-    def _new_file(self, part: str) -> Path:
-        """A file for a segment that is not there yet: scenes that were saved may name the others."""
-        stem = Path(self.name).stem
-        names = (part_file("segment", stem, part, *([str(n)] if n > 1 else [])) for n in count(1))
-        return next(file for name in names if not (file := self._folder / name).exists())
 
     def _change(self, edit: Edit) -> None:
         session, value = self._session, edit.value

@@ -15,7 +15,7 @@ from typing import Any
 import torch
 
 from texgs.core.errors import ArgumentError
-from texgs.core.names import require_name
+from texgs.core.names import part_file, require_name
 from texgs.edit.parts import parts_with_surfels
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.scene.scene import Scene
@@ -65,7 +65,9 @@ class Work:
             ArgumentError: if a job is at work, or the segment cannot have this name.
         """
         require_new(self._edits.scene, asked.part)
-        require_name(split(self._edits.scene, asked.part)[1], "segment")
+        name = split(self._edits.scene, asked.part)[1]
+        require_name(name, "segment")
+        part_file("segment", str(name))
         self._begin(page, partial(self._segment, asked, page))
 
     async def begin_look(self, asked: Look, page: Page) -> None:
@@ -140,7 +142,10 @@ class Work:
         if not parts:
             parts = tuple(await asyncio.to_thread(parts_with_surfels, scene))
             edit = replace(edit, parts=list(parts))
-        output = self._looks.preview_folder() if asked.is_preview else self._edits.new_folder(edit.name)
+        if asked.is_preview:
+            output = self._looks.preview_folder(page.number, parts)
+        else:
+            output = self._edits.new_folder(edit.name)
 
         def show(part: str, file: Path) -> None:
             loop.call_soon_threadsafe(page.try_on, {part: file})

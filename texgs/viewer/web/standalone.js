@@ -22,7 +22,7 @@ class StandalonePage extends ScenePage {
 
   #tellWords() {
     const { original, scene } = this.state;
-    const words = difference(original, scene).map(wordOf);
+    const words = difference(original, scene).map(wordOf).map(quoted);
     get("words").hidden = !words.length;
     get("words").querySelector("textarea").value = words.join(" ");
   }
@@ -39,6 +39,11 @@ function wordOf({ part, key, value }) {
   const place = part ? `${part}.${key}` : key;
   if (key === "light") return `light=${value ? `${value.azimuth},${value.polar}` : "headlight"}`;
   return `${place}=${Array.isArray(value) ? toHex(value) : value ?? ""}`;
+}
+
+/** A word as a shell takes it. */
+function quoted(word) {
+  return /^[\w./#,=+-]*$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
 async function start() {
