@@ -126,5 +126,7 @@ connection.addEventListener("open", () => {
   notices.keep("");
   page?.state.restart();
 });
-connection.addEventListener("lost", () => notices.keep(
-  "No connection to texgs view. This page tries again; start the same command if it has ended."));
+connection.addEventListener("lost", () => { // before the page's job hears of it
+  if (page?.job.isAtWork) notices.tell("The connection broke, which cancelled what was being made.", "error stays");
+  notices.keep("No connection to texgs view. This page tries again; start the same command if it has ended.");
+});
