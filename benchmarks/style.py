@@ -19,7 +19,7 @@ from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import History, stylize
 from texgs.fields.surfels.model import Surfels
 from texgs.models.precision import fast_dtype
-from texgs.models.vgg import CHANNELS, STYLE_LAYERS, Vgg
+from texgs.models.vgg import STYLE_LAYERS, Vgg, channels, rectified
 
 ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick
 LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)
@@ -64,10 +64,10 @@ def iterations(runs: list[History], where: dict[str, object], count: int) -> lis
 def random_vgg(device: torch.device) -> Vgg:
     """A network of the right size whose activations keep theirs."""
     generator, dtype = torch.Generator().manual_seed(0), fast_dtype(device)
-    widths = [3, *(CHANNELS[int(name[4]) - 1] for name in LAYERS)]
-    weights, biases = [], []
+    widths = [3, *map(channels, LAYERS)]
+    convolutions = []
     for inputs, outputs in pairwise(widths):
         weight = (2 / (9 * inputs)) ** 0.5 * torch.randn(outputs, inputs, 3, 3, generator=generator)
-        weights.append(weight.to(device, dtype, memory_format=torch.channels_last))
-        biases.append(torch.zeros(outputs, device=device, dtype=dtype))
-    return Vgg(tuple(weights), tuple(biases), LAYERS, STYLE_LAYERS)
+        bias = torch.zeros(outputs, device=device, dtype=dtype)
+        convolutions.append(rectified(weight.to(device, dtype), bias))
+    return Vgg(tuple(convolutions), LAYERS, STYLE_LAYERS, dtype)

@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from texgs.core.errors import ShapeError
-from texgs.edit.distribution import FeatureDistribution, drawn
+from texgs.edit.distribution import FeatureDistribution
+from texgs.models.nnfm import drawn
 
 
 def maps(seed, *shape):

@@ -80,4 +80,4 @@ def test_what_is_not_on_the_object_does_not_count(vgg):
         terms = Objective.of(recipe, STYLE, 1, vgg, None).terms(x, share, 0)
         (gradient,) = torch.autograd.grad(sum(terms.values()), x)
         far = gradient[:, :, 46:].abs().max()  # farther than a filter or a patch reaches from the object
-        assert bool(far > 0) == (name == "paper")
+        assert bool(far > 1e-7 * gradient.abs().max()) == (name == "paper")  # below: rounding of convolutions

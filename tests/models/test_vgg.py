@@ -61,7 +61,7 @@ def test_bfloat16_is_close_and_has_gradients(files):
 
 def test_layers_of_several_blocks_come_one_by_one(files):
     network = Vgg.load(files / "vgg.pth", layers=("relu1_2", "relu2_2"), dtype=torch.float32)
-    assert len(network.weights) == 4, "no more is read than needed"
+    assert len(network.convolutions) == 4, "no more is read than needed"
     image = torch.rand(3, 16, 24)
     for found, truth in zip(
         network.layers(image[None]), expected(image, random_weights(), (3, 8)), strict=True

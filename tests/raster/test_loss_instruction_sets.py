@@ -1,4 +1,4 @@
-"""The tests of losses, shading, voxel grids and encodings, once more on every other instruction set."""
+"""Tests of what is not the rasterizer itself, once more on every other instruction set."""
 
 import os
 import subprocess
@@ -9,7 +9,16 @@ import pytest
 
 from texgs.raster import native
 
-NAMES = ("ssim", "normals", "smoothness", "shading", "voxels", "voxel_optimizer", "hash_encoding")
+NAMES = (
+    "ssim",
+    "normals",
+    "smoothness",
+    "shading",
+    "voxels",
+    "voxel_optimizer",
+    "hash_encoding",
+    "convolution",
+)
 FILES = [str(Path(__file__).with_name(f"test_{name}.py")) for name in NAMES]
 
 

@@ -14,6 +14,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.edit.sliced import BANKS, FILTERS, QUANTILES, STYLE_MOST, at_quantiles, ranking, to_quantiles
+from texgs.models.nnfm import drawn
 
 MOST = 2048  # features of one comparison
 
@@ -67,17 +68,3 @@ class FeatureDistribution:
             return features.sum().float() * 0
         bank %= len(self.directions)
         return to_quantiles(self.directions[bank] @ rows.T, self.quantiles[bank]) / self.variance
-
-
-def drawn(features: Tensor, where: Tensor | None, most: int, generator: torch.Generator) -> Tensor:
-    """Some features [n, C] of [C, h, w], float32: those where a mask [h, w] is true, `most` of them."""
-    size = check.shape("features", features, "C h w")
-    if where is None:
-        places = torch.arange(size["h"] * size["w"], device=features.device)
-    else:
-        check.shape("where", where, "h w", h=size["h"], w=size["w"])
-        places = where.flatten().nonzero()[:, 0]
-    if len(places) > most:
-        places = places[torch.randperm(len(places), generator=generator)[:most].to(places.device)]
-    rows = features.permute(1, 2, 0).flatten(0, 1)  # [h w, C], a view where channels are last in memory
-    return rows.index_select(0, places).float()

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.models.tensors import read_tensors
-from texgs.models.vgg import Vgg
+from texgs.models.vgg import Vgg, channels
 from texgs.models.weights import locate
 
 LAYERS = ("relu1_2", "relu2_2", "relu3_3", "relu4_3", "relu5_3")
@@ -44,7 +44,7 @@ class Lpips:
         weights = tuple(stored[name].flatten().to(device, torch.float32) for name in names)
         backbone = Vgg.load(vgg, device, LAYERS, dtype)
         for name, weight, layer in zip(names, weights, LAYERS, strict=True):
-            check.shape(f"{heads}: {name}", weight, f"{len(backbone.biases[backbone.names.index(layer)])}")
+            check.shape(f"{heads}: {name}", weight, f"{channels(layer)}")
         return cls(backbone, weights)
 
     def features(self, images: Tensor) -> list[Tensor]:

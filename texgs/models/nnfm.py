@@ -49,16 +49,12 @@ class StyleFeatures:
             ArgumentError: if the region is empty.
         """
         size = check.shape("features", features, "C h w")
-        vectors = features.detach().flatten(1).T  # [h w, C]
         if region is not None:
             check.shape("region", region, "h w", h=size["h"], w=size["w"])
-            vectors = vectors[region.flatten()]
-        if not len(vectors):
+        rows = drawn(features.detach(), region, positions, torch.Generator().manual_seed(seed))
+        if not len(rows):
             raise ArgumentError("region: expected a part of the style picture, got none of its features")
-        if positions is not None and len(vectors) > positions:
-            order = torch.randperm(len(vectors), generator=torch.Generator().manual_seed(seed))
-            vectors = vectors[order[:positions].to(vectors.device)]
-        exact = F.normalize(vectors.float(), dim=1)
+        exact = F.normalize(rows, dim=1)
         unit = exact.to(features.dtype).contiguous()
         if dimensions is None or dimensions >= size["C"]:
             return cls(unit, exact, None)
@@ -117,15 +113,23 @@ def nnfm(
     Raises:
         ShapeError: if the shapes do not fit.
     """
-    size = check.shape("features", features, "C h w", C=style.unit.shape[1])
-    queries = features.permute(1, 2, 0).flatten(0, 1)  # [h w, C], a view where channels are last in memory
-    if where is not None:
-        check.shape("where", where, "h w", h=size["h"], w=size["w"])
-        queries = queries[where.flatten().nonzero()[:, 0]]
-    if most is not None and len(queries) > most:
-        order = torch.randperm(len(queries), generator=torch.Generator().manual_seed(seed))
-        queries = queries[order[:most].to(queries.device)]
+    check.shape("features", features, "C h w", C=style.unit.shape[1])
+    queries = drawn(features, where, most, torch.Generator().manual_seed(seed))
     if not len(queries):
         return features.sum().float() * 0
     neighbours = style.unit[style.nearest(queries.detach())]
-    return (1 - F.cosine_similarity(queries.float(), neighbours.float(), dim=1, eps=1e-8)).mean()
+    return (1 - F.cosine_similarity(queries, neighbours.float(), dim=1, eps=1e-8)).mean()
+
+
+def drawn(features: Tensor, where: Tensor | None, most: int | None, generator: torch.Generator) -> Tensor:
+    """Features [n, C] of [C, h, w], float32, where a mask [h, w] is true; at random `most` of them."""
+    size, places = check.shape("features", features, "C h w"), None
+    if where is not None:
+        check.shape("where", where, "h w", h=size["h"], w=size["w"])
+        places = where.flatten().nonzero()[:, 0]
+    rows = features.permute(1, 2, 0).flatten(0, 1)  # [h w, C], a view where channels are last in memory
+    count = len(rows) if places is None else len(places)
+    if most is not None and count > most:
+        order = torch.randperm(count, generator=generator)[:most].to(rows.device)
+        places = order if places is None else places[order]
+    return (rows if places is None else rows.index_select(0, places)).float()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from texgs.core import check
 from texgs.models.precision import fast_dtype
 from texgs.models.tensors import read_tensors
 from texgs.models.weights import locate
+from texgs.raster.convolution import RectifiedConvolution
 
 MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of ImageNet, per channel
 BLOCKS = (2, 2, 3, 3, 3)  # convolutions between poolings
@@ -25,10 +26,10 @@ STYLE_LAYERS = ("relu3_1", "relu3_2", "relu3_3")  # 3 x 256 channels, a quarter 
 class Vgg:
     """Convolutions up to the last layer wanted, frozen."""
 
-    weights: tuple[Tensor, ...]  # [out, in, 3, 3] each, channels last
-    biases: tuple[Tensor, ...]
+    convolutions: tuple[Callable[[Tensor], Tensor], ...]  # each with its rectifier
     names: tuple[str, ...]  # of the layers, such as relu3_1
     wanted: tuple[str, ...]
+    dtype: torch.dtype  # that features are computed in
 
     @classmethod
     def load(
@@ -56,20 +57,13 @@ class Vgg:
         stored = read_tensors(path, [f"{key}.{kind}" for key in keys for kind in ("weight", "bias")])
         dtype = fast_dtype(torch.device(device)) if dtype is None else dtype
         for key, name, before in zip(keys, names, [None, *names], strict=False):
-            inputs = 3 if before is None else CHANNELS[int(before[4]) - 1]
-            check.shape(
-                f"{path}: {key}.weight", stored[f"{key}.weight"], f"{CHANNELS[int(name[4]) - 1]} {inputs} 3 3"
-            )
-        weights = [
-            stored[f"{key}.weight"].to(device, dtype, memory_format=torch.channels_last) for key in keys
+            inputs = 3 if before is None else channels(before)
+            check.shape(f"{path}: {key}.weight", stored[f"{key}.weight"], f"{channels(name)} {inputs} 3 3")
+        convolutions = [
+            rectified(*(stored[f"{key}.{kind}"].to(device, dtype) for kind in ("weight", "bias")))
+            for key in keys
         ]
-        biases = [stored[f"{key}.bias"].to(device, dtype) for key in keys]
-        return cls(tuple(weights), tuple(biases), tuple(names), tuple(layers))
-
-    @property
-    def dtype(self) -> torch.dtype:
-        """That features are computed in."""
-        return self.weights[0].dtype
+        return cls(tuple(convolutions), tuple(names), tuple(layers), dtype)
 
     def layers(self, images: Tensor, wanted: Sequence[str] | None = None) -> list[Tensor]:
         """Outputs [N, C, H/s, W/s] of some layers, s = 1, 2, 4 ... by block; differentiable.
@@ -84,10 +78,10 @@ class Vgg:
         x = normalize(images, torch.tensor(MEAN), torch.tensor(DEVIATION))
         x = x.to(self.dtype, memory_format=torch.channels_last)
         wanted, features = self.wanted if wanted is None else wanted, []
-        for name, weight, bias in zip(self.names, self.weights, self.biases, strict=True):
+        for name, convolve in zip(self.names, self.convolutions, strict=True):
             if name.endswith("_1") and name != "relu1_1":
                 x = F.max_pool2d(x, 2)
-            x = F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
+            x = convolve(x)
             if name in wanted:
                 features.append(x)
         return features
@@ -103,7 +97,7 @@ class Vgg:
         joined: dict[int, list[Tensor]] = {}
         for name, layer in zip(wanted, self.layers(image[None], wanted), strict=True):
             joined.setdefault(2 ** (int(name[4]) - 1), []).append(layer)
-        return {stride: torch.cat(layers, dim=1)[0] for stride, layers in joined.items()}
+        return {stride: torch.cat(layers, dim=1).squeeze(0) for stride, layers in joined.items()}
 
     def features(self, image: Tensor) -> Tensor:
         """The wanted layers, all of one block, as one [C, H/s, W/s].
@@ -113,6 +107,19 @@ class Vgg:
         """
         (features,) = self.blocks(image).values()
         return features
+
+
+def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
+    """max(0, weight * x + bias) of images x [N, in, H, W] with zeros around them."""
+    if weight.device.type == "cpu" and weight.dtype == torch.float32:
+        return RectifiedConvolution(weight, bias)
+    weight = weight.contiguous(memory_format=torch.channels_last)
+    return lambda x: F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
+
+
+def channels(name: str) -> int:
+    """Of a layer."""
+    return CHANNELS[int(name[4]) - 1]
 
 
 def place(name: str) -> int:

@@ -1,0 +1,109 @@
+"""Winograd's convolution against torch's in double precision, for gradients too."""
+
+import pytest
+import torch
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from torch.nn import functional as F
+
+from tests.raster.threads import with_threads
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from texgs.raster.convolution import RectifiedConvolution
+
+SIZES = st.tuples(*[st.integers(1, most) for most in (2, 40, 40, 23, 23)])
+
+
+def case(sizes, seed=0):
+    """A convolution that keeps the size of numbers, and images for it."""
+    count, inputs, outputs, height, width = sizes
+    generator = torch.Generator().manual_seed(seed)
+    weight = (2 / (9 * inputs)) ** 0.5 * torch.randn(outputs, inputs, 3, 3, generator=generator)
+    bias = 0.1 * torch.randn(outputs, generator=generator)
+    return RectifiedConvolution(weight, bias), torch.randn(count, inputs, height, width, generator=generator)
+
+
+def close(found, expected):
+    """Within the rounding of transforms whose numbers are up to 100 times as large as their results."""
+    difference = found.double() - expected
+    assert difference.norm() <= 1e-5 * expected.norm()
+    assert difference.abs().max() <= 1e-4 * expected.abs().max()
+
+
+@settings(deadline=None, max_examples=60)
+@given(SIZES, st.integers(0, 9))
+def test_values_and_gradients(sizes, seed):
+    convolution, images = case(sizes, seed)
+    images.requires_grad_()
+    found = convolution(images)
+    weight = convolution.weight.double()
+    sums = F.conv2d(images.detach().double(), weight, convolution.bias.double(), padding=1)
+    close(found.detach(), sums.clamp(min=0))
+    upstream = torch.randn(sums.shape, generator=torch.Generator().manual_seed(seed + 1))
+    (gradient,) = torch.autograd.grad(found, images, upstream)
+    # that of the same rectifier: sums near 0 may be rounded to either side
+    close(gradient, F.conv_transpose2d(upstream.double() * (found > 0), weight, padding=1))
+
+
+@pytest.mark.parametrize("channels", [(64, 64), (144, 128), (512, 256)])
+def test_many_tiles(channels):
+    """Several batches, the last of them not full."""
+    convolution, images = case((1, *channels, 61, 70))
+    sums = F.conv2d(images.double(), convolution.weight.double(), convolution.bias.double(), padding=1)
+    close(convolution(images), sums.clamp(min=0))
+
+
+def test_any_layout_of_memory():
+    convolution, images = case((2, 16, 32, 9, 14))
+    expected = convolution(images)
+    assert torch.equal(convolution(images.contiguous(memory_format=torch.channels_last)), expected)
+    assert torch.equal(convolution(images.repeat(2, 2, 1, 1)[:2, :16]), expected)
+
+
+def test_the_same_bits_for_any_number_of_threads():
+    convolution, images = case((1, 48, 48, 90, 71))
+    images.requires_grad_()
+
+    def run():
+        found = convolution(images)
+        return found.detach(), torch.autograd.grad(found.square().sum(), images)[0]
+
+    first = with_threads(1, run)
+    for threads in (2, 3, 7):
+        assert all(map(torch.equal, with_threads(threads, run), first))
+
+
+def test_what_is_no_number_stays_so():
+    convolution, images = case((1, 3, 16, 12, 12))
+    images[0, 1, 5, 6] = float("nan")
+    found = convolution(images)
+    assert found[0, :, 4:7, 5:8].isnan().all()
+    assert found[0, :, 8:].isfinite().all()
+
+
+def test_a_second_derivative_is_refused():
+    convolution, images = case((1, 3, 16, 8, 8))
+    images.requires_grad_()
+    (gradient,) = torch.autograd.grad(convolution(images).square().sum(), images, create_graph=True)
+    with pytest.raises(RuntimeError, match="once_differentiable"):
+        gradient.sum().backward()
+
+
+def test_errors_name_the_argument():
+    convolution, images = case((1, 3, 16, 8, 8))
+    weight, bias = convolution.weight, convolution.bias
+    with pytest.raises(ShapeError, match="weight: expected"):
+        RectifiedConvolution(weight[..., :2], bias)
+    with pytest.raises(ShapeError, match="bias: expected"):
+        RectifiedConvolution(weight, bias[1:])
+    with pytest.raises(ArgumentError, match="weight: expected float32, got float64"):
+        RectifiedConvolution(weight.double(), bias)
+    with pytest.raises(ArgumentError, match="bias: not differentiable here"):
+        RectifiedConvolution(weight, bias.clone().requires_grad_())
+    with pytest.raises(ShapeError, match="images: expected"):
+        convolution(images[:, :2])
+    with pytest.raises(ShapeError, match="images: expected at least one pixel"):
+        convolution(images[..., :0])
+    with pytest.raises(ArgumentError, match="images: expected float32, got bfloat16"):
+        convolution(images.bfloat16())
+    with pytest.raises(DeviceError, match="images: expected a tensor on cpu, got meta"):
+        convolution(images.to("meta"))

@@ -1,0 +1,148 @@
+"""Convolutions with 3x3 kernels that stay as they are, on the CPU, by Winograd's F(4x4, 3x3).
+
+They take a quarter of the multiplications of a direct convolution (Lavin and Gray 2016). Relative errors are about
+1e-6, those of a direct one 3e-7 to 1e-6; rounding reaches up to a tile of 4x4 pixels farther than the kernels do.
+"""
+
+from __future__ import annotations
+
+from ctypes import POINTER, Structure, byref, c_int32, c_void_p
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from texgs.core import check
+from texgs.core.errors import DeviceError, ShapeError
+from texgs.raster import native
+
+BLOCK = 16  # channels that lie side by side
+TRANSFORM = (  # G of Lavin and Gray 2016, section 4.3
+    (1 / 4, 0, 0),
+    (-1 / 6, -1 / 6, -1 / 6),
+    (-1 / 6, 1 / 6, -1 / 6),
+    (1 / 24, 1 / 12, 1 / 6),
+    (1 / 24, -1 / 12, 1 / 6),
+    (0, 0, 1),
+)
+
+
+class NativeConvolution(Structure):
+    """`texgs_convolution`."""
+
+    _fields_ = [
+        *((name, c_int32) for name in ("width", "height", "inputs", "outputs")),
+        ("kernel", c_void_p),
+        ("bias", c_void_p),
+        ("is_rectified", c_int32),
+    ]
+
+
+@dataclass(frozen=True, eq=False)
+class RectifiedConvolution:
+    """max(0, weight * image + bias) with zeros around the image; differentiable once, in the image.
+
+    Args:
+        weight: [out, in, 3, 3] float32, constant.
+        bias: [out] float32, constant.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+
+    weight: Tensor
+    bias: Tensor
+
+    def __post_init__(self) -> None:
+        size = check.shape("weight", self.weight, "outputs inputs 3 3")
+        check.shape("bias", self.bias, "outputs", outputs=size["outputs"])
+        check.constant(weight=self.weight, bias=self.bias)
+        for name, x in (("weight", self.weight), ("bias", self.bias)):
+            check.floating(name, x)
+            _require_cpu(name, x)
+
+    def __call__(self, images: Tensor) -> Tensor:
+        """[N, out, H, W] of images [N, in, H, W]; memory in the order of channels_last is not copied."""
+        check.shape("images", images, "N inputs H W", inputs=self.weight.shape[1])
+        check.floating("images", images)
+        _require_cpu("images", images)
+        if images.numel() == 0:
+            raise ShapeError(f"images: expected at least one pixel, got {list(images.shape)}")
+        return _Convolve.apply(images, self)
+
+    @cached_property
+    def kernel(self) -> Tensor:
+        """Of the way there."""
+        return transformed(self.weight)
+
+    @cached_property
+    def adjoint(self) -> Tensor:
+        """Kernel of the way back: outputs and inputs change places, and each 3x3 is turned by half a turn."""
+        return transformed(self.weight.transpose(0, 1).flip(2, 3))
+
+    @cached_property
+    def padded_bias(self) -> Tensor:
+        """Of whole blocks."""
+        return F.pad(self.bias, (0, -len(self.bias) % BLOCK)).contiguous()
+
+
+def transformed(weight: Tensor) -> Tensor:
+    """G g G^T of each kernel g of [out, in, 3, 3], as [36, out / 16, in, 16]; filled up with zeros."""
+    outputs, inputs = weight.shape[:2]
+    g = torch.tensor(TRANSFORM, dtype=torch.float64)
+    padded = F.pad(weight.double(), (0, 0, 0, 0, 0, -inputs % BLOCK, 0, -outputs % BLOCK))
+    points = torch.einsum("yi,oijk,xk->yxoj", g, padded.transpose(1, 2), g)
+    return points.reshape(36, -1, BLOCK, padded.shape[1]).transpose(2, 3).float().contiguous()
+
+
+class _Convolve(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, images: Tensor, convolution: RectifiedConvolution) -> Tensor:
+        ctx.convolution, ctx.inputs = convolution, images.shape[1]
+        result = _call(convolution.kernel, images, None, convolution.padded_bias)
+        ctx.save_for_backward(result)
+        return result[:, : len(convolution.bias)]
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
+        (gate,) = ctx.saved_tensors
+        return _call(ctx.convolution.adjoint, gradient, gate, None)[:, : ctx.inputs], None
+
+
+def _call(kernel: Tensor, images: Tensor, gate: Tensor | None, bias: Tensor | None) -> Tensor:
+    """[N, out, H, W] of whole blocks of channels."""
+    _describe()
+    inputs, outputs = kernel.shape[2], BLOCK * kernel.shape[1]
+    images = F.pad(images, (0, 0, 0, 0, 0, inputs - images.shape[1])) if images.shape[1] < inputs else images
+    images = images.contiguous(memory_format=torch.channels_last)
+    count, _, height, width = images.shape
+    result = images.new_empty(count, height, width, outputs)
+    shape = NativeConvolution(
+        width, height, inputs, outputs, kernel.data_ptr(), native.address(bias), bias is not None
+    )
+    for index in range(count):
+        native.call(
+            "texgs_convolve",
+            byref(shape),
+            images[index].data_ptr(),
+            None if gate is None else gate[index].data_ptr(),
+            result[index].data_ptr(),
+            device=torch.device("cpu"),
+        )
+    return result.permute(0, 3, 1, 2)
+
+
+def _require_cpu(name: str, x: Tensor) -> None:
+    if x.device.type != "cpu":
+        raise DeviceError(f"{name}: expected a tensor on cpu, got {x.device}; torch convolves on GPUs")
+
+
+@cache
+def _describe() -> None:
+    """Tell ctypes the argument types."""
+    arguments = [POINTER(NativeConvolution), c_void_p, c_void_p, c_void_p, c_void_p]
+    native.function(native.library("cpu"), "texgs_convolve").argtypes = arguments
