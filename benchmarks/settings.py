@@ -22,6 +22,7 @@ SECTIONS = (
     "views",
     "fit",
     "scene",
+    "convolution",
     "style",
     "segment",
     "voxels",

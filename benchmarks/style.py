@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
-import torch
-
+from benchmarks.convolution import random_vgg
 from benchmarks.fit import DISTANCE, VIEWS
 from benchmarks.report import Measurement, Section
 from benchmarks.scene import model
@@ -19,10 +16,9 @@ from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import History, stylize
 from texgs.fields.surfels.model import Surfels
 from texgs.models.precision import fast_dtype
-from texgs.models.vgg import STYLE_LAYERS, Vgg, channels, rectified
+from texgs.models.vgg import Vgg
 
 ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick
-LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)
 RECIPES = ("default", "patches")
 
 
@@ -30,7 +26,7 @@ def run(settings: Settings) -> Section:
     """Time edits with each recipe; the weights of VGG are random, which takes as long."""
     keep_freed_memory()  # as the command line does
     section = Section()
-    scene, vgg = model(0, settings.device), random_vgg(settings.device)
+    scene, vgg = model(0, settings.device), random_vgg(settings.device, fast_dtype(settings.device))
     style = StylePicture.of(picture("dots", 256))
     for size in settings.sizes:
         cameras = [orbit(-60.0 + 360 / VIEWS * i, 25.0, DISTANCE, 30.0, size, size) for i in range(VIEWS)]
@@ -59,15 +55,3 @@ def iterations(runs: list[History], where: dict[str, object], count: int) -> lis
     found["iteration"] = [sum(times) for times in zip(*found.values(), strict=True)]
     found["start"] = [1e3 * run.seconds["start"] for run in runs]
     return [Measurement.of(name, where, "ms", values) for name, values in found.items()]
-
-
-def random_vgg(device: torch.device) -> Vgg:
-    """A network of the right size whose activations keep theirs."""
-    generator, dtype = torch.Generator().manual_seed(0), fast_dtype(device)
-    widths = [3, *map(channels, LAYERS)]
-    convolutions = []
-    for inputs, outputs in pairwise(widths):
-        weight = (2 / (9 * inputs)) ** 0.5 * torch.randn(outputs, inputs, 3, 3, generator=generator)
-        bias = torch.zeros(outputs, device=device, dtype=dtype)
-        convolutions.append(rectified(weight.to(device, dtype), bias))
-    return Vgg(tuple(convolutions), LAYERS, STYLE_LAYERS, dtype)

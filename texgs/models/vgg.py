@@ -113,6 +113,11 @@ def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
     """max(0, weight * x + bias) of images x [N, in, H, W] with zeros around them."""
     if weight.device.type == "cpu" and weight.dtype == torch.float32:
         return RectifiedConvolution(weight, bias)
+    return by_torch(weight, bias)
+
+
+def by_torch(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
+    """The same for any device and type of numbers."""
     weight = weight.contiguous(memory_format=torch.channels_last)
     return lambda x: F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
 

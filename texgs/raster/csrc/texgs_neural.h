@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0
  *
- * What fields of small networks need besides a matrix product: points along rays, and their hash encoding (Mueller et
- * al. 2022). In libtexgs alone; the conventions are those of texgs.h.
+ * What networks need besides a matrix product: points along rays and their hash encoding (Mueller et al. 2022) for
+ * fields, convolutions for features of images. In libtexgs alone; the conventions are those of texgs.h.
  */
 #ifndef TEXGS_NEURAL_H
 #define TEXGS_NEURAL_H

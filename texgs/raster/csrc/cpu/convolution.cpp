@@ -51,7 +51,7 @@ int32_t texgs_convolve(const texgs_convolution* shape, const float* image, const
         ConvolutionJob job{*shape, image, gate, result, 0};
         job.batch = batch_of(job);
         const int64_t tiles = job.tiles(), batches = (tiles + job.batch - 1) / job.batch;
-        thread_local Buffer memory;
+        Buffer memory;
         float* scratch = memory.ensure<float>(threads() * job.scratch());
         const auto kernel = convolve_kernel();
         parallel_for(batches, 1, [&](int64_t first, int64_t last, int worker) {
