@@ -15,7 +15,7 @@ from torch.nn import functional as F
 from texgs.core import check
 from texgs.core.errors import ArgumentError
 
-SCORES = 1 << 23  # numbers at a time of all queries by all positions: 32 MB
+SCORES = 1 << 21  # numbers at a time of all queries by all positions: 8 MB, which stay in caches
 
 
 @dataclass(frozen=True, eq=False)
