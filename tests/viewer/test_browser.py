@@ -315,6 +315,24 @@ def test_pages_share_their_edits(chromium, scene_file):
         expect(one.get_by_role("checkbox", name="Headlight")).to_be_checked()
 
 
+def test_a_page_too_many_waits_for_its_turn(chromium, scene_file):
+    fifteen = """async () => {
+      const address = new URL("socket", location.href.replace(/^http/, "ws"));
+      window.others = Array.from({ length: 15 }, () => new WebSocket(address));
+      await Promise.all(others.map((each) => new Promise((done) => { each.onmessage = done; })));
+    }"""
+    with served(scene_file) as (_, address), opened(chromium, address) as page:
+        page.evaluate(fifteen)
+        late = chromium.new_page()
+        late.goto(address)
+        told = late.get_by_text("16 pages of this scene are open")
+        expect(told).to_be_visible(timeout=WAIT)
+        page.evaluate("() => others[0].close()")
+        expect(told).to_be_hidden(timeout=WAIT)
+        expect(late.get_by_role("checkbox", name="TF02")).to_be_checked(timeout=WAIT)
+        late.close()
+
+
 def test_a_page_finds_a_server_that_was_started_again(chromium, scene_file):
     with served(scene_file) as (process, address):
         port = int(re.search(r":(\d+)/", address).group(1))

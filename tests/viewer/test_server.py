@@ -8,7 +8,7 @@ from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
-from aiohttp import WSMsgType, WSServerHandshakeError
+from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
 from aiohttp.test_utils import TestClient, TestServer
 from PIL import Image
 
@@ -403,9 +403,12 @@ def test_there_are_so_many_pages_at_most(scene_file, monkeypatch):
     monkeypatch.setattr("texgs.viewer.server.MOST_PAGES", 1)
 
     async def work(browser, client):
-        with pytest.raises(WSServerHandshakeError) as error:
-            async with page(client):
-                pass
-        assert error.value.status == 503
+        async with page(client) as other:
+            message = await asyncio.wait_for(other.socket.receive(), WAIT)
+            assert (message.type, message.data) == (WSMsgType.CLOSE, WSCloseCode.TRY_AGAIN_LATER)
+            assert message.extra == "1 pages of this scene are open, which is the most. Close one; this page waits."
+        async with page(client) as other:
+            assert (await asyncio.wait_for(other.socket.receive(), WAIT)).type == WSMsgType.CLOSE
+        assert browser.socket.closed is False
 
     with_page(scene_file, work)

@@ -95,12 +95,14 @@ class Server:
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """One page: what it asks for is done until it is gone."""
-        if len(self._pages) >= MOST_PAGES:
-            raise web.HTTPServiceUnavailable(text=f"expected at most {MOST_PAGES} pages; close one")
         socket = web.WebSocketResponse(
             max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
         await socket.prepare(request)
+        if len(self._pages) >= MOST_PAGES:  # a browser tells a page nothing of a refused handshake
+            too_many = f"{MOST_PAGES} pages of this scene are open, which is the most. Close one; this page waits."
+            await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=too_many.encode())
+            return socket
         self._count += 1
         page = Page(socket, self.edits, self.frames, self.work.segmenter, self._count)
         page.tell_scene({**self.greeting(), "page": page.number})

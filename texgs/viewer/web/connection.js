@@ -2,7 +2,7 @@
 
 const FIRST_DELAY = 500, LONGEST_DELAY = 4000; // milliseconds before another attempt
 
-/** Dispatches "message" (detail: parsed JSON), "frame" (detail: ArrayBuffer), "open" and "lost". */
+/** Dispatches "message" (detail: parsed JSON), "frame" (detail: ArrayBuffer), "open" and "lost" (detail: why). */
 export class Connection extends EventTarget {
   #socket = null;
   #delay = FIRST_DELAY;
@@ -26,16 +26,14 @@ export class Connection extends EventTarget {
   #open() {
     const socket = this.#socket = new WebSocket(this.address);
     socket.binaryType = "arraybuffer";
-    socket.onopen = () => {
-      this.#delay = FIRST_DELAY;
-      this.dispatchEvent(new Event("open"));
-    };
+    socket.onopen = () => this.dispatchEvent(new Event("open"));
     socket.onmessage = ({ data }) => {
+      this.#delay = FIRST_DELAY; // not before: a server may end at once what it has taken
       const [name, detail] = typeof data === "string" ? ["message", JSON.parse(data)] : ["frame", data];
       this.dispatchEvent(new CustomEvent(name, { detail }));
     };
-    socket.onclose = () => {
-      this.dispatchEvent(new Event("lost"));
+    socket.onclose = ({ reason }) => {
+      this.dispatchEvent(new CustomEvent("lost", { detail: reason }));
       setTimeout(() => this.#open(), this.#delay);
       this.#delay = Math.min(2 * this.#delay, LONGEST_DELAY);
     };

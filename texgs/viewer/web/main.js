@@ -111,6 +111,7 @@ const connection = new Connection(new URL("socket", location.href.replace(/^http
 let page = null;
 connection.addEventListener("message", ({ detail }) => {
   if (detail.type === "scene") {
+    notices.keep("");
     if (page) page.adopt(detail);
     else page = new Page(detail, connection, notices);
   } else if (detail.level === "question") {
@@ -122,11 +123,9 @@ connection.addEventListener("message", ({ detail }) => {
     notices.tell(detail.text, detail.level);
   }
 });
-connection.addEventListener("open", () => {
-  notices.keep("");
-  page?.state.restart();
-});
-connection.addEventListener("lost", () => { // before the page's job hears of it
+connection.addEventListener("open", () => page?.state.restart());
+connection.addEventListener("lost", ({ detail: why }) => { // before the page's job hears of it
   if (page?.job.isAtWork) notices.tell("The connection broke, which cancelled what was being made.", "error stays");
-  notices.keep("No connection to texgs view. This page tries again; start the same command if it has ended.");
+  const gone = "No connection to texgs view. This page tries again; start the same command if it has ended.";
+  notices.keep(why || gone);
 });
