@@ -100,7 +100,7 @@ class Server:
         )
         await socket.prepare(request)
         if len(self._pages) >= MOST_PAGES:  # a browser tells a page nothing of a refused handshake
-            why = f"{MOST_PAGES} pages of this scene are open, the most there can be. Close one: this page waits."
+            why = f"{MOST_PAGES} pages of this scene are open, which is the most. Close one: this page waits."
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=why.encode())
             return socket
         self._count += 1
