@@ -30,10 +30,10 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
         ConfigError: if the sweep has no seed or edit, or a variant changes what must be the same for all.
     """
     config = compose(words)
-    found, sweep = changes(config), config.sweep
-    if not found:
+    by_variant, sweep = changes(config), config.sweep
+    if not by_variant:
         return [words]
-    for name, listed in found.items():
+    for name, listed in by_variant.items():
         check_variant(name, listed)
     check_seeds(config)
     words = (*words, *edits_of_sweep(config))
@@ -44,7 +44,7 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
             *(*words, *listed, *own_views(config, name)),
             *(f"variant='{name}'", f"fit.seed={seed}", f"edit.seed={edit_seed}"),
         )
-        for name, listed in found.items()
+        for name, listed in by_variant.items()
         for seed, edit_seed in product(sweep.seeds, sweep.edit_seeds)
     ]
 

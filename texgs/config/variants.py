@@ -73,8 +73,8 @@ def edit_variant(config: DictConfig) -> str:
 def swept(config: DictConfig) -> dict[str, str]:
     """What makes a configuration another one than the rest of its sweep: values as text, by their keys."""
     listed = changes(config).get(config.variant, ())
-    found = {key_of(change): change.partition("=")[2] for change in listed}
-    values = {key: OmegaConf.select(config, key) if "." in key else text for key, text in found.items()}
+    texts = {key_of(change): change.partition("=")[2] for change in listed}
+    values = {key: OmegaConf.select(config, key) if "." in key else text for key, text in texts.items()}
     for key, seeds in SEEDS.items():
         if len(config.sweep[seeds]) > 1:
             values[key] = OmegaConf.select(config, key)

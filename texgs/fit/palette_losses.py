@@ -30,8 +30,8 @@ def grid_loss(
 ) -> Tensor:
     """Mean squared difference [] of logarithms of density and of the grid's, at random voxels of [n, 3]."""
     drawn = torch.randint(len(voxels), (SEEDS,), generator=generator)
-    found, _ = density(voxels[drawn], parameters, geometry.levels)
-    return (found.log() - geometry.grid.density[1:][drawn].log()).square().mean()
+    sigma, _ = density(voxels[drawn], parameters, geometry.levels)
+    return (sigma.log() - geometry.grid.density[1:][drawn].log()).square().mean()
 
 
 def base_loss(

@@ -70,8 +70,8 @@ def refine(
         raise FitError(
             "texture: texels are not finite after Adam; look for values that are not in the model before"
         )
-    found = {name: x.detach() for name, x in optimizer.parameters.items()}
-    return Surfels({**model.parameters, **found}, model.shading, model.metadata)
+    fitted = {name: x.detach() for name, x in optimizer.parameters.items()}
+    return Surfels({**model.parameters, **fitted}, model.shading, model.metadata)
 
 
 def texel_map(model: Surfels, camera: Camera) -> Tensor:

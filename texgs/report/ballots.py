@@ -39,14 +39,14 @@ def read_votes(study: Study, paths: Iterable[str | Path]) -> Votes:
     Raises:
         ArgumentError: naming the file that is no complete ballot of this study, or that is there twice.
     """
-    found: dict[str, tuple[Path, Ballot]] = {}
+    by_id: dict[str, tuple[Path, Ballot]] = {}
     for path in sorted(map(Path, paths)):
         ballot = read_ballot(study, path)
-        if ballot.ballot in found:
-            first, _ = found[ballot.ballot]
+        if ballot.ballot in by_id:
+            first, _ = by_id[ballot.ballot]
             raise ArgumentError(f"{path}: expected another ballot than {first}, got the same one; keep one")
-        found[ballot.ballot] = (path, ballot)
-    return Votes(study, [found[name][1] for name in sorted(found)])
+        by_id[ballot.ballot] = (path, ballot)
+    return Votes(study, [by_id[name][1] for name in sorted(by_id)])
 
 
 def votes_beside(key: str | Path) -> Votes | None:

@@ -55,8 +55,8 @@ def fitting(records: Iterable[Record[Any]]) -> Table:
 def in_phases(records: Iterable[Record[Any]]) -> list[Record[FitResult]]:
     """The phases of fits that are of no sweep, by data set, label and their order; unknown ones last."""
     order = {phase: place for place, phase in enumerate(phases())}
-    found = [record for record in of(FitResult, records) if not record.is_swept]
-    return sorted(found, key=lambda each: (place_of(each), each.label, order.get(each.stage, len(order))))
+    unswept = [record for record in of(FitResult, records) if not record.is_swept]
+    return sorted(unswept, key=lambda each: (place_of(each), each.label, order.get(each.stage, len(order))))
 
 
 def row_of(parts: Sequence[Record[FitResult]], published: Mapping[Key, Line]) -> Ours:
@@ -87,8 +87,8 @@ def measures(record: Record[FitResult]) -> list[float | None]:
 def fits(records: Iterable[Record[Any]]) -> Table:
     """The table of all phases of fits among some jobs, each basic TF by itself."""
     columns = (Column("data set"), Column("TF"), *LABELS[1:], *MEASURES)
-    found = sorted(in_phases(records), key=lambda each: (place_of(each), each.tf or ""))
+    ordered = sorted(in_phases(records), key=lambda each: (place_of(each), each.tf or ""))
     rows = [
-        Row([each.title, each.tf, each.label, each.stage, *measures(each)], [each.path]) for each in found
+        Row([each.title, each.tf, each.label, each.stage, *measures(each)], [each.path]) for each in ordered
     ]
     return Table(CAPTION, columns, rows)

@@ -71,7 +71,7 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
         records: of the jobs.
         folder: of the report, which links begin at.
     """
-    found: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
+    by_section: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):
         for name, words in record.facts.get("pictures", {}).items():
             picture = record.path.with_name(name)
@@ -86,8 +86,8 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
                     is_narrow=name in NARROW or name.startswith("style"),
                     **page(record, folder),
                 )
-                found[section_of(record, name)].append(figure)
-    return found
+                by_section[section_of(record, name)].append(figure)
+    return by_section
 
 
 def page(record: Record[Any], folder: Path) -> dict[str, str]:

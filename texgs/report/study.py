@@ -102,14 +102,14 @@ def questions_of(records: Iterable[Record[Any]], edits: Sequence[str], seed: int
             place = list(KINDS).index(record.result.follows)
             groups[place, record.dataset, str(sorted(record.result.followed.items()))].append(record)
     order = random.Random(seed)
-    found = [question_of(groups[key], records, order) for key in sorted(groups) if len(groups[key]) > 1]
-    if not found:
+    questions = [question_of(groups[key], records, order) for key in sorted(groups) if len(groups[key]) > 1]
+    if not questions:
         alone = ", ".join(f"{group[0].dataset} {group[0].result.edit}" for group in groups.values())
         raise ArgumentError(
             "study: expected two scenes or more of a data set that follow the same picture or instruction, "
             f"got only one of each ({alone}); run edits of other methods"
         )
-    return found
+    return questions
 
 
 def question_of(

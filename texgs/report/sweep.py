@@ -61,12 +61,12 @@ def measured(keys: Sequence[tuple[str, ...]]) -> list[str]:
 
 def columns(named: Sequence[str], titles: Sequence[str], spread: Sequence[str]) -> list[Column]:
     """What the cells of a row are."""
-    found = [*map(Column, named), Column("seeds", 0)]
+    header = [*map(Column, named), Column("seeds", 0)]
     for title in titles:
-        found.append(Column(title, DIGITS[title]))
+        header.append(Column(title, DIGITS[title]))
         if title in spread:
-            found.append(Column(f"± {title}", DIGITS[title] + (DIGITS[title] == 0)))
-    return found
+            header.append(Column(f"± {title}", DIGITS[title] + (DIGITS[title] == 0)))
+    return header
 
 
 def mean(runs: Sequence[Run], title: str) -> float | None:
@@ -83,9 +83,9 @@ def deviation(runs: Sequence[Run], title: str) -> float | None:
 
 def values(runs: Sequence[Run], title: str) -> list[float]:
     """A measure of all runs that are done; none where one of them has not measured it."""
-    found = [run.measures.get(title) for run in runs if run.measures]
-    known = [value for value in found if value is not None]
-    return known if len(known) == len(found) else []
+    numbers = [run.measures.get(title) for run in runs if run.measures]
+    known = [value for value in numbers if value is not None]
+    return known if len(known) == len(numbers) else []
 
 
 def caption(titles: Sequence[str], spread: Sequence[str]) -> str:

@@ -70,11 +70,11 @@ def different(runs: Sequence[Run]) -> list[str]:
 
 def grouped(runs: Sequence[Run]) -> dict[str, dict[str, list[Run]]]:
     """The runs by what they are of and by variant."""
-    found: dict[str, dict[str, list[Run]]] = {}
+    by_label: dict[str, dict[str, list[Run]]] = {}
     for run in runs:
         label = " ".join(filter(None, run.series))
-        found.setdefault(label, {}).setdefault(run.variant, []).append(run)
-    return found
+        by_label.setdefault(label, {}).setdefault(run.variant, []).append(run)
+    return by_label
 
 
 def draw_panels(
@@ -132,13 +132,13 @@ def draw_bars(
 
 def looks(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
     """Pictures [H, W, 3] of the edited scenes by what they are of and by variant, of the first seed each."""
-    found: dict[str, dict[str, np.ndarray]] = {}
+    by_label: dict[str, dict[str, np.ndarray]] = {}
     for run in runs:
-        by_variant = found.setdefault(" ".join(filter(None, run.series)), {}) if run.edit else {}
+        by_variant = by_label.setdefault(" ".join(filter(None, run.series)), {}) if run.edit else {}
         scene = run.sources[0].with_name("scene.yaml")
         if run.edit and run.variant not in by_variant and scene.is_file():
             by_variant[run.variant] = picture(scene)
-    return {label: by_variant for label, by_variant in found.items() if by_variant}
+    return {label: by_variant for label, by_variant in by_label.items() if by_variant}
 
 
 def picture(path: Path) -> np.ndarray:

@@ -64,10 +64,10 @@ def runs_of(records: Iterable[Record[Any]], name: str) -> list[Run]:
         ArgumentError: if there is none.
     """
     own = [record for record in records if record.variant and record.sweep == name]
-    found = [*fits(of(FitResult, own)), *edits(own)]
-    if not found:
+    runs = [*fits(of(FitResult, own)), *edits(own)]
+    if not runs:
         raise ArgumentError(f"sweep {name}: no fit or edit of it among the metrics files; run it first")
-    return sorted(found, key=lambda run: (run.dataset, bool(run.edit), *run.series[1:], natural(run.variant)))
+    return sorted(runs, key=lambda run: (run.dataset, bool(run.edit), *run.series[1:], natural(run.variant)))
 
 
 def fits(records: Iterable[Record[FitResult]]) -> list[Run]:
@@ -103,12 +103,12 @@ def edits(records: Sequence[Record[Any]]) -> list[Run]:
     measured = {(each.dataset, each.label, each.result.edit): each for each in of(EditMeasures, records)}
     runs = []
     for record in of(EditResult, records):
-        found = measured.get((record.dataset, record.label, record.result.edit))
+        metrics = measured.get((record.dataset, record.label, record.result.edit))
         measures: dict[str, float | None] = {"minutes": record.result.edit_seconds / 60}
         for title, (name, _) in OF_EDITS.items():
-            measures[title] = getattr(found.result, name) if found else None
+            measures[title] = getattr(metrics.result, name) if metrics else None
         key = (record.dataset, "", record.facts["recipe"], record.result.edit, record.variant)
-        runs.append(Run(*key, measures, [record.path, *([found.path] if found else [])]))
+        runs.append(Run(*key, measures, [record.path, *([metrics.path] if metrics else [])]))
     return runs
 
 

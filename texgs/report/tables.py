@@ -158,11 +158,11 @@ def of_recipes(records: Iterable[Record[Any]]) -> Table:
 
 def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
     """Numbers of training and test views, each with the data sets that have so many; of sweeps none."""
-    found: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+    views: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
     for record in of(SheetResult, records):
         for what, count in (("training views", record.result.train), ("test views", record.result.test)):
-            found[what][count].add(record.dataset)
-    return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in found.items()}
+            views[what][count].add(record.dataset)
+    return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in views.items()}
 
 
 OURS = (

@@ -66,13 +66,13 @@ def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
 
 def counted(votes: Votes) -> dict[str, list[Panel]]:
     """The votes of each question, by what methods follow there."""
-    found: dict[str, list[Panel]] = defaultdict(list)
+    panels: dict[str, list[Panel]] = defaultdict(list)
     for place, question in enumerate(votes.study.questions):
         methods = [option.compared for option in question.options]
         ranks = np.array([ballot.ranks[place] for ballot in votes.ballots])
         ranked = Rankings.of(methods, ranks).sorted(sorted(methods, key=astuple))
-        found[question.follows].append(Panel(question.dataset, words_of(question.followed), ranked))
-    return found
+        panels[question.follows].append(Panel(question.dataset, words_of(question.followed), ranked))
+    return panels
 
 
 def published() -> dict[str, list[Panel]]:
@@ -80,10 +80,10 @@ def published() -> dict[str, list[Panel]]:
     lines: dict[str, dict[str, list[int]]] = defaultdict(dict)  # by data set and method
     for (dataset, method), line in paper("user_study", keys=2).items():
         lines[dataset][method] = [int(line[rank]) for rank in PUBLISHED]
-    found: dict[str, list[Panel]] = {}
+    panels: dict[str, list[Panel]] = {}
     for follows, table in METHODS.items():
         known = {method for (method,) in paper(table)}
-        found[follows] = [
+        panels[follows] = [
             Panel(
                 dataset,
                 "-",
@@ -92,7 +92,7 @@ def published() -> dict[str, list[Panel]]:
             for dataset, by in lines.items()
             if set(by) == known
         ]
-    return found
+    return panels
 
 
 def alike(panels: Iterable[Panel]) -> list[list[Panel]]:

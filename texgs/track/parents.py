@@ -62,10 +62,10 @@ def reopened(client: "MlflowClient", experiment_id: str, tags: Mapping[str, str]
     """The run of the same key, RUNNING again with these tags; None where there is none."""
     from mlflow.entities import RunTag
 
-    found = client.search_runs([experiment_id], f"tags.`{KEY}` = '{tags[KEY]}'", max_results=1)
-    if not found:
+    runs = client.search_runs([experiment_id], f"tags.`{KEY}` = '{tags[KEY]}'", max_results=1)
+    if not runs:
         return None
-    id = str(found[0].info.run_id)
+    id = str(runs[0].info.run_id)
     client.update_run(id, status="RUNNING")
     client.log_batch(id, tags=[RunTag(name, value) for name, value in texts(tags).items()])
     return id

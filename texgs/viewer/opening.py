@@ -58,13 +58,13 @@ def only_scene(folder: Path) -> Path:
     Raises:
         ArgumentError: if there is none, or several.
     """
-    found = sorted(folder.rglob(SCENE))
-    if len(found) != 1:
-        some = ", ".join(str(each.relative_to(folder)) for each in found[:MOST_LISTED])
-        more = ", ..." if len(found) > MOST_LISTED else ""
-        got = f"{len(found)} ({some}{more}); name one of them" if found else "none; texgs compose writes one"
+    files = sorted(folder.rglob(SCENE))
+    if len(files) != 1:
+        some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])
+        more = ", ..." if len(files) > MOST_LISTED else ""
+        got = f"{len(files)} ({some}{more}); name one of them" if files else "none; texgs compose writes one"
         raise ArgumentError(f"{folder}: expected one scene.yaml in this folder or below, got {got}")
-    return found[0]
+    return files[0]
 
 
 def title_of(path: Path) -> str:

@@ -100,13 +100,13 @@ def clicked_of(values: Mapping[str, Any]) -> Clicked:
     camera, points = orbit_of(values.get("camera")), values.get("points")
     if not isinstance(points, list) or not 1 <= len(points) <= MOST_POINTS:
         raise ArgumentError(f"points: expected 1 to {MOST_POINTS} of them, got {points!r:.100}")
-    found = []
+    clicks = []
     for point in points:
         if not isinstance(point, list) or len(point) != 3:
             raise ArgumentError(f"points: expected x, y, and true or false, got {point!r:.100}")
         x, y = (number("points", each, -MOST_PIXELS, 2 * MOST_PIXELS) for each in point[:2])
-        found.append((x, y, flag("points", point[2])))
-    return Clicked(camera, tuple(found))
+        clicks.append((x, y, flag("points", point[2])))
+    return Clicked(camera, tuple(clicks))
 
 
 def _mask(values: Mapping[str, Any]) -> Mask:

@@ -158,8 +158,8 @@ def _blended(fields: Sequence[PaletteField], factors: Sequence[float], rays: Ten
     values[:, 4] = shows.points.distance
     for index, each in enumerate(fields):
         own = owner == index
-        found = shows.points.take(own)
-        values[own, :3] = each.color(found, harmonics[found.ray])
+        own_points = shows.points.take(own)
+        values[own, :3] = each.color(own_points, harmonics[own_points.ray])
     return shows.blend(values, len(rays))
 
 

@@ -70,10 +70,10 @@ class Shown(NamedTuple):
 
 def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> Points:
     """All points on rays [N, 6] that the grid lets through, with their densities."""
-    found, ray = ray_points(geometry.grid, rays, geometry.march)
+    points, ray = ray_points(geometry.grid, rays, geometry.march)
     origin, direction = rays[ray].split(3, dim=1)
-    distance = ((found - origin) * direction).sum(1) / direction.square().sum(1)
-    at = geometry.unit(found)
+    distance = ((points - origin) * direction).sum(1) / direction.square().sum(1)
+    at = geometry.unit(points)
     sigma, features = density(at, parameters, geometry.levels)
     return Points(at, ray, distance, geometry.length * sigma, features)
 

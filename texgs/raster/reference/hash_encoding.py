@@ -13,7 +13,7 @@ WORD = 1 << 32
 
 def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
     """Features [n, 2 levels] at points [n, 3]; see `texgs.raster.hash_encoding.encode`."""
-    found = []
+    features = []
     for resolution, start, end in zip(levels.resolutions, levels.first, levels.first[1:], strict=False):
         place = resolution * points.clamp(0, 1)
         cell = place.detach().long().clamp_max(resolution - 1)
@@ -21,8 +21,8 @@ def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
         for corner in torch.cartesian_prod(*[torch.arange(2)] * 3):
             weight = torch.where(corner == 1, place - cell, 1 - (place - cell)).prod(1)
             feature = feature + weight[:, None] * table[start + row(cell + corner, resolution, end - start)]
-        found.append(feature)
-    return torch.cat(found, dim=1)
+        features.append(feature)
+    return torch.cat(features, dim=1)
 
 
 def row(point: Tensor, resolution: int, rows: int) -> Tensor:
