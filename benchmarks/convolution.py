@@ -43,13 +43,13 @@ def pair(network: Vgg, where: dict[str, object]) -> Case:
     """Features of an image, then the gradient of some of them."""
     size = where["size"]
     image = torch.rand(3, size, size, generator=torch.Generator().manual_seed(0)).requires_grad_()
-    found: list[Tensor] = []
+    features: list[Tensor] = []
 
     def forward() -> None:
-        found[:] = network.layers(image[None])
+        features[:] = network.layers(image[None])
 
     def backward() -> None:
-        torch.autograd.grad(found, image, list(map(torch.ones_like, found)))
+        torch.autograd.grad(features, image, list(map(torch.ones_like, features)))
 
     return Case("features", where, {"forward": forward, "backward": backward})
 

@@ -88,11 +88,11 @@ def parts(fit: Fit) -> dict[str, float]:
     with profile(activities=activities) as recorded:
         for _ in range(PROFILED):
             fit.step()
-    found: dict[str, float] = defaultdict(float)
+    milliseconds: dict[str, float] = defaultdict(float)
     for event in recorded.key_averages():
         taken = event.self_device_time_total if gpu else event.self_cpu_time_total
-        found[part(event.key)] += taken / PROFILED / 1e3
-    return dict(found)
+        milliseconds[part(event.key)] += taken / PROFILED / 1e3
+    return dict(milliseconds)
 
 
 def part(name: str) -> str:

@@ -57,10 +57,10 @@ def slope(x: list[float], y: list[float]) -> float:
 
 def doubling(low: int, high: int) -> list[int]:
     """low, 2 low, 4 low, ... up to high."""
-    found = [max(low, 1)]
-    while 2 * found[-1] <= high:
-        found.append(2 * found[-1])
-    return found
+    values = [max(low, 1)]
+    while 2 * values[-1] <= high:
+        values.append(2 * values[-1])
+    return values
 
 
 def _ends(numbers: tuple[int, ...]) -> tuple[int, int]:

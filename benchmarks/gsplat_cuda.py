@@ -36,7 +36,7 @@ class Peer(workload.Workload):
         from gsplat import rasterization_2dgs
 
         a = self.arguments
-        found = rasterization_2dgs(
+        outputs = rasterization_2dgs(
             means=a["means"],
             quats=a["quats"],
             scales=pad(a["scales"], (0, 1), value=1.0),
@@ -49,7 +49,7 @@ class Peer(workload.Workload):
             near_plane=a["options"].near,
             far_plane=a["options"].far,
         )
-        color, _, normal, _, _, median, _ = found
+        color, _, normal, _, _, median, _ = outputs
         return SimpleNamespace(color=color[0], normal=normal[0], median=median[0, ..., 0])
 
 

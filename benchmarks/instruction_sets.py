@@ -67,8 +67,8 @@ def child() -> None:
     ]
     print(json.dumps(native.instruction_set()), flush=True)
     for _ in sys.stdin:
-        found = [timed for case in cases for timed in visit(case, settings.device)]
-        print(json.dumps(found), flush=True)
+        timings = [timed for case in cases for timed in visit(case, settings.device)]
+        print(json.dumps(timings), flush=True)
 
 
 def _start(name: str, settings: Settings) -> subprocess.Popen:

@@ -66,13 +66,13 @@ class Scene:
 @torch.no_grad()
 def deep_gram(model: Surfels, cameras: list[Camera], lights: list[Light], style: Tensor, vgg: Vgg) -> float:
     """Distance of the Gram matrices of layers that nothing optimises, as `Likeness.gram`."""
-    target, found = gram(vgg.features(style)), []
+    target, distances = gram(vgg.features(style)), []
     for camera, light in zip(cameras, lights, strict=True):
         shown = model.render(camera, light)
         on = F.avg_pool2d(shown.alpha[None], STRIDE)[0] > ON_OBJECT
         seen = vgg.features(shown.color.clamp(0, 1).permute(2, 0, 1))
-        found.append(float((gram(seen[:, on]) - target).norm() / target.norm()))
-    return mean(found)
+        distances.append(float((gram(seen[:, on]) - target).norm() / target.norm()))
+    return mean(distances)
 
 
 def measured(
@@ -85,13 +85,13 @@ def measured(
     seconds = time.process_time() - begin
     cameras, lights = scene.cameras(scene.held)
     scaled = style.scaled(max(cameras[0].width, cameras[0].height)).image
-    found = likeness(edited, cameras, lights, scaled, networks[0])
+    scores = likeness(edited, cameras, lights, scaled, networks[0])
     numbers = {
         "cpu_seconds": round(seconds, 1),
-        "nnfm": round(found.nnfm, 3),
-        "gram": round(found.gram, 3),
+        "nnfm": round(scores.nnfm, 3),
+        "gram": round(scores.gram, 3),
         "deep": round(deep_gram(edited, cameras, lights, scaled, networks[1]), 3),
-        "color": round(max(map(abs, found.color)), 3),
+        "color": round(max(map(abs, scores.color)), 3),
     }
     return numbers, picture(edited, cameras[1], lights[1])
 

@@ -41,8 +41,8 @@ def run(settings: Settings) -> Section:
             reason = (done.stderr.strip().splitlines() or ["it died"])[-1]
             section.skip(f"{view['surfels']} surfels at {view['width']} x {view['height']}", reason)
             continue
-        found = json.loads(done.stdout.splitlines()[-1])
-        section.measurements += [Measurement.of(name, where, "MB", [1e-6 * x]) for name, x in found.items()]
+        peaks = json.loads(done.stdout.splitlines()[-1])
+        section.measurements += [Measurement.of(name, where, "MB", [1e-6 * x]) for name, x in peaks.items()]
     if settings.device.type == "cpu" and not STATUS.exists():
         section.skip("resident", "this system does not report the peak of a process's resident memory")
     return section
@@ -63,12 +63,12 @@ def child() -> None:
         torch.cuda.reset_peak_memory_stats(device)
     made.forward()
     made.backward()
-    found = {"scratch of the library": native.peak_memory(device_type=device.type)}
+    peaks = {"scratch of the library": native.peak_memory(device_type=device.type)}
     if device.type == "cuda":
-        found["growth of torch"] = torch.cuda.max_memory_allocated(device) - before
+        peaks["growth of torch"] = torch.cuda.max_memory_allocated(device) - before
     elif STATUS.exists():
-        found["resident growth"] = _resident("VmHWM") - before
-    print(json.dumps(found))
+        peaks["resident growth"] = _resident("VmHWM") - before
+    print(json.dumps(peaks))
 
 
 def _camera(width: int, height: int) -> Camera:

@@ -22,8 +22,8 @@ class Measurement:
     @classmethod
     def of(cls, name: str, parameters: dict[str, Any], unit: str, values: Iterable[float]) -> Measurement:
         """Median and minimum of the values."""
-        found = list(values)
-        return cls(name, parameters, unit, median(found), min(found), len(found))
+        samples = list(values)
+        return cls(name, parameters, unit, median(samples), min(samples), len(samples))
 
     def over(self, other: Measurement, name: str, **more: Any) -> Measurement:
         """How many times as much as another one; medians by medians, minima by minima."""
@@ -50,7 +50,7 @@ class Section:
 
     def find(self, name: str, **parameters: Any) -> Measurement:
         """The measurement of that name whose parameters include these."""
-        (found,) = (
+        (measurement,) = (
             m for m in self.measurements if m.name == name and parameters.items() <= m.parameters.items()
         )
-        return found
+        return measurement

@@ -49,8 +49,8 @@ def run(settings: Settings) -> Section:
     for camera, mask in zip(cameras, masks, strict=True):
         weights.add(camera, mask)
     for name, make in ways.items():
-        found = counted(make(), cameras, masks)
-        iou = float(weights.weights[found & half].sum() / weights.weights[found | half].sum())
+        selected = counted(make(), cameras, masks)
+        iou = float(weights.weights[selected & half].sum() / weights.weights[selected | half].sum())
         section.measurements.append(
             Measurement("IoU by contribution", {**where, "by": name}, "1", iou, iou, 1)
         )

@@ -51,7 +51,7 @@ def edited(
 def iterations(runs: list[History], where: dict[str, object], count: int) -> list[Measurement]:
     """Milliseconds of an iteration, as a whole and by part; and of the start, once."""
     parts = [name for name in runs[0].seconds if name != "start"]
-    found = {f"part {name}": [1e3 * run.seconds[name] / count for run in runs] for name in parts}
-    found["iteration"] = [sum(times) for times in zip(*found.values(), strict=True)]
-    found["start"] = [1e3 * run.seconds["start"] for run in runs]
-    return [Measurement.of(name, where, "ms", values) for name, values in found.items()]
+    milliseconds = {f"part {name}": [1e3 * run.seconds[name] / count for run in runs] for name in parts}
+    milliseconds["iteration"] = [sum(times) for times in zip(*milliseconds.values(), strict=True)]
+    milliseconds["start"] = [1e3 * run.seconds["start"] for run in runs]
+    return [Measurement.of(name, where, "ms", values) for name, values in milliseconds.items()]

@@ -63,11 +63,11 @@ def visit(case: Case, device: torch.device) -> Iterator[tuple[str, float]]:
 
 def run_once(case: Case, device: torch.device) -> dict[str, float]:
     """Seconds of one run by name: phases, their sum, passes."""
-    found = {name: seconds(phase, device) for name, phase in case.phases.items()}
-    found = {case.name: sum(found.values())} | found
+    times = {name: seconds(phase, device) for name, phase in case.phases.items()}
+    times = {case.name: sum(times.values())} | times
     if case.has_passes:
-        found |= {f"pass {name}": taken for name, taken in native.pass_seconds().items()}
-    return found
+        times |= {f"pass {name}": taken for name, taken in native.pass_seconds().items()}
+    return times
 
 
 def seconds(run: Callable[[], object], device: torch.device) -> float:

@@ -73,7 +73,7 @@ def without_times(value: object) -> object:
 
 def contents(results: Path) -> dict[str, str]:
     """Digests of all files that have to be equal, by their paths."""
-    found = {}
+    digests = {}
     for path in sorted(results.rglob("*")):
         name = path.relative_to(results).as_posix()
         hidden = any(part.startswith(".") for part in path.relative_to(results).parts)
@@ -82,8 +82,8 @@ def contents(results: Path) -> dict[str, str]:
         data = path.read_bytes()
         if path.name == "metrics.json":
             data = json.dumps(without_times(json.loads(data)["numbers"]), sort_keys=True).encode()
-        found[name] = hashlib.sha256(data).hexdigest()
-    return found
+        digests[name] = hashlib.sha256(data).hexdigest()
+    return digests
 
 
 def statuses(results: Path) -> dict[str, int]:
