@@ -68,7 +68,7 @@ def test_every_peer_is_measured_or_skipped(everything):
         s["name"] for s in section["skipped"]
     ]
     for peer in ("gsplat's torch functions", "scalar loop", "avx512", "avx2", "portable"):
-        assert any(peer in found for found in peers), peer
+        assert any(peer in name for name in peers), peer
 
 
 def test_peers_render_the_same(everything):
@@ -105,9 +105,9 @@ def test_defaults_are_those_of_the_targets():
 def test_cases_take_turns():
     order = []
     cases = [Case(name, {"case": name}, {name: lambda name=name: order.append(name)}) for name in "ab"]
-    found = measure(cases, rounds=2, device=torch.device("cpu"), title="turns")
+    measurements = measure(cases, rounds=2, device=torch.device("cpu"), title="turns")
     assert "".join(order) == 2 * (5 * "a" + 5 * "b")
-    assert [(m.name, m.n) for m in found] == [("a", 6), ("b", 6)]
+    assert [(m.name, m.n) for m in measurements] == [("a", 6), ("b", 6)]
 
 
 def test_phases_add_up():

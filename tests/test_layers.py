@@ -50,15 +50,15 @@ FILES = sorted((ROOT / "texgs").rglob("*.py"))
 def test_imports_point_to_the_left(path):
     package = package_of(path)
     module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-    found = {
+    packages = {
         name.split(".")[1]
         for name in imports(ast.parse(path.read_text()), module)
         if name.startswith("texgs.")
     }
     assert package == "" or package in LEFT, f"{package} is in no layer: add it to LEFT"
     allowed = LEFT.get(package, set()) | {package, "__version__"}
-    assert found <= allowed, (
-        f"{path} imports {sorted(found - allowed)}; {package} may import {sorted(allowed)}"
+    assert packages <= allowed, (
+        f"{path} imports {sorted(packages - allowed)}; {package} may import {sorted(allowed)}"
     )
 
 

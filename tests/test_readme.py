@@ -85,7 +85,7 @@ def blocks(page, language):
 
 def commands():
     """Page, folder and command, each of the last two once; a block starts in the project's folder."""
-    found = {}
+    pages = {}
     for page in ALL:
         for block in blocks(page, "sh"):
             folder = "."
@@ -93,8 +93,8 @@ def commands():
                 if line.startswith("cd "):
                     folder = line.removeprefix("cd ")
                 else:
-                    found.setdefault((folder, line.removeprefix(".venv/bin/")), page)
-    return [(page, folder, line) for (folder, line), page in found.items()]
+                    pages.setdefault((folder, line.removeprefix(".venv/bin/")), page)
+    return [(page, folder, line) for (folder, line), page in pages.items()]
 
 
 COMMANDS = commands()
@@ -148,8 +148,8 @@ def test_command_runs(page, folder, command, project, monkeypatch):
     """In their order: later ones use what earlier ones wrote."""
     if command.startswith("make") and shutil.which("make") is None:
         pytest.skip("make is not installed")
-    found = instead(command)
-    if not found:
+    substitute = instead(command)
+    if not substitute:
         pytest.skip(next(reason for pattern, _, reason in INSTEAD if re.match(pattern, command)))
     if "profiles/slurm" in command:
         pytest.importorskip("snakemake_executor_plugin_slurm")
@@ -157,7 +157,7 @@ def test_command_runs(page, folder, command, project, monkeypatch):
     monkeypatch.chdir(place if place.is_dir() else project)  # some pages name folders of other machines
     monkeypatch.setenv("TEXGS_DATA", str(project))
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    code, said = run(shlex.split(os.path.expandvars(found)))
+    code, said = run(shlex.split(os.path.expandvars(substitute)))
     assert code == 0, said
 
 

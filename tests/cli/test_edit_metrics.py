@@ -75,9 +75,9 @@ def test_clip_sees_the_edited_scene_and_the_one_before(scenes, tmp_path):
     edit = SimpleNamespace(source_caption="a beetle", target_caption="a beetle made of gold")
     settings = SimpleNamespace(edit=edit, clip=name, weights={name: "here"})
     opened = after.open(), before.open()
-    found = clip_numbers(settings, (after, before), opened, CAMERAS, "ball")
+    scores = clip_numbers(settings, (after, before), opened, CAMERAS, "ball")
     views = [[scene.render(camera).color.clamp(0, 1) for camera in CAMERAS] for scene in opened]
     expected = clip_scores(Clip.load(name), *views, edit.source_caption, edit.target_caption)
-    assert found["similarity"] == pytest.approx(expected.similarity, abs=1e-6)
-    assert found["direction"] == pytest.approx(expected.direction, abs=1e-6)
-    assert abs(found["direction"]) > 1e-4
+    assert scores["similarity"] == pytest.approx(expected.similarity, abs=1e-6)
+    assert scores["direction"] == pytest.approx(expected.direction, abs=1e-6)
+    assert abs(scores["direction"]) > 1e-4

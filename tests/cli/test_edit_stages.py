@@ -113,14 +113,14 @@ def test_a_part_of_a_model_is_edited_alone(results, edit):
 
 
 def test_measures_without_weights_say_what_is_missing(results):
-    found = numbers(results / "edit_metrics" / "glass")
-    assert found["geometry_kept"] is True
-    assert (found["width"], found["height"]) == (48, 48)
-    assert "clip-vit-base-patch32 are not on this machine" in found["clip_missing"]
-    assert "similarity" not in found
-    assert 0 <= found["short_rmse"] <= 0.2
-    assert "short_lpips" not in found
-    assert found["megabytes"] > 0
+    metrics = numbers(results / "edit_metrics" / "glass")
+    assert metrics["geometry_kept"] is True
+    assert (metrics["width"], metrics["height"]) == (48, 48)
+    assert "clip-vit-base-patch32 are not on this machine" in metrics["clip_missing"]
+    assert "similarity" not in metrics
+    assert 0 <= metrics["short_rmse"] <= 0.2
+    assert "short_lpips" not in metrics
+    assert metrics["megabytes"] > 0
 
 
 def test_a_part_that_is_not_there(results, capsys, monkeypatch):
@@ -165,14 +165,14 @@ def test_another_picture_in_the_same_file_is_another_style(results, tmp_path, mo
     monkeypatch.chdir(results.parents[3])
     style, folder = tmp_path / "mine.png", results / "edits" / "mine"
     words = [*WORDS, *FEW, "edit=glass", f"edit.image.style={style}", "edit.name=mine"]
-    found = []
+    times = []
     for level in (0, 0, 255):
-        if not found or level:
+        if not times or level:
             Image.new("RGB", (64, 64 + level), (level, 0, 0)).save(style)
         assert main(["edit_image", *words]) == 0
-        found.append((folder / "TF01.safetensors").stat().st_mtime_ns)
-    assert found[0] == found[1], "nothing has changed"
-    assert found[1] != found[2]
+        times.append((folder / "TF01.safetensors").stat().st_mtime_ns)
+    assert times[0] == times[1], "nothing has changed"
+    assert times[1] != times[2]
 
 
 def test_an_edit_whose_base_was_not_made(tmp_path, capsys, monkeypatch, results):

@@ -39,11 +39,11 @@ def export(source, target, *words):
 def test_gaussians_of_a_scene_are_those_of_its_models(scene, tmp_path, kind, capsys):
     assert export(scene, tmp_path / "out.ply", "--kind", kind) == 0
     assert capsys.readouterr().out.strip() == str(tmp_path / "out.ply")
-    found = read_ply(tmp_path / "out.ply").parameters
-    assert len(found["means"]) == 230
+    parameters = read_ply(tmp_path / "out.ply").parameters
+    assert len(parameters["means"]) == 230
     assert ("scale_2" in vertices(tmp_path / "out.ply").dtype.names) == (kind == "3dgs")
     own = ball(2, n=80).parameters["opacities"].sigmoid()
-    torch.testing.assert_close(found["opacities"][150:].sigmoid(), 0.5 * own)
+    torch.testing.assert_close(parameters["opacities"][150:].sigmoid(), 0.5 * own)
 
 
 def test_the_ending_chooses(model, tmp_path):
@@ -89,13 +89,13 @@ def test_textures_of_surfels_that_nobody_sees_are_dropped(tmp_path):
 
 def test_points_of_a_scene(scene, tmp_path):
     assert export(scene, tmp_path / "p.ply", "--kind", "points", "--opacity", "0.3") == 0
-    found = vertices(tmp_path / "p.ply")
+    points = vertices(tmp_path / "p.ply")
     counts = [
         int((scale * ball(*of).parameters["opacities"].sigmoid() >= 0.3).sum())
         for scale, of in ((1, (1,)), (0.5, (2, 80)))
     ]
-    assert len(found) == sum(counts)
-    reds = found[counts[0] :]
+    assert len(points) == sum(counts)
+    reds = points[counts[0] :]
     assert reds["red"].mean() > 240 > 3 * reds["blue"].mean()
 
 

@@ -42,18 +42,18 @@ def test_fits_tell_which_views_they_are_of_and_what_their_data_stand_in_for(resu
     for folder in (*phases, results / "pse"):
         assert json.loads((folder / "metrics.json").read_text())["stand_in"] == "vortex"
     for folder in phases:
-        found = numbers(folder.parent, folder.name)
-        assert (found["train_views"], found["width"], found["height"]) == (12, 48, 48)
+        metrics = numbers(folder.parent, folder.name)
+        assert (metrics["train_views"], metrics["width"], metrics["height"]) == (12, 48, 48)
 
 
 def test_edits_are_compared_with_the_volume(results):
-    found = numbers(results, "pse")
-    titles = [step["title"] for step in found["pse"]]
+    metrics = numbers(results, "pse")
+    titles = [step["title"] for step in metrics["pse"]]
     assert titles[:3] == ["as fitted", "+ opacity of TF01 x 0.4", "+ other colours"]
     assert titles[3:] == ["+ k_a x 0.7, k_d x 1.2, k_s x 2", "+ light from the left"]
-    assert len(found["relight"]) == 6
-    assert all(step["psnr"] > 12 for step in (*found["pse"], *found["relight"]))
-    assert found["pse"][0]["psnr"] > 16
+    assert len(metrics["relight"]) == 6
+    assert all(step["psnr"] > 12 for step in (*metrics["pse"], *metrics["relight"]))
+    assert metrics["pse"][0]["psnr"] > 16
     for name in ("pse.png", "relight.png"):
         assert (results / "pse" / name).stat().st_size > 5000
     last = read_scene(results / "pse" / "pse-4.yaml")
@@ -65,10 +65,10 @@ def test_edits_are_compared_with_the_volume(results):
 
 
 def test_frames_are_timed_beside_the_volume(results):
-    found = numbers(results, "timing")
-    assert 0 < found["frame_mean_ms"] <= found["frame_max_ms"]
-    assert found["volume_mean_ms"] > 0
-    assert (found["width"], found["height"]) == (48, 48)
+    metrics = numbers(results, "timing")
+    assert 0 < metrics["frame_mean_ms"] <= metrics["frame_max_ms"]
+    assert metrics["volume_mean_ms"] > 0
+    assert (metrics["width"], metrics["height"]) == (48, 48)
 
 
 def test_tables_and_report_have_them(results, monkeypatch, capsys):

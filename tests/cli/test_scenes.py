@@ -61,10 +61,10 @@ def test_edits_show_and_are_data(scene, tmp_path):
         "background=0,0,0",
     ]
     assert main(["edit", str(scene), *words, "--output", str(edited)]) == 0
-    found = read_scene(edited)
-    assert found.models["TF01"].edit.palette == (1, 0, 0)
-    assert not found.models["TF02"].edit.visible
-    assert (found.light.kind, found.light.azimuth, found.light.polar) == ("directional", 30, -10)
+    result = read_scene(edited)
+    assert result.models["TF01"].edit.palette == (1, 0, 0)
+    assert not result.models["TF02"].edit.visible
+    assert (result.light.kind, result.light.azimuth, result.light.polar) == ("directional", 30, -10)
     assert render(edited, tmp_path / "a.png") == 0
     picture = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
     assert picture[0, 0].tolist() == [0, 0, 0]

@@ -55,10 +55,10 @@ def test_a_picture_is_a_frame_of_the_changed_scene(studio):
     session.set_light(Light("directional", -30.0, 40.0))
     expected = session.frame(orbit(*VIEW, 4.0311, 20.0, SIZE, SIZE))
     plain = studio.take(shot()).pixels
-    found = studio.take(shot(fov_y=20.0, light=[-30.0, 40.0], changes=["low.opacity=0.5"])).pixels
-    np.testing.assert_array_equal(np.round(found * 255), expected)
+    changed = studio.take(shot(fov_y=20.0, light=[-30.0, 40.0], changes=["low.opacity=0.5"])).pixels
+    np.testing.assert_array_equal(np.round(changed * 255), expected)
     np.testing.assert_array_equal(studio.take(shot()).pixels, plain, "changes are taken back")
-    assert np.abs(found - plain).max() > 0.1
+    assert np.abs(changed - plain).max() > 0.1
 
 
 @pytest.mark.parametrize("show", ["scene", "volume"])

@@ -40,10 +40,10 @@ def test_names_tell_variant_seed_and_edit(stage, words, tf, expected):
 
 
 def test_tags_are_of_what_a_job_is_and_leave_out_what_it_is_not():
-    found = tags(job("edit_text", (*GOLD, "edit.seed=0,1")), IDENTITY, "abc")
+    result = tags(job("edit_text", (*GOLD, "edit.seed=0,1")), IDENTITY, "abc")
     expected = {"stage": "edit_text", "dataset": "sphere", "recipe": "demo", "field": "surfels"}
     expected |= {"variant": "128", "sweep": "size", "seed": "1", "fit_seed": "0", "edit": "gold"}
-    assert found.items() >= {**expected, "device": "cpu", PARENT: "abc"}.items()
+    assert result.items() >= {**expected, "device": "cpu", PARENT: "abc"}.items()
     assert not tags(job("volume", ()), IDENTITY, None).keys() & {"tf", "variant", "sweep", "edit", PARENT}
 
 
@@ -57,8 +57,8 @@ def test_losses_are_a_curve_over_iterations_and_times_one_over_frames():
 
 def test_edits_by_numbers_have_a_metric_each_and_their_mean():
     compared = [Comparison("as fitted", 30.0, 0.9), Comparison("other colours", 20.0, 0.8)]
-    found = scalars(plain(PseResult(2, compared, [Comparison("light")])))
-    assert found == {
+    metrics = scalars(plain(PseResult(2, compared, [Comparison("light")])))
+    assert metrics == {
         "views": 2.0,
         "pse_psnr": 25.0,
         "pse_psnr/as fitted": 30.0,

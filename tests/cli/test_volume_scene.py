@@ -25,18 +25,18 @@ HIGH = {"opacity": [[0.6, 0.0], [0.7, 0.9], [1.0, 0.9]], "color": [[0.6, 0.8, 0.
 
 
 def test_opacity_and_colour_of_a_transfer_function():
-    found = edited(TF, PartEdit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
-    np.testing.assert_allclose(found.opacity, [(0, 0), (1, 0.75), (17 / 12, 1), (2, 1)], err_msg="at most 1")
-    np.testing.assert_allclose(found.color, [(0, 0.4, 0.4, 0.2), (2, 0.6, 0.6, 0.4)])
+    tf = edited(TF, PartEdit(opacity=1.5, palette=(0.5, 0.5, 0.5)), (0.3, 0.5, 0.9))
+    np.testing.assert_allclose(tf.opacity, [(0, 0), (1, 0.75), (17 / 12, 1), (2, 1)], err_msg="at most 1")
+    np.testing.assert_allclose(tf.color, [(0, 0.4, 0.4, 0.2), (2, 0.6, 0.6, 0.4)])
     assert edited(TF, PartEdit(), ()) == TF
 
 
 def test_what_an_edit_cuts_off_is_cut_off_at_every_value():
     """Also between points: the product is at most 1 there, and no lower."""
     values = np.linspace(0, 2, 41)
-    found = edited(TF, PartEdit(opacity=3.0, palette=(1.0, 0.0, 0.5)), (0.3, 0.5, 0.9))
+    tf = edited(TF, PartEdit(opacity=3.0, palette=(1.0, 0.0, 0.5)), (0.3, 0.5, 0.9))
     color, alpha = TF(values)[:, :3] + [0.7, -0.5, -0.4], 3 * TF(values)[:, 3]
-    np.testing.assert_allclose(found(values), np.clip(np.column_stack([color, alpha]), 0, 1), atol=1e-12)
+    np.testing.assert_allclose(tf(values), np.clip(np.column_stack([color, alpha]), 0, 1), atol=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -19,9 +19,9 @@ def there(monkeypatch, tmp_path):
     """Checksums of weights by name, as if they were on this machine."""
     for name in ("TEXGS_WEIGHTS", "TORCH_HOME", "HF_HOME", "XDG_CACHE_HOME"):
         monkeypatch.setenv(name, str(tmp_path / "none"))
-    found = {}
-    monkeypatch.setattr(weights, "checksum", lambda name, _checksums: found.get(name))
-    return found
+    checksums = {}
+    monkeypatch.setattr(weights, "checksum", lambda name, _checksums: checksums.get(name))
+    return checksums
 
 
 def settings(stage, *words):

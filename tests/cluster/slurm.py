@@ -184,7 +184,7 @@ def stop(slurm: Slurm, daemons: list[subprocess.Popen[bytes]]) -> None:
 
 def processes_below(folder: Path) -> list[str]:
     """Command lines of living processes that mention the folder or work in it."""
-    found = []
+    commands = []
     for process in Path("/proc").glob("[0-9]*"):
         try:
             words = (process / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
@@ -192,5 +192,5 @@ def processes_below(folder: Path) -> list[str]:
         except OSError:  # it has ended meanwhile
             continue
         if int(process.name) != os.getpid() and (str(folder) in words or place.startswith(str(folder))):
-            found.append(words)
-    return found
+            commands.append(words)
+    return commands

@@ -84,8 +84,8 @@ def images(folder):
 
 def some_images(folder):
     """The same, once there are a few."""
-    found = images(folder)
-    return found if len(found) >= 3 else {}
+    times = images(folder)
+    return times if len(times) >= 3 else {}
 
 
 def text_of(log):

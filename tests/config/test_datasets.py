@@ -111,17 +111,17 @@ def test_missing_views_are_explained(tmp_path):
 
 @pytest.mark.parametrize("name", PAPER)
 def test_has_the_numbers_of_the_paper(name):
-    found, (dims, width, n_scenes) = dataset(name), PAPER[name]
-    assert found.title == name.replace("_", " ")
-    assert found.image == width
-    assert found.volume.reduce == 1
-    if found.views_folder is None:
-        assert len(found.basic_tfs) == n_scenes
-    if found.volume.generator is not None:
-        assert (found.volume.size,) * 3 == dims
-    if found.volume.dims is not None:
-        assert tuple(found.volume.dims) == dims
-        assert found.volume.file.endswith(f"_{'x'.join(map(str, dims))}_{found.volume.dtype}.raw")
+    config, (dims, width, n_scenes) = dataset(name), PAPER[name]
+    assert config.title == name.replace("_", " ")
+    assert config.image == width
+    assert config.volume.reduce == 1
+    if config.views_folder is None:
+        assert len(config.basic_tfs) == n_scenes
+    if config.volume.generator is not None:
+        assert (config.volume.size,) * 3 == dims
+    if config.volume.dims is not None:
+        assert tuple(config.volume.dims) == dims
+        assert config.volume.file.endswith(f"_{'x'.join(map(str, dims))}_{config.volume.dtype}.raw")
 
 
 def test_stand_ins_are_labelled():
@@ -134,14 +134,14 @@ def test_stand_ins_are_labelled():
 
 @pytest.mark.parametrize("name", sorted({*with_key("file")} & {*with_values("data")}))
 def test_agrees_with_the_real_volume(name, manifest):
-    found = dataset(name)
-    known = manifest[found.volume.file]
-    source = open_source(real_data(f"volumes/{found.volume.file}"))
+    config = dataset(name)
+    known = manifest[config.volume.file]
+    source = open_source(real_data(f"volumes/{config.volume.file}"))
     assert list(source.dims) == known["dims_xyz"]
-    assert found.volume.sha256 in (None, known["sha256"])
+    assert config.volume.sha256 in (None, known["sha256"])
     if name in PAPER:
         assert source.dims == PAPER[name][0]
-    for tf, points in found.basic_tfs.items():
+    for tf, points in config.basic_tfs.items():
         first, last = in_data_values(tf, points, "data", known["min"], known["max"]).support
         assert known["min"] <= first < last <= known["max"]
 

@@ -56,9 +56,9 @@ def test_what_a_row_and_a_column_say_counts_together_and_the_column_first():
     columns = (
         "[{title: x, light: [3, 4], changes: ['TF02.visible=false']}, {title: y, edit: none, show: volume}]"
     )
-    ((titles, found),) = grids("edits=[gold]", grid(rows, columns))
+    ((titles, by_row),) = grids("edits=[gold]", grid(rows, columns))
     assert titles == ["x", "y"]
-    (ax, ay), (bx, by) = found["a"], found["b"]
+    (ax, ay), (bx, by) = by_row["a"], by_row["b"]
     assert (ax["scene"], ax["show"], ax["light"]) == ("quick/gold", "scene", [3, 4])
     assert ax["changes"] == ["TF01.opacity=0.5", "TF02.visible=false"]
     assert (ay["scene"], ay["show"], ay["light"]) == ("quick/none", "volume", [1, 2])
@@ -71,8 +71,8 @@ def test_without_a_volume_its_rows_and_columns_are_left_out(tmp_path):
     given = grid("[{title: a}, {title: b, show: error}]", "[{title: x, show: volume}, {title: y}]")
     (tmp_path / "vortex" / "TF01").mkdir(parents=True)
     (tmp_path / "vortex" / "TF01" / "transforms_train.json").write_text("{}")
-    ((titles, found),) = grids(*words, given)
-    assert (titles, list(found)) == (["y"], ["a"])
+    ((titles, by_row),) = grids(*words, given)
+    assert (titles, list(by_row)) == (["y"], ["a"])
     with pytest.raises(ConfigError, match="expected a picture in a row and a column, got none"):
         grids(*words, grid("[{show: volume}]"))
 

@@ -22,13 +22,13 @@ def test_fingerprints_differ_by_contents_and_names_but_not_by_what_python_compil
     (tmp_path / "below").mkdir()
     file = tmp_path / "below" / "a.py"
     file.write_text("1")
-    found = {fingerprint(tmp_path)}
+    fingerprints = {fingerprint(tmp_path)}
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "__pycache__" / "a.pyc").write_text("compiled")
-    found.add(fingerprint(tmp_path))
-    assert len(found) == 1
+    fingerprints.add(fingerprint(tmp_path))
+    assert len(fingerprints) == 1
     file.write_text("2")
-    found.add(fingerprint(tmp_path))
+    fingerprints.add(fingerprint(tmp_path))
     file.rename(tmp_path / "b.py")
-    found.add(fingerprint(tmp_path))
-    assert len(found) == 3
+    fingerprints.add(fingerprint(tmp_path))
+    assert len(fingerprints) == 3

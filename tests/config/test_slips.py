@@ -55,9 +55,9 @@ def told(*words):
 )
 def test_names_the_file_and_the_line(mine, text, line, message):
     mine.write_bytes(text if isinstance(text, bytes) else text.encode())
-    found = told("dataset=mine")
-    assert found.startswith(f"conf/dataset/mine.yaml:{line}: ")
-    assert message in found
+    error = told("dataset=mine")
+    assert error.startswith(f"conf/dataset/mine.yaml:{line}: ")
+    assert message in error
 
 
 def test_brackets_without_end_name_the_file(mine):

@@ -20,11 +20,11 @@ def test_without_a_sweep_there_are_the_given_words():
 
 @pytest.mark.parametrize("name", [name for name in members("sweep") if name != "none"])
 def test_every_sweep_of_conf_composes(name):
-    found = [compose(words) for words in variants((f"sweep={name}", "dataset=engine", "tf=TF01"))]
-    edits = {edit_folder(each, "any") for each in found}
-    assert len(found) > 1
-    assert len({fit_folder(each) for each in found}) * len(edits) == len(found)
-    assert all(each.sweep.name == name for each in found)
+    configs = [compose(words) for words in variants((f"sweep={name}", "dataset=engine", "tf=TF01"))]
+    edits = {edit_folder(each, "any") for each in configs}
+    assert len(configs) > 1
+    assert len({fit_folder(each) for each in configs}) * len(edits) == len(configs)
+    assert all(each.sweep.name == name for each in configs)
 
 
 def words_of(**changes):
@@ -41,19 +41,24 @@ def folders(words):
 
 def test_a_variant_has_its_overrides_its_seed_and_a_folder_of_its_own():
     words = ("tf=TF01", "sweep.seeds=[0, 5]", *words_of(a=["fit.low_pass=3"], b=[]))
-    found = [compose(each) for each in variants(words)]
-    assert [(each.fit.low_pass, each.fit.seed) for each in found] == [(3, 0), (3, 5), (6, 0), (6, 5)]
-    assert [fit_folder(each) for each in found] == ["default-a", "default-a-s5", "default-b", "default-b-s5"]
-    assert STAGES["shading"].settings(found[0])["fit"]["variant"] == "a"
+    configs = [compose(each) for each in variants(words)]
+    assert [(each.fit.low_pass, each.fit.seed) for each in configs] == [(3, 0), (3, 5), (6, 0), (6, 5)]
+    assert [fit_folder(each) for each in configs] == [
+        "default-a",
+        "default-a-s5",
+        "default-b",
+        "default-b-s5",
+    ]
+    assert STAGES["shading"].settings(configs[0])["fit"]["variant"] == "a"
 
 
 def test_views_of_a_variant_are_its_own_unless_it_names_them():
     changes = {"a": ["views.width=10"], "b": ["views=paper", "views.name=views-c"], "d": []}
     words = ("dataset=engine", "tf=TF01", *words_of(**changes))
-    found = [compose(each) for each in variants(words)]
-    folders = [STAGES["views"].output(each).name for each in found]
+    configs = [compose(each) for each in variants(words)]
+    folders = [STAGES["views"].output(each).name for each in configs]
     assert folders == ["views-a", "views-c", "views"]
-    assert [STAGES["sheet"].applies(each) for each in found] == [False, False, True]
+    assert [STAGES["sheet"].applies(each) for each in configs] == [False, False, True]
 
 
 def test_variants_that_change_edits_alone_share_the_fits():
@@ -125,8 +130,8 @@ def test_a_sweep_is_named_after_its_keys_and_other_words_stay():
 
 def test_swept_values_are_told_in_full():
     words = as_sweep(("views.train.frequency=2,3", "fit.seed=0,1", "dataset=engine"))
-    found = [swept(compose(each)) for each in variants(words)]
-    assert found[1] == {"views.train.frequency": "2", "fit.seed": "1"}
+    values = [swept(compose(each)) for each in variants(words)]
+    assert values[1] == {"views.train.frequency": "2", "fit.seed": "1"}
     assert swept(compose(("fit.seed=3",))) == {}
 
 

@@ -40,13 +40,13 @@ def faulty():
 
 def reports(lib, fault, *arguments):
     """What is reported with each seed."""
-    found = []
+    messages = []
     for seed in SEEDS:
         lib.emulation_seed(seed)
         assert fault(*arguments) is not False
         report = lib.emulation_synchronize()
-        found.append(report and report.decode())
-    return found
+        messages.append(report and report.decode())
+    return messages
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -70,13 +70,13 @@ def test_freed_memory(faulty):
 
 
 def test_host_that_does_not_wait_reads_nothing_in_some_orders(faulty):
-    found = []
-    reports(faulty, lambda: found.append(faulty.read_too_early()))
-    assert any(math.isnan(x) for x in found)
-    assert any(x == 0 for x in found)
+    values = []
+    reports(faulty, lambda: values.append(faulty.read_too_early()))
+    assert any(math.isnan(x) for x in values)
+    assert any(x == 0 for x in values)
 
 
 def test_stream_that_does_not_wait_for_another_is_reported_in_some_orders(faulty):
-    found = reports(faulty, faulty.two_streams, False)
-    assert any("copying device memory that nothing wrote" in (report or "") for report in found)
+    messages = reports(faulty, faulty.two_streams, False)
+    assert any("copying device memory that nothing wrote" in (report or "") for report in messages)
     assert reports(faulty, faulty.two_streams, True) == [None] * len(SEEDS)

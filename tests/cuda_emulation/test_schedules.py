@@ -19,18 +19,18 @@ SEEDS = range(4)
 
 def losses():
     """Values and gradients of all losses and of shading, by name."""
-    found = {"D-SSIM": test_ssim.evaluate(l1_dssim, *test_ssim.pair(33, 70, 3))}
-    found["smoothness"] = test_smoothness.evaluate(bilateral_smoothness, *test_smoothness.maps(33, 70, 2))
+    results = {"D-SSIM": test_ssim.evaluate(l1_dssim, *test_ssim.pair(33, 70, 3))}
+    results["smoothness"] = test_smoothness.evaluate(bilateral_smoothness, *test_smoothness.maps(33, 70, 2))
     depth, normal, *constants = test_normals.view(33, 70)
     value, gradients = test_normals.gradients(
         lambda n, z: normal_consistency(n, z, *constants), normal, depth
     )
-    found["normals"] = (value, *gradients)
+    results["normals"] = (value, *gradients)
     leaves, camera = test_shading.surfels(700, test_shading.MATERIAL), test_shading.CAMERA
-    found["shading"] = sum(map(tuple, test_shading.gradients(blinn_phong_texture, leaves, camera)), ())
+    results["shading"] = sum(map(tuple, test_shading.gradients(blinn_phong_texture, leaves, camera)), ())
     sh = [torch.linspace(-1, 1, 700 * 48).reshape(700, 16, 3), leaves[-2]]
-    found["harmonics"] = sum(map(tuple, test_shading.gradients(spherical_harmonics, sh, camera)), ())
-    return {f"{name} {i}": x for name, all_ in found.items() for i, x in enumerate(all_)}
+    results["harmonics"] = sum(map(tuple, test_shading.gradients(spherical_harmonics, sh, camera)), ())
+    return {f"{name} {i}": x for name, all_ in results.items() for i, x in enumerate(all_)}
 
 
 COMPUTED = {
@@ -49,7 +49,7 @@ def test_every_order_gives_the_same_bits(name):
     expected = None
     for seed in SEEDS:
         with emulated.emulated_cuda(seed):
-            found = COMPUTED[name]()
-        expected = expected or found
-        for quantity, value in found.items():
+            values = COMPUTED[name]()
+        expected = expected or values
+        for quantity, value in values.items():
             assert torch.equal(value, expected[quantity]), (seed, quantity)

@@ -67,6 +67,6 @@ def truth(model, of_class, camera):
     return mask, shown.statistics.weight_sum
 
 
-def overlap(found, expected, weights):
+def overlap(mask, expected, weights):
     """Intersection over union by contribution."""
-    return float(weights[found & expected].sum() / weights[found | expected].sum())
+    return float(weights[mask & expected].sum() / weights[mask | expected].sum())

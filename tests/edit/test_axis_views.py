@@ -77,8 +77,8 @@ def test_each_view_is_chosen_once_and_the_sum_of_cosines_is_largest():
     chosen = nearest_to_axes(cameras, BOX)
     cosines = torch.tensor(list(AXES.values())) @ torch.stack([c.position / 3 for c in cameras]).T
     best = max(sum(float(cosines[k, i]) for k, i in enumerate(some)) for some in permutations(range(7), 6))
-    found = sum(float(cosines[k, cameras.index(camera)]) for k, camera in enumerate(chosen.values()))
-    assert found == pytest.approx(best, abs=1e-5)
+    total = sum(float(cosines[k, cameras.index(camera)]) for k, camera in enumerate(chosen.values()))
+    assert total == pytest.approx(best, abs=1e-5)
 
 
 def test_a_camera_inside_of_the_scene():

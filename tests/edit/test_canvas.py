@@ -19,7 +19,7 @@ def scene():
 def pasted(canvas, full):
     """Places of a full view [H, W, 3] over black at which it shows what a canvas does."""
     height, width = canvas.alpha.shape
-    found = [
+    places = [
         (top, left)
         for top in range(full.shape[0] - height + 1)
         for left in range(full.shape[1] - width + 1)
@@ -27,7 +27,7 @@ def pasted(canvas, full):
             full[top : top + height, left : left + width], canvas.color.permute(1, 2, 0), atol=2e-5
         )
     ]
-    return found
+    return places
 
 
 @pytest.mark.parametrize(("is_lit", "look"), [(True, "shaded"), (False, "unshaded")])
@@ -82,5 +82,5 @@ def test_the_visible_part_holds_all_that_is_seen_in_multiples_of_eight():
 def test_an_extent_stays_within_the_image(size, places, expected):
     seen = torch.zeros(size, dtype=torch.bool)
     seen[places] = True
-    found = extent(seen)
-    assert (found.start, found.stop) == expected
+    span = extent(seen)
+    assert (span.start, span.stop) == expected

@@ -184,8 +184,8 @@ def test_radii_are_those_of_a_sphere_on_the_axis():
     (camera,) = cameras(1, 48)
     ahead = camera.position + 2 * camera.viewmat[2, :3]
     behind = camera.position - camera.viewmat[2, :3]
-    found = radii(torch.stack([ahead, behind]), torch.tensor([[0.1, 0.2, 0.05]] * 2).log(), camera)
-    torch.testing.assert_close(found, torch.tensor([3 * 0.2 * float(camera.K[1, 1]) / 2, 0.0]))
+    result = radii(torch.stack([ahead, behind]), torch.tensor([[0.1, 0.2, 0.05]] * 2).log(), camera)
+    torch.testing.assert_close(result, torch.tensor([3 * 0.2 * float(camera.K[1, 1]) / 2, 0.0]))
 
 
 def test_patches_lie_inside_of_the_image_and_around_what_is_visible():

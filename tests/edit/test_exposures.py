@@ -84,8 +84,8 @@ def test_straight_colours_are_those_that_were_blended_over_white():
     generator = torch.Generator().manual_seed(0)
     alpha = torch.rand(20, 30, generator=generator) * 0.5 + 0.5
     color = torch.tensor([0.2, 0.9, 0.4]) + 0.05 * torch.rand(20, 30, 3, generator=generator)
-    found = straight_colors(color * alpha[..., None] + 1 - alpha[..., None], alpha)
-    assert_close(found, color, atol=6e-3, rtol=0)
+    straight = straight_colors(color * alpha[..., None] + 1 - alpha[..., None], alpha)
+    assert_close(straight, color, atol=6e-3, rtol=0)
 
 
 def test_straight_colours_go_on_beyond_the_silhouette_and_bear_noise_there():
@@ -95,9 +95,9 @@ def test_straight_colours_go_on_beyond_the_silhouette_and_bear_noise_there():
     color = torch.tensor([0.1, 0.6, 0.3])
     image = color * alpha[..., None] + 1 - alpha[..., None]
     image[10:30, 30] += 0.02  # twice as much as is to be seen there
-    found = straight_colors(image, alpha)
-    assert_close(found[20, 20], color, atol=1e-4, rtol=0)
-    assert (found[15:25, 30:36] - color).abs().max() < 0.25  # divided by alpha alone it would be white
+    straight = straight_colors(image, alpha)
+    assert_close(straight[20, 20], color, atol=1e-4, rtol=0)
+    assert (straight[15:25, 30:36] - color).abs().max() < 0.25  # divided by alpha alone it would be white
 
 
 def test_views_of_nothing_want_nothing(model):

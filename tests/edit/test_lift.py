@@ -43,13 +43,13 @@ def clicks(*places, negative=(), camera=FRONT):
 
 def test_a_click_is_where_its_ray_meets_the_surface():
     model, _ = two_balls()
-    found = prompts_at(model, clicks((-0.3, 0.05, 0.0), (0.3, 0.1, 0.1), negative=[(-0.25, -0.1, 0.0)]))
+    prompts = prompts_at(model, clicks((-0.3, 0.05, 0.0), (0.3, 0.1, 0.1), negative=[(-0.25, -0.1, 0.0)]))
     middles = torch.tensor([[-0.3, 0.0, 0.0], [0.3, 0.1, 0.1], [-0.3, 0.0, 0.0]])
     torch.testing.assert_close(
-        (found.places - middles).norm(dim=1), torch.full((3,), 0.25), atol=0.02, rtol=0
+        (prompts.places - middles).norm(dim=1), torch.full((3,), 0.25), atol=0.02, rtol=0
     )
-    assert (found.places[:, 2] > middles[:, 2]).all(), "on the side that faces the camera"
-    assert found.positive.tolist() == [True, True, False]
+    assert (prompts.places[:, 2] > middles[:, 2]).all(), "on the side that faces the camera"
+    assert prompts.positive.tolist() == [True, True, False]
 
 
 def test_a_click_through_a_thin_layer_is_on_what_shows_through():
@@ -101,19 +101,19 @@ def test_places_are_visible_where_nothing_is_in_front_of_them():
 @pytest.mark.parametrize("vote", ["contribution", "centre"])
 def test_one_click_segments_an_object_on_all_of_its_sides(vote):
     model, numbers = two_balls()
-    found = lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Alike(), vote=vote)
+    segment = lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Alike(), vote=vote)
     weights = sum(truth(model, numbers == 0, camera)[1] for camera in cameras())
-    assert overlap(found.mask, numbers == 0, weights) > (0.97 if vote == "contribution" else 0.8)
-    assert found.used > 30, "also views that see nothing of the place clicked on"
-    assert found.used + found.left_out == 43
+    assert overlap(segment.mask, numbers == 0, weights) > (0.97 if vote == "contribution" else 0.8)
+    assert segment.used > 30, "also views that see nothing of the place clicked on"
+    assert segment.used + segment.left_out == 43
 
 
 def test_grabcut_segments_an_object():
     model, numbers = two_balls()
     some = cameras(size=128, frequency=1)
-    found = lift(model, clicks((0.3, 0.1, 0.35), negative=[(-0.3, 0.0, 0.25)]), some, GrabCut())
+    segment = lift(model, clicks((0.3, 0.1, 0.35), negative=[(-0.3, 0.0, 0.25)]), some, GrabCut())
     weights = sum(truth(model, numbers == 1, camera)[1] for camera in some)
-    assert overlap(found.mask, numbers == 1, weights) > 0.95
+    assert overlap(segment.mask, numbers == 1, weights) > 0.95
 
 
 def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along():
@@ -140,10 +140,10 @@ def test_a_mask_that_contradicts_the_others_has_no_vote():
             right = super().__call__(image, points, positive)
             return ~right if len(self.images) % 4 == 0 else right
 
-    found = lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Confused())
+    segment = lift(model, clicks((-0.3, 0.0, 0.25)), cameras(), Confused())
     weights = sum(truth(model, numbers == 0, camera)[1] for camera in cameras())
-    assert overlap(found.mask, numbers == 0, weights) > 0.97
-    assert found.left_out >= 10
+    assert overlap(segment.mask, numbers == 0, weights) > 0.97
+    assert segment.left_out >= 10
 
 
 def test_a_segment_without_surfels_is_an_error():

@@ -67,8 +67,8 @@ def test_only_the_region_of_the_style_is_searched(vgg):
     region = torch.zeros(64, 64, dtype=torch.bool)
     region[:32] = True
     style = StylePicture(STYLE.image, region)
-    found = Objective.of(preset("default", patches=0.0, **EXACT), style, 1, vgg, None)
-    assert len(found.style.unit) == 16 * 8
+    objective = Objective.of(preset("default", patches=0.0, **EXACT), style, 1, vgg, None)
+    assert len(objective.style.unit) == 16 * 8
 
 
 def test_what_is_not_on_the_object_does_not_count(vgg):

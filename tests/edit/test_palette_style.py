@@ -70,7 +70,7 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
     objective = Objective.of(recipe, STYLE.scaled(48), 2, vgg, None)
     (layer,) = run.layers(camera)
     values = run.gather(layer, 0.4, objective, 0.7, camera, 0)
-    found = {name: x.grad.clone() for name, x in run.free.items()}
+    deferred = {name: x.grad.clone() for name, x in run.free.items()}
 
     geometry, parameters = field.geometry, field.parameters
     pixels = camera_rays(camera).flatten(0, 1)
@@ -90,7 +90,7 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
     farther = (raw > 1) & (gradient < 0) | (raw < 0) & (gradient > 0)
     raw.backward(gradient.masked_fill(farther, 0))
     for name, x in learned.items():
-        torch.testing.assert_close(found[name], x.grad, atol=1e-6, rtol=1e-3)
+        torch.testing.assert_close(deferred[name], x.grad, atol=1e-6, rtol=1e-3)
 
 
 def test_free_colours_learn_those_of_the_recoloured_palette(field, images):

@@ -13,11 +13,11 @@ def small():
 
 @pytest.mark.parametrize("name", PICTURES)
 def test_a_picture_is_colours_with_contrast_and_always_the_same(small, name):
-    found = small[name]
-    assert found.shape == (3, 96, 96)
-    assert 0 <= found.min() <= found.max() <= 1
-    assert found.std(dim=(1, 2)).min() > 0.05
-    assert torch.equal(found, picture(name, 96))
+    image = small[name]
+    assert image.shape == (3, 96, 96)
+    assert 0 <= image.min() <= image.max() <= 1
+    assert image.std(dim=(1, 2)).min() > 0.05
+    assert torch.equal(image, picture(name, 96))
 
 
 def test_pictures_differ(small):

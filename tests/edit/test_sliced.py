@@ -30,9 +30,9 @@ def test_in_one_dimension_it_is_the_wasserstein_distance():
     """Of a sample and the same moved aside, the mean distance is how far: its square is the result."""
     values = noise(2, 3, 200)
     moved = values[:, torch.randperm(200)] + 0.25
-    found = float(to_quantiles(moved, at_quantiles(values.sort(dim=1).values, 200)))
+    result = float(to_quantiles(moved, at_quantiles(values.sort(dim=1).values, 200)))
     distance = wasserstein_distance(values[0].numpy(), moved[0].numpy())
-    assert found == pytest.approx(distance**2, abs=1e-5)
+    assert result == pytest.approx(distance**2, abs=1e-5)
 
 
 def test_the_gradient_is_that_of_sorting():
@@ -56,8 +56,8 @@ def test_a_uniform_shift_of_colour_is_found_exactly():
     picture = noise(7, 3, 50, 50)
     style = PatchStatistics.of(picture, seed=3)
     expected = (0.1 * style.filters[2].sum(dim=1)).square().mean()
-    found = sliced_wasserstein(picture + 0.1, style, bank=2)
-    assert float(found) == pytest.approx(float(expected), rel=0.05)
+    distance = sliced_wasserstein(picture + 0.1, style, bank=2)
+    assert float(distance) == pytest.approx(float(expected), rel=0.05)
 
 
 def test_only_what_counts_is_compared():

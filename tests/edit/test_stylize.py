@@ -35,9 +35,9 @@ def base_color(model):
     """c_ind of every texel: palette + offset + texel."""
     p = model.parameters
     places, surfel = owners(p)
-    found = p["texels"].clone()
-    found[places] += p["palette"] + p["colors"][surfel]
-    return found
+    colors = p["texels"].clone()
+    colors[places] += p["palette"] + p["colors"][surfel]
+    return colors
 
 
 @pytest.mark.parametrize("name", [name for name in PRESETS if name != "paper"])
@@ -67,10 +67,10 @@ def test_a_plain_style_becomes_the_colour_of_the_surface():
     cameras, lights = views()
     done = stylize(model, cameras, lights, style, preset("preview"))
     for look in ("shaded", "unshaded"):
-        found, expected = (
+        image, expected = (
             Composition([x]).render(cameras[0], look=look).color for x in (done.model, Surfels(plain))
         )
-        torch.testing.assert_close(found, expected, atol=1e-5, rtol=0)
+        torch.testing.assert_close(image, expected, atol=1e-5, rtol=0)
 
 
 def test_iterations_lower_the_loss_on_views_not_trained_on(vgg, style):
@@ -90,8 +90,8 @@ def test_without_weights_patches_alone_bring_the_colours_of_the_style(style):
     done = stylize(
         ball(), cameras, lights, style, short("patches", iterations=60, start="random", is_lit=False)
     )
-    found = render_unlit(done.model, cameras[1])
-    assert (found - style.mean).abs().max() < 0.06
+    image = render_unlit(done.model, cameras[1])
+    assert (image - style.mean).abs().max() < 0.06
     assert (render_unlit(ball(), cameras[1]) - style.mean).abs().max() > 0.2
 
 

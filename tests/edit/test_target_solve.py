@@ -94,16 +94,16 @@ def test_solve_agrees_with_dense_least_squares(few):
     A, wanted = dense(exposures, model)
     sums = back_project(exposures, model)
     start = fill_unseen(sums, model)
-    found = solve(
+    texels = solve(
         exposures, model, sums, start, sweeps=150, generator=torch.Generator().manual_seed(0), title=""
     )
     exact = torch.linalg.lstsq(A, wanted).solution
     left = (A @ exact - wanted).square().sum()
     zero = (A @ start.double() - wanted).square().sum()
-    assert (A @ found.double() - wanted).square().sum() < left + 0.01 * (zero - left)
+    assert (A @ texels.double() - wanted).square().sum() < left + 0.01 * (zero - left)
     clear = A.square().sum(dim=0) > 3.0
     assert int(clear.sum()) > 10
-    assert (found[clear] - known[clear]).abs().mean() < 0.25 * (start[clear] - known[clear]).abs().mean()
+    assert (texels[clear] - known[clear]).abs().mean() < 0.25 * (start[clear] - known[clear]).abs().mean()
 
 
 def test_three_sweeps_are_as_good_as_the_papers_iterations(problem, model):

@@ -62,8 +62,8 @@ def test_light_falls_on_what_was_edited_bare(model):
     plain = recolored(model, torch.tensor(BLUE).expand(len(p["texels"]), 3))
     for light in (Light("headlight"), Light("directional", 70, 20)):
         camera = around(3)[1]
-        found, expected = (Composition([m]).render(camera, light).color for m in (done.model, plain))
-        assert_close(found, expected, atol=0.03, rtol=0)
+        color, expected = (Composition([m]).render(camera, light).color for m in (done.model, plain))
+        assert_close(color, expected, atol=0.03, rtol=0)
 
 
 def test_lit_edits_look_as_wanted_under_the_light_of_the_edit(model):

@@ -33,30 +33,30 @@ def test_a_wall_that_faces_z_shows_the_picture_upright():
     x, y = torch.meshgrid(torch.arange(size) + 0.5, torch.arange(size) + 0.5, indexing="xy")
     picture = torch.stack([x / size, y / size, torch.zeros_like(x)])
     p = wall([1.0, 0, 0, 0])
-    found = project(p, picture, pixel)
+    texels = project(p, picture, pixel)
     for n, (across, along) in enumerate(p["sizes"].tolist()):
         for i, j in ((0, 0), (across - 1, along - 1), (1, 2)):
             at = place(p, n, i, j) / pixel
             expected = torch.stack([at[0] / size + 0.5, 0.5 - at[1] / size, torch.zeros(())])
-            texel = found[int(p["offsets"][n]) + j * across + i]
+            texel = texels[int(p["offsets"][n]) + j * across + i]
             torch.testing.assert_close(texel, expected, atol=1e-5, rtol=0)
 
 
 def test_a_picture_of_one_colour_is_that_colour_everywhere():
     p = ball().parameters
     color = torch.tensor([0.2, 0.7, 0.4])
-    found = project(p, color[:, None, None].expand(3, 40, 30), 0.01)
-    torch.testing.assert_close(found, color.expand_as(found))
+    texels = project(p, color[:, None, None].expand(3, 40, 30), 0.01)
+    torch.testing.assert_close(texels, color.expand_as(texels))
 
 
 def test_contrast_is_kept_where_projections_meet():
     p = ball(2000).parameters
     noise = torch.rand(1, 300, 300, generator=torch.Generator().manual_seed(0))
     picture = (0.3 * noise + 0.35).expand(3, -1, -1)
-    found = project(p, picture, 0.01)[:, 0]
+    texels = project(p, picture, 0.01)[:, 0]
     _, surfel = owners(p)
     steepest = (p["means"].abs() / p["means"].norm(dim=1, keepdim=True)).max(dim=1).values
-    values = torch.zeros(len(steepest)).index_add_(0, surfel, found[owners(p)[0]] - 0.5)
+    values = torch.zeros(len(steepest)).index_add_(0, surfel, texels[owners(p)[0]] - 0.5)
     slanted, straight = values[steepest < 0.65].std(), values[steepest > 0.95].std()
     assert slanted == pytest.approx(float(straight), rel=0.25)
 

@@ -18,36 +18,36 @@ def made(schedule, count, seed=0):
 
 
 def test_in2n_edits_the_next_view_every_ten_iterations_and_learns_from_all():
-    found = made(in2n(In2nKeys(passes=2), 7), 7)
-    assert len(found) == 2 * 7 * 10
-    for iteration, turn in enumerate(found):
+    all_turns = made(in2n(In2nKeys(passes=2), 7), 7)
+    assert len(all_turns) == 2 * 7 * 10
+    for iteration, turn in enumerate(all_turns):
         assert turn.edited == ([iteration // 10 % 7] if iteration % 10 == 0 else [])
         assert list(turn.learned) == list(range(7))
-    levels = [turn.level for turn in found if turn.edited]
+    levels = [turn.level for turn in all_turns if turn.edited]
     assert 0.02 <= min(levels) < max(levels) <= 0.98
 
 
 def test_igs2gs_edits_all_views_in_turn_and_learns_from_each_at_once():
-    found = made(igs2gs(Igs2gsKeys(every=2500), 162), 162)
-    assert len(found) == 7500
-    assert sum(len(turn.edited) for turn in found) == 3 * 162
-    for iteration, turn in enumerate(found):
+    all_turns = made(igs2gs(Igs2gsKeys(every=2500), 162), 162)
+    assert len(all_turns) == 7500
+    assert sum(len(turn.edited) for turn in all_turns) == 3 * 162
+    for iteration, turn in enumerate(all_turns):
         place = iteration % 2500
         assert turn.edited == ([place] if place < 162 else [])
         assert list(turn.learned) == ([place] if place < 162 else list(range(162)))
-    levels = [turn.level for turn in found if turn.edited]
+    levels = [turn.level for turn in all_turns if turn.edited]
     assert 0.7 <= min(levels) < max(levels) <= 0.98
 
 
 def test_dge_edits_twenty_views_together_with_falling_noise_and_learns_from_nothing_else():
-    found = made(dge(DgeKeys(rounds=5), 92), 92)
-    assert len(found) == 2500
-    rounds = [turn for turn in found if turn.edited]
+    all_turns = made(dge(DgeKeys(rounds=5), 92), 92)
+    assert len(all_turns) == 2500
+    rounds = [turn for turn in all_turns if turn.edited]
     assert [turn.level for turn in rounds] == [0.998, 0.3, 0.3, 0.021, 0.021]
     for index, turn in enumerate(rounds):
         assert len(set(turn.edited)) == 20
         assert list(turn.edited) == sorted(turn.edited)
-        for each in found[500 * index : 500 * (index + 1)]:
+        for each in all_turns[500 * index : 500 * (index + 1)]:
             assert list(each.learned) == list(turn.edited)
     assert list(rounds[0].edited) != list(rounds[1].edited)
 

@@ -33,8 +33,8 @@ def counted(votes, model, of_class, change=lambda mask, seed: mask):
 @pytest.mark.parametrize("change", [lambda mask, seed: mask, noisy])
 def test_opaque_objects_are_told_apart(number, change):
     model, numbers = two_balls()
-    found, weights = counted(ContributionVotes(model), model, numbers == number, change)
-    assert overlap(found, numbers == number, weights) > 0.97
+    selected, weights = counted(ContributionVotes(model), model, numbers == number, change)
+    assert overlap(selected, numbers == number, weights) > 0.97
 
 
 @pytest.mark.parametrize("change", [lambda mask, seed: mask, noisy])
@@ -43,10 +43,10 @@ def test_a_ball_seen_through_a_shell_is_told_apart_better_than_by_centres(change
     by_weight, weights = counted(ContributionVotes(model), model, numbers > 0, change)
     by_centre, _ = counted(CentreVotes(model), model, numbers > 0, change)
     plain, _ = counted(ContributionVotes(model, rounds=0), model, numbers > 0, change)
-    found = overlap(by_weight, numbers > 0, weights)
-    assert found >= 0.95
-    assert found > overlap(by_centre, numbers > 0, weights) + 0.02
-    assert found > overlap(plain, numbers > 0, weights)
+    iou = overlap(by_weight, numbers > 0, weights)
+    assert iou >= 0.95
+    assert iou > overlap(by_centre, numbers > 0, weights) + 0.02
+    assert iou > overlap(plain, numbers > 0, weights)
 
 
 def test_shares_are_sums_over_fragments():
@@ -73,8 +73,8 @@ def test_surfels_that_no_view_shows_follow_their_neighbours():
     hidden[[3, 700, 1600, 2900]] = True
     opacities = torch.where(hidden, -20.0, model.parameters["opacities"])
     unseen = type(model)({**model.parameters, "opacities": opacities}, model.shading)
-    found, _ = counted(ContributionVotes(unseen), unseen, numbers == 0)
-    assert found[hidden].tolist() == [True, True, False, False]
+    selected, _ = counted(ContributionVotes(unseen), unseen, numbers == 0)
+    assert selected[hidden].tolist() == [True, True, False, False]
 
 
 def test_centres_vote_as_counted_by_hand():

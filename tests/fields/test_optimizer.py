@@ -43,8 +43,8 @@ class Oracle:
 def assert_close(optimizer, oracle, rows=slice(None)):
     for name, x in oracle.leaves.items():
         expected = x.detach() if name == "ambient" else x.detach()[rows]
-        found = optimizer.parameters[name].detach()[: len(expected)]
-        torch.testing.assert_close(found, expected, rtol=1e-5, atol=1e-6)  # fused and plain round differently
+        value = optimizer.parameters[name].detach()[: len(expected)]
+        torch.testing.assert_close(value, expected, rtol=1e-5, atol=1e-6)  # fused and plain round differently
 
 
 def test_it_is_adam_with_a_rate_for_each_parameter():

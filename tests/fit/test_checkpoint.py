@@ -39,10 +39,10 @@ def wait_for(path, seconds=60):
         time.sleep(0.001)
 
 
-def assert_equal_states(found, expected):
-    assert found.keys() == expected.keys()
+def assert_equal_states(state, expected):
+    assert state.keys() == expected.keys()
     for name, x in expected.items():
-        assert torch.equal(found[name], x), name
+        assert torch.equal(state[name], x), name
 
 
 @pytest.fixture(scope="module")

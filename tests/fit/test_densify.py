@@ -140,10 +140,10 @@ def test_surfels_may_all_be_removed():
 
 
 def test_splits_depend_on_the_generator_only():
-    found = [surfels([LARGE] * 2) for _ in range(3)]
-    for optimizer, seed in zip(found, (0, 0, 1), strict=True):
+    optimizers = [surfels([LARGE] * 2) for _ in range(3)]
+    for optimizer, seed in zip(optimizers, (0, 0, 1), strict=True):
         step(optimizer, [1.0, 1.0], seed=seed)
-    first, same, other = (optimizer.parameters["means"] for optimizer in found)
+    first, same, other = (optimizer.parameters["means"] for optimizer in optimizers)
     assert torch.equal(first, same)
     assert not torch.equal(first, other)
 

@@ -93,12 +93,12 @@ def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
 
 
 def test_seeds_are_grey_from_everywhere_and_as_thick_as_wide(tmp_path):
-    found = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 2, 0)
-    assert found["scales"].shape == (80, 3)
-    assert torch.equal(found["scales"][:, 2], found["scales"][:, :2].amin(dim=1))
-    assert found["sh_rest"].shape == (80, 8, 3)
-    assert not found["sh_rest"].any()
-    shown = 0.5 + Y00 * found["sh"]
+    parameters = seed_gaussians(ball_images(), ViewSet(tmp_path, [], [], {}), SEEDS, 2, 0)
+    assert parameters["scales"].shape == (80, 3)
+    assert torch.equal(parameters["scales"][:, 2], parameters["scales"][:, :2].amin(dim=1))
+    assert parameters["sh_rest"].shape == (80, 8, 3)
+    assert not parameters["sh_rest"].any()
+    shown = 0.5 + Y00 * parameters["sh"]
     assert bool(((shown > -1e-6) & (shown < 1 + 1e-6)).all())
 
 

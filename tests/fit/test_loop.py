@@ -112,10 +112,10 @@ def test_a_rate_of_zero_keeps_a_parameter():
 
 
 def test_progress_is_told_after_every_iteration():
-    found = list(new_fit(iterations=CHECKED_EVERY + 5, densify=Densify(stop=0)).run())
-    assert [done.iteration for done in found] == list(range(1, CHECKED_EVERY + 6))
-    assert [done.iteration for done in found if done.loss is not None] == [CHECKED_EVERY, CHECKED_EVERY + 5]
-    assert all(done.n_surfels == 80 for done in found)
+    steps = list(new_fit(iterations=CHECKED_EVERY + 5, densify=Densify(stop=0)).run())
+    assert [done.iteration for done in steps] == list(range(1, CHECKED_EVERY + 6))
+    assert [done.iteration for done in steps if done.loss is not None] == [CHECKED_EVERY, CHECKED_EVERY + 5]
+    assert all(done.n_surfels == 80 for done in steps)
 
 
 def test_the_extent_is_that_of_the_cameras_or_four_times_that_of_the_surfels():
@@ -170,9 +170,9 @@ def test_views_without_alpha_fit_from_files(tmp_path):
         path = write_png(tmp_path / f"r_{index}.png", ball_planes(camera)[:3].permute(1, 2, 0))
         views.append(View(camera, path, HEADLIGHT))
     write_transforms(tmp_path, "train", views, {"aabb": [[-0.4] * 3, [0.4] * 3]})
-    found = read_views(tmp_path)
-    images = load(found.train)
-    parameters, colors = seed_surfels(images, found, "auto", 80, 0.1, 0.55, 0)
+    view_set = read_views(tmp_path)
+    images = load(view_set.train)
+    parameters, colors = seed_surfels(images, view_set, "auto", 80, 0.1, 0.55, 0)
     start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
     fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
     assert is_finite(fit.state())

@@ -94,8 +94,8 @@ def test_alpha_without_l1_is_its_dissimilarity_at_the_same_weight(target):
     parameters = per_surfel()
     alpha = Surfels(parameters, OPTICS).render(target.camera, target.light).alpha[..., None].double()
     expected = 0.5 * 0.2 * (1 - ssim(alpha, target.alpha[..., None].double()))
-    found = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
-    assert found == pytest.approx(float(expected), rel=1e-3)
+    term = loss(parameters, target, alpha=0.5, alpha_l1=False) - loss(parameters, target, alpha=0.0)
+    assert term == pytest.approx(float(expected), rel=1e-3)
 
 
 def test_shading_turns_normals_unless_told_not_to(target):
@@ -127,15 +127,15 @@ def test_loss_and_gradients_of_the_visible_part_are_those_of_the_view():
     images = images_of([planes], [camera])
     part, whole = visible_part(images, 0, p, ShadingModel().options), images.target(0)
     assert part.share < 0.6
-    found = []
+    results = []
     for target in (part, whole):
         leaves = {name: x.clone().requires_grad_() for name, x in p.items()}
         view_loss(leaves, ShadingModel(), target, ALL, None, iteration=1).backward()
         without_normals = view_loss(p, ShadingModel(), target, replace(ALL, normal=0.0), None, iteration=1)
-        found.append((without_normals, {name: x.grad for name, x in leaves.items()}))
-    assert_close(found[0][0], found[1][0], rtol=1e-5, atol=0)
-    for name, gradient in found[0][1].items():
-        scale = float(found[1][1][name].abs().max())
+        results.append((without_normals, {name: x.grad for name, x in leaves.items()}))
+    assert_close(results[0][0], results[1][0], rtol=1e-5, atol=0)
+    for name, gradient in results[0][1].items():
+        scale = float(results[1][1][name].abs().max())
         assert_close(
-            gradient, found[1][1][name], rtol=1e-3, atol=1e-4 * scale, msg=lambda m, n=name: f"{n}: {m}"
+            gradient, results[1][1][name], rtol=1e-3, atol=1e-4 * scale, msg=lambda m, n=name: f"{n}: {m}"
         )

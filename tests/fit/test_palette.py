@@ -45,21 +45,21 @@ def images():
 @pytest.fixture(scope="module")
 def fit(images):
     """A fit with its progress, and the density networks before palette colours learned."""
-    found = PaletteFit(images, SETTINGS)
-    found.progress = []
-    for done in found.run():
-        found.progress.append(done)
+    palette_fit = PaletteFit(images, SETTINGS)
+    palette_fit.progress = []
+    for done in palette_fit.run():
+        palette_fit.progress.append(done)
         if done.step == STEPS - 40:
-            found.before = {name: x.detach().clone() for name, x in found.parameters.items()}
-    return found
+            palette_fit.before = {name: x.detach().clone() for name, x in palette_fit.parameters.items()}
+    return palette_fit
 
 
 def quality(field, images):
     """Mean PSNR over views."""
-    found = [
+    values = [
         psnr(field.render(camera).color, images.target(i).color) for i, camera in enumerate(images.cameras)
     ]
-    return sum(found) / len(found)
+    return sum(values) / len(values)
 
 
 def test_the_ball_is_found(fit, images):
@@ -113,7 +113,7 @@ def test_the_loss_of_the_base_has_the_gradient_of_a_plain_graph(fit, images):
     rays, target = fit.rays.draw(64, 2, torch.Generator().manual_seed(0))
     loss = base_loss(rays, target, fit.geometry, parameters, -1.0)
     names = ["density.table", "density.0", "trunk.0", "base.0"]
-    found = torch.autograd.grad(loss, [parameters[name] for name in names])
+    gradients = torch.autograd.grad(loss, [parameters[name] for name in names])
     with torch.no_grad():
         points = points_on(rays, fit.geometry, parameters)
     sigma, features = density(points.at, parameters, fit.levels)
@@ -128,7 +128,7 @@ def test_the_loss_of_the_base_has_the_gradient_of_a_plain_graph(fit, images):
         total = total + (blended + light - target[ray]).square().sum()
     torch.testing.assert_close(loss, total / (3 * 64), rtol=1e-4, atol=1e-8)
     expected = torch.autograd.grad(total / (3 * 64), [parameters[name] for name in names])
-    for one, other in zip(found, expected, strict=True):
+    for one, other in zip(gradients, expected, strict=True):
         torch.testing.assert_close(one, other, rtol=1e-3, atol=1e-6)
 
 

@@ -171,10 +171,10 @@ def test_images_are_shrunk_by_averages_and_the_rest_is_cut():
 def test_given_points_come_first(tmp_path):
     colors = {name: ("uchar", [0, 51, 102, 153, 255]) for name in ("red", "green", "blue")}
     write_ply(tmp_path / "points3d.ply", {**xyz(), **colors})
-    parameters, found = seeds(tmp_path, count=2)
+    parameters, seed_colors = seeds(tmp_path, count=2)
     expected = torch.tensor([[0.0, 1.0, 2.0]]) + 0.25 * torch.arange(5)[:, None]
     assert torch.equal(parameters["means"], expected)
-    torch.testing.assert_close(found, torch.tensor([0.0, 0.2, 0.4, 0.6, 1.0])[:, None].repeat(1, 3))
+    torch.testing.assert_close(seed_colors, torch.tensor([0.0, 0.2, 0.4, 0.6, 1.0])[:, None].repeat(1, 3))
 
 
 def test_points_without_colours_take_those_of_the_views(tmp_path):

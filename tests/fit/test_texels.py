@@ -50,15 +50,15 @@ def test_sizes_follow_the_formula():
 @pytest.mark.parametrize("budget", [1000, 20_000, 300_000])
 def test_budget_is_met_but_for_rounding_up(budget):
     scales = torch.rand(50, 2) * 0.1 + 0.02
-    found = total(sizes_for_budget(scales, budget))
+    count = total(sizes_for_budget(scales, budget))
     perimeter = math.sqrt(budget * 50) * 4  # one more row and column each, of at most six times longer sides
-    assert budget <= found <= budget + perimeter + 50
+    assert budget <= count <= budget + perimeter + 50
 
 
 def test_a_texel_is_a_pixel_where_a_surfel_is_fully_seen():
     scales = torch.full((4, 2), 0.1)
-    found = sizes_where_seen(scales, sight([1.0, 0.25, 0.0, 1.0], [0.061, 0.061, math.inf, 0.0301]))
-    assert found.tolist() == [[10, 10], [5, 5], [1, 1], [20, 20]]
+    sizes = sizes_where_seen(scales, sight([1.0, 0.25, 0.0, 1.0], [0.061, 0.061, math.inf, 0.0301]))
+    assert sizes.tolist() == [[10, 10], [5, 5], [1, 1], [20, 20]]
 
 
 def test_textures_lie_one_after_the_other():
@@ -74,16 +74,16 @@ def test_look_sees_the_size_of_pixels_and_what_is_hidden():
     p["opacities"] = torch.full((20,), 8.0)
     p["means"][0] = torch.tensor([0.0, 50.0, 0.0])  # in no view
     views = cameras()
-    found = look(
+    seen = look(
         textured(Surfels(p, ShadingModel()), torch.zeros(3), torch.ones(20, 2, dtype=torch.int32)),
         ball_images(),
         "",
     )
-    assert found.largest[0] == 0
-    assert found.pixel[0] == math.inf
+    assert seen.largest[0] == 0
+    assert seen.pixel[0] == math.inf
     expected = torch.tensor(min(float(v.position.norm() / v.K[0, 0]) for v in views))
-    assert_close(found.pixel[found.largest > 0], expected.expand(int((found.largest > 0).sum())))
-    assert (found.curvature[found.largest > 0] > 0).all()
+    assert_close(seen.pixel[seen.largest > 0], expected.expand(int((seen.largest > 0).sum())))
+    assert (seen.curvature[seen.largest > 0] > 0).all()
 
 
 def test_mean_color_counts_what_is_there_only():
@@ -120,10 +120,10 @@ def test_texels_can_take_the_colors_over(ball, images):
 
 
 def test_all_else_stays(ball, images):
-    found = texturize(ball, images, sweeps=1, iterations=2)
+    fitted = texturize(ball, images, sweeps=1, iterations=2)
     for name in ("means", "quats", "scales", "opacities", "ambient", "diffuse", "specular", "shininess"):
-        assert found.parameters[name] is ball.parameters[name]
-    assert_close(found.parameters["colors"] + found.parameters["palette"], ball.parameters["colors"])
+        assert fitted.parameters[name] is ball.parameters[name]
+    assert_close(fitted.parameters["colors"] + fitted.parameters["palette"], ball.parameters["colors"])
 
 
 def test_same_seed_same_texels(ball, images):

@@ -84,22 +84,22 @@ def test_it_is_adam_on_texels_and_palette_with_rates_of_their_own(start, images,
     falls = [final ** (step / steps) for step in range(steps)]
     order = torch.randperm(6, generator=torch.Generator().manual_seed(0)).tolist()[::-1]
     expected = oracle(start, images, [(0.025 * f, 0.01 * f) for f in falls], sparsity, order)
-    found = refine(
+    refined = refine(
         start, images, iterations=steps, **PAPER | {"final": final, "sparsity": sparsity}
     ).parameters
     # D-SSIM of the visible part differs by what its windows do not see beyond the border.
-    assert_close(found["palette"], expected["palette"], atol=2e-4, rtol=0)
-    error = (found["texels"] - expected["texels"]).abs()
+    assert_close(refined["palette"], expected["palette"], atol=2e-4, rtol=0)
+    error = (refined["texels"] - expected["texels"]).abs()
     assert float(error.mean()) < 2e-4
-    assert float((found["texels"] - start.parameters["texels"]).abs().mean()) > 100 * float(error.mean())
+    assert float((refined["texels"] - start.parameters["texels"]).abs().mean()) > 100 * float(error.mean())
 
 
 def test_gradients_of_palette_and_texels_are_those_of_the_definition(start, images):
     camera, target = images.cameras[0], images.target(0)
     p = {name: x.double() if x.is_floating_point() else x for name, x in start.parameters.items()}
-    found = {name: start.parameters[name].clone().requires_grad_() for name in ("palette", "texels")}
-    exact = {name: p[name].clone().requires_grad_() for name in found}
-    (changed(start, **found).render(camera).color - target.color).square().sum().backward()
+    leaves = {name: start.parameters[name].clone().requires_grad_() for name in ("palette", "texels")}
+    exact = {name: p[name].clone().requires_grad_() for name in leaves}
+    (changed(start, **leaves).render(camera).color - target.color).square().sum().backward()
     a, d, s, b = material(p, start.shading.material).values()
     view = {name: getattr(camera, name).double() for name in ("viewmat", "K")}
     base, gain = shading.blinn_phong_texture(
@@ -116,9 +116,9 @@ def test_gradients_of_palette_and_texels_are_those_of_the_definition(start, imag
         options=start.shading.options,
     ).color
     (image - target.color.double()).square().sum().backward()
-    for name in found:
+    for name in leaves:
         scale = float(exact[name].grad.abs().max())
-        assert_close(found[name].grad.double(), exact[name].grad, atol=1e-4 * scale, rtol=1e-3)  # float32
+        assert_close(leaves[name].grad.double(), exact[name].grad, atol=1e-4 * scale, rtol=1e-3)  # float32
 
 
 def test_the_texel_map_shows_texels_without_palette_and_light(start, images):
@@ -169,9 +169,9 @@ def test_the_palette_alone_finds_the_palette_of_the_images(start):
     views = cameras()
     planes = [changed(start, palette=known).render(view, HEADLIGHT) for view in views]
     images = images_of([torch.cat([r.color.permute(2, 0, 1), r.alpha[None]]) for r in planes], views)
-    found = refine(start, images, iterations=200, **PAPER | {"rate": 0.0, "final": 0.02})
-    assert torch.equal(found.parameters["texels"], start.parameters["texels"])
-    assert_close(found.parameters["palette"], known, atol=0.01, rtol=0)  # images have 8 bits and are clamped
+    model = refine(start, images, iterations=200, **PAPER | {"rate": 0.0, "final": 0.02})
+    assert torch.equal(model.parameters["texels"], start.parameters["texels"])
+    assert_close(model.parameters["palette"], known, atol=0.01, rtol=0)  # images have 8 bits and are clamped
 
 
 def test_sparsity_moves_what_texels_have_in_common_to_the_palette(start, images):
@@ -180,24 +180,24 @@ def test_sparsity_moves_what_texels_have_in_common_to_the_palette(start, images)
     )
     sizes, palettes = [], []
     for sparsity in (0.0, 3.0):
-        found = refine(shifted, images, iterations=120, **PAPER | {"sparsity": sparsity, "rate": 0.01})
-        sizes.append(float(texel_map(found, images.cameras[0]).abs().mean()))
-        palettes.append(found.parameters["palette"])
+        refined = refine(shifted, images, iterations=120, **PAPER | {"sparsity": sparsity, "rate": 0.01})
+        sizes.append(float(texel_map(refined, images.cameras[0]).abs().mean()))
+        palettes.append(refined.parameters["palette"])
     assert sizes[1] < 0.5 * sizes[0]
     assert (palettes[1] - palettes[0]).mean() > 0.02
 
 
 def test_the_palette_remains_a_colour(start, images):
     dark = changed(start, palette=torch.full((3,), 0.01), texels=start.parameters["texels"] + 0.8)
-    found = refine(dark, images, iterations=5, **PAPER | {"palette_rate": 0.5})
-    assert ((found.parameters["palette"] >= 0) & (found.parameters["palette"] <= 1)).all()
+    refined = refine(dark, images, iterations=5, **PAPER | {"palette_rate": 0.5})
+    assert ((refined.parameters["palette"] >= 0) & (refined.parameters["palette"] <= 1)).all()
 
 
 def test_the_paper_recipe_begins_with_the_mean_colour(plain, images):
     values = {"texels": 2000, "sweeps": 0, "iterations": 1, "has_offset": False}
-    found = texturize(plain, images, **values, rate=0.025, palette_rate=0.01, final=1.0)
+    fitted = texturize(plain, images, **values, rate=0.025, palette_rate=0.01, final=1.0)
     still = texturize(plain, images, **values, rate=0.025)
-    moved = (found.parameters["palette"] - still.parameters["palette"]).abs()
+    moved = (fitted.parameters["palette"] - still.parameters["palette"]).abs()
     assert_close(moved, torch.full((3,), 0.01))  # Adam's first step is its rate
 
 

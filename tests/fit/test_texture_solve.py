@@ -72,11 +72,11 @@ def test_solve_agrees_with_dense_least_squares():
     residual = (wanted - base).flatten(end_dim=2).double()
     exact = torch.linalg.lstsq(A, residual).solution
     solved = solve(model, images, look(model, images, ""), sweeps=60, ridge=0.05, seed=0, title="")
-    found = solved.parameters["texels"].double()
+    texels = solved.parameters["texels"].double()
     is_seen = A.sum(dim=0) > 0.05 * A.sum(dim=0).max()  # the corners hardly are
     assert int(is_seen.sum()) >= 12
-    assert_close(found[is_seen], exact[is_seen], atol=0.02, rtol=0)
-    left = ((A @ found - residual).square().sum() / residual.square().sum()).item()
+    assert_close(texels[is_seen], exact[is_seen], atol=0.02, rtol=0)
+    left = ((A @ texels - residual).square().sum() / residual.square().sum()).item()
     assert left < 5e-3
 
 
@@ -86,26 +86,26 @@ def test_curvature_is_that_of_the_dense_matrix_among_other_surfels():
     gains = [model.shading.colors(model.parameters, c, HEADLIGHT).gain.item() for c in images.cameras]
     exact = torch.stack([a.sum(dim=0) * gain for a, gain in zip(A, gains, strict=True)])  # [V, T]
     typical = exact.square().sum(dim=0) / exact.sum(dim=0)
-    found = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
+    ours = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
     middle = [5, 6, 9, 10]
-    assert_close(found[middle], typical[middle], atol=0, rtol=0.25)  # texels as wide as 1.5 sigma are coarse
-    assert_close(found.sum(), typical.sum(), atol=0, rtol=0.05)
+    assert_close(ours[middle], typical[middle], atol=0, rtol=0.25)  # texels as wide as 1.5 sigma are coarse
+    assert_close(ours.sum(), typical.sum(), atol=0, rtol=0.05)
 
 
 def test_curvature_bounds_that_of_a_surfel_alone():
     model, _, images = one_surfel()
     A = dense(model, images).reshape(len(images), -1, 16)
     exact = torch.stack([a.T @ a.sum(dim=1) for a in A])  # [V, T], rows of A'A summed
-    found = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
-    assert (found >= exact.mean(dim=0)).all()
+    curvatures = curvature(model.parameters["sizes"], look(model, images, "").curvature)[:, 0].double()
+    assert (curvatures >= exact.mean(dim=0)).all()
 
 
 def test_curvatures_of_texels_sum_to_those_of_surfels():
     sizes = torch.tensor([[3, 2], [1, 1], [7, 5]], dtype=torch.int32)
     of_surfels = torch.tensor([2.0, 0.5, 3.0])
-    found = curvature(sizes, of_surfels)[:, 0]
-    assert_close(torch.stack([x.sum() for x in found.split([6, 1, 35])]), of_surfels)
-    assert int(found[7:].argmax()) == 2 * 7 + 3  # rows of v, the middle one
+    curvatures = curvature(sizes, of_surfels)[:, 0]
+    assert_close(torch.stack([x.sum() for x in curvatures.split([6, 1, 35])]), of_surfels)
+    assert int(curvatures[7:].argmax()) == 2 * 7 + 3  # rows of v, the middle one
 
 
 def test_solve_finds_detail(start, images):

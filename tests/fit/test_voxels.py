@@ -39,19 +39,19 @@ def images():
 
 @pytest.fixture(scope="module")
 def fit(images):
-    found = VoxelFit(images, SETTINGS)
-    found.progress = list(found.run())
-    return found
+    voxel_fit = VoxelFit(images, SETTINGS)
+    voxel_fit.progress = list(voxel_fit.run())
+    return voxel_fit
 
 
 @torch.no_grad()
 def quality(fit, images):
     """Mean PSNR over views."""
-    found = []
+    values = []
     for index, camera in enumerate(images.cameras):
         color = render_view(fit.grid, camera, fit.march).color
-        found.append(psnr(color, images.target(index).color))
-    return sum(found) / len(found)
+        values.append(psnr(color, images.target(index).color))
+    return sum(values) / len(values)
 
 
 def test_the_ball_is_found(fit, images):
@@ -125,13 +125,13 @@ def test_optimisers_without_total_variation(images, optimizer, rate):
 def test_training_rays_pass_through_their_pixels(images):
     rays = training_rays(images)
     ids = torch.arange(len(rays))
-    found, colors = rays.take(ids)
+    all_rays, colors = rays.take(ids)
     start = int((rays.views == 0).sum())
     near = widened(images.planes[1, 3], AROUND)
     inside = rays.views[start:] == 1
     assert int(inside.sum()) == int(near.sum())
     expected = torch.cat([camera_rays(images.cameras[1])[near], images.target(1).color[near]], dim=1)
-    of_view = torch.cat([found, colors], dim=1)[rays.views == 1]
+    of_view = torch.cat([all_rays, colors], dim=1)[rays.views == 1]
     assert torch.equal(of_view[sorting(of_view)], expected[sorting(expected)])
 
 

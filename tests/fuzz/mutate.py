@@ -99,24 +99,24 @@ def repeat(data: bytearray, random: random.Random) -> bytes:
 
 def number(data: bytearray, random: random.Random) -> bytes:
     """One number of a text is another one."""
-    found = list(re.finditer(rb"-?\d+(\.\d+)?", bytes(data[:4000])))
-    if not found:
+    matches = list(re.finditer(rb"-?\d+(\.\d+)?", bytes(data[:4000])))
+    if not matches:
         return size(data, random)
-    at = random.choice(found)
+    at = random.choice(matches)
     return bytes(data[: at.start()] + random.choice(NUMBERS) + data[at.end() :])
 
 
 def word(data: bytearray, random: random.Random) -> bytes:
     """One word of a text is something else."""
-    found = list(re.finditer(rb"[A-Za-z_.]{2,}", bytes(data[:4000]))) or [re.match(b"", b"")]
-    at = random.choice(found)
+    matches = list(re.finditer(rb"[A-Za-z_.]{2,}", bytes(data[:4000]))) or [re.match(b"", b"")]
+    at = random.choice(matches)
     return bytes(data[: at.start()] + random.choice(WORDS) + data[at.end() :])
 
 
 def swap(data: bytearray, random: random.Random) -> bytes:
     """One word of a text is another word of it."""
-    found = list(re.finditer(rb"[A-Za-z0-9_.]{2,}", bytes(data[:4000]))) or [re.match(b"", b"")]
-    at, other = random.choice(found), random.choice(found)
+    matches = list(re.finditer(rb"[A-Za-z0-9_.]{2,}", bytes(data[:4000]))) or [re.match(b"", b"")]
+    at, other = random.choice(matches), random.choice(matches)
     return bytes(data[: at.start()] + other.group() + data[at.end() :])
 
 

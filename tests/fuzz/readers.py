@@ -187,11 +187,11 @@ def release(folder: Path) -> Path:
     from plyfile import PlyData, PlyElement
 
     surfels, p = sample("shading", material="paper"), sample().parameters
-    found = PlyData.read(write_ply(folder / "m.ply", surfels, "release"))["vertex"].data
-    names = [(name, "<f4") for name in found.dtype.names if not name.startswith("f_rest_")]
-    vertices = np.zeros(len(found), [*names, ("mappings_0", "<f4")])
+    data = PlyData.read(write_ply(folder / "m.ply", surfels, "release"))["vertex"].data
+    names = [(name, "<f4") for name in data.dtype.names if not name.startswith("f_rest_")]
+    vertices = np.zeros(len(data), [*names, ("mappings_0", "<f4")])
     for name, _ in names:
-        vertices[name] = found[name]
+        vertices[name] = data[name]
     PlyData([PlyElement.describe(vertices, "vertex")]).write(folder / "point_cloud.ply")
     dims = torch.cat([p["sizes"].long(), p["offsets"][:, None]], dim=1)
     np.savez_compressed(folder / "texture.npz", texture_dc=p["texels"].numpy(), texture_dims=dims.numpy())

@@ -50,8 +50,8 @@ def test_damage_is_told_or_harmless(tmp_path, context, name):
         f"{name}, seed {lines[-1][0]}: the process ended with {process.exitcode}\n"
         f"{(tmp_path / 'hangs').read_text()}"
     )
-    found = [line for line in lines if len(line) > 1]
-    assert len(found) == cases
-    assert [line for line in found if line[1] not in ("valid", "refused")] == []
-    assert [line for line in found if not line[2].isprintable() or len(line[2]) > 1.2 * LONGEST] == []
-    assert any(line[1] == "refused" for line in found), "no damage was found at all"
+    outcomes = [line for line in lines if len(line) > 1]
+    assert len(outcomes) == cases
+    assert [line for line in outcomes if line[1] not in ("valid", "refused")] == []
+    assert [line for line in outcomes if not line[2].isprintable() or len(line[2]) > 1.2 * LONGEST] == []
+    assert any(line[1] == "refused" for line in outcomes), "no damage was found at all"

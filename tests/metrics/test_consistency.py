@@ -48,11 +48,11 @@ def plane(view, half=0.4):
 def test_a_textured_plane_is_consistent():
     frames = [plane(camera(0.3 * i - 0.6, 0.1 * i, target=(0.0, 0.0, 0.0))) for i in range(5)]
     for apart in (1, 3):
-        found = consistency(frames, [apart])[apart]
-        assert found.rmse < 2e-4, "but for what interpolation between pixels loses"
-        assert found.covered > 0.85
-        assert found.pairs == 5 - apart
-        assert found.perceptual is None
+        result = consistency(frames, [apart])[apart]
+        assert result.rmse < 2e-4, "but for what interpolation between pixels loses"
+        assert result.covered > 0.85
+        assert result.pairs == 5 - apart
+        assert result.perceptual is None
 
 
 def test_colours_that_change_with_the_view_are_measured():
@@ -122,9 +122,9 @@ def test_rendered_views_of_surfels_are_consistent_with_themselves():
     view = Camera(scene.viewmat, scene.K, scene.width, scene.height)
     depth = torch.full((scene.height, scene.width), 2.0)
     frame = SeenFrame(torch.rand(scene.height, scene.width, 3), depth, torch.ones_like(depth), view)
-    found = consistency([frame, frame])[1]
-    assert found.rmse < 1e-5
-    assert found.covered > 0.9
+    result = consistency([frame, frame])[1]
+    assert result.rmse < 1e-5
+    assert result.covered > 0.9
 
 
 def test_a_scene_is_consistent_without_light_and_less_so_under_a_light_that_moves():

@@ -35,10 +35,10 @@ def test_a_model_is_almost_its_own_pictures(tmp_path: Path):
         seen = model.render(camera, light, background=torch.zeros(3))
         write_png(tmp_path / f"{index}.png", seen.color, seen.alpha)
         views.append(View(camera, tmp_path / f"{index}.png", light))
-    found = evaluate(model, views)
-    assert len(found["psnr"]) == 3
-    assert mean(found)["psnr"] > 48, "only rounding to 8 bits is between them"
-    assert mean(found)["ssim"] > 0.999
+    scores = evaluate(model, views)
+    assert len(scores["psnr"]) == 3
+    assert mean(scores)["psnr"] > 48, "only rounding to 8 bits is between them"
+    assert mean(scores)["ssim"] > 0.999
     halved = evaluate(model, views, reduce=2)
     assert 15 < mean(halved)["psnr"] < 48
 

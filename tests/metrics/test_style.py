@@ -31,10 +31,10 @@ def test_a_view_is_like_itself_and_less_like_noise(vgg):
 def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0])
-    found = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
+    inside = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
     around = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha < 0.1)
-    assert found.gram < 0.3 < around.gram
-    assert max(abs(x) for x in found.color) < 1e-5
+    assert inside.gram < 0.3 < around.gram
+    assert max(abs(x) for x in inside.color) < 1e-5
 
 
 def test_colours_are_those_of_opaque_pixels(vgg):
@@ -42,17 +42,17 @@ def test_colours_are_those_of_opaque_pixels(vgg):
     color = torch.tensor([0.1, 0.5, 0.9])
     p = ball().parameters
     plain = Surfels({**p, "palette": color, "colors": torch.zeros_like(p["colors"])})
-    found = likeness(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
+    scores = likeness(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
     pixels = []
     for camera, light in zip(cameras, lights, strict=True):
         shown = Composition([plain]).render(camera, light)
         pixels.append(shown.color.clamp(0, 1)[shown.alpha > 0.9])
     expected = (torch.cat(pixels).mean(0) - 0.5).tolist()
-    assert list(found.color) == pytest.approx(expected, abs=1e-5)
+    assert list(scores.color) == pytest.approx(expected, abs=1e-5)
 
 
 def test_nothing_to_see_is_no_number(vgg):
     cameras, lights = views(1)
     faint = ball(opacity=-9.0)
-    found = likeness(faint, cameras, lights, torch.rand(3, 64, 64), vgg)
-    assert all(math.isnan(x) for x in (found.nnfm, found.gram, *found.color))
+    scores = likeness(faint, cameras, lights, torch.rand(3, 64, 64), vgg)
+    assert all(math.isnan(x) for x in (scores.nnfm, scores.gram, *scores.color))

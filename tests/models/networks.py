@@ -24,13 +24,13 @@ def features():
 def random_weights(seed=0, last=None):
     """Tensors by name, with activations that neither vanish nor explode; up to module `last`."""
     generator = torch.Generator().manual_seed(seed)
-    found = {}
+    weights = {}
     for name, shape in ((name, x.shape) for name, x in features().state_dict().items()):
         if last is None or int(name.split(".")[0]) <= last:
             fan = shape[1] * 9 if len(shape) == 4 else 1
             scale = (2 / fan) ** 0.5 if len(shape) == 4 else 0.1
-            found[f"features.{name}"] = scale * torch.randn(shape, generator=generator)
-    return found
+            weights[f"features.{name}"] = scale * torch.randn(shape, generator=generator)
+    return weights
 
 
 @pytest.fixture(scope="module")

@@ -43,12 +43,12 @@ def test_features_agree_with_the_pipeline_of_transformers(folder, clip):
     pictures = [(image(seed).numpy() * 255).round().astype(np.uint8) for seed in (0, 1)]
     pixels = processor(pictures, return_tensors="pt")["pixel_values"].float()
     with torch.no_grad():
-        found = model(pixel_values=pixels, **tokens)
+        outputs = model(pixel_values=pixels, **tokens)
     ours = clip.images(torch.stack([image(0), image(1)]))
-    torch.testing.assert_close(ours, normalize(found.image_embeds, dim=1), atol=1e-5, rtol=0)
+    torch.testing.assert_close(ours, normalize(outputs.image_embeds, dim=1), atol=1e-5, rtol=0)
     texts = clip.texts(TEXTS)
-    torch.testing.assert_close(texts, normalize(found.text_embeds, dim=1), atol=1e-5, rtol=0)
-    logits = found.logits_per_image / model.logit_scale.exp()
+    torch.testing.assert_close(texts, normalize(outputs.text_embeds, dim=1), atol=1e-5, rtol=0)
+    logits = outputs.logits_per_image / model.logit_scale.exp()
     for text in range(2):
         torch.testing.assert_close(similarity(ours, texts[text]), logits[:, text], atol=1e-5, rtol=0)
 
@@ -85,17 +85,17 @@ def test_features_are_differentiable_in_the_image(clip):
 
 def test_scores_are_means_of_cosines_over_views(clip):
     before, after = [image(0), image(1, 24, 40)], [image(5), image(6, 24, 40)]
-    found = clip_scores(clip, after, before, *TEXTS)
+    scores = clip_scores(clip, after, before, *TEXTS)
     f = [clip.images(x[None])[0].double() for x in (*before, *after)]
     g = clip.texts(TEXTS).double()
 
     def cosine(a, b):
         return float(a @ b / (a @ a).sqrt() / (b @ b).sqrt())
 
-    assert found.backbone == "tiny-clip"
-    assert found.similarity == pytest.approx(np.mean([cosine(f[2], g[1]), cosine(f[3], g[1])]), abs=1e-5)
+    assert scores.backbone == "tiny-clip"
+    assert scores.similarity == pytest.approx(np.mean([cosine(f[2], g[1]), cosine(f[3], g[1])]), abs=1e-5)
     expected = [cosine(f[2] - f[0], g[1] - g[0]), cosine(f[3] - f[1], g[1] - g[0])]
-    assert found.direction == pytest.approx(np.mean(expected), abs=1e-4)
+    assert scores.direction == pytest.approx(np.mean(expected), abs=1e-4)
 
 
 def test_directions_in_closed_form():

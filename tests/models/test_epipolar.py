@@ -53,8 +53,8 @@ def test_fundamental_matrix_of_kornia(angles):
     view, key = pair(angles)
     K, R, t = zip(*((c.K, c.viewmat[:3, :3], c.viewmat[:3, 3:]) for c in (view, key)), strict=True)
     expected = fundamental_from_essential(essential_from_Rt(R[0], t[0], R[1], t[1]), *K).T
-    found = fundamental(view, key).float()
-    assert_close(found / found.norm(), expected / expected.norm(), atol=1e-5, rtol=0)
+    matrix = fundamental(view, key).float()
+    assert_close(matrix / matrix.norm(), expected / expected.norm(), atol=1e-5, rtol=0)
 
 
 @pytest.mark.parametrize("angles", PAIRS)
@@ -100,14 +100,14 @@ def test_match_is_brute_force():
     view, key = torch.randn(20, 6, generator=generator), torch.randn(15, 6, generator=generator)
     allowed = torch.rand(20, 15, generator=generator) < 0.3
     allowed[:, 4] |= ~allowed.any(dim=1)
-    found = match(view, key, allowed)
+    matches = match(view, key, allowed)
     for i in range(20):
         cosines = {
             j: float(view[i].double() @ key[j].double() / view[i].double().norm() / key[j].double().norm())
             for j in range(15)
             if allowed[i, j]
         }
-        assert int(found[i]) == max(cosines, key=cosines.__getitem__)
+        assert int(matches[i]) == max(cosines, key=cosines.__getitem__)
 
 
 def test_match_prefers_an_allowed_unlike_token_to_a_forbidden_one():
@@ -157,9 +157,9 @@ def test_with_itself_as_the_key_attention_is_plain(unet):
     plain = branches_of(unet, latents, texts)([0])[:, 0]
     consistency = Consistency(unet)
     consistency.aim([orbit(0, 0, 3.0, 35, 64, 64)] * 2, (64, 64))
-    found = consistency.run(branches_of(unet, latents, texts), 2, 500, torch.Generator().manual_seed(0))
+    outputs = consistency.run(branches_of(unet, latents, texts), 2, 500, torch.Generator().manual_seed(0))
     for view in range(2):
-        assert_close(found[:, view], plain, atol=1e-5, rtol=1e-5)
+        assert_close(outputs[:, view], plain, atol=1e-5, rtol=1e-5)
 
 
 def test_other_views_take_over_from_the_key(unet):
@@ -168,10 +168,10 @@ def test_other_views_take_over_from_the_key(unet):
     consistency = Consistency(unet)
     consistency.aim(list(pair(((0, 0), (40, 10)), 64, 64)), (64, 64))
     alone = [branches([view])[:, 0] for view in range(2)]
-    found = consistency.run(branches, 2, 500, torch.Generator().manual_seed(0))
+    outputs = consistency.run(branches, 2, 500, torch.Generator().manual_seed(0))
     (key,) = consistency.key_ids
-    assert_close(found[:, key], alone[key], atol=1e-5, rtol=1e-5)
-    assert not torch.allclose(found[:, 1 - key], alone[1 - key], atol=1e-3)
+    assert_close(outputs[:, key], alone[key], atol=1e-5, rtol=1e-5)
+    assert not torch.allclose(outputs[:, 1 - key], alone[1 - key], atol=1e-3)
     late = consistency.run(branches, 2, 50, torch.Generator().manual_seed(0))
     assert_close(late, torch.stack(alone, dim=1), atol=1e-5, rtol=1e-5)
 
@@ -220,10 +220,10 @@ def test_outputs_of_two_keys_are_blended(unet):
     plain = branches_of(unet, latents, texts)([0])[:, 0]
     consistency = Consistency(unet)
     consistency.aim([orbit(0, 0, 3.0, 35, 64, 64)] * 10, (64, 64))
-    found = consistency.run(branches_of(unet, latents, texts), 10, 500, torch.Generator().manual_seed(0))
+    outputs = consistency.run(branches_of(unet, latents, texts), 10, 500, torch.Generator().manual_seed(0))
     assert len(consistency.key_ids) == 2
     for view in range(10):
-        assert_close(found[:, view], plain, atol=1e-5, rtol=1e-5)
+        assert_close(outputs[:, view], plain, atol=1e-5, rtol=1e-5)
 
 
 def test_a_network_without_self_attention_is_refused():

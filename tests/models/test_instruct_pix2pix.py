@@ -59,9 +59,9 @@ def test_denoising_undoes_noise_that_is_predicted_exactly(folder):
     clean = torch.randn(1, 4, 8, 8, generator=seeded(1))
     noise = torch.randn(clean.shape, generator=seeded(2))  # what the loop will draw
     model.predict = lambda *_: noise
-    found = model.denoise(clean, clean, torch.zeros(3, 1, 1), model.times(None), seeded(2))
+    denoised = model.denoise(clean, clean, torch.zeros(3, 1, 1), model.times(None), seeded(2))
     last = float(model.alphas[0])
-    assert_close(found, math.sqrt(last) * clean + math.sqrt(1 - last) * noise, atol=1e-5, rtol=1e-4)
+    assert_close(denoised, math.sqrt(last) * clean + math.sqrt(1 - last) * noise, atol=1e-5, rtol=1e-4)
 
 
 def test_steps_start_at_the_level_of_the_noise_and_end_at_none(folder):
@@ -101,10 +101,10 @@ def test_negative_prompt_counts(folder):
 def test_images_to_edit_are_scaled_latents_and_conditions_plain_ones(folder):
     model = InstructPix2Pix.open(folder)
     images = torch.rand(1, 3, 64, 64, generator=seeded())
-    found = model.vae.encode(2 * images - 1).latent_dist
-    assert_close(model.encode(images, None), found.mode())
-    noise = torch.randn(found.mean.shape, generator=seeded(3))
-    assert_close(model.encode(images, seeded(3)), 0.18215 * (found.mean + found.std * noise))
+    distribution = model.vae.encode(2 * images - 1).latent_dist
+    assert_close(model.encode(images, None), distribution.mode())
+    noise = torch.randn(distribution.mean.shape, generator=seeded(3))
+    assert_close(model.encode(images, seeded(3)), 0.18215 * (distribution.mean + distribution.std * noise))
 
 
 @pytest.mark.parametrize("size", [(48, 64), (64, 40), (30, 30), (100, 160), (7, 64)])

@@ -27,8 +27,8 @@ def picture(*discs, size=SIZE, background=(1.0, 1.0, 1.0)):
     return image.clamp(0, 1), masks
 
 
-def overlap(found, expected):
-    return float((found & expected).sum() / (found | expected).sum())
+def overlap(mask, expected):
+    return float((mask & expected).sum() / (mask | expected).sum())
 
 
 def click(*points, negative=()):
@@ -52,10 +52,10 @@ def test_grabcut_finds_the_object_clicked_on_among_others_of_its_colour(size):
 
 def test_grabcut_tells_touching_objects_apart_by_colour():
     image, (yellow, blue) = picture((40, 48, 22, YELLOW), (62, 48, 18, BLUE))
-    found = GrabCut()(image, *click((30, 48), negative=[(64, 48)]))
-    assert overlap(found, yellow & ~blue) > 0.9
-    found = GrabCut()(image, *click((64, 48), negative=[(30, 48)]))
-    assert overlap(found, blue) > 0.9
+    mask = GrabCut()(image, *click((30, 48), negative=[(64, 48)]))
+    assert overlap(mask, yellow & ~blue) > 0.9
+    mask = GrabCut()(image, *click((64, 48), negative=[(30, 48)]))
+    assert overlap(mask, blue) > 0.9
 
 
 def test_grabcut_finds_an_object_that_fills_a_picture_without_a_plain_border():
@@ -187,13 +187,13 @@ def test_a_sam_folder_agrees_with_the_pipeline_of_transformers(tiny_sam):
     torch.testing.assert_close(sam.prepared(image), pixels.float(), atol=1e-5, rtol=1e-5)
     model = SamModel.from_pretrained(tiny_sam).eval()
     with torch.no_grad():
-        found = model(
+        outputs = model(
             pixel_values=pixels.float(),
             input_points=points[None, None] - 0.5,
             input_labels=torch.tensor([[[1, 0]]]),
             multimask_output=False,
         )
-    logits = torch.nn.functional.interpolate(found.pred_masks[0], (64, 64), mode="bilinear")[0, 0]
+    logits = torch.nn.functional.interpolate(outputs.pred_masks[0], (64, 64), mode="bilinear")[0, 0]
     assert torch.equal(sam(image, points, torch.tensor([True, False])), logits > 0)
 
 

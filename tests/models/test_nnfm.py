@@ -43,14 +43,14 @@ def test_where_a_feature_is_in_the_style_does_not_matter():
 def test_the_gradient_holds_neighbours_fixed():
     features, style = made(6, 6, 2, 3), made(7, 6, 4, 4)
     features = features.requires_grad_()
-    (found,) = torch.autograd.grad(nnfm(features, StyleFeatures.of(style)), features)
+    (gradient,) = torch.autograd.grad(nnfm(features, StyleFeatures.of(style)), features)
     x, step = features.detach().double(), 1e-4
     for index in range(6):
         moved = [x.clone() for _ in range(2)]
         for sign, y in zip((1, -1), moved, strict=True):
             y[index, 1, 2] += sign * step
         numeric = (brute(moved[0], style) - brute(moved[1], style)) / (2 * step)
-        assert float(found[index, 1, 2]) == pytest.approx(numeric, abs=1e-5)
+        assert float(gradient[index, 1, 2]) == pytest.approx(numeric, abs=1e-5)
 
 
 def test_a_search_in_few_dimensions_finds_neighbours_that_are_as_near():

@@ -28,12 +28,12 @@ def expected(image, weights, wanted):
         {name.removeprefix("features."): x.double() for name, x in weights.items()}, strict=False
     )
     mean, deviation = torch.tensor([0.485, 0.456, 0.406]), torch.tensor([0.229, 0.224, 0.225])
-    x, found = ((image - mean[:, None, None]) / deviation[:, None, None]).double()[None], []
+    x, outputs = ((image - mean[:, None, None]) / deviation[:, None, None]).double()[None], []
     for index, module in enumerate(modules[: max(wanted) + 1]):
         x = module(x)
         if index in wanted:
-            found.append(x)
-    return found
+            outputs.append(x)
+    return outputs
 
 
 @pytest.mark.parametrize("name", ["vgg.safetensors", "vgg.pth"])
@@ -41,18 +41,18 @@ def test_features_are_those_of_torchvisions_modules(files, name):
     image = torch.rand(3, 41, 30)
     network = Vgg.load(files / name, dtype=torch.float32)
     truth = torch.cat(expected(image, random_weights(), STYLE), dim=1)[0]
-    found = network.features(image)
-    assert found.shape == (768, 10, 7)
-    assert_close(found.double(), truth, rtol=1e-4, atol=1e-4)
+    maps = network.features(image)
+    assert maps.shape == (768, 10, 7)
+    assert_close(maps.double(), truth, rtol=1e-4, atol=1e-4)
 
 
 def test_bfloat16_is_close_and_has_gradients(files):
     image = torch.rand(3, 32, 32, requires_grad=True)
     truth = torch.cat(expected(image.detach(), random_weights(), STYLE), dim=1)[0]
-    found = Vgg.load(files / "vgg.pth", dtype=torch.bfloat16).features(image)
-    assert found.dtype == torch.bfloat16
-    assert torch.cosine_similarity(found.double(), truth, dim=0).min() > 0.999
-    (gradient,) = torch.autograd.grad(found.float().square().mean(), image)
+    maps = Vgg.load(files / "vgg.pth", dtype=torch.bfloat16).features(image)
+    assert maps.dtype == torch.bfloat16
+    assert torch.cosine_similarity(maps.double(), truth, dim=0).min() > 0.999
+    (gradient,) = torch.autograd.grad(maps.float().square().mean(), image)
     exact = image.detach().clone().requires_grad_()
     network = Vgg.load(files / "vgg.pth", dtype=torch.float32)
     (other,) = torch.autograd.grad(network.features(exact).square().mean(), exact)
@@ -63,10 +63,10 @@ def test_layers_of_several_blocks_come_one_by_one(files):
     network = Vgg.load(files / "vgg.pth", layers=("relu1_2", "relu2_2"), dtype=torch.float32)
     assert len(network.convolutions) == 4, "no more is read than needed"
     image = torch.rand(3, 16, 24)
-    for found, truth in zip(
+    for layer, truth in zip(
         network.layers(image[None]), expected(image, random_weights(), (3, 8)), strict=True
     ):
-        assert_close(found.double(), truth, rtol=1e-4, atol=1e-4)
+        assert_close(layer.double(), truth, rtol=1e-4, atol=1e-4)
 
 
 def test_weights_of_something_else_are_refused(tmp_path):
@@ -90,12 +90,12 @@ def test_real_weights_tell_an_edge_from_noise():
 def test_layers_of_a_block_are_joined_by_their_stride(files):
     network = Vgg.load(files / "vgg.pth", dtype=torch.float32)
     image = torch.rand(3, 16, 24)
-    found = network.blocks(image, ("relu1_2", "relu2_2", *STYLE.values()))
-    assert {stride: x.shape for stride, x in found.items()} == {
+    blocks = network.blocks(image, ("relu1_2", "relu2_2", *STYLE.values()))
+    assert {stride: x.shape for stride, x in blocks.items()} == {
         1: (64, 16, 24),
         2: (128, 8, 12),
         4: (768, 4, 6),
     }
     layers = [x[0] for x in network.layers(image[None], ("relu1_2", "relu2_2"))]
-    assert_close([found[1], found[2]], layers, rtol=0, atol=0)
-    assert_close(found[4], network.features(image), rtol=0, atol=0)
+    assert_close([blocks[1], blocks[2]], layers, rtol=0, atol=0)
+    assert_close(blocks[4], network.features(image), rtol=0, atol=0)

@@ -127,9 +127,9 @@ def test_only_the_tensors_asked_for_come_back(tmp_path):
     torch.save(tensors, tmp_path / "old.pth", _use_new_zipfile_serialization=False)
     for name in ("x.safetensors", "x.pth", "old.pth"):
         assert read_tensors(tmp_path / name).keys() == tensors.keys()
-        (found,) = read_tensors(tmp_path / name, ["b"]).items()
-        assert found[0] == "b"
-        assert torch.equal(found[1], tensors["b"])
+        (item,) = read_tensors(tmp_path / name, ["b"]).items()
+        assert item[0] == "b"
+        assert torch.equal(item[1], tensors["b"])
         with pytest.raises(ArgumentError, match=f"{name}: expected tensor c, got a, b"):
             read_tensors(tmp_path / name, ["b", "c"])
 

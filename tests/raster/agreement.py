@@ -88,9 +88,9 @@ def images(render):
     return {name: getattr(render, name) for name in IMAGES if getattr(render, name) is not None}
 
 
-def relative(found, expected):
+def relative(result, expected):
     """Distance of two tensors in units of the length of the second; the distance itself where that is 0."""
-    difference = (found.detach().cpu().double() - expected).norm()
+    difference = (result.detach().cpu().double() - expected).norm()
     length = expected.norm()
     return float(difference / length if length > 0 else difference)
 
@@ -104,10 +104,10 @@ def gradients(rasterize, scene, cotangents, options=DEFAULT_OPTIONS, wanted=None
     total = sum(
         (rendered[name] * cotangent.to(rendered[name])).sum() for name, cotangent in cotangents.items()
     )
-    found = torch.autograd.grad(total, list(leaves.values()), allow_unused=True)
+    derivatives = torch.autograd.grad(total, list(leaves.values()), allow_unused=True)
     return {
         name: torch.zeros_like(leaf) if gradient is None else gradient
-        for (name, leaf), gradient in zip(leaves.items(), found, strict=True)
+        for (name, leaf), gradient in zip(leaves.items(), derivatives, strict=True)
     }
 
 
@@ -127,10 +127,10 @@ def random_cotangents(scene, names, mask=None, seed=0):
     """Random gradients of the images `names`, zero outside the mask [H, W]."""
     generator = torch.Generator().manual_seed(seed)
     channels = {"color": (scene.channels,), "normal": (3,)}
-    found = {}
+    cotangents = {}
     for name in names:
         shape = (scene.height, scene.width, *channels.get(name, ()))
         cotangent = torch.randn(shape, generator=generator, dtype=torch.float64)
         keep = torch.ones(shape[:2], dtype=torch.bool) if mask is None else mask
-        found[name] = cotangent * keep.reshape(*shape[:2], *[1] * (len(shape) - 2))
-    return found
+        cotangents[name] = cotangent * keep.reshape(*shape[:2], *[1] * (len(shape) - 2))
+    return cotangents

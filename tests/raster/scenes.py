@@ -72,10 +72,10 @@ class Scene:
 
     def leaves(self) -> dict[str, Tensor]:
         """The tensors that gradients are defined for, by name."""
-        found = {name: getattr(self, name) for name in SURFEL_TENSORS}
+        tensors = {name: getattr(self, name) for name in SURFEL_TENSORS}
         if self.texture is not None:
-            found |= {name: getattr(self.texture, name) for name in TEXTURE_TENSORS}
-        return {name: x for name, x in found.items() if x is not None}
+            tensors |= {name: getattr(self.texture, name) for name in TEXTURE_TENSORS}
+        return {name: x for name, x in tensors.items() if x is not None}
 
     def with_leaves(self, leaves: dict[str, Tensor]) -> Scene:
         """This scene with other tensors in place of some of its leaves."""

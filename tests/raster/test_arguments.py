@@ -265,12 +265,12 @@ def test_memory_layout_does_not_matter(device, drawn):
     scene = drawn(replace(random_scene(), shift=torch.rand(N, 2))).to(device)
     strided = scene.map(lambda x: x.repeat_interleave(2, 0)[::2] if x.ndim == 1 else x.T.contiguous().T)
     assert not strided.means.is_contiguous()
-    expected, found = (images(s.render(rasterize, scene.outputs)) for s in (scene, strided))
+    expected, result = (images(s.render(rasterize, scene.outputs)) for s in (scene, strided))
     cotangents = random_cotangents(scene, names_of(scene))
     expected |= gradients(rasterize, scene, cotangents)
-    found |= gradients(rasterize, strided, cotangents)
+    result |= gradients(rasterize, strided, cotangents)
     for name, value in expected.items():
-        assert torch.equal(found[name], value), name
+        assert torch.equal(result[name], value), name
 
 
 def test_expanded_gradients_and_tensors(device):

@@ -11,8 +11,8 @@ MEASURED = {"light": 21.8, "opaque": 38.6, "heavy": 62.2, "transl": 32.4, "trans
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_fragments_per_pixel(kind):
-    found, covered = fragments_per_pixel(surfels(kind), camera(400), stride=3)
-    assert found == pytest.approx(MEASURED[kind], rel=0.1)  # a ninth of the tiles
+    fragments, covered = fragments_per_pixel(surfels(kind), camera(400), stride=3)
+    assert fragments == pytest.approx(MEASURED[kind], rel=0.1)  # a ninth of the tiles
     assert covered == pytest.approx(0.5, abs=0.06)
 
 

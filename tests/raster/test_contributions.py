@@ -30,30 +30,30 @@ def explicit(scene, options=DEFAULT_OPTIONS):
 def test_statistics(device, drawn, seed):
     scene = drawn(random_scene(seed, n=300))
     expected = explicit(scene)[1]
-    found = scene.to(device).render(rasterize, ("statistics",)).statistics
+    result = scene.to(device).render(rasterize, ("statistics",)).statistics
     unsure = int((~decided(scene)).sum())
     # a pixel on a threshold gives or takes a fragment of 1/255, or what is left of the light at its end
-    torch.testing.assert_close(found.weight_sum.cpu().double(), expected.weight_sum, rtol=1e-4, atol=0.02)
-    torch.testing.assert_close(found.weight_max.cpu().double(), expected.weight_max, rtol=1e-3, atol=5e-3)
-    assert (found.pixels.cpu() - expected.pixels).abs().max() <= min(unsure, 10)
+    torch.testing.assert_close(result.weight_sum.cpu().double(), expected.weight_sum, rtol=1e-4, atol=0.02)
+    torch.testing.assert_close(result.weight_max.cpu().double(), expected.weight_max, rtol=1e-3, atol=5e-3)
+    assert (result.pixels.cpu() - expected.pixels).abs().max() <= min(unsure, 10)
     seen = expected.pixels > 0
-    assert (found.radii.cpu()[seen & (found.pixels.cpu() > 0)] > 0).all()
-    torch.testing.assert_close(found.radii.cpu().double()[seen], expected.radii[seen], rtol=1e-3, atol=0.5)
+    assert (result.radii.cpu()[seen & (result.pixels.cpu() > 0)] > 0).all()
+    torch.testing.assert_close(result.radii.cpu().double()[seen], expected.radii[seen], rtol=1e-3, atol=0.5)
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_statistics_of_hard_cases(device, drawn, name):
     scene = drawn(HARD_CASES[name]())
     render = scene.to(device).render(rasterize, ("statistics",))
-    found = render.statistics
-    for tensor in vars(found).values():
+    result = render.statistics
+    for tensor in vars(result).values():
         assert tensor.shape == (len(scene.means),)
         assert tensor.isfinite().all()
         assert (tensor >= 0).all()
-    torch.testing.assert_close(found.weight_sum.sum(), render.alpha.sum(), rtol=1e-4, atol=1e-4)
-    assert (found.radii[found.pixels > 0] > 0).all()
-    assert (found.weight_max <= found.weight_sum + 1e-6).all()
-    assert (found.weight_sum <= found.weight_max * found.pixels * (1 + 1e-5) + 1e-6).all()
+    torch.testing.assert_close(result.weight_sum.sum(), render.alpha.sum(), rtol=1e-4, atol=1e-4)
+    assert (result.radii[result.pixels > 0] > 0).all()
+    assert (result.weight_max <= result.weight_sum + 1e-6).all()
+    assert (result.weight_sum <= result.weight_max * result.pixels * (1 + 1e-5) + 1e-6).all()
 
 
 @pytest.mark.parametrize("channels", [1, 3, 8, 32])

@@ -22,9 +22,9 @@ def case(sizes, seed=0):
     return RectifiedConvolution(weight, bias), torch.randn(count, inputs, height, width, generator=generator)
 
 
-def close(found, expected):
+def close(result, expected):
     """Within the rounding of transforms whose numbers are up to 100 times as large as their results."""
-    difference = found.double() - expected
+    difference = result.double() - expected
     assert difference.norm() <= 1e-5 * expected.norm()
     assert difference.abs().max() <= 1e-4 * expected.abs().max()
 
@@ -34,14 +34,14 @@ def close(found, expected):
 def test_values_and_gradients(sizes, seed):
     convolution, images = case(sizes, seed)
     images.requires_grad_()
-    found = convolution(images)
+    outputs = convolution(images)
     weight = convolution.weight.double()
     sums = F.conv2d(images.detach().double(), weight, convolution.bias.double(), padding=1)
-    close(found.detach(), sums.clamp(min=0))
+    close(outputs.detach(), sums.clamp(min=0))
     upstream = torch.randn(sums.shape, generator=torch.Generator().manual_seed(seed + 1))
-    (gradient,) = torch.autograd.grad(found, images, upstream)
+    (gradient,) = torch.autograd.grad(outputs, images, upstream)
     # that of the same rectifier: sums near 0 may be rounded to either side
-    close(gradient, F.conv_transpose2d(upstream.double() * (found > 0), weight, padding=1))
+    close(gradient, F.conv_transpose2d(upstream.double() * (outputs > 0), weight, padding=1))
 
 
 @pytest.mark.parametrize("channels", [(64, 64), (144, 128), (512, 256)])
@@ -64,8 +64,8 @@ def test_the_same_bits_for_any_number_of_threads():
     images.requires_grad_()
 
     def run():
-        found = convolution(images)
-        return found.detach(), torch.autograd.grad(found.square().sum(), images)[0]
+        outputs = convolution(images)
+        return outputs.detach(), torch.autograd.grad(outputs.square().sum(), images)[0]
 
     first = with_threads(1, run)
     for threads in (2, 3, 7):
@@ -75,9 +75,9 @@ def test_the_same_bits_for_any_number_of_threads():
 def test_what_is_no_number_stays_so():
     convolution, images = case((1, 3, 16, 12, 12))
     images[0, 1, 5, 6] = float("nan")
-    found = convolution(images)
-    assert found[0, :, 4:7, 5:8].isnan().all()
-    assert found[0, :, 8:].isfinite().all()
+    outputs = convolution(images)
+    assert outputs[0, :, 4:7, 5:8].isnan().all()
+    assert outputs[0, :, 8:].isfinite().all()
 
 
 def test_a_second_derivative_is_refused():

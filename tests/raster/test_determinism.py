@@ -16,14 +16,14 @@ from texgs.raster.api import rasterize, splat
 def everything(scene):
     """All that the rasterizer computes for a scene, by name."""
     render = scene.render(rasterize, scene.outputs)
-    found = images(render) | vars(render.statistics)
+    results = images(render) | vars(render.statistics)
     image = torch.linspace(-1, 1, scene.height * scene.width * 2, device=scene.means.device)
     geometry = {
         name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
     }
-    found["sums"], found["weights"] = splat(image.reshape(scene.height, scene.width, 2), **geometry)
+    results["sums"], results["weights"] = splat(image.reshape(scene.height, scene.width, 2), **geometry)
     cotangents = random_cotangents(scene, names_of(scene))
-    return found | {f"gradient of {name}": x for name, x in gradients(rasterize, scene, cotangents).items()}
+    return results | {f"gradient of {name}": x for name, x in gradients(rasterize, scene, cotangents).items()}
 
 
 def generated(n=8000, size=200):

@@ -28,15 +28,15 @@ def differences(scene, cotangents, options):
         rendered = images(scene.with_leaves(leaves).render(reference.rasterize, tuple(cotangents), options))
         return sum((rendered[name] * cotangent).sum() for name, cotangent in cotangents.items())
 
-    found = {}
+    quotients = {}
     for name, leaf in scene.leaves().items():
         flat = torch.empty(leaf.numel(), dtype=torch.float64)
         for i in range(leaf.numel()):
             step = torch.zeros_like(leaf)
             step.view(-1)[i] = STEP
             flat[i] = (value({name: leaf + step}) - value({name: leaf - step})) / (2 * STEP)
-        found[name] = flat.reshape(leaf.shape)
-    return found
+        quotients[name] = flat.reshape(leaf.shape)
+    return quotients
 
 
 def visible(scene):
@@ -48,10 +48,10 @@ def check(scene, device, names, **changes):
     """Compare all gradients of a scene."""
     cotangents = random_cotangents(scene, names, visible(scene))
     expected = differences(scene.double(), cotangents, replace(OFF, **changes))
-    found = gradients(rasterize, scene.to(device), cotangents, replace(ALMOST_OFF, **changes))
+    derivatives = gradients(rasterize, scene.to(device), cotangents, replace(ALMOST_OFF, **changes))
     for name, gradient in expected.items():
         if gradient.norm() > 1e-6:
-            assert relative(found[name], gradient) < TOLERANCE, name
+            assert relative(derivatives[name], gradient) < TOLERANCE, name
 
 
 def small(seed, n=8):
@@ -98,7 +98,7 @@ def test_direction_in_a_larger_scene(device, drawn):
     scene = drawn(random_scene(5, n=150))
     scene = replace(scene, opacities=0.9 * scene.opacities, shift=torch.zeros(150, 2))
     cotangents = random_cotangents(scene, ("color", "depth"), visible(scene))
-    found = gradients(rasterize, scene.to(device), cotangents, ALMOST_OFF)
+    derivatives = gradients(rasterize, scene.to(device), cotangents, ALMOST_OFF)
     generator = torch.Generator().manual_seed(0)
     for name, leaf in scene.double().leaves().items():
         direction = torch.randn(leaf.shape, generator=generator, dtype=torch.float64)
@@ -108,4 +108,4 @@ def test_direction_in_a_larger_scene(device, drawn):
             rendered = images(moved.render(reference.rasterize, ("depth",), OFF))
             ends.append(sum((rendered[image] * cotangent).sum() for image, cotangent in cotangents.items()))
         slope = float(ends[0] - ends[1]) / 2e-7
-        assert float((found[name].cpu() * direction).sum()) == pytest.approx(slope, rel=5e-3), name
+        assert float((derivatives[name].cpu() * direction).sum()) == pytest.approx(slope, rel=5e-3), name

@@ -26,15 +26,15 @@ def described(options):
 def check(scene, device, options=DEFAULT_OPTIONS):
     """Compare all images of a scene, pixel by pixel where the definition is sure."""
     outputs = [name for name in scene.outputs if name != "statistics"]
-    found = images(scene.to(device).render(rasterize, outputs, options))
+    rendered = images(scene.to(device).render(rasterize, outputs, options))
     expected = true_images(scene, outputs, options)
     sure = decided(scene, options)
     assert 1 - sure.double().mean() < UNDECIDED
     texels = 0 if scene.texture is None else int(scene.texture.sizes.max())
     for name in names_of(scene):
-        assert found[name].shape == expected[name].shape
-        assert found[name].dtype == torch.float32
-        error = (found[name].cpu() - expected[name]).abs()
+        assert rendered[name].shape == expected[name].shape
+        assert rendered[name].dtype == torch.float32
+        error = (rendered[name].cpu() - expected[name]).abs()
         tolerance = TOLERANCE[name] + (TEXEL * texels if name == "color" else 0)
         assert float(error[sure].max()) < tolerance, name
         assert sure.all() or (error[~sure] < 0.02).double().mean() > 0.9, name  # a weak fragment more or less

@@ -38,15 +38,15 @@ TOLERANCE = {
 def check(scene, device, names=("color",), options=DEFAULT_OPTIONS, wanted=None):
     """Compare the gradients of random combinations of the images `names` in pixels off all thresholds."""
     cotangents = random_cotangents(scene, names, decided(scene, options))
-    found = gradients(rasterize, scene.to(device), cotangents, options, wanted)
+    derivatives = gradients(rasterize, scene.to(device), cotangents, options, wanted)
     expected = true_gradients(scene, cotangents, options, wanted)
     for name, gradient in expected.items():
-        assert found[name].shape == gradient.shape
-        assert found[name].isfinite().all()
+        assert derivatives[name].shape == gradient.shape
+        assert derivatives[name].isfinite().all()
         if gradient.norm() < 1e-9:  # no influence but for rounding, as of the scales on the median depth
-            assert found[name].norm() < 1e-2, name
+            assert derivatives[name].norm() < 1e-2, name
         else:
-            assert relative(found[name], gradient) < TOLERANCE[name], name
+            assert relative(derivatives[name], gradient) < TOLERANCE[name], name
 
 
 @pytest.mark.parametrize(

@@ -30,16 +30,16 @@ AMBIGUOUS = {"edge-on": {"normal"}}
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_images(device, drawn, name):
     scene = drawn(HARD_CASES[name]())
-    found = images(scene.to(device).render(rasterize, scene.outputs))
+    rendered = images(scene.to(device).render(rasterize, scene.outputs))
     expected = true_images(scene, scene.outputs)
     sure = decided(scene)
     assert sure.double().mean() > 0.85
     for image in names_of(scene):
-        assert found[image].isfinite().all()
+        assert rendered[image].isfinite().all()
         if image not in AMBIGUOUS.get(name, ()):
-            error = (found[image].cpu() - expected[image]).abs()[sure]
+            error = (rendered[image].cpu() - expected[image]).abs()[sure]
             assert float(error.max()) < TOLERANCE.get(name, 1e-4), image
-    assert found["alpha"].max() <= 1
+    assert rendered["alpha"].max() <= 1
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
@@ -48,24 +48,24 @@ def test_gradients(device, drawn, name):
     scene = replace(scene, shift=torch.zeros(len(scene.means), 2))
     compared = set(names_of(scene)) - {"distortion"} - AMBIGUOUS.get(name, set())
     cotangents = random_cotangents(scene, sorted(compared), decided(scene))
-    found = gradients(rasterize, scene.to(device), cotangents)
+    derivatives = gradients(rasterize, scene.to(device), cotangents)
     expected = true_gradients(scene, cotangents)
     for tensor, gradient in expected.items():
-        assert found[tensor].isfinite().all()
+        assert derivatives[tensor].isfinite().all()
         if gradient.norm() > 1e-6:
-            assert relative(found[tensor], gradient) < GRADIENT_TOLERANCE.get(name, 1e-3), tensor
+            assert relative(derivatives[tensor], gradient) < GRADIENT_TOLERANCE.get(name, 1e-3), tensor
         else:
-            assert found[tensor].norm() < 1e-3
+            assert derivatives[tensor].norm() < 1e-3
 
 
 @pytest.mark.parametrize("name", HARD_CASES)
 def test_textured(device, name):
     scene = HARD_CASES[name]()
     scene = textured(scene, sizes=[(4, 4), (1, 1), (33, 7), (1, 200), (60, 50)])
-    found = images(scene.to(device).render(rasterize))
+    rendered = images(scene.to(device).render(rasterize))
     expected = true_images(scene)
-    error = (found["color"].cpu() - expected["color"]).abs()[decided(scene)]
-    assert found["color"].isfinite().all()
+    error = (rendered["color"].cpu() - expected["color"]).abs()[decided(scene)]
+    assert rendered["color"].isfinite().all()
     share = 0.98 if name == "edge-on" else 0.999  # along an edge texture coordinates run through all values
     assert (error < TOLERANCE.get(name, 1e-3)).double().mean() > share or not error.numel()
     for gradient in gradients(rasterize, scene.to(device), random_cotangents(scene, ("color",))).values():
@@ -78,12 +78,12 @@ def test_textured(device, name):
 )
 def test_other_filters(device, name, options):
     scene = HARD_CASES[name]()
-    found = images(scene.to(device).render(rasterize, OUTPUTS, options))
+    rendered = images(scene.to(device).render(rasterize, OUTPUTS, options))
     expected = true_images(scene, OUTPUTS, options)
     sure = decided(scene, options)
     for image in set(IMAGES) - AMBIGUOUS.get(name, set()):
-        assert found[image].isfinite().all()
-        error = (found[image].cpu() - expected[image]).abs()[sure]
+        assert rendered[image].isfinite().all()
+        error = (rendered[image].cpu() - expected[image]).abs()[sure]
         assert float(error.max()) < TOLERANCE.get(name, 1e-3), image
 
 
@@ -92,23 +92,23 @@ def test_other_filters(device, name, options):
 )
 def test_antialiased(device, name):
     scene, options = gaussians(HARD_CASES[name]()), Options(antialiased=True)
-    found = images(scene.to(device).render(rasterize, scene.outputs, options))
+    tensors = images(scene.to(device).render(rasterize, scene.outputs, options))
     expected = true_images(scene, scene.outputs, options)
     sure = decided(scene, options)
     for image in names_of(scene):
-        assert found[image].isfinite().all()
-        assert float((found[image].cpu() - expected[image]).abs()[sure].max()) < 1e-4, image
+        assert tensors[image].isfinite().all()
+        assert float((tensors[image].cpu() - expected[image]).abs()[sure].max()) < 1e-4, image
     cotangents = random_cotangents(scene, ("color", "depth"), sure)
-    found = gradients(rasterize, scene.to(device), cotangents, options)
+    tensors = gradients(rasterize, scene.to(device), cotangents, options)
     for tensor, gradient in true_gradients(scene, cotangents, options).items():
-        assert relative(found[tensor], gradient) < 1e-3 or gradient.norm() < 1e-6, tensor
+        assert relative(tensors[tensor], gradient) < 1e-3 or gradient.norm() < 1e-6, tensor
 
 
 def test_every_surfel_at_one_pixel(device, drawn):
     scene = drawn(few(n=3000, width=20, height=20))
     scene = replace(scene, means=1e-3 * scene.means, opacities=0.01 * scene.opacities)
-    found = images(scene.to(device).render(rasterize, scene.outputs))
+    rendered = images(scene.to(device).render(rasterize, scene.outputs))
     expected = true_images(scene, scene.outputs)
-    error = (found["color"].cpu() - expected["color"]).abs()
+    error = (rendered["color"].cpu() - expected["color"]).abs()
     assert float(error.median()) < 1e-4  # depths differ by less than float32 resolves, so a few change places
     assert float(error.max()) < 0.05

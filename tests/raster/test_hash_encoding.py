@@ -21,7 +21,7 @@ def scene(n=700, levels=SMALL, seed=0):
 
 def looped(point, table, levels):
     """Features of one point, corner by corner, in the numbers of Python."""
-    found = []
+    features = []
     for level, resolution in enumerate(levels.resolutions):
         start, end = levels.first[level : level + 2]
         place = [resolution * min(max(x, 0.0), 1.0) for x in point]
@@ -38,8 +38,8 @@ def looped(point, table, levels):
             else:
                 row = (at[0] ^ at[1] * 2654435761 ^ at[2] * 805459861) % 2**32 % (end - start)
             feature = [f + weight * table[start + row][c] for c, f in enumerate(feature)]
-        found += feature
-    return found
+        features += feature
+    return features
 
 
 def test_the_definition_is_that_of_plain_loops():
@@ -59,19 +59,19 @@ def test_the_definition_has_the_gradient_of_finite_differences():
 @pytest.mark.parametrize("n", [0, 1, 31, 700])
 def test_features(n):
     points, table = scene(max(n, 8))
-    found = encode(points[:n], table, SMALL)
+    features = encode(points[:n], table, SMALL)
     expected = definition.encode(points[:n].double(), table.double(), SMALL)
     # float32 places of up to 50 cells: 50 * 2^-23 of differences of rows of about 3
-    torch.testing.assert_close(found.double(), expected, atol=1e-4, rtol=1e-5)
+    torch.testing.assert_close(features.double(), expected, atol=1e-4, rtol=1e-5)
 
 
 def test_gradient():
     points, table = scene()
     given = torch.randn(len(points), SMALL.width, generator=torch.Generator().manual_seed(1))
-    found, expected = (x.requires_grad_() for x in (table.clone(), table.double()))
-    encode(points, found, SMALL).backward(given)
+    leaf, expected = (x.requires_grad_() for x in (table.clone(), table.double()))
+    encode(points, leaf, SMALL).backward(given)
     definition.encode(points.double(), expected, SMALL).backward(given.double())
-    torch.testing.assert_close(found.grad.double(), expected.grad, atol=1e-3, rtol=1e-4)
+    torch.testing.assert_close(leaf.grad.double(), expected.grad, atol=1e-3, rtol=1e-4)
 
 
 def test_threads():

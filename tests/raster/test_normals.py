@@ -33,9 +33,9 @@ def gradients(loss, *leaves):
     return value.detach(), torch.autograd.grad(value, leaves)
 
 
-def assert_close(found, expected, tolerance=5e-6):
+def assert_close(result, expected, tolerance=5e-6):
     """Equal within a part of the length; float32 differences of neighbouring depths lose one digit."""
-    assert (found - expected).norm() <= tolerance * expected.norm()
+    assert (result - expected).norm() <= tolerance * expected.norm()
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -44,24 +44,24 @@ def test_normals_and_their_gradient(size, device):
     exact = (viewmat.double(), K.double())
     expected = definition.depth_to_normal(depth.double(), *exact)
     assert_close(depth_to_normal(depth, viewmat, K), expected)
-    _, (found,) = gradients(lambda z: (weights * depth_to_normal(z, viewmat, K)).sum(), depth)
+    _, (gradient,) = gradients(lambda z: (weights * depth_to_normal(z, viewmat, K)).sum(), depth)
     _, (expected,) = gradients(
         lambda z: (weights.double() * definition.depth_to_normal(z, *exact)).sum(),
         depth.double(),
     )
-    assert_close(found, expected)
+    assert_close(gradient, expected)
 
 
 @pytest.mark.parametrize("size", SIZES)
 def test_consistency_and_its_gradients(size, device):
     depth, normal, alpha, viewmat, K = view(*size, device)
-    value, found = gradients(lambda n, z: normal_consistency(n, z, alpha, viewmat, K), normal, depth)
+    value, derivatives = gradients(lambda n, z: normal_consistency(n, z, alpha, viewmat, K), normal, depth)
     constants = (alpha.double(), viewmat.double(), K.double())
     expected_value, expected = gradients(
         lambda n, z: definition.normal_consistency(n, z, *constants), normal.double(), depth.double()
     )
     assert value.item() == pytest.approx(expected_value.item(), rel=1e-6)
-    for one, other in zip(found, expected, strict=True):
+    for one, other in zip(derivatives, expected, strict=True):
         assert_close(one, other)
 
 
@@ -112,9 +112,11 @@ def test_any_number_of_threads_gives_the_same_bits():
     depth, normal, alpha, viewmat, K = view(201, 97)
 
     def everything():
-        value, found = gradients(lambda n, z: normal_consistency(n, z, alpha, viewmat, K), normal, depth)
+        value, derivatives = gradients(
+            lambda n, z: normal_consistency(n, z, alpha, viewmat, K), normal, depth
+        )
         _, (by_depth,) = gradients(lambda z: (normal * depth_to_normal(z, viewmat, K)).sum(), depth)
-        return [value, *found, by_depth]
+        return [value, *derivatives, by_depth]
 
     expected = with_threads(1, everything)
     for n in (2, 7):

@@ -113,8 +113,8 @@ def test_surfels_of_no_size_have_finite_gradients(device, scale):
     """Squares of such lengths are smaller than the smallest floats."""
     scene = random_scene(n=50).to(device)
     scene = replace(scene, scales=torch.full_like(scene.scales, scale))
-    found = gradients(rasterize, scene, random_cotangents(scene, ("color",)))
-    assert all(bool(gradient.isfinite().all()) for gradient in found.values())
+    derivatives = gradients(rasterize, scene, random_cotangents(scene, ("color",)))
+    assert all(bool(gradient.isfinite().all()) for gradient in derivatives.values())
 
 
 def test_a_gain_that_is_not_finite_leaves_other_textures_their_gradients(device):

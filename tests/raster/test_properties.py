@@ -66,9 +66,9 @@ def test_constant_texture_is_a_constant_colour(device, scene, width, height):
     plain = (
         replace(scene, features=base + gain[:, None] * scene.features).to(device).render(rasterize, OUTPUTS)
     )
-    found = replace(textured_scene, texture=texture).to(device).render(rasterize, OUTPUTS)
+    rendered = replace(textured_scene, texture=texture).to(device).render(rasterize, OUTPUTS)
     for name, image in images(plain).items():
-        torch.testing.assert_close(getattr(found, name), image, **CLOSE)
+        torch.testing.assert_close(getattr(rendered, name), image, **CLOSE)
 
 
 @examples

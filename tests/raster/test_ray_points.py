@@ -35,11 +35,11 @@ def test_points_are_on_their_rays_front_to_back():
 
 def test_rays_may_be_a_view_with_gaps():
     scene = voxel_scene(degree=0)
-    found, expected = (
+    strided, expected = (
         ray_points(scene.grid, rays, March()) for rays in (scene.rays[::2], scene.rays[::2].clone())
     )
     assert len(expected.points) > 0
-    assert all(map(torch.equal, found, expected))
+    assert all(map(torch.equal, strided, expected))
 
 
 def test_threads():

@@ -52,7 +52,7 @@ def test_gaussian_on_the_axis():
 def test_covariance_is_that_of_projected_points():
     """Of a small Gaussian, whose extent the perspective projection maps almost linearly."""
     quats, scales, mean = [[0.8, 0.3, 0.5, 0.1]], [[3e-3, 1e-3, 2e-3]], [[0.4, -0.3, 2.0]]
-    found = projected(means=mean, quats=quats, scales=scales, opacities=[0.8]).covariance[0]
+    covariance = projected(means=mean, quats=quats, scales=scales, opacities=[0.8]).covariance[0]
     normal = torch.randn(400_000, 3, generator=torch.Generator().manual_seed(0)).double()
     axes = quats_to_matrices(torch.tensor(quats).double())[0] * torch.tensor(scales).double()
     points = torch.tensor(mean).double() + normal @ axes.T
@@ -60,7 +60,7 @@ def test_covariance_is_that_of_projected_points():
     expected = torch.cov(pixels.T) + 0.3 * torch.eye(2)
     # an estimate of n samples is off by sqrt(2 / n)
     torch.testing.assert_close(
-        found - 0.3 * torch.eye(2), expected - 0.3 * torch.eye(2), rtol=0.01, atol=1e-5
+        covariance - 0.3 * torch.eye(2), expected - 0.3 * torch.eye(2), rtol=0.01, atol=1e-5
     )
 
 
@@ -106,8 +106,8 @@ def test_antialiased_gaussians_keep_their_amount_of_light():
     """Opacity times area on screen is what it is without the dilation."""
     gaussian = {"means": [[0, 0, 2]], "scales": [[0.02, 0.04, 0.01]], "opacities": [0.6]}
     for dilation in (1e-6, 0.3, 1.0):
-        found = projected(Options(antialiased=True, dilation=dilation), **gaussian)
-        amount = found.opacity[0] * torch.linalg.det(found.covariance[0]).sqrt()
+        projection = projected(Options(antialiased=True, dilation=dilation), **gaussian)
+        amount = projection.opacity[0] * torch.linalg.det(projection.covariance[0]).sqrt()
         assert amount.item() == pytest.approx(0.6 * (FOCAL / 2) ** 2 * 0.02 * 0.04, rel=1e-3)
     point = projected(Options(antialiased=True), **gaussian | {"scales": [[1e-9, 1e-9, 1e-9]]})
     assert point.opacity.item() == pytest.approx(0.6 * 0.005)  # the least factor, as in 3DGS

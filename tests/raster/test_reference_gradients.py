@@ -71,15 +71,15 @@ def test_median_passes_its_gradient_to_the_depth_of_one_fragment():
     tensors = inputs()
     image = rasterize(**CAMERA, **SIZE, **tensors, outputs=("median",), options=SMOOTH)
     gradient = torch.autograd.grad(image.median.sum(), list(tensors.values()), allow_unused=True)
-    found = dict(zip(tensors, gradient, strict=True))
-    assert found["opacities"] is None or found["opacities"].count_nonzero() == 0
+    by_name = dict(zip(tensors, gradient, strict=True))
+    assert by_name["opacities"] is None or by_name["opacities"].count_nonzero() == 0
     step = 1e-6 * torch.randn(N, 3, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
     medians = []
     for sign in (1, -1):
         moved = {**tensors, "means": tensors["means"] + sign * step}
         medians.append(rasterize(**CAMERA, **SIZE, **moved, outputs=("median",), options=SMOOTH).median.sum())
     torch.testing.assert_close(
-        (medians[0] - medians[1]) / 2, (found["means"] * step).sum(), rtol=1e-5, atol=0
+        (medians[0] - medians[1]) / 2, (by_name["means"] * step).sum(), rtol=1e-5, atol=0
     )
 
 

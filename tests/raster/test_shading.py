@@ -44,9 +44,9 @@ def gradients(function, leaves, *constants, **options):
     return [x.detach() for x in outputs], torch.autograd.grad(total, leaves)
 
 
-def assert_close(found, expected, tolerance):
+def assert_close(values, expected, tolerance):
     """Equal within a part of the length, tensor by tensor."""
-    for one, other in zip(found, expected, strict=True):
+    for one, other in zip(values, expected, strict=True):
         assert (one - other).norm() <= tolerance * other.norm() + 1e-30  # below, float32 ends
 
 
@@ -69,15 +69,15 @@ def test_blinn_phong(n, shared, light, facing, device):
     constants = seen_from(device, light)
     exact = [None if x is None else x.double() for x in constants]
     doubles = [x.double() for x in leaves]
-    values, found = gradients(blinn_phong_texture, leaves, *constants, facing=facing)
+    values, derivatives = gradients(blinn_phong_texture, leaves, *constants, facing=facing)
     expected_values, expected = gradients(definition.blinn_phong_texture, doubles, *exact, facing=facing)
     assert_close(values, expected_values, 2e-6)
     # A power of 40 amplifies the rounding of its base and of log2 as much.
-    assert_close(found, expected, 1e-5)
-    values, found = gradients(blinn_phong, leaves, *constants, facing=facing)
+    assert_close(derivatives, expected, 1e-5)
+    values, derivatives = gradients(blinn_phong, leaves, *constants, facing=facing)
     expected_values, expected = gradients(definition.blinn_phong, doubles, *exact, facing=facing)
     assert_close(values, expected_values, 2e-6)
-    assert_close(found, expected, 1e-5)
+    assert_close(derivatives, expected, 1e-5)
 
 
 @pytest.mark.parametrize("light", LIGHTS)
@@ -94,12 +94,12 @@ def test_facing_is_the_light_of_volume_renderers(light, device):
     material = [torch.full((1,), getattr(look, name), device=device) for name in MATERIAL]
     color, *_, quats = surfels(500, device=device)
     means = torch.zeros_like(color)  # in one place, as a distant viewer is in one direction
-    found = blinn_phong(color, *material, means, quats, *seen_from(device, light), facing=True)
+    shaded = blinn_phong(color, *material, means, quats, *seen_from(device, light), facing=True)
     to_viewer = normalize(CAMERA.double(), dim=0)
     to_light = to_viewer if LIGHTS[light] is None else normalize(LIGHTS[light].double(), dim=0)
     normal = quats_to_matrices(quats.cpu().double())[:, :, 2]
     expected = shade(color.cpu().double(), normal, to_viewer, to_light, look)
-    torch.testing.assert_close(found.clamp(0, 1).cpu().double(), expected, atol=2e-6, rtol=0)
+    torch.testing.assert_close(shaded.clamp(0, 1).cpu().double(), expected, atol=2e-6, rtol=0)
 
 
 @pytest.mark.parametrize("shininess", [0.0, 0.5, 20.0])
@@ -109,19 +109,21 @@ def test_light_behind_the_face_that_the_camera_sees_leaves_ambient_light(shinine
     quats = torch.tensor([[1.0, 0, 0, 0], [0, 1.0, 0, 0]], device=device).repeat(20, 1)  # normals z and -z
     light = torch.tensor([0.3, 0.2, -1.0], device=device)
     leaves = [color, *material, means, quats]
-    (shaded, gain), found = gradients(blinn_phong_texture, leaves, CAMERA.to(device), light, facing=True)
+    (shaded, gain), derivatives = gradients(
+        blinn_phong_texture, leaves, CAMERA.to(device), light, facing=True
+    )
     assert torch.equal(gain, material[0].expand(40))
     assert torch.equal(shaded, material[0] * color)
-    assert [bool(x.any()) for x in found] == [True, True, False, False, False, False, False]
+    assert [bool(x.any()) for x in derivatives] == [True, True, False, False, False, False, False]
     _, both = gradients(blinn_phong_texture, leaves, CAMERA.to(device), light)
     assert all(x.any() for x in both[:5])
 
 
 def test_facing_changes_nothing_for_a_headlight(device):
     leaves = surfels(3001, ("diffuse",), device)
-    values, found = gradients(blinn_phong_texture, leaves, CAMERA.to(device), facing=True)
+    values, derivatives = gradients(blinn_phong_texture, leaves, CAMERA.to(device), facing=True)
     expected_values, expected = gradients(blinn_phong_texture, leaves, CAMERA.to(device))
-    pairs = zip((*values, *found), (*expected_values, *expected), strict=True)
+    pairs = zip((*values, *derivatives), (*expected_values, *expected), strict=True)
     assert all(torch.equal(one, other) for one, other in pairs)
 
 
@@ -136,9 +138,9 @@ def test_surfels_have_no_front(light, facing, device):
         return torch.stack([-x, w, z, -y], -1)
 
     expected_values, expected = gradients(blinn_phong_texture, [*leaves, quats], *constants, facing=facing)
-    values, found = gradients(blinn_phong_texture, [*leaves, turned(quats)], *constants, facing=facing)
+    values, derivatives = gradients(blinn_phong_texture, [*leaves, turned(quats)], *constants, facing=facing)
     assert_close(values, expected_values, 2e-6)
-    assert_close(found, [*expected[:-1], turned(expected[-1])], 1e-5)
+    assert_close(derivatives, [*expected[:-1], turned(expected[-1])], 1e-5)
 
 
 def test_a_surfel_that_faces_the_headlight(facing, device):
@@ -172,8 +174,8 @@ def test_grazing_and_opposite_directions_stay_finite(facing, device):
     camera = torch.tensor([0.0, 0.0, 3.0], device=device)
     for light in (None, torch.tensor([0.0, 0.0, -1.0], device=device)):  # no light, and straight from behind
         leaves = [color, *material, means, quats]
-        values, found = gradients(blinn_phong_texture, leaves, camera, light, facing=facing)
-        assert all(x.isfinite().all() for x in (*values, *found))
+        values, derivatives = gradients(blinn_phong_texture, leaves, camera, light, facing=facing)
+        assert all(x.isfinite().all() for x in (*values, *derivatives))
 
 
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
@@ -183,12 +185,12 @@ def test_spherical_harmonics(n, degree, device):
     sh = torch.randn(n, (degree + 1) ** 2, 3, generator=generator).to(device)
     means = torch.randn(n, 3, generator=generator).to(device)
     camera = CAMERA.to(device)
-    values, found = gradients(spherical_harmonics, [sh, means], camera)
+    values, derivatives = gradients(spherical_harmonics, [sh, means], camera)
     expected_values, expected = gradients(
         definition.spherical_harmonics, [sh.double(), means.double()], camera.double()
     )
     assert_close(values, expected_values, 1e-6)
-    assert_close(found, expected, 2e-6)
+    assert_close(derivatives, expected, 2e-6)
 
 
 def test_definition_of_spherical_harmonics_by_finite_differences():
@@ -226,9 +228,9 @@ def test_any_number_of_threads_gives_the_same_bits(light, facing):
     sh = [torch.rand(5000, 16, 3), leaves[5]]
 
     def everything():
-        values, found = gradients(blinn_phong_texture, leaves, CAMERA, LIGHTS[light], facing=facing)
+        values, derivatives = gradients(blinn_phong_texture, leaves, CAMERA, LIGHTS[light], facing=facing)
         colors, by_sh = gradients(spherical_harmonics, sh, CAMERA)
-        return [*values, *found, *colors, *by_sh]
+        return [*values, *derivatives, *colors, *by_sh]
 
     expected = with_threads(1, everything)
     for n in (2, 7):
@@ -243,10 +245,10 @@ def test_a_shininess_that_is_not_finite_is_seen(device):
 
 
 def test_no_surfels(device):
-    values, found = gradients(blinn_phong_texture, surfels(0, ("ambient",), device), CAMERA.to(device))
+    values, derivatives = gradients(blinn_phong_texture, surfels(0, ("ambient",), device), CAMERA.to(device))
     assert [len(x) for x in values] == [0, 0]
-    assert [len(x) for x in found] == [0, 1, 0, 0, 0, 0, 0]
-    assert not found[1].any()
+    assert [len(x) for x in derivatives] == [0, 1, 0, 0, 0, 0, 0]
+    assert not derivatives[1].any()
     assert spherical_harmonics(torch.zeros(0, 4, 3, device=device), values[0], CAMERA.to(device)).shape == (
         0,
         3,

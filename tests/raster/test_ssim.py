@@ -23,9 +23,9 @@ def pair(height, width, channels, device="cpu", noise=0.1):
     return image.permute(1, 2, 0).to(device), target.permute(1, 2, 0).to(device)
 
 
-def distance(found, expected):
+def distance(gradient, expected):
     """Of two gradients, relative to the length of the second."""
-    return ((found - expected).norm() / expected.norm()).item()
+    return ((gradient - expected).norm() / expected.norm()).item()
 
 
 def evaluate(loss, image, target):
@@ -77,8 +77,8 @@ def test_definition_window_by_window():
         covariance = (weights * a * b).sum() - mean_a * mean_b
         likeness = (2 * mean_a * mean_b + 0.01**2) * (2 * covariance + 0.03**2)
         values.append(likeness / ((mean_a**2 + mean_b**2 + 0.01**2) * (var_a + var_b + 0.03**2)))
-    found = definition.ssim(*(torch.from_numpy(each)[..., None] for each in (image, target)))
-    assert found.item() == pytest.approx(np.mean(values), rel=1e-9)
+    similarity = definition.ssim(*(torch.from_numpy(each)[..., None] for each in (image, target)))
+    assert similarity.item() == pytest.approx(np.mean(values), rel=1e-9)
 
 
 @pytest.mark.parametrize("size", SIZES)

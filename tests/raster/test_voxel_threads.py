@@ -14,17 +14,17 @@ def everything(degree, size=(64, 40, 36), n_rays=20_000):
     """A rendering, its gradient, the largest weights, total variation and a step of the optimiser."""
     scene = voxel_scene(size=size, degree=degree, n_rays=n_rays)
     rows = scene.grid.rows.requires_grad_()
-    found = render_rays(scene.grid, scene.rays, scene.march)
-    gradient = torch.autograd.grad(found.color.square().sum() + found.alpha.sum(), rows)[0]
+    rendered = render_rays(scene.grid, scene.rays, scene.march)
+    gradient = torch.autograd.grad(rendered.color.square().sum() + rendered.alpha.sum(), rows)[0]
     weights = torch.zeros(len(rows))
     Samples(scene.grid, scene.march, scene.rays).mark(weights)
     rows.requires_grad_(False)
     optimizer = VoxelOptimizer(scene.grid, "adam")
-    Samples(scene.grid, scene.march, scene.rays).add_gradient(found.color, None, optimizer.gradient)
+    Samples(scene.grid, scene.march, scene.rays).add_gradient(rendered.color, None, optimizer.gradient)
     add_total_variation(scene.grid, torch.arange(20), 1.0, 1.0, optimizer.gradient)
     optimizer.step(VoxelRates(1.0, 0.1, 0.1))
     scene.grid.refresh_occupancy()
-    return [*found, gradient, weights, rows.clone(), scene.grid.occupied, scene.grid.distance]
+    return [*rendered, gradient, weights, rows.clone(), scene.grid.occupied, scene.grid.distance]
 
 
 @pytest.mark.parametrize("degree", [0, 2])

@@ -27,12 +27,12 @@ def gradients(scene, outputs, inputs, seed=1):
 def test_image_and_gradient(degree, transmittance_min, device):
     scene = voxel_scene(degree, degree=degree, transmittance_min=transmittance_min).to(device)
     rows = scene.grid.rows.requires_grad_()
-    found = render_rays(scene.grid, scene.rays, scene.march)
+    rendered = render_rays(scene.grid, scene.rays, scene.march)
     leaves = [scene.density.double().requires_grad_(), scene.sh.double().requires_grad_()]
     expected = scene.definition(*leaves)
-    for name, a, b in zip(found._fields, found, expected, strict=True):
+    for name, a, b in zip(rendered._fields, rendered, expected, strict=True):
         torch.testing.assert_close(a.double(), b, rtol=1e-4, atol=2e-5, msg=name)  # float32 places in cells
-    (gradient,) = gradients(scene, found, [rows])
+    (gradient,) = gradients(scene, rendered, [rows])
     density, sh = unpack_rows(gradient[1:])
     for a, b in zip((density, sh), gradients(scene, expected, leaves), strict=True):
         assert (a - b).norm() <= 2e-5 * b.norm()  # float32
@@ -231,10 +231,10 @@ def test_rays_from_far_away_stay_inside_of_the_lattice(away, device):
     aims = torch.tensor([[1.0, 0.3, 0.2], [-0.2, 1.0, 0.1], [0.3, -0.1, 1.0], [1.0, 1.0, 1.0]], device=device)
     rays = torch.cat([torch.cat([-away * sign * aims, sign * aims], dim=1) for sign in (1, -1)])
     rows = scene.grid.rows.requires_grad_()
-    found = render_rays(scene.grid, rays, scene.march)
-    assert found.color.isfinite().all()
-    assert ((found.alpha >= 0) & (found.alpha <= 1)).all()
-    assert torch.autograd.grad(found.color.sum(), rows)[0].isfinite().all()
+    rendered = render_rays(scene.grid, rays, scene.march)
+    assert rendered.color.isfinite().all()
+    assert ((rendered.alpha >= 0) & (rendered.alpha <= 1)).all()
+    assert torch.autograd.grad(rendered.color.sum(), rows)[0].isfinite().all()
 
 
 def test_errors_name_the_argument():

@@ -35,9 +35,9 @@ def test_means_of_the_papers_basic_scenes_and_seeds_are_the_papers_rows(tmp_path
         for tf, factor in (("TF01", 0.9), ("TF02", 1.1)):
             for seed, more in ((0, 0.05), (1, -0.05)):
                 write_fit(tmp_path, line, sweep, factor + more, tf=tf, seed=seed)
-    found, expected = rows(ablation(records(tmp_path), sweep)), lines(sweep)
-    assert len(found) == len(expected)
-    for row, line in zip(found, expected, strict=True):
+    entries, expected = rows(ablation(records(tmp_path), sweep)), lines(sweep)
+    assert len(entries) == len(expected)
+    for row, line in zip(entries, expected, strict=True):
         assert row["recipe"] == "paper"
         assert row["basic scenes"] == 2
         for title, key in zip(TITLES, KEYS, strict=True):
@@ -48,9 +48,9 @@ def test_means_of_the_papers_basic_scenes_and_seeds_are_the_papers_rows(tmp_path
 @pytest.mark.parametrize("changed", [{"recipe": "quick"}, {"dataset": "engine"}, {"stand_in": "ionization"}])
 def test_what_is_not_like_for_like_stands_above_the_papers_rows(tmp_path, changed):
     write_fit(tmp_path, lines("views")[0], "views", **changed)
-    found = rows(ablation(records(tmp_path), "views"))
-    (own,) = [row for row in found if row["recipe"] != "the paper"]
-    theirs = [row for row in found if row["recipe"] == "the paper"]
+    entries = rows(ablation(records(tmp_path), "views"))
+    (own,) = [row for row in entries if row["recipe"] != "the paper"]
+    theirs = [row for row in entries if row["recipe"] == "the paper"]
     assert own["PSNR (paper)"] in (UNLIKE, None)
     assert [row["training views"] for row in theirs] == ["42", "92", "162", "252"]
     assert [row["PSNR"] for row in theirs] == [29.33, 30.95, 31.64, 31.71]

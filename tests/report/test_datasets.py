@@ -28,14 +28,14 @@ def test_data_sets_are_in_the_papers_order_and_stand_ins_below(tmp_path):
     for name in [*sorted(names), "another"]:
         metrics(tmp_path, "views", views, name, "TF01")
     metrics(tmp_path, "views", views, "jets", "TF01", stand_in="five jets")
-    found = rows(datasets(records(tmp_path)))
-    assert [row["data set"] for row in found] == [
+    entries = rows(datasets(records(tmp_path)))
+    assert [row["data set"] for row in entries] == [
         names[0],
         "jets, stand-in for five jets",
         *names[1:],
         "another",
     ]
-    assert [found[1][c] for c in ("samples (paper)", "MiB (paper)", "ms / frame (paper)")] == [None] * 3
+    assert [entries[1][c] for c in ("samples (paper)", "MiB (paper)", "ms / frame (paper)")] == [None] * 3
 
 
 def test_published_views_have_a_row_without_a_volume(tmp_path):

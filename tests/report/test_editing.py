@@ -55,10 +55,12 @@ def test_means_over_four_data_sets_are_the_papers_rows(tmp_path, driven):
             edit(tmp_path, line["method"], values, follows=follows, dataset=dataset)
         far = {key: 100 * value for key, value in numbers.items()}
         edit(tmp_path, line["method"], far, follows=follows, dataset="e", stand_in="a")
-    found = rows(make(records(tmp_path)))
-    theirs = {row["method"]: row for row in found if row["recipe"] == "the paper"}
-    means = {row["edit"]: row for row in found if row["data set"] == "mean of 4" and row["recipe"] == "quick"}
-    assert len(found) == len(published) * 7
+    entries = rows(make(records(tmp_path)))
+    theirs = {row["method"]: row for row in entries if row["recipe"] == "the paper"}
+    means = {
+        row["edit"]: row for row in entries if row["data set"] == "mean of 4" and row["recipe"] == "quick"
+    }
+    assert len(entries) == len(published) * 7
     for line in published:
         for key, title in OWN.items():
             if isinstance(line.get(key), float):

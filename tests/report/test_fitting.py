@@ -49,11 +49,11 @@ def write_paper(folder):
 
 def test_means_of_the_papers_basic_scenes_are_the_papers_rows(tmp_path):
     write_paper(tmp_path)
-    found, expected = rows(fitting(records(tmp_path))), lines("fitting")
-    assert [(row["data set"], row["phase"]) for row in found] == [
+    entries, expected = rows(fitting(records(tmp_path))), lines("fitting")
+    assert [(row["data set"], row["phase"]) for row in entries] == [
         (line["dataset"], line["phase"]) for line in expected
     ]
-    for row, line in zip(found, expected, strict=True):
+    for row, line in zip(entries, expected, strict=True):
         assert row["recipe"] == "paper"
         assert row["basic scenes"] == SIZES[line["dataset"]]["basic_scenes"]
         for title, key in MEASURES.items():
@@ -99,10 +99,10 @@ def test_data_that_the_paper_does_not_have_stand_alone(tmp_path):
 def test_a_stand_in_has_a_row_of_its_own_without_the_papers_numbers(tmp_path):
     line = next(line for line in lines("fitting") if line["dataset"] == "five_jets")
     metrics(tmp_path, "surfels", phase_of(line, 1.0), "jets", "TF01", recipe="paper", stand_in="five jets")
-    found = rows(fitting(records(tmp_path)))
-    assert [row["data set"] for row in found[:4]] == ["five_jets"] * 3 + ["jets, stand-in for five jets"]
-    assert [row["recipe"] for row in found[:4]] == ["the paper"] * 3 + ["paper"]
-    assert [found[3][f"{title} (paper)"] for title in MEASURES] == [None] * 6
+    entries = rows(fitting(records(tmp_path)))
+    assert [row["data set"] for row in entries[:4]] == ["five_jets"] * 3 + ["jets, stand-in for five jets"]
+    assert [row["recipe"] for row in entries[:4]] == ["the paper"] * 3 + ["paper"]
+    assert [entries[3][f"{title} (paper)"] for title in MEASURES] == [None] * 6
 
 
 def test_a_measure_that_a_basic_scene_lacks_has_no_mean(tmp_path):
@@ -123,12 +123,12 @@ def test_fits_are_listed_one_by_one_but_for_those_of_sweeps(tmp_path):
         for phase in ("texture", "shading"):
             metrics(tmp_path, phase, FitResult(90.0, 7), tf=tf)
     metrics(tmp_path, "texture", FitResult(90.0, 7), tf="TF01", sweep="views", variant="42")
-    found = rows(fits(records(tmp_path)))
-    assert [(row["TF"], row["phase"]) for row in found] == [
+    entries = rows(fits(records(tmp_path)))
+    assert [(row["TF"], row["phase"]) for row in entries] == [
         ("TF01", "shading"),
         ("TF01", "texture"),
         ("TF02", "shading"),
         ("TF02", "texture"),
     ]
-    assert {row["minutes"] for row in found} == {1.5}
+    assert {row["minutes"] for row in entries} == {1.5}
     assert all("42" not in row["recipe"] for row in rows(fitting(records(tmp_path))))

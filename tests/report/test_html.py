@@ -97,27 +97,27 @@ def page(tmp_path, paths, left_out=()):
 
 
 def test_sections_are_in_the_papers_order_and_every_link_leads_somewhere(tmp_path, paths):
-    found = page(tmp_path, paths)
-    keys = [key for key in found.ids if key in SECTIONS]
+    document = page(tmp_path, paths)
+    keys = [key for key in document.ids if key in SECTIONS]
     assert keys == [key for key in SECTIONS if key in keys]
     assert set(keys) == set(SECTIONS) - {"scenes", "ablations", "sizes"}, "these have nothing to show"
-    assert len(found.ids) == len(set(found.ids))
-    assert {link for link in found.links if not link.startswith("#")} == set()
-    assert {link[1:] for link in found.links} <= set(found.ids)
+    assert len(document.ids) == len(set(document.ids))
+    assert {link for link in document.links if not link.startswith("#")} == set()
+    assert {link[1:] for link in document.links} <= set(document.ids)
 
 
 def test_every_figure_has_its_words_and_command(tmp_path, paths):
-    found = page(tmp_path, paths)
-    captions = " ".join(found.of("figcaption"))
+    document = page(tmp_path, paths)
+    captions = " ".join(document.of("figcaption"))
     names = ["gallery", "edit", "style-TF01", "pse", "relight", "comparison", "sheet", "new"]
     assert all(f"Words of {name}.png." in captions for name in names)
-    assert set(found.of("code")) >= {
+    assert set(document.of("code")) >= {
         "texgs edit_image dataset=engine fit=quick edit=painted",
         "texgs comparison dataset=engine tf=TF01 fit=a 'fits=[a,b]'",
         "texgs sheet dataset=engine tf=TF01",
     }
-    assert len(found.sources) == 11, "nine pictures, the curve of the fit and the paper's votes"
-    for source in found.sources:
+    assert len(document.sources) == 11, "nine pictures, the curve of the fit and the paper's votes"
+    for source in document.sources:
         kind, data = source.split(";base64,")
         assert kind == "data:image/webp"
         assert Image.open(io.BytesIO(base64.b64decode(data))).format == "WEBP"
@@ -174,18 +174,18 @@ def test_votes_have_their_table_and_figure(tmp_path, paths):
 
 
 def test_rows_lead_to_their_jobs(tmp_path, paths):
-    found = page(tmp_path, paths)
+    document = page(tmp_path, paths)
     timing = sorted(paths).index(paths[1]) + 1
-    assert found.links.count(f"#job-{timing}") == 1
-    assert [key for key in found.ids if key.startswith("job-")] == [f"job-{n}" for n in range(1, 10)]
+    assert document.links.count(f"#job-{timing}") == 1
+    assert [key for key in document.ids if key.startswith("job-")] == [f"job-{n}" for n in range(1, 10)]
 
 
 def test_what_was_left_out_stands_on_top(tmp_path, paths):
     old = tmp_path / "old.json"
     old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
-    found = page(tmp_path, [*paths, old], [LeftOut("data set wood", "no <file>", ["phase"])])
-    assert found.ids[0] == "left-out"
-    first, second = found.of("li")[:2]
+    document = page(tmp_path, [*paths, old], [LeftOut("data set wood", "no <file>", ["phase"])])
+    assert document.ids[0] == "left-out"
+    first, second = document.of("li")[:2]
     assert first == "data set wood: no <file>."
     assert second.startswith("1 metrics file: of another version of texgs")
     assert "left-out" not in page(tmp_path, paths).ids

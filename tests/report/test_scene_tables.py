@@ -21,10 +21,10 @@ def test_sums_over_the_papers_basic_scenes_are_the_papers_sizes(tmp_path):
             count = round(line["primitives"] / scenes)
             result = FitResult(60.0, count, sizes=sizes, **seen)
             metrics(tmp_path, "texture", result, line["dataset"], f"TF{index}", "paper")
-    found = {row["data set"]: row for row in rows(model_size(records(tmp_path)))}
-    assert len(found) == len(model_size(records(tmp_path)).rows) == 4
+    by_dataset = {row["data set"]: row for row in rows(model_size(records(tmp_path)))}
+    assert len(by_dataset) == len(model_size(records(tmp_path)).rows) == 4
     for line in lines("model_size"):
-        row = found[line["dataset"]]
+        row = by_dataset[line["dataset"]]
         assert row["basic scenes"] == line["basic_scenes"]
         for title, key in (GROUPS | {"primitives": "primitives"}).items():
             assert row[title] == pytest.approx(line[key])
@@ -40,10 +40,10 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
     table = model_size(records(tmp_path))
     own = [row for row in table.rows if row.sources]
     assert [[path.stem for path in row.sources] for row in own] == [["0000", "0002"], ["0001", "0003"]]
-    found = [row for row in rows(table) if row["recipe"] != "the paper"]
-    assert [row["recipe"] for row in found] == ["quick", "quick-s1"]
-    assert (found[0]["basic scenes"], found[0]["primitives"], found[0]["texture MiB"]) == (2, 2000, 16.0)
-    assert found[0]["texture MiB (paper)"] == UNLIKE
+    ours = [row for row in rows(table) if row["recipe"] != "the paper"]
+    assert [row["recipe"] for row in ours] == ["quick", "quick-s1"]
+    assert (ours[0]["basic scenes"], ours[0]["primitives"], ours[0]["texture MiB"]) == (2, 2000, 16.0)
+    assert ours[0]["texture MiB (paper)"] == UNLIKE
     theirs = {row["data set"]: row for row in rows(table) if row["recipe"] == "the paper"}
     assert theirs["wood"]["texture MiB"] == 114.5
 
@@ -62,10 +62,10 @@ def test_frames_have_means_without_stand_ins_and_the_volumes_of_the_paper_at_its
         timing = replace(ALONE, frame_mean_ms=ms, width=512, height=512)
         metrics(tmp_path, "timing", timing, dataset=dataset)
     metrics(tmp_path, "timing", replace(timing, frame_mean_ms=50.0), "jets", stand_in="engine")
-    found = {row["data set"]: row for row in rows(rendering(records(tmp_path)))}
-    assert found["engine"]["volume, ms (paper)"] == 16.14
-    assert found["jets, stand-in for engine"]["volume, ms (paper)"] is None
-    assert found["mean of 2"]["mean ms"] == 5.0
+    by_dataset = {row["data set"]: row for row in rows(rendering(records(tmp_path)))}
+    assert by_dataset["engine"]["volume, ms (paper)"] == 16.14
+    assert by_dataset["jets, stand-in for engine"]["volume, ms (paper)"] is None
+    assert by_dataset["mean of 2"]["mean ms"] == 5.0
 
 
 def test_edits_with_and_without_a_volume(tmp_path):

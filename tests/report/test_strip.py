@@ -8,9 +8,9 @@ from texgs.report.strip import DPI, INCHES, NOTE, content, write_strip
 
 def picture(rows, columns, size=(60, 80), value=0.2):
     """White with a grey block."""
-    found = np.ones((*size, 3))
-    found[rows, columns] = value
-    return found
+    pixels = np.ones((*size, 3))
+    pixels[rows, columns] = value
+    return pixels
 
 
 def test_a_row_for_each_name_and_a_column_for_each_title(tmp_path):

@@ -25,16 +25,16 @@ def test_scenes_that_follow_the_same_are_one_question_pictures_first(tmp_path):
         for name in ("dge", "text"):
             edit(tmp_path, name, dataset=dataset, followed=WORDS, method="text")
     edit(tmp_path, "copper", dataset="wood", followed={"TF01": "make it copper"}, method="text")
-    found = questions(tmp_path)
-    assert [(each.follows, each.dataset, names(each)) for each in found] == [
+    asked = questions(tmp_path)
+    assert [(each.follows, each.dataset, names(each)) for each in asked] == [
         ("style", "engine", ["arf", "style"]),
         ("style", "wood", ["arf", "style"]),
         ("instruction", "engine", ["dge", "text"]),
         ("instruction", "wood", ["dge", "text"]),
     ], "copper is alone with its instruction"
-    assert [len(each.pictures) for each in found] == [1, 1, 0, 0]
-    assert found[0].pictures[0].endswith("style.png")
-    assert found[0].options[0].scene.endswith(f"{found[0].options[0].edit}/scene.yaml")
+    assert [len(each.pictures) for each in asked] == [1, 1, 0, 0]
+    assert asked[0].pictures[0].endswith("style.png")
+    assert asked[0].options[0].scene.endswith(f"{asked[0].options[0].edit}/scene.yaml")
 
 
 def test_the_order_is_random_and_that_of_the_seed(tmp_path):

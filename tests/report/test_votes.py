@@ -66,8 +66,8 @@ def test_the_papers_votes_stand_beside_with_what_its_counts_tell():
 def test_each_kind_has_its_own_votes_and_the_papers_for_it():
     both = replace(STUDY, questions=[*STUDY.questions, *study("vw", follows="instruction").questions])
     ballots = [replace(each, ranks=[*each.ranks, [1, 2]]) for each in BALLOTS]
-    found = rows(user_study(Votes(both, ballots)))
-    text = [row for row in found if row["kind"] == "text-driven"]
+    entries = rows(user_study(Votes(both, ballots)))
+    text = [row for row in entries if row["kind"] == "text-driven"]
     assert [row["p (Friedman)"] for row in text if row["method"] == "all"] == [
         "needs three methods",
         "only counts are published",
@@ -77,17 +77,17 @@ def test_each_kind_has_its_own_votes_and_the_papers_for_it():
 
 
 def test_data_sets_with_other_methods_are_added_up_on_their_own():
-    found = rows(user_study(Votes(study("xyz", "xy"), [Ballot("aa", [[1, 2, 3], [1, 2]])])))
-    totals = [row["method"] for row in found if row["data set"] == "all 1"]
+    entries = rows(user_study(Votes(study("xyz", "xy"), [Ballot("aa", [[1, 2, 3], [1, 2]])])))
+    totals = [row["method"] for row in entries if row["data set"] == "all 1"]
     assert totals == ["x", "y", "z", "all", "x", "y", "all"]
 
 
 def test_without_votes_there_are_those_of_the_paper():
     table = user_study(None)
     assert table.caption.startswith("No votes but the paper's.")
-    found = rows(table)
-    assert {row["edit"] for row in found} == {"the paper"}
-    assert [row["kind"] for row in found] == ["image-driven"] * 21 + ["text-driven"] * 21
+    entries = rows(table)
+    assert {row["edit"] for row in entries} == {"the paper"}
+    assert [row["kind"] for row in entries] == ["image-driven"] * 21 + ["text-driven"] * 21
 
 
 def test_the_papers_file_holds_ten_votes_in_each_row_and_column():

@@ -48,9 +48,9 @@ def test_joined_surfels_look_like_the_edited_scene_without_light():
     expected = scene.render(CAMERA, edits=EDITS, look="unshaded")
     surfels = joined(scene.parts, EDITS)
     assert (len(surfels), surfels.stage) == (300, "surfels")
-    found = surfels.render(CAMERA)
-    assert_close(found.alpha, expected.alpha, atol=1e-5, rtol=0)
-    assert_close(found.color, expected.color, atol=1e-5, rtol=0)
+    rendered = surfels.render(CAMERA)
+    assert_close(rendered.alpha, expected.alpha, atol=1e-5, rtol=0)
+    assert_close(rendered.color, expected.color, atol=1e-5, rtol=0)
 
 
 def test_a_scene_goes_through_a_file_of_gaussians(tmp_path):
@@ -72,10 +72,10 @@ def test_nothing_visible_is_refused():
 def test_points_are_means_and_mean_colors_of_opaque_surfels(tmp_path):
     model = ball(1)
     p = model.parameters
-    found = vertices(write_points(tmp_path / "points.ply", model, 0.6))
+    points = vertices(write_points(tmp_path / "points.ply", model, 0.6))
     opaque = (torch.sigmoid(p["opacities"]) >= 0.6).nonzero()[:, 0]
-    assert 0 < len(opaque) == len(found) < len(model)
-    for point, n in zip(found, opaque.tolist(), strict=True):
+    assert 0 < len(opaque) == len(points) < len(model)
+    for point, n in zip(points, opaque.tolist(), strict=True):
         texels = p["texels"][p["offsets"][n] :][: int(p["sizes"][n].prod())]
         color = (p["colors"][n] + p["palette"] + texels.mean(0)).clamp(0, 1) * 255
         assert [point[axis] for axis in "xyz"] == p["means"][n].tolist()
@@ -85,9 +85,9 @@ def test_points_are_means_and_mean_colors_of_opaque_surfels(tmp_path):
 
 def test_points_before_shading_have_the_constant_harmonic(tmp_path):
     model = sample("surfels", n=9)
-    found = vertices(write_points(tmp_path / "points.ply", model, 0.0))
+    points = vertices(write_points(tmp_path / "points.ply", model, 0.0))
     color = (0.5 + 0.28209479 * model.parameters["sh"][:, 0]).clamp(0, 1) * 255
-    got = np.stack([found[name] for name in ("red", "green", "blue")], axis=1)
+    got = np.stack([points[name] for name in ("red", "green", "blue")], axis=1)
     assert np.abs(got - color.numpy()).max() <= 0.51
 
 

@@ -22,10 +22,10 @@ def shot(scene, mode, **options):
 
 def test_colour_is_what_is_rendered(scene):
     expected = scene.render(CAMERA, SIDE, background=torch.tensor([0.0, 0.5, 1.0])).color
-    found = shot(scene, "shaded", background=(0.0, 0.5, 1.0))
-    assert found.dtype == np.uint8
-    assert np.abs(found / 255 - expected.numpy()).max() <= 0.5 / 255 + 1e-6
-    assert found[0, 0].tolist() == [0, 128, 255]
+    pixels = shot(scene, "shaded", background=(0.0, 0.5, 1.0))
+    assert pixels.dtype == np.uint8
+    assert np.abs(pixels / 255 - expected.numpy()).max() <= 0.5 / 255 + 1e-6
+    assert pixels[0, 0].tolist() == [0, 128, 255]
 
 
 def test_alpha_is_white_on_black_and_depth_grows_away_from_the_camera(scene):
@@ -45,10 +45,10 @@ def test_normals_of_a_flat_scene_are_one_colour():
     model = ball(1, n=400)
     p = {**model.parameters, "quats": torch.tensor([1.0, 0, 0, 0]).expand(400, 4)}
     scene = Composition([Surfels({**p, "opacities": torch.full((400,), 5.0)})])
-    found = shot(scene, "normal")
+    pixels = shot(scene, "normal")
     seen = scene.render(CAMERA, SIDE).alpha.numpy() > 0.99
     facing = 1 if CAMERA.position[2] > 0 else -1
-    assert np.abs(found[seen] / 255 - (np.array([0, 0, facing]) + 1) / 2).max() < 0.02
+    assert np.abs(pixels[seen] / 255 - (np.array([0, 0, facing]) + 1) / 2).max() < 0.02
 
 
 def test_factors_are_grey_over_black():
@@ -57,15 +57,15 @@ def test_factors_are_grey_over_black():
     scene = Composition([Surfels(p)])
     seen = scene.render(CAMERA, SIDE).alpha.numpy() > 0.995
     for mode, value in {"ambient": 0.4, "diffuse": 0.5, "specular": 0.2, "shininess": 0.2}.items():
-        found = shot(scene, mode)
-        assert found[0, 0].tolist() == [0, 0, 0]
-        assert np.abs(found[seen] / 255 - value).max() < 0.01, mode
+        pixels = shot(scene, mode)
+        assert pixels[0, 0].tolist() == [0, 0, 0]
+        assert np.abs(pixels[seen] / 255 - value).max() < 0.01, mode
 
 
 def test_nothing_to_see_is_the_background(scene):
     for mode in ("shaded", "normal", "depth"):
-        found = frame(scene, CAMERA, SIDE, [PartEdit(visible=False)], mode, (1.0, 0.0, 0.0))
-        assert (found == [255, 0, 0]).all()
+        pixels = frame(scene, CAMERA, SIDE, [PartEdit(visible=False)], mode, (1.0, 0.0, 0.0))
+        assert (pixels == [255, 0, 0]).all()
 
 
 def test_a_mode_that_is_none(scene):

@@ -61,9 +61,9 @@ def test_those_of_a_killed_process_are_closed_and_gone_on_with(uri, client):
     again = open_parents(uri, "texgs", "k", {"": RUNS[""]})[""]
     assert again.id == killed.info.run_id
     close_dead_runs(uri, "texgs")
-    found = client.get_run(again.id)
-    assert found.info.status == "RUNNING", "this process lives"
-    assert found.data.tags["texgs.process"].startswith(f"{os.getpid()} ")
+    stored = client.get_run(again.id)
+    assert stored.info.status == "RUNNING", "this process lives"
+    assert stored.data.tags["texgs.process"].startswith(f"{os.getpid()} ")
 
 
 def test_without_tracking_nothing_is_recorded():

@@ -53,15 +53,15 @@ def test_finished_run_holds_everything(uri, client, tmp_path):
             job.log({"loss": 1 / (step + 1)}, step)
         job.log({"worst": math.nan, "most": math.inf, "clip@512": 0.3})
         job.artifact(tmp_path / "tables")
-    found = client.get_run(job.id)
-    assert found.info.status == "FINISHED"
-    assert found.info.run_name == "fit"
-    assert client.get_experiment(found.info.experiment_id).name == "texgs"
-    assert found.data.tags["git.sha"] == "0f3c"
-    assert found.data.params == {"fit.steps": "7"}
-    assert found.data.metrics["psnr"] == 30
-    assert found.data.metrics["clip_512"] == 0.3
-    assert math.isnan(found.data.metrics["worst"])
+    stored = client.get_run(job.id)
+    assert stored.info.status == "FINISHED"
+    assert stored.info.run_name == "fit"
+    assert client.get_experiment(stored.info.experiment_id).name == "texgs"
+    assert stored.data.tags["git.sha"] == "0f3c"
+    assert stored.data.params == {"fit.steps": "7"}
+    assert stored.data.metrics["psnr"] == 30
+    assert stored.data.metrics["clip_512"] == 0.3
+    assert math.isnan(stored.data.metrics["worst"])
     assert [(m.step, m.value) for m in client.get_metric_history(job.id, "loss")] == [
         (0, 1),
         (1, 1 / 2),
@@ -82,10 +82,10 @@ def test_failed_run_names_the_error(uri, client):
     with pytest.raises(ValueError, match="NaN"):
         fail()
     [job] = jobs
-    found = client.get_run(job.id)
-    assert found.info.status == "FAILED"
-    assert found.data.tags["error"] == "ValueError: NaN in means"
-    assert found.data.metrics == {"loss": 1.0}
+    stored = client.get_run(job.id)
+    assert stored.info.status == "FAILED"
+    assert stored.data.tags["error"] == "ValueError: NaN in means"
+    assert stored.data.metrics == {"loss": 1.0}
 
 
 @pytest.mark.parametrize("signal", [KeyboardInterrupt, SystemExit])

@@ -10,7 +10,7 @@ BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 
 
-def found():
+def chromium_path():
     """The path of a Chromium; skips the test that asks where it or Playwright is missing."""
     pytest.importorskip("playwright.sync_api", reason=MISSING)
     path = next(filter(None, map(shutil.which, BROWSERS)), None)
@@ -22,7 +22,7 @@ def found():
 @contextmanager
 def browser(args=SOFTWARE):
     """A Playwright browser, started with these arguments."""
-    path = found()
+    path = chromium_path()
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:

@@ -80,12 +80,12 @@ def test_the_view_that_is_nearest_is_shown(scene):
 
 
 def test_the_difference_is_that_of_the_scene_under_the_light_of_the_view(scene):
-    found = origins(scene)
+    result = origins(scene)
     shown = only(scene, "TF01")
-    assert found.frame(view("difference"), shown, 1.0).max() <= GAIN
+    assert result.frame(view("difference"), shown, 1.0).max() <= GAIN
     entry = shown.models["TF01"]
     half = replace(shown, models={**shown.models, "TF01": replace(entry, edit=PartEdit(opacity=0.5))})
-    assert found.frame(view("difference"), half, 1.0).max() > 10 * GAIN
+    assert result.frame(view("difference"), half, 1.0).max() > 10 * GAIN
 
 
 def test_a_wide_frame_has_the_view_in_its_middle(scene):
@@ -127,8 +127,8 @@ def test_a_damaged_summary_of_the_volume_is_left_out(scene, tmp_path, text):
 
 def test_a_scene_by_itself_has_nothing(tmp_path):
     file = write_model(tmp_path / "a/b/c/d/e/f/model.safetensors", ball(1))
-    found = origins(Scene({"TF01": SceneModel(file)}))
-    assert (found.modes, found.places, found.transfer) == ([], [], None)
+    result = origins(Scene({"TF01": SceneModel(file)}))
+    assert (result.modes, result.places, result.transfer) == ([], [], None)
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"frames": []}'])
@@ -143,9 +143,9 @@ def test_what_is_damaged_is_left_out_and_said(scene, tmp_path, caplog, text):
 def test_views_without_a_transfer_function_are_still_views(scene, tmp_path, tf):
     path = tmp_path / "TF01/views/transforms_train.json"
     path.write_text(json.dumps({**json.loads(path.read_text()), "tf": tf}))
-    found = origins(scene)
-    assert found.modes == ["truth", "difference"]
-    assert found.transfer is None
+    result = origins(scene)
+    assert result.modes == ["truth", "difference"]
+    assert result.transfer is None
 
 
 def test_a_picture_fits_into_a_frame():

@@ -138,10 +138,10 @@ def test_clicks_make_a_segment_that_is_edited_undone_and_saved(balls):
     saved = read_scene(scene_file).models["balls"]
     assert saved.segments["red"].edit == PartEdit(opacity=0.5)
     model, _ = two_balls()
-    found = read_segment(saved.segments["red"].file, model)
+    mask = read_segment(saved.segments["red"].file, model)
     clicks = Clicks(FRONT.camera(), torch.tensor([at(RED)]), torch.tensor([True]))
-    assert found.equal(lift(model, clicks, icosphere_of(VIEWS, LENS), GrabCut()).mask)
-    assert bool(found[red].all())
+    assert mask.equal(lift(model, clicks, icosphere_of(VIEWS, LENS), GrabCut()).mask)
+    assert bool(mask[red].all())
 
 
 def test_a_segment_replaces_no_file(balls):

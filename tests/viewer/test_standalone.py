@@ -111,9 +111,9 @@ def expected(file, size, light=HEADLIGHT, edits=None, turned=(0.0, 0.0)):
 
 def differ(page, *rest, **edited):
     """Largest difference of what is shown from what is expected, within the outline of what has the focus."""
-    found = shown(page)
-    height, width = found.shape[:2]
-    difference = np.abs(found.astype(int) - expected(*rest, (width, height), **edited))
+    pixels = shown(page)
+    height, width = pixels.shape[:2]
+    difference = np.abs(pixels.astype(int) - expected(*rest, (width, height), **edited))
     return int(difference[4:-4, 4:-4].max())
 
 
@@ -147,8 +147,8 @@ def test_nothing_else_may_run_or_load(chromium, file):
 
 def test_it_holds_a_picture_of_the_first_view(file):
     poster = re.search(r"data:image/jpeg;base64,([^\"]*)", file.read_text())[1]
-    found = np.asarray(Image.open(io.BytesIO(base64.b64decode(poster))))
-    assert np.abs(found.astype(int) - expected(file, found.shape[:2])).mean() < 3
+    pixels = np.asarray(Image.open(io.BytesIO(base64.b64decode(poster))))
+    assert np.abs(pixels.astype(int) - expected(file, pixels.shape[:2])).mean() < 3
 
 
 def test_it_opens_as_a_file_and_shows_what_the_rasterizer_renders(page, file):

@@ -92,9 +92,9 @@ def difference(page, packed, description, scene, camera, mode="shaded", *, light
     for part, edit in zip(parts, edits, strict=True):
         part["edit"] = {**vars(edit)}
     expected = rendered(packed, camera, light, edits, scene.background, mode)
-    found = drawn(page, camera, shown, mode)
+    pixels = drawn(page, camera, shown, mode)
     assert expected.std() > 5  # something is seen
-    return int(np.abs(expected.astype(int) - found.astype(int)).max())
+    return int(np.abs(expected.astype(int) - pixels.astype(int)).max())
 
 
 @pytest.mark.parametrize("light", [HEADLIGHT, SIDE, Light("directional", -60, -50)])
@@ -154,19 +154,19 @@ def test_the_background_is_that_of_the_scene(page, description):
 def test_depths_are_sorted_exactly_and_ties_as_the_rasterizer_has_them(page, count):
     depths = np.random.default_rng(count).exponential(size=count).astype(np.float32)
     depths[::3] = depths[: len(depths[::3])].round(1) + np.float32(0.2)  # many are the same
-    found = page.evaluate(
+    order = page.evaluate(
         "depths => { const order = new DepthOrder(depths.length); depths.forEach((z, i) => order.add(i, z));"
         " return [...order.farToNear()]; }",
         depths.tolist(),
     )
-    assert found == np.argsort(depths, kind="stable")[::-1].tolist()
+    assert order == np.argsort(depths, kind="stable")[::-1].tolist()
 
 
 def test_half_precision_is_read_exactly(page):
     halves = np.arange(2**16, dtype=np.uint16).view(np.float16)
     finite = np.isfinite(halves)
-    found = page.evaluate("bits => bits.map(halfToFloat)", np.flatnonzero(finite).tolist())
-    assert np.array_equal(np.array(found, np.float32), halves[finite].astype(np.float32))
+    values = page.evaluate("bits => bits.map(halfToFloat)", np.flatnonzero(finite).tolist())
+    assert np.array_equal(np.array(values, np.float32), halves[finite].astype(np.float32))
 
 
 def test_texels_beyond_eight_bits_have_sixteen(chromium, tmp_path):

@@ -183,12 +183,12 @@ def test_every_type_of_samples_looks_the_same(dtype, dims, device):
         ((low, 0), (half, 0.3), (most, 0.6), (high, 0.9)), ((half, 0.8, 0.4, 0.2), (high, 0.1, 0.2, 0.9))
     )
     camera, light = orbit(-60, 20, 2, 34, 20, 20), Light("directional", 30, 40)
-    expected, found = (
+    expected, image = (
         Caster(grid, Appearance(), device).render(tf, camera, light)
         for grid in (Grid(levels), Grid(levels.astype(dtype)))
     )
     assert (expected[..., 3] > 0.1).any()
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(image, expected)
 
 
 def wavy(points):
@@ -211,31 +211,31 @@ def test_it_is_what_marching_in_torch_sees(step, light, spacing, device):
     )
     expected = march(grid, SHELLS, camera, look, light)
     cast = Caster(grid, look, device).cast(SHELLS, camera, light, OUTPUTS)
-    found = Cast(*(plane.cpu() for plane in (cast.rgba, cast.depth, cast.median, cast.normal)))
+    planes = Cast(*(plane.cpu() for plane in (cast.rgba, cast.depth, cast.median, cast.normal)))
     np.testing.assert_allclose(
-        found.rgba[..., :3], expected.color, atol=0.0015
+        planes.rgba[..., :3], expected.color, atol=0.0015
     )  # light that is left at an end
-    np.testing.assert_allclose(found.rgba[..., 3], expected.alpha, atol=0.0015)
-    assert psnr(found.rgba.numpy(), torch.cat([expected.color, expected.alpha[..., None]], -1).numpy()) > 70
+    np.testing.assert_allclose(planes.rgba[..., 3], expected.alpha, atol=0.0015)
+    assert psnr(planes.rgba.numpy(), torch.cat([expected.color, expected.alpha[..., None]], -1).numpy()) > 70
     seen = expected.alpha > 0.01
-    np.testing.assert_allclose(found.depth[seen], expected.depth[seen], atol=1e-3)
-    np.testing.assert_allclose(found.normal[seen], expected.normal[seen], atol=5e-3)
-    assert not found.depth[expected.alpha == 0].any()
+    np.testing.assert_allclose(planes.depth[seen], expected.depth[seen], atol=1e-3)
+    np.testing.assert_allclose(planes.normal[seen], expected.normal[seen], atol=5e-3)
+    assert not planes.depth[expected.alpha == 0].any()
 
 
 @pytest.mark.parametrize("points", [8, 9, 16, 17, 150])
 def test_functions_of_many_points_are_what_marching_sees(points, device):
     grid, camera, look, tf = ball(24), orbit(-60, 20, 2.5, 30, 30, 25), Appearance(), wavy(points)
     expected = march(grid, tf, camera, look, HEADLIGHT)
-    found = Caster(grid, look, device).render(tf, camera, HEADLIGHT)
-    assert psnr(found, torch.cat([expected.color, expected.alpha[..., None]], -1).numpy()) > 70
+    image = Caster(grid, look, device).render(tf, camera, HEADLIGHT)
+    assert psnr(image, torch.cat([expected.color, expected.alpha[..., None]], -1).numpy()) > 70
 
 
 def test_the_median_is_where_half_of_the_light_is_gone(device):
     x, _, _ = lattice(33, 33, 33)
     camera, look = orbit(-90, 0, 3, 10, 9, 9), Appearance(step=0.05, opacity_unit=0.05)
-    found = Caster(Grid(x), look, device).cast(constant(0.1), camera, HEADLIGHT, ("median",))
-    assert float(found.median[4, 4]) == pytest.approx(2.5 + 0.05 * np.log(0.5) / np.log(0.9), abs=2e-3)
+    rendered = Caster(Grid(x), look, device).cast(constant(0.1), camera, HEADLIGHT, ("median",))
+    assert float(rendered.median[4, 4]) == pytest.approx(2.5 + 0.05 * np.log(0.5) / np.log(0.9), abs=2e-3)
     thin = Caster(Grid(x), look, device).cast(constant(0.01), camera, HEADLIGHT, ("median",))
     assert float(thin.median[4, 4]) == 0
 
@@ -243,10 +243,10 @@ def test_the_median_is_where_half_of_the_light_is_gone(device):
 @pytest.mark.parametrize("light", [HEADLIGHT, Light("directional", 30, 40)])
 def test_vtk_sees_the_same(light):
     camera, look = orbit(-60, 20, 2.5, 30, 60, 50), Appearance(step=0.25)
-    found = Caster(ball(64), look).render(SHELLS, camera, light)
+    image = Caster(ball(64), look).render(SHELLS, camera, light)
     expected = VtkCaster(ball(64), look, 2).render(SHELLS, camera, light)
-    assert psnr(over_white(found), over_white(expected)) > 48
-    assert psnr(found[..., 3], expected[..., 3]) > 48
+    assert psnr(over_white(image), over_white(expected)) > 48
+    assert psnr(image[..., 3], expected[..., 3]) > 48
 
 
 def test_a_value_at_the_end_of_a_function_is_visible(device):
@@ -272,11 +272,11 @@ def test_missing_values_are_transparent_and_counted(device):
     away[2:10, 3:12, 4:13] = -100  # with the cells around
     camera = orbit(-60, 20, 2, 34, 25, 25)
     tf = TransferFunction(((0.1, 0.5), (1, 0.9)), ((0, 1, 1, 1),))
-    found = caster.render(tf, camera, HEADLIGHT)
-    assert np.isfinite(found).all()
+    image = caster.render(tf, camera, HEADLIGHT)
+    assert np.isfinite(image).all()
     assert bool(caster.cast(tf, camera, HEADLIGHT, ("normal",)).normal.isfinite().all())
     covered = Caster(Grid(np.nan_to_num(away, nan=-100)), Appearance(), device).render(tf, camera, HEADLIGHT)
-    assert psnr(found[..., 3], covered[..., 3]) > 25
+    assert psnr(image[..., 3], covered[..., 3]) > 25
     nothing = Caster(Grid(np.full((4, 4, 4), np.nan)), Appearance(), device)
     assert not nothing.render(tf, camera, HEADLIGHT).any()
 
@@ -316,8 +316,8 @@ def test_points_hold_the_function_at_every_value(tf):
     one, other = points[first], points[first + 1]
     width = other[:, :1] - one[:, :1]
     place = np.divide(values[:, None] - one[:, :1], width, where=width > 0, out=np.zeros_like(width))
-    found = one[:, 1:] + place * (other[:, 1:] - one[:, 1:])
-    np.testing.assert_allclose(found[:, [1, 2, 3, 0]], tf(values), atol=1e-5)
+    interpolated = one[:, 1:] + place * (other[:, 1:] - one[:, 1:])
+    np.testing.assert_allclose(interpolated[:, [1, 2, 3, 0]], tf(values), atol=1e-5)
 
 
 @pytest.mark.parametrize(("low", "high"), [(16777216, 16777217), (0, 1e39), (-3e38, 3e38), (0, 1e-39)])
@@ -341,8 +341,8 @@ def test_another_shading_is_that_of_a_caster_that_has_it(device):
         Appearance(ambient=0.1, specular=0.0),
         orbit(9, 9, 3, 30, 9, 9),
     )
-    found = Caster(grid, Appearance(), device).looking(dark).render(SHELLS, camera, HEADLIGHT)
-    np.testing.assert_array_equal(found, Caster(grid, dark, device).render(SHELLS, camera, HEADLIGHT))
+    image = Caster(grid, Appearance(), device).looking(dark).render(SHELLS, camera, HEADLIGHT)
+    np.testing.assert_array_equal(image, Caster(grid, dark, device).render(SHELLS, camera, HEADLIGHT))
 
 
 SKEWED = torch.tensor([[9.0, 1.0, 4.0], [0.0, 9.0, 4.0], [0.0, 0.0, 1.0]])

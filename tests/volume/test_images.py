@@ -29,11 +29,11 @@ def expected_planes(pixels):
 
 
 def test_images_are_kept_to_half_a_value_of_8_bits(tmp_path):
-    found = [random_view(tmp_path, camera, seed) for seed, camera in enumerate(cameras(3, size=8))]
-    images = load([view for view, _ in found])
+    pairs = [random_view(tmp_path, camera, seed) for seed, camera in enumerate(cameras(3, size=8))]
+    images = load([view for view, _ in pairs])
     assert images.planes.dtype == torch.uint8
     assert len(images) == 3
-    for index, (view, pixels) in enumerate(found):
+    for index, (view, pixels) in enumerate(pairs):
         target = images.target(index)
         planes = torch.cat([target.color.permute(2, 0, 1), target.alpha[None]])
         assert (planes.double() - expected_planes(pixels)).abs().max() <= 0.5 / 255 + 1e-6

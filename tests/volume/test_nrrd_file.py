@@ -48,8 +48,8 @@ def test_other_readers_agree(tmp_path, dtype):
     image = reader.GetOutput()
     assert (image.GetDimensions(), image.GetSpacing()) == ((13, 12, 11), SPACING)
     assert image.GetOrigin() == pytest.approx(ORIGIN)
-    found = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(11, 12, 13)
-    np.testing.assert_array_equal(found, sample_values(dtype))
+    scalars = vtk_to_numpy(image.GetPointData().GetScalars()).reshape(11, 12, 13)
+    np.testing.assert_array_equal(scalars, sample_values(dtype))
 
 
 def test_header_is_padded_for_every_length():

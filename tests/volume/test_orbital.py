@@ -51,8 +51,8 @@ def test_orbitals_are_orthonormal():
     axis = np.linspace(-32, 32, 65)
     places = (axis, axis[:, None], axis[:, None, None])
     smooth = [(n, degree, order) for n, degree, order in NUMBERS if degree >= 1 and n <= 3]
-    found = np.stack([wave_function(*numbers, *places).ravel() for numbers in smooth])
-    np.testing.assert_allclose(found @ found.T, np.eye(len(found)), atol=2e-3)
+    orbitals = np.stack([wave_function(*numbers, *places).ravel() for numbers in smooth])
+    np.testing.assert_allclose(orbitals @ orbitals.T, np.eye(len(orbitals)), atol=2e-3)
 
 
 @pytest.mark.parametrize("numbers", [(3, 2, 0), (4, 3, 0), (4, 2, -1)])

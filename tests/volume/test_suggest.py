@@ -37,7 +37,7 @@ def check(basic, low, high):
     assert len({tf.color[0][1:] for tf in list(basic.values())[:6]}) == min(len(basic), 6)
 
 
-def found(basic, value):
+def names_at(basic, value):
     """Names of the functions in which a value is at least half as opaque as it gets."""
     return [n for n, tf in basic.items() if tf(value)[3] >= 0.5 * max(alpha for _, alpha in tf.opacity)]
 
@@ -46,20 +46,20 @@ class TestMaterials:
     def test_air_soft_tissue_and_bone(self):
         basic = suggest(*histogram(CT))
         check(basic, CT.min(), CT.max())
-        assert found(basic, -1000) == []
-        assert found(basic, 40) == ["TF01"]
-        assert found(basic, 1200) == ["TF02"]
+        assert names_at(basic, -1000) == []
+        assert names_at(basic, 40) == ["TF01"]
+        assert names_at(basic, 1200) == ["TF02"]
 
     def test_a_rare_dense_material_is_found(self):
         values = np.append(CT, RNG.normal(2600, 30, 3000))
         basic = suggest(*histogram(values))
-        assert [found(basic, v) for v in (40, 1200, 2600)] == [["TF01"], ["TF02"], ["TF03"]]
+        assert [names_at(basic, v) for v in (40, 1200, 2600)] == [["TF01"], ["TF02"], ["TF03"]]
 
     def test_noise_below_the_background_is_left_out_but_not_a_material(self):
         air = normal((0, 5, 500_000), (100, 10, 100_000))
-        assert found(suggest(*histogram(np.append(air, RNG.normal(-60, 10, 2000)))), -60) == []
+        assert names_at(suggest(*histogram(np.append(air, RNG.normal(-60, 10, 2000)))), -60) == []
         basic = suggest(*histogram(np.append(air, RNG.normal(-60, 10, 60_000))))
-        assert [found(basic, v) for v in (-60, 0, 100)] == [["TF01"], [], ["TF02"]]
+        assert [names_at(basic, v) for v in (-60, 0, 100)] == [["TF01"], [], ["TF02"]]
 
     def test_the_scale_of_values_and_counts_is_free(self):
         counts, low, high = histogram(CT)
@@ -70,7 +70,7 @@ class TestMaterials:
     def test_the_maximum_is_visible(self):
         values = np.append(CT, np.full(5000, 2000))  # saturated
         basic = suggest(*histogram(values))
-        assert found(basic, 2000) == [list(basic)[-1]]
+        assert names_at(basic, 2000) == [list(basic)[-1]]
 
 
 class TestSimulations:
@@ -94,16 +94,16 @@ class TestSimulations:
         counts, low, high = histogram(normal((0, 1, 300_000)))
         basic = suggest(counts, low, high)
         check(basic, low, high)
-        assert found(basic, 0) == []
-        assert found(basic, 0.9 * low)
-        assert found(basic, 0.9 * high)
+        assert names_at(basic, 0) == []
+        assert names_at(basic, 0.9 * low)
+        assert names_at(basic, 0.9 * high)
 
 
 class TestLabels:
     def test_every_label_but_the_lowest_has_its_function(self):
         basic = suggest(*histogram(np.repeat([0, 1, 2, 7], [900, 50, 10, 2])))
         check(basic, 0, 7)
-        assert [found(basic, label) for label in (0, 1, 2, 7)] == [[], ["TF01"], ["TF02"], ["TF03"]]
+        assert [names_at(basic, label) for label in (0, 1, 2, 7)] == [[], ["TF01"], ["TF02"], ["TF03"]]
 
     def test_many_labels_are_grouped(self):
         counts, low, high = histogram(np.repeat(np.arange(25), 100))
@@ -114,8 +114,8 @@ class TestLabels:
 
     def test_a_mask(self):
         basic = suggest([100, 400], 0, 1)
-        assert found(basic, 1) == ["TF01"]
-        assert found(basic, 0) == []
+        assert names_at(basic, 1) == ["TF01"]
+        assert names_at(basic, 0) == []
 
 
 class TestCount:
@@ -166,13 +166,13 @@ def scalars(name):
 class TestRealVolumes:
     def test_engine_casing_and_dense_parts(self):
         basic = suggest(*histogram(scalars("engine.vti")))
-        assert found(basic, 0) == []
-        assert found(basic, 140) == ["TF01"]
-        assert found(basic, 254) == [list(basic)[-1]] != ["TF01"]
+        assert names_at(basic, 0) == []
+        assert names_at(basic, 140) == ["TF01"]
+        assert names_at(basic, 254) == [list(basic)[-1]] != ["TF01"]
 
     def test_tooth_dentin_and_enamel(self):
         basic = suggest(*histogram(scalars("tooth.nrrd")))
-        assert [found(basic, v) for v in (76, 163, 235)] == [[], ["TF01"], ["TF02"]]
+        assert [names_at(basic, v) for v in (76, 163, 235)] == [[], ["TF01"], ["TF02"]]
 
     def test_hydrogen_lobes(self):
         values = scalars("hydrogen.vti")

@@ -74,8 +74,8 @@ class TestWithoutSteps:
         for point in tf.without_steps().color:
             color.AddRGBPoint(*point)
         values = np.arange(-72, 73) / 8  # on the points and between them
-        found = [(*color.GetColor(value), opacity.GetValue(value)) for value in values]
-        np.testing.assert_allclose(found, tf(values), rtol=0, atol=1e-4)  # a step moves by 1e-6 of the range
+        rgba = [(*color.GetColor(value), opacity.GetValue(value)) for value in values]
+        np.testing.assert_allclose(rgba, tf(values), rtol=0, atol=1e-4)  # a step moves by 1e-6 of the range
 
     @given(functions())
     def test_is_strictly_ascending_and_ends_transparent(self, tf):

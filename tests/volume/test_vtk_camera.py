@@ -30,13 +30,13 @@ def test_vtk_projects_points_as_we_do(width, height, azimuth, polar):
 
 
 @pytest.mark.parametrize(
-    ("entry", "value", "found"), [((0, 0), 90.0, "90, 109.899"), ((1, 2), 31.0, "40, 31")]
+    ("entry", "value", "focal"), [((0, 0), 90.0, "90, 109.899"), ((1, 2), 31.0, "40, 31")]
 )
-def test_a_lens_that_vtk_does_not_have_is_an_error(entry, value, found):
+def test_a_lens_that_vtk_does_not_have_is_an_error(entry, value, focal):
     camera = orbit(0, 0, 2, 40, 80, 80)
     K = camera.K.clone()
     K[entry] = value
-    with pytest.raises(ArgumentError, match=rf"principal point \(40.0, 40.0\), got focal lengths .*{found}"):
+    with pytest.raises(ArgumentError, match=rf"principal point \(40.0, 40.0\), got focal lengths .*{focal}"):
         aim(vtk.vtkCamera(), replace(camera, K=K))
 
 

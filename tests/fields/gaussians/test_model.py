@@ -43,11 +43,11 @@ def test_a_view_is_that_of_the_float64_reference(antialiased):
         outputs=("depth",),
         options=Options(antialiased=antialiased),
     )
-    found = model.render(CAMERA, outputs=("depth",))
+    rendered = model.render(CAMERA, outputs=("depth",))
     # Rounding of float32; a fragment whose alpha is at the threshold of 1/255 may be in one of them only.
-    assert_close(found.color.double(), expected.color, atol=5e-3, rtol=0)
-    assert float((found.color - expected.color).abs().mean()) < 1e-5
-    assert float((found.depth - expected.depth).abs().mean()) < 1e-3
+    assert_close(rendered.color.double(), expected.color, atol=5e-3, rtol=0)
+    assert float((rendered.color - expected.color).abs().mean()) < 1e-5
+    assert float((rendered.depth - expected.depth).abs().mean()) < 1e-3
 
 
 def test_the_filter_matters():
@@ -59,10 +59,10 @@ def test_the_filter_matters():
 
 def test_light_changes_nothing_and_the_background_is_white_unless_told():
     model = sample(5)
-    found = model.render(CAMERA)
-    assert torch.equal(found.color, model.render(CAMERA, Light("directional", 100, 30)).color)
-    empty = found.alpha == 0
-    assert bool((found.color[empty] == 1).all())
+    rendered = model.render(CAMERA)
+    assert torch.equal(rendered.color, model.render(CAMERA, Light("directional", 100, 30)).color)
+    empty = rendered.alpha == 0
+    assert bool((rendered.color[empty] == 1).all())
     assert bool((model.render(CAMERA, background=torch.zeros(3)).color[empty] == 0).all())
 
 

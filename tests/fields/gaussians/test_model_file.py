@@ -32,9 +32,9 @@ def rewritten(path, tensors=None, **description):
 @pytest.mark.parametrize("n", [0, 7])
 def test_round_trip_is_exact(tmp_path, degree, n):
     model = sample(n, degree=degree, antialiased=degree == 2)
-    found = open_field(write_gaussians(tmp_path / "new" / "model.safetensors", model))
-    assert same(found, model)
-    assert (found.kind, found.shading, found.metadata) == ("gaussians", model.shading, model.metadata)
+    field = open_field(write_gaussians(tmp_path / "new" / "model.safetensors", model))
+    assert same(field, model)
+    assert (field.kind, field.shading, field.metadata) == ("gaussians", model.shading, model.metadata)
 
 
 def test_the_same_model_gives_the_same_bytes(tmp_path):

@@ -32,7 +32,7 @@ def test_the_layout_is_that_of_3dgs_with_248_bytes_each(tmp_path, degree):
 
 def test_values_are_raw_and_harmonics_channel_major(tmp_path):
     model = sample()
-    p, found = model.parameters, vertices(write_ply(tmp_path / "m.ply", model))
+    p, columns = model.parameters, vertices(write_ply(tmp_path / "m.ply", model))
     for name, expected in (
         ("x", p["means"][:, 0]),
         ("nz", torch.zeros(7)),
@@ -44,37 +44,37 @@ def test_values_are_raw_and_harmonics_channel_major(tmp_path):
         ("f_rest_15", p["sh"][:, 1, 1]),
         ("f_rest_44", p["sh"][:, 15, 2]),
     ):
-        np.testing.assert_array_equal(found[name], expected.numpy(), err_msg=name)
+        np.testing.assert_array_equal(columns[name], expected.numpy(), err_msg=name)
 
 
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10**6), n=st.integers(0, 5), antialiased=st.booleans())
 def test_gaussians_come_back_exactly_but_for_the_filter(tmp_path_factory, seed, n, antialiased):
     model = sample(n, seed=seed, antialiased=antialiased)
-    found = read_ply(write_ply(tmp_path_factory.mktemp("p") / "m.ply", model))
-    assert same(found, model)
-    assert found.shading == Baked()
+    restored = read_ply(write_ply(tmp_path_factory.mktemp("p") / "m.ply", model))
+    assert same(restored, model)
+    assert restored.shading == Baked()
 
 
 def test_fewer_harmonics_come_back_with_zeros(tmp_path):
     model = sample(degree=1)
-    found = read_ply(write_ply(tmp_path / "m.ply", model)).parameters["sh"]
-    assert torch.equal(found[:, :4], model.parameters["sh"])
-    assert not found[:, 4:].any()
+    harmonics = read_ply(write_ply(tmp_path / "m.ply", model)).parameters["sh"]
+    assert torch.equal(harmonics[:, :4], model.parameters["sh"])
+    assert not harmonics[:, 4:].any()
 
 
 def test_files_of_other_programs_may_have_fewer_harmonics_and_more_properties(tmp_path):
     path = write_ply(tmp_path / "m.ply", sample())
     changes = {f"f_rest_{k}": None for k in range(45)} | {"segment": np.arange(7)}
-    found = read_ply(write_vertices(tmp_path / "o.ply", columns_of(path, **changes), text=True))
-    assert torch.equal(found.parameters["sh"], sample().parameters["sh"][:, :1])
+    restored = read_ply(write_vertices(tmp_path / "o.ply", columns_of(path, **changes), text=True))
+    assert torch.equal(restored.parameters["sh"], sample().parameters["sh"][:, :1])
 
 
 def test_surfels_written_for_viewers_of_gaussians_are_gaussians(tmp_path):
     model = surfels("surfels")
-    found = read_ply(write_surfels(tmp_path / "m.ply", model, "3dgs"))
-    assert torch.equal(found.parameters["scales"][:, :2], model.parameters["scales"])
-    assert found.parameters["scales"][:, 2].exp().max() < 1.1e-6
+    restored = read_ply(write_surfels(tmp_path / "m.ply", model, "3dgs"))
+    assert torch.equal(restored.parameters["scales"][:, :2], model.parameters["scales"])
+    assert restored.parameters["scales"][:, 2].exp().max() < 1.1e-6
 
 
 @pytest.mark.parametrize(

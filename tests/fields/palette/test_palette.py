@@ -102,10 +102,10 @@ def test_blending_weights_are_those_of_a_plain_loop():
     for d, r in zip(depth, ray.tolist(), strict=True):
         expected.append(left.get(r, 1.0) * (1 - torch.exp(-d)))
         left[r] = left.get(r, 1.0) * torch.exp(-d)
-    found, expected = blending_weights(depth, ray), torch.stack(expected)
-    torch.testing.assert_close(found.double(), expected, atol=1e-7, rtol=1e-6)
+    weights, expected = blending_weights(depth, ray), torch.stack(expected)
+    torch.testing.assert_close(weights.double(), expected, atol=1e-7, rtol=1e-6)
     values = torch.randn(400, generator=generator).double()
-    gradients = [torch.autograd.grad((x.double() * values).sum(), depth)[0] for x in (found, expected)]
+    gradients = [torch.autograd.grad((x.double() * values).sum(), depth)[0] for x in (weights, expected)]
     torch.testing.assert_close(*gradients, atol=1e-6, rtol=1e-5)
     assert len(blending_weights(depth[:0], ray[:0])) == 0
 
@@ -123,12 +123,12 @@ def test_the_full_configuration_is_as_large_as_the_paper_says():
 def test_files_give_the_same_bits_and_are_known_by_their_header(tmp_path, free):
     field = box(scale=1.0, free=free)
     path = write_palette(tmp_path / "model.safetensors", field)
-    found = open_field(path)
-    assert isinstance(found, PaletteField)
-    assert found.metadata == field.metadata
-    assert torch.equal(found.render(CAMERA).color, field.render(CAMERA).color)
-    assert write_palette(tmp_path / "again", found).read_bytes() == path.read_bytes()
-    assert path.stat().st_size == pytest.approx(found.sizes()["stored_total_mib"] * 2**20, abs=4000)
+    restored = open_field(path)
+    assert isinstance(restored, PaletteField)
+    assert restored.metadata == field.metadata
+    assert torch.equal(restored.render(CAMERA).color, field.render(CAMERA).color)
+    assert write_palette(tmp_path / "again", restored).read_bytes() == path.read_bytes()
+    assert path.stat().st_size == pytest.approx(restored.sizes()["stored_total_mib"] * 2**20, abs=4000)
 
 
 @pytest.mark.parametrize(
@@ -168,8 +168,8 @@ def test_clusters_are_of_hues_and_the_largest_comes_first():
     light = 0.3 + 0.7 * torch.rand(900, 1, generator=generator)
     hues = torch.tensor([[1.0, 0.2, 0.1], [0.1, 0.3, 1.0]])
     colors = light * hues[(torch.arange(900) % 3 == 0).long()]
-    found = cluster_colors(colors, 2)
-    torch.testing.assert_close(found / found.amax(1, keepdim=True), hues, atol=0.01, rtol=0)
+    clusters = cluster_colors(colors, 2)
+    torch.testing.assert_close(clusters / clusters.amax(1, keepdim=True), hues, atol=0.01, rtol=0)
     one = cluster_colors(torch.tensor([[0.5, 0.5, 0.5], [0.4, 0.4, 0.2]]), 3)
     torch.testing.assert_close(one.sort(0).values[2], torch.tensor([0.5, 0.5, 0.5]))
     assert one.shape == (3, 3)

@@ -26,6 +26,6 @@ def write_vertices(path, columns, **kind):
 
 def columns_of(path, **changes):
     """Columns of a PLY file, some changed; None removes one."""
-    found = vertices(path)
-    columns = {name: np.array(found[name]) for name in found.dtype.names} | changes
+    data = vertices(path)
+    columns = {name: np.array(data[name]) for name in data.dtype.names} | changes
     return {name: column for name, column in columns.items() if column is not None}

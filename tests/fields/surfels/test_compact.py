@@ -37,9 +37,9 @@ def rewritten(path, **header):
 @pytest.mark.parametrize("shared", [False, True])
 def test_every_tensor_comes_back_within_its_bound(tmp_path, stage, shared):
     model = sample(stage, shared=shared, low_pass=2.5, material="paper", local_viewer=False)
-    found = read_compact(write_compact(tmp_path / "new" / "model.texgs", model))
-    assert (found.stage, found.shading, found.metadata) == (stage, model.shading, model.metadata)
-    given, got = dict(model.parameters), dict(found.parameters)
+    restored = read_compact(write_compact(tmp_path / "new" / "model.texgs", model))
+    assert (restored.stage, restored.shading, restored.metadata) == (stage, model.shading, model.metadata)
+    given, got = dict(model.parameters), dict(restored.parameters)
     assert given.keys() == got.keys()
     for name in {"means", "palette", "sizes", "offsets"} & given.keys():
         assert torch.equal(got.pop(name), given.pop(name)), name
@@ -61,8 +61,8 @@ def test_no_texel_is_off_by_more_than_half_a_step(tmp_path_factory, texels, step
     model = sample(n=1)
     p = {"texels": torch.tensor([texels]), "sizes": torch.ones(1, 2, dtype=torch.int32)}
     model = changed(model, **p)
-    found = read_compact(write_compact(tmp_path_factory.mktemp("m") / "m", model, step=step))
-    error = (found.parameters["texels"] - p["texels"]).abs()
+    restored = read_compact(write_compact(tmp_path_factory.mktemp("m") / "m", model, step=step))
+    error = (restored.parameters["texels"] - p["texels"]).abs()
     assert bool((error <= step / 2 + 2**-23 * p["texels"].abs()).all())
 
 
@@ -71,10 +71,10 @@ def test_textures_in_any_order_come_back_one_after_the_other(tmp_path):
     p = model.parameters
     order = torch.tensor([2, 0, 3, 1])
     shuffled = changed(model, sizes=p["sizes"][order], offsets=p["offsets"][order])
-    found = read_compact(write_compact(tmp_path / "m", shuffled)).parameters
+    restored = read_compact(write_compact(tmp_path / "m", shuffled)).parameters
     for n, old in enumerate(order.tolist()):
         count = int(p["sizes"][old].prod())
-        got = found["texels"][found["offsets"][n] :][:count]
+        got = restored["texels"][restored["offsets"][n] :][:count]
         assert float((got - p["texels"][p["offsets"][old] :][:count]).abs().max()) <= STEP / 2
 
 
@@ -87,38 +87,38 @@ def test_colors_hardly_change_and_the_file_is_an_eighth(tmp_path):
     texels = 0.03 * torch.randn(3000 * 64, 1, generator=g) + 0.002 * torch.randn(3000 * 64, 3, generator=g)
     model = changed(model, sizes=sizes, offsets=torch.arange(3000) * 64, texels=texels)
     path = write_compact(tmp_path / "m", model)
-    found = read_compact(path)
+    restored = read_compact(path)
     assert path.stat().st_size < texels.nbytes / 8
     for azimuth in (0, 120, 240):
         camera = orbit(azimuth, 20, 3, 40, 128, 128)
-        one, other = (m.render(camera).color for m in (model, found))
+        one, other = (m.render(camera).color for m in (model, restored))
         assert psnr(other, one) > 54.3, "costs a model at 38 dB less than 0.1 dB"
 
 
 def test_a_model_of_38_db_loses_less_than_a_tenth(tmp_path):
     model = ball(2, n=500)
-    found = read_compact(write_compact(tmp_path / "m", model))
+    restored = read_compact(write_compact(tmp_path / "m", model))
     exact = model.render(CAMERA).color
     noise = torch.randn(exact.shape, generator=torch.Generator().manual_seed(1))
     target = exact + 10 ** (-38 / 20) * noise  # an image that the model explains to 38 dB
-    assert psnr(exact, target) - psnr(found.render(CAMERA).color, target) < 0.1
+    assert psnr(exact, target) - psnr(restored.render(CAMERA).color, target) < 0.1
 
 
 def test_unseen_surfels_keep_one_mean_texel(tmp_path):
     model = ball(1)
     p = model.parameters
     seen = torch.rand(len(model), generator=torch.Generator().manual_seed(0)) > 0.5
-    found = read_compact(write_compact(tmp_path / "m", model, seen)).parameters
-    assert torch.equal(found["sizes"][seen], p["sizes"][seen])
-    assert bool((found["sizes"][~seen] == 1).all())
+    restored = read_compact(write_compact(tmp_path / "m", model, seen)).parameters
+    assert torch.equal(restored["sizes"][seen], p["sizes"][seen])
+    assert bool((restored["sizes"][~seen] == 1).all())
     for n in range(len(model)):
         count = int(p["sizes"][n].prod())
         old = p["texels"][p["offsets"][n] :][:count]
-        new = found["texels"][found["offsets"][n] :][: int(found["sizes"][n].prod())]
+        new = restored["texels"][restored["offsets"][n] :][: int(restored["sizes"][n].prod())]
         assert float((new - (old if seen[n] else old.mean(0))).abs().max()) <= STEP / 2 + 1e-6
     one_stage = sample("shading")
-    found = read_compact(write_compact(tmp_path / "s", one_stage, torch.zeros(7, dtype=torch.bool)))
-    assert len(found) == 7, "a model without texture has none to drop"
+    restored = read_compact(write_compact(tmp_path / "s", one_stage, torch.zeros(7, dtype=torch.bool)))
+    assert len(restored) == 7, "a model without texture has none to drop"
 
 
 def test_a_surfel_behind_an_opaque_wall_is_unseen():
@@ -140,8 +140,8 @@ def test_a_surfel_behind_an_opaque_wall_is_unseen():
 def test_what_half_precision_cannot_hold_stays(tmp_path):
     model = sample("shading")
     colors = model.parameters["colors"] * 1e6
-    found = read_compact(write_compact(tmp_path / "m", changed(model, colors=colors)))
-    assert torch.equal(found.parameters["colors"], colors)
+    restored = read_compact(write_compact(tmp_path / "m", changed(model, colors=colors)))
+    assert torch.equal(restored.parameters["colors"], colors)
 
 
 def test_no_surfels_are_a_model_and_the_same_model_gives_the_same_bytes(tmp_path):

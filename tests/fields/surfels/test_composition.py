@@ -70,9 +70,9 @@ def test_one_model_unedited_is_the_model_bit_for_bit(light):
 def test_a_scene_is_the_union_of_its_surfels(light):
     models = [ball(1), ball(2, shared=False, middle=0.2), ball(3, middle=-0.1)]
     expected = union(*models).render(CAMERA, light)
-    found = Composition(models).render(CAMERA, light)
-    assert_close(found.color, expected.color, atol=1e-6, rtol=0)
-    assert_close(found.alpha, expected.alpha, atol=1e-6, rtol=0)
+    rendered = Composition(models).render(CAMERA, light)
+    assert_close(rendered.color, expected.color, atol=1e-6, rtol=0)
+    assert_close(rendered.alpha, expected.alpha, atol=1e-6, rtol=0)
 
 
 def test_hiding_is_removing_bit_for_bit():
@@ -101,9 +101,9 @@ def test_an_edit_is_the_model_with_other_numbers():
 
 def test_an_opacity_above_one_is_one():
     model = ball(5)
-    found = Composition([model]).render(CAMERA, SIDE, [PartEdit(opacity=1000.0)])
+    rendered = Composition([model]).render(CAMERA, SIDE, [PartEdit(opacity=1000.0)])
     full = {**model.parameters, "opacities": torch.full((150,), 40.0)}
-    assert torch.equal(found.alpha, Surfels(full).render(CAMERA, SIDE).alpha)
+    assert torch.equal(rendered.alpha, Surfels(full).render(CAMERA, SIDE).alpha)
 
 
 def test_edits_do_not_copy_texels():
@@ -117,23 +117,23 @@ def test_looks_of_the_material_are_its_factors():
     """Where a surfel is opaque, blending shows what it has; factors of both models differ."""
     models = [ball(1, n=2000), ball(2, n=2000, middle=0.0)]
     edits = [PartEdit(diffuse=0.5), PartEdit(diffuse=0.5)]
-    found = Composition(models).render(CAMERA, SIDE, edits, look="diffuse")
-    assert_close(found.color, 0.25 * found.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
+    rendered = Composition(models).render(CAMERA, SIDE, edits, look="diffuse")
+    assert_close(rendered.color, 0.25 * rendered.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
 
 
 def test_without_light_colours_are_those_of_palette_and_texels():
     model = ball(1, n=3000)
     flat = {**model.parameters, "texels": torch.zeros_like(model.parameters["texels"])}
     flat["colors"] = torch.zeros_like(flat["colors"])
-    found = Composition([Surfels(flat)]).render(CAMERA, SIDE, look="unshaded", background=torch.zeros(3))
-    assert_close(found.color, found.alpha[..., None] * flat["palette"], atol=1e-5, rtol=0)
+    rendered = Composition([Surfels(flat)]).render(CAMERA, SIDE, look="unshaded", background=torch.zeros(3))
+    assert_close(rendered.color, rendered.alpha[..., None] * flat["palette"], atol=1e-5, rtol=0)
 
 
 def test_texels_alone_are_around_grey():
     model = ball(1, n=3000)
     even = {**model.parameters, "texels": torch.full_like(model.parameters["texels"], 0.125)}
-    found = Composition([Surfels(even)]).render(CAMERA, SIDE, look="texture", background=torch.zeros(3))
-    assert_close(found.color, 0.625 * found.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
+    rendered = Composition([Surfels(even)]).render(CAMERA, SIDE, look="texture", background=torch.zeros(3))
+    assert_close(rendered.color, 0.625 * rendered.alpha[..., None].expand(-1, -1, 3), atol=1e-5, rtol=0)
 
 
 def test_discs_are_opaque_within_one_standard_deviation():

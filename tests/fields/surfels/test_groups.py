@@ -36,11 +36,11 @@ def test_counts_what_the_paper_counts(dataset):
     p = {name: x.expand(n, *x.shape[1:]) for name, x in whole.parameters.items() if name in per_surfel}
     p |= {"palette": torch.zeros(3), "texels": torch.zeros(1, 3).expand(n_scenes * N_TEXELS, 3)}
     p |= {"sizes": torch.ones(1, 2, dtype=torch.int32).expand(n, 2), "offsets": torch.arange(n)}
-    found = Surfels(p).sizes()
-    assert round(found["geometry_mib"], 1) == geometry
-    assert round(found["shading_mib"], 1) == shading
-    assert found["texture_mib"] == pytest.approx(texture, rel=1e-3)
-    assert found["total_mib"] == pytest.approx(geometry + shading + texture, rel=1e-3)
+    by_group = Surfels(p).sizes()
+    assert round(by_group["geometry_mib"], 1) == geometry
+    assert round(by_group["shading_mib"], 1) == shading
+    assert by_group["texture_mib"] == pytest.approx(texture, rel=1e-3)
+    assert by_group["total_mib"] == pytest.approx(geometry + shading + texture, rel=1e-3)
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -48,10 +48,10 @@ def test_stored_is_the_file_without_its_header(tmp_path, stage):
     model = sample(stage, n=500)
     data = write_model(tmp_path / "m", model).read_bytes()
     header = 8 + int.from_bytes(data[:8], "little")
-    found = model.sizes()
-    assert found["stored_total_mib"] * 2**20 == pytest.approx(len(data) - header, abs=1e-6)
+    by_group = model.sizes()
+    assert by_group["stored_total_mib"] * 2**20 == pytest.approx(len(data) - header, abs=1e-6)
     groups = ("stored_geometry_mib", "stored_shading_mib", "stored_texture_mib")
-    assert found["stored_total_mib"] == pytest.approx(sum(found[group] for group in groups))
+    assert by_group["stored_total_mib"] == pytest.approx(sum(by_group[group] for group in groups))
     assert header < 2048
 
 
@@ -63,9 +63,9 @@ def test_files_are_as_large_as_in_the_papers_tables_of_edits(surfels, published)
 
 
 def test_groups():
-    found = sample("shading", n=64, shared=True).sizes()
-    assert found["geometry_mib"] == 64 * 40 / 2**20
-    assert found["shading_mib"] == 4 * 4 / 2**20
-    assert found["stored_shading_mib"] == (64 * 12 + 4 * 4) / 2**20
-    assert found["texture_mib"] == found["stored_texture_mib"] == 0
+    by_group = sample("shading", n=64, shared=True).sizes()
+    assert by_group["geometry_mib"] == 64 * 40 / 2**20
+    assert by_group["shading_mib"] == 4 * 4 / 2**20
+    assert by_group["stored_shading_mib"] == (64 * 12 + 4 * 4) / 2**20
+    assert by_group["texture_mib"] == by_group["stored_texture_mib"] == 0
     assert sample("surfels").sizes()["shading_mib"] == 0

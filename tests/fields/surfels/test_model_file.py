@@ -32,9 +32,9 @@ def rewritten(path, tensors=None, **description):
 @pytest.mark.parametrize("shared", [False, True])
 def test_round_trip_is_exact(tmp_path, stage, shared):
     model = sample(stage, shared=shared, low_pass=2.5, material="paper", local_viewer=False)
-    found = read_model(write_model(tmp_path / "new" / "model.safetensors", model))
-    assert same(found, model)
-    assert (found.stage, found.shading, found.metadata) == (stage, model.shading, model.metadata)
+    restored = read_model(write_model(tmp_path / "new" / "model.safetensors", model))
+    assert same(restored, model)
+    assert (restored.stage, restored.shading, restored.metadata) == (stage, model.shading, model.metadata)
 
 
 @settings(max_examples=30, deadline=None)
@@ -47,9 +47,9 @@ def test_round_trip_is_exact(tmp_path, stage, shared):
 def test_any_finite_value_and_any_metadata_come_back(tmp_path_factory, values, metadata):
     model = sample("shading", n=1)
     model = Surfels({**model.parameters, "means": torch.tensor([values])}, model.shading, metadata)
-    found = read_model(write_model(tmp_path_factory.mktemp("m") / "m", model))
-    assert same(found, model)
-    assert found.metadata == metadata
+    restored = read_model(write_model(tmp_path_factory.mktemp("m") / "m", model))
+    assert same(restored, model)
+    assert restored.metadata == metadata
 
 
 def test_no_surfels_are_a_model(tmp_path):
@@ -66,9 +66,9 @@ def test_views_of_one_memory_and_gradients_are_written(tmp_path):
     model = sample("shading")
     twice = torch.randn(7, 6, requires_grad=True)
     model = Surfels({**model.parameters, "means": twice[:, ::2], "colors": twice[:, ::2]})
-    found = read_model(write_model(tmp_path / "m", model))
-    assert torch.equal(found.parameters["means"], twice[:, ::2])
-    assert not found.parameters["colors"].requires_grad
+    restored = read_model(write_model(tmp_path / "m", model))
+    assert torch.equal(restored.parameters["means"], twice[:, ::2])
+    assert not restored.parameters["colors"].requires_grad
 
 
 def test_other_programs_can_read_the_tensors(tmp_path):

@@ -32,9 +32,9 @@ def release_run(folder):
 
 def test_textures_of_the_release(tmp_path):
     path, relightable, pictures = release_run(tmp_path)
-    found = read_ply(path)
-    assert (found.stage, found.shading) == ("texture", relightable.shading)
-    p = found.parameters
+    model = read_ply(path)
+    assert (model.stage, model.shading) == ("texture", relightable.shading)
+    p = model.parameters
     for name in ("means", "quats", "scales", "opacities", "ambient", "shininess"):
         assert torch.equal(p[name], relightable.parameters[name])
     palette = np.array([0.9, 0.5, 0.0])

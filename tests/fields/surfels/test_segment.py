@@ -47,9 +47,9 @@ def test_the_same_edit_everywhere_is_the_edit_of_the_model_bit_for_bit(shared, e
     models = [ball(1, shared=shared), ball(2, middle=0.2)]
     plain = Composition(models).render(CAMERA, SIDE, [edit, PartEdit()], outputs=OUTPUTS)
     scene = Composition(models, [[HALF, TENTH], []])
-    found = scene.render(CAMERA, SIDE, [edit, edit, edit, PartEdit()], outputs=OUTPUTS)
+    edited = scene.render(CAMERA, SIDE, [edit, edit, edit, PartEdit()], outputs=OUTPUTS)
     for name in ("color", "alpha", *OUTPUTS):
-        assert torch.equal(getattr(found, name), getattr(plain, name)), name
+        assert torch.equal(getattr(edited, name), getattr(plain, name)), name
     if edit == PartEdit():
         assert torch.equal(scene.render(CAMERA, SIDE).color, plain.color)
 
@@ -66,15 +66,15 @@ def test_segments_are_edited_as_models_of_their_own():
     ]
     split = [only(model, ~HALF & ~third), only(model, HALF), only(model, third), other]
     expected = Composition(split).render(CAMERA, SIDE, edits)
-    found = Composition([model, other], [[HALF, TENTH], []]).render(CAMERA, SIDE, edits)
-    assert_close(found.color, expected.color, atol=1e-5, rtol=0)
-    assert_close(found.alpha, expected.alpha, atol=1e-5, rtol=0)
+    rendered = Composition([model, other], [[HALF, TENTH], []]).render(CAMERA, SIDE, edits)
+    assert_close(rendered.color, expected.color, atol=1e-5, rtol=0)
+    assert_close(rendered.alpha, expected.alpha, atol=1e-5, rtol=0)
 
 
 def test_hiding_a_segment_is_removing_it():
     model = ball(3)
-    found = Composition([model], [[HALF]]).render(CAMERA, SIDE, [PartEdit(), PartEdit(visible=False)])
-    assert torch.equal(found.color, Composition([only(model, ~HALF)]).render(CAMERA, SIDE).color)
+    hidden = Composition([model], [[HALF]]).render(CAMERA, SIDE, [PartEdit(), PartEdit(visible=False)])
+    assert torch.equal(hidden.color, Composition([only(model, ~HALF)]).render(CAMERA, SIDE).color)
     alone = Composition([model], [[HALF]]).render(CAMERA, SIDE, [PartEdit(visible=False), PartEdit()])
     assert torch.equal(alone.color, Composition([only(model, HALF)]).render(CAMERA, SIDE).color)
 
@@ -93,12 +93,12 @@ def test_texels_of_variants_go_to_their_surfels():
         replace(model, parameters={**p, "texels": p["texels"] + 2, "colors": p["colors"] - 3}),
     ]
     joined = with_variants(model, labels_of([HALF, TENTH], 150), styles).parameters
-    found, second = joined["texels"], TENTH & ~HALF
+    texels, second = joined["texels"], TENTH & ~HALF
     assert torch.equal(joined["colors"], torch.where(second[:, None], p["colors"] - 3, p["colors"]))
     for surfel in range(150):
         own = slice(int(p["offsets"][surfel]), int(p["offsets"][surfel] + p["sizes"][surfel].prod()))
         added = 1 if HALF[surfel] else 2 if TENTH[surfel] else 0
-        assert torch.equal(found[own], p["texels"][own] + added)
+        assert torch.equal(texels[own], p["texels"][own] + added)
     assert with_variants(model, labels_of([HALF], 150), [model]) is model, "nothing is copied"
 
 
@@ -107,9 +107,9 @@ def test_what_other_programs_read_has_the_edits_of_segments():
     scene = Composition([model], [[HALF]])
     split = Composition([only(model, ~HALF), only(model, HALF)])
     edits = [PartEdit(palette=(0, 1, 0)), PartEdit(opacity=0.5)]
-    found, expected = joined(scene.parts, edits), joined(split.parts, edits)
+    result, expected = joined(scene.parts, edits), joined(split.parts, edits)
     for mask, part in ((~HALF, slice(75)), (HALF, slice(75, 150))):
-        for name, values in found.parameters.items():
+        for name, values in result.parameters.items():
             assert torch.equal(values[mask], expected.parameters[name][part]), name
 
 

@@ -27,17 +27,17 @@ def rewritten(path, **tensors):
 
     with safe_open(path, framework="pt") as file:
         header = file.metadata()
-    found = {name: x for name, x in {**load_file(path), **tensors}.items() if x is not None}
-    save_file(found, path, header)
+    kept = {name: x for name, x in {**load_file(path), **tensors}.items() if x is not None}
+    save_file(kept, path, header)
     return path
 
 
 def test_a_file_without_colours_keeps_those_of_the_model(tmp_path):
     model = sample()
     path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), colors=None)
-    found = with_texture(model, path).parameters
-    assert torch.equal(found["colors"], model.parameters["colors"])
-    assert torch.equal(found["texels"], model.parameters["texels"] + 0.5)
+    parameters = with_texture(model, path).parameters
+    assert torch.equal(parameters["colors"], model.parameters["colors"])
+    assert torch.equal(parameters["texels"], model.parameters["texels"] + 0.5)
 
 
 @pytest.mark.parametrize(

@@ -35,14 +35,14 @@ def ball(center=(0.0, 0.0, 0.0), color=0.4, density=60.0, side=32, spacing=0.02,
 def test_files_give_the_same_bits_and_are_known_by_their_header(tmp_path):
     field = ball(degree=2)
     path = write_voxels(tmp_path / "model.safetensors", field)
-    found = open_field(path)
-    assert isinstance(found, Voxels)
-    assert torch.equal(found.grid.rows, field.grid.rows)
-    assert torch.equal(found.grid.masks, field.grid.masks)
-    assert found.metadata == field.metadata
-    assert torch.equal(found.render(CAMERA).color, field.render(CAMERA).color)
-    assert write_voxels(tmp_path / "again", found).read_bytes() == path.read_bytes()
-    assert path.stat().st_size == pytest.approx(found.sizes()["stored_total_mib"] * 2**20, abs=2000)
+    restored = open_field(path)
+    assert isinstance(restored, Voxels)
+    assert torch.equal(restored.grid.rows, field.grid.rows)
+    assert torch.equal(restored.grid.masks, field.grid.masks)
+    assert restored.metadata == field.metadata
+    assert torch.equal(restored.render(CAMERA).color, field.render(CAMERA).color)
+    assert write_voxels(tmp_path / "again", restored).read_bytes() == path.read_bytes()
+    assert path.stat().st_size == pytest.approx(restored.sizes()["stored_total_mib"] * 2**20, abs=2000)
 
 
 def test_sizes_are_those_that_the_paper_counts():

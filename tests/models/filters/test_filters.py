@@ -121,10 +121,10 @@ def test_gold_is_gold():
 def test_tint_keeps_light_and_dark():
     surface = plane()
     surface = replace(surface, color=torch.linspace(0.2, 0.9, len(surface.tone))[:, None].expand(-1, 3))
-    found = tint(surface, (0.1, 0.5, 0.5))
-    assert (found[:, 1].diff() > -1e-6).all()
+    tinted = tint(surface, (0.1, 0.5, 0.5))
+    assert (tinted[:, 1].diff() > -1e-6).all()
     middle = (surface.color[:, 0] - surface.color.mean()).abs().argmin()
-    assert_close(found[middle], torch.tensor([0.1, 0.5, 0.5]), atol=0.01, rtol=0)
+    assert_close(tinted[middle], torch.tensor([0.1, 0.5, 0.5]), atol=0.01, rtol=0)
 
 
 def test_nothing_to_paint_on():
