@@ -2,8 +2,9 @@
 
 import os
 
-# Idle OpenMP threads are not to spin: on a busy machine that makes small torch operations ten times slower.
-os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+from texgs.core.waiting import waiting
+
+os.environ.update(waiting())  # before torch is imported
 
 import zlib
 

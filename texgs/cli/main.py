@@ -14,6 +14,7 @@ from texgs.config.fields import kinds
 from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import collect_rarely, keep_freed_memory, told
+from texgs.core.waiting import waiting
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
@@ -138,7 +139,7 @@ def own_process() -> None:
     for stream in (sys.stdout, sys.stderr):  # what a terminal cannot show is no reason to stop
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
-    os.environ.setdefault("OMP_WAIT_POLICY", "passive")  # read by torch: threads that spin cost others much
+    os.environ.update(waiting())
     keep_freed_memory()
     collect_rarely()
 

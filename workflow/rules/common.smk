@@ -11,6 +11,7 @@ from texgs.config.places import PLACES
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
 from texgs.core.memory import collect_rarely
+from texgs.core.waiting import waiting
 
 collect_rarely()
 
@@ -112,8 +113,8 @@ def finish(status):
 
 
 # In front of the commands, not a parameter of the rules: where runs are recorded and how threads wait changes no
-# result. Threads that spin while they wait take the cores that other jobs and the other threads need.
-ENVIRONMENT = {"OMP_WAIT_POLICY": os.environ.get("OMP_WAIT_POLICY", "passive")}
+# result.
+ENVIRONMENT = waiting()
 if PLAN.tracking is not None:
     ENVIRONMENT |= {
         "TEXGS_TRACKING": PLAN.tracking,
