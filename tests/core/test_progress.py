@@ -57,11 +57,11 @@ def test_unknown_length_is_counted_without_a_remaining_time(clock, log):
     ]
 
 
-def test_given_total_wins_and_nothing_to_do_is_one_line(clock, log):
+def test_given_total_wins_and_nothing_to_do_is_no_line(clock, log):
     for _ in progress(iter("abc"), 3, title="a", unit="letter"):
         clock[0] += 1
     assert list(progress([], title="b", unit="view")) == []
-    assert log() == ["a: 3 of 3 letter, 1.0 letter/s, took 3 s", "b: 0 view, took 0 s"]
+    assert log() == ["a: 3 of 3 letter, 1.0 letter/s, took 3 s"]
 
 
 def test_a_loop_left_early_says_how_far_it_came(clock, log):

@@ -35,8 +35,8 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
     """Yield the items of a loop; report on stderr how many are done, how fast, and the time left.
 
     A terminal shows one moving bar. Anything else, such as the log file of a job, gets a plain line at most
-    every five seconds and one at the end, also where the loop was left early. The rates of these lines are
-    means since the start.
+    every five seconds and one at the end, also where the loop was left early; none where there is nothing to
+    do. The rates of these lines are means since the start.
 
     Args:
         iterable: items of the loop.
@@ -87,7 +87,8 @@ def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
         outcome = "took"
     finally:
         seconds = monotonic() - start
-        _write(f"{title}: {_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}")
+        if done or outcome != "took":  # else there was nothing to do
+            _write(f"{title}: {_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}")
 
 
 def _write(line: str) -> None:

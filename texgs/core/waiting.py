@@ -2,7 +2,7 @@
 
 A fit has thousands of loops a second that take less than a millisecond. To wake a thread that sleeps takes as
 long as many of them, above all on virtual machines; one that spins on takes a core that others need. So they
-spin for some 30 microseconds and then sleep. docs/accuracy.md says what that is worth.
+spin for some tens of microseconds and then sleep. docs/accuracy.md says what that is worth.
 """
 
 import os
