@@ -25,7 +25,7 @@ def run(settings: Settings) -> Section:
         return section
     keep_freed_memory()  # as the command line does
     networks = {"texgs": random_vgg(settings.device, torch.float32)}
-    for dtype in {torch.float32, fast_dtype(settings.device)}:
+    for dtype in dict.fromkeys((torch.float32, fast_dtype(settings.device))):
         name = f"torch, {str(dtype).removeprefix('torch.')}"
         networks[name] = random_vgg(settings.device, dtype, is_torch=True)
     for size in settings.sizes:

@@ -22,11 +22,17 @@ def case(sizes, seed=0):
     return RectifiedConvolution(weight, bias), torch.randn(count, inputs, height, width, generator=generator)
 
 
-def close(result, expected):
-    """Within the rounding of transforms whose numbers are up to 100 times as large as their results."""
+def close(result, expected, sizes):
+    """Within a rounding that follows the sizes of what is summed up: the sum may be nearly 0."""
     difference = result.double() - expected
-    assert difference.norm() <= 1e-5 * expected.norm()
-    assert difference.abs().max() <= 1e-4 * expected.abs().max()
+    assert difference.norm() <= 5e-6 * sizes.norm()
+    assert difference.abs().max() <= 5e-5 * sizes.max()
+
+
+def sums(images, convolution):
+    """In double precision, before the rectifier; and those of all terms without their signs."""
+    terms = [x.detach().double() for x in (images, convolution.weight, convolution.bias)]
+    return F.conv2d(*terms, padding=1), F.conv2d(*(x.abs() for x in terms), padding=1)
 
 
 @settings(deadline=None, max_examples=60)
@@ -35,21 +41,22 @@ def test_values_and_gradients(sizes, seed):
     convolution, images = case(sizes, seed)
     images.requires_grad_()
     outputs = convolution(images)
-    weight = convolution.weight.double()
-    sums = F.conv2d(images.detach().double(), weight, convolution.bias.double(), padding=1)
-    close(outputs.detach(), sums.clamp(min=0))
-    upstream = torch.randn(sums.shape, generator=torch.Generator().manual_seed(seed + 1))
+    expected, sizes = sums(images, convolution)
+    close(outputs.detach(), expected.clamp(min=0), sizes)
+    upstream = torch.randn(expected.shape, generator=torch.Generator().manual_seed(seed + 1))
     (gradient,) = torch.autograd.grad(outputs, images, upstream)
     # that of the same rectifier: sums near 0 may be rounded to either side
-    close(gradient, F.conv_transpose2d(upstream.double() * (outputs > 0), weight, padding=1))
+    terms = upstream.double() * (outputs > 0), convolution.weight.double()
+    expected, sizes = (F.conv_transpose2d(*each, padding=1) for each in (terms, [x.abs() for x in terms]))
+    close(gradient, expected, sizes)
 
 
 @pytest.mark.parametrize("channels", [(64, 64), (144, 128), (512, 256)])
 def test_many_tiles(channels):
     """Several batches, the last of them not full."""
     convolution, images = case((1, *channels, 61, 70))
-    sums = F.conv2d(images.double(), convolution.weight.double(), convolution.bias.double(), padding=1)
-    close(convolution(images), sums.clamp(min=0))
+    expected, sizes = sums(images, convolution)
+    close(convolution(images), expected.clamp(min=0), sizes)
 
 
 def test_any_layout_of_memory():
@@ -57,6 +64,22 @@ def test_any_layout_of_memory():
     expected = convolution(images)
     assert torch.equal(convolution(images.contiguous(memory_format=torch.channels_last)), expected)
     assert torch.equal(convolution(images.repeat(2, 2, 1, 1)[:2, :16]), expected)
+
+
+def test_gradients_of_any_layout():
+    """Of a part of what was joined, of a sum (one number for all), and with saved results reordered."""
+    convolution, images = case((1, 16, 32, 9, 14))
+    images.requires_grad_()
+    outputs = convolution(images)
+    (expected,) = torch.autograd.grad(outputs, images, torch.ones_like(outputs))
+    (of_sum,) = torch.autograd.grad(convolution(images).sum(), images)
+    joined = torch.cat([convolution(images), convolution(images)], dim=1)
+    (of_part,) = torch.autograd.grad(joined, images, torch.cat([torch.ones_like(outputs)] * 2, dim=1) / 2)
+    with torch.autograd.graph.saved_tensors_hooks(lambda x: x.contiguous().clone(), lambda x: x):
+        hooked = convolution(images)
+    (of_hooked,) = torch.autograd.grad(hooked.sum(), images)
+    for gradient in (of_sum, of_part, of_hooked):
+        torch.testing.assert_close(gradient, expected, rtol=0, atol=1e-6)
 
 
 def test_the_same_bits_for_any_number_of_threads():

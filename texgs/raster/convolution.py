@@ -1,7 +1,8 @@
 """Convolutions with 3x3 kernels that stay as they are, on the CPU, by Winograd's F(4x4, 3x3).
 
 They take a quarter of the multiplications of a direct convolution (Lavin and Gray 2016). Relative errors are
-2e-6 to 4e-6, about four times those of a direct one; rounding reaches up to 4 pixels farther than kernels do.
+2e-6 to 4e-6, about four times those of a direct one. Rounding, NaN and infinity reach up to 3 pixels farther
+than kernels do.
 """
 
 from __future__ import annotations
@@ -65,7 +66,11 @@ class RectifiedConvolution:
             _require_cpu(name, x)
 
     def __call__(self, images: Tensor) -> Tensor:
-        """[N, out, H, W] of images [N, in, H, W]; memory in the order of channels_last is not copied."""
+        """[N, out, H, W] of images [N, in, H, W], both with channels last in memory.
+
+        Images are copied where they have another order, or a number of channels that 16 does not divide. The
+        result is not to be changed in place.
+        """
         check.shape("images", images, "N inputs H W", inputs=self.weight.shape[1])
         check.floating("images", images)
         _require_cpu("images", images)
@@ -75,17 +80,17 @@ class RectifiedConvolution:
 
     @cached_property
     def kernel(self) -> Tensor:
-        """Of the way there."""
+        """The weights, transformed; for the way there."""
         return transformed(self.weight)
 
     @cached_property
     def adjoint(self) -> Tensor:
-        """Kernel of the way back: outputs and inputs change places, and each 3x3 is turned by half a turn."""
+        """For the way back: outputs and inputs change places, and each 3x3 is turned by half a turn."""
         return transformed(self.weight.transpose(0, 1).flip(2, 3))
 
     @cached_property
     def padded_bias(self) -> Tensor:
-        """Of whole blocks."""
+        """The bias, filled up with zeros to whole blocks."""
         return F.pad(self.bias, (0, -len(self.bias) % BLOCK)).contiguous()
 
 
@@ -110,11 +115,12 @@ class _Convolve(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, gradient: Tensor) -> tuple[Tensor, None]:
         (gate,) = ctx.saved_tensors
+        gate = gate.contiguous(memory_format=torch.channels_last)  # hooks of saved tensors may reorder it
         return _call(ctx.convolution.adjoint, gradient, gate, None)[:, : ctx.inputs], None
 
 
 def _call(kernel: Tensor, images: Tensor, gate: Tensor | None, bias: Tensor | None) -> Tensor:
-    """[N, out, H, W] of whole blocks of channels."""
+    """[N, out, H, W] of whole blocks of channels, rectified where there is a bias."""
     _describe()
     inputs, outputs = kernel.shape[2], BLOCK * kernel.shape[1]
     images = F.pad(images, (0, 0, 0, 0, 0, inputs - images.shape[1])) if images.shape[1] < inputs else images

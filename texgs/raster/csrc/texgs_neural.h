@@ -37,13 +37,13 @@ TEXGS_API int32_t texgs_hash_backward(const texgs_hash*, int64_t n, const float*
 typedef struct {
     int32_t width, height;
     int32_t inputs, outputs;
-    const float* kernel;  /* [36, outputs / 16, inputs, 16]: G g G^T of each 3x3 kernel g, see winograd.cpp */
+    const float* kernel;  /* [36, outputs / 16, inputs, 16]: G g G^T of each 3x3 kernel g (Lavin and Gray 2016) */
     const float* bias;    /* [outputs], or null for 0 */
     int32_t is_rectified; /* negative results are 0 */
 } texgs_convolution;
 
-/* result [height, width, outputs] of an image [height, width, inputs]. Where a gate [height, width, inputs] is 0 or
- * less, the image counts as 0; null: nowhere. */
+/* result [height, width, outputs], at an address that 64 divides, of an image [height, width, inputs]. Where a gate
+ * [height, width, inputs] is 0 or less, the image counts as 0; null: nowhere. */
 TEXGS_API int32_t texgs_convolve(const texgs_convolution*, const float* image, const float* gate, float* result,
                                  void* stream);
 

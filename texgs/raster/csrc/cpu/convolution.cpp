@@ -12,7 +12,8 @@ namespace texgs {
 namespace {
 
 constexpr int32_t kMostChannels = 4096;
-constexpr int64_t kLeastBatch = 24, kMostBatch = 96, kChannelsPerTile = 680;  // by measurement
+constexpr int64_t kMostTiles = int64_t(1) << 31;  // they are counted by int
+constexpr int64_t kLeastBatch = 24, kMostBatch = 96, kPairsPerTile = 680;  // by measurement
 
 auto convolve_kernel() {
 #if defined(__x86_64__) || defined(_M_X64)
@@ -30,7 +31,7 @@ bool are_blocks(int32_t channels) {
 // channels is larger than they are. Threads get equal shares.
 int batch_of(const ConvolutionJob& job) {
     const int64_t kernel = int64_t(job.shape.inputs) * job.shape.outputs, tiles = job.tiles(), team = threads();
-    const int64_t wanted = std::clamp(kernel / kChannelsPerTile, kLeastBatch, kMostBatch);
+    const int64_t wanted = std::clamp(kernel / kPairsPerTile, kLeastBatch, kMostBatch);
     const int64_t rounds = std::max<int64_t>(1, (tiles + wanted * team / 2) / (wanted * team));
     const int64_t share = (tiles + rounds * team - 1) / (rounds * team);
     return static_cast<int>((share + kTileRows - 1) / kTileRows * kTileRows);
@@ -49,6 +50,7 @@ int32_t texgs_convolve(const texgs_convolution* shape, const float* image, const
                 "channels: expected multiples of 16 up to 4096");
         require(reinterpret_cast<uintptr_t>(result) % 64 == 0, "result: expected an address that 64 divides");
         ConvolutionJob job{*shape, image, gate, result, 0};
+        require(job.tiles() < kMostTiles, "image: too large");
         job.batch = batch_of(job);
         const int64_t tiles = job.tiles(), batches = (tiles + job.batch - 1) / job.batch;
         Buffer memory;

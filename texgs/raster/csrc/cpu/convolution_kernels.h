@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What convolution.cpp hands to the kernels of an instruction set, and the table of those kernels.
+// What convolution.cpp hands to the kernels of an instruction set.
 #pragma once
 #include <cstdint>
 
@@ -18,7 +18,7 @@ struct ConvolutionJob {
     int batch;  // tiles that go through the three steps together, a multiple of kTileRows
 
     int tiles_across() const { return (shape.width + 3) / 4; }
-    int tiles() const { return tiles_across() * ((shape.height + 3) / 4); }
+    int64_t tiles() const { return int64_t(tiles_across()) * ((shape.height + 3) / 4); }
     // Floats between the points of a batch. A whole number of pages would map all of them to the same cache lines.
     int64_t input_stride() const { return int64_t(shape.inputs) * batch + kChannelBlock; }
     int64_t output_stride() const { return int64_t(shape.outputs) * batch + kChannelBlock; }

@@ -11,8 +11,10 @@ namespace texgs::TEXGS_ISA {
 namespace {
 
 constexpr int kSide = 6, kStep = 4;
-constexpr int kRows = kLanes == 16 ? 12 : 6;  // tiles times vectors of channels that are summed up in registers
+// Tiles times vectors of channels that are summed up in registers.
+constexpr int kRows = kLanes == 16 ? 12 : 6;
 constexpr int kColumns = 2;
+static_assert(kTileRows % kRows == 0 && kChannelBlock % kLanes == 0);
 
 // Tiles [begin, end). What lies beyond the last of them is multiplied too, and not read.
 struct Batch {
