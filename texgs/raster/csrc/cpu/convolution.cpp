@@ -12,7 +12,7 @@ namespace texgs {
 namespace {
 
 constexpr int32_t kMostChannels = 4096;
-constexpr int64_t kMostTiles = int64_t(1) << 31;  // they are counted by int
+constexpr int64_t kMostTiles = INT32_MAX;
 constexpr int64_t kLeastBatch = 24, kMostBatch = 96, kPairsPerTile = 680;  // by measurement
 
 auto convolve_kernel() {
