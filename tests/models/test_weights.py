@@ -64,7 +64,7 @@ def test_another_file_of_that_name_is_refused_also_after_it_was_whole(folder):
             look("tiny")
 
 
-def test_missing_weights_are_one_sentence_with_size_source_and_place(folder):
+def test_missing_weights_are_one_sentence_with_size_source_and_place(folder, capsys):
     with pytest.raises(MissingDataError) as caught:
         locate("tiny")
     message = str(caught.value)
@@ -78,13 +78,15 @@ def test_missing_weights_are_one_sentence_with_size_source_and_place(folder):
     ):
         assert part in message
     assert "\n" not in message
+    assert "tiny: downloading its weights (0.1 MB) from a shelf\n" in capsys.readouterr().err
     assert not list(folder.rglob("tiny.bin*")), "nothing half downloaded is left"
 
 
-def test_a_file_that_nothing_is_known_to_download_is_only_looked_for(folder, monkeypatch):
+def test_a_file_that_nothing_is_known_to_download_is_only_looked_for(folder, monkeypatch, capsys):
     monkeypatch.setitem(CATALOGUE, "tiny", Single((File("other.bin", 2, CHECKSUM),), "a shelf"))
     with pytest.raises(MissingDataError, match=r"\(2 MB\) are not on this machine; get them from a shelf"):
         locate("tiny")
+    assert not capsys.readouterr().err
 
 
 @pytest.mark.parametrize("place", ["weights/hub", f"hub/models--texgs--none/snapshots/{'0' * 40}"])

@@ -27,11 +27,13 @@ def address(tmp_path):
     thread.join()
 
 
-def test_a_file_is_downloaded_once(address, tmp_path):
+def test_a_file_is_downloaded_once_and_this_is_said(address, tmp_path, capsys):
     path = tmp_path / "cache" / "a.raw"
     download(address, SHA256, path)
     assert path.read_bytes() == DATA
+    assert f"{path}: downloading it from {address}\n" in capsys.readouterr().err
     download("http://127.0.0.1:9/nobody-listens", SHA256, path)
+    assert not capsys.readouterr().err
     require_whole(path, SHA256)
     path.write_bytes(b"A volume")
     with pytest.raises(ArgumentError, match=r"a\.raw: expected the checksum .* delete the file"):

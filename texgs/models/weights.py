@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -17,7 +18,7 @@ def locate(name: str) -> Path:
     """Path of the weights of a model: of a file, or of a folder in the layout of the Hugging Face hub.
 
     Looked for in the weights folder (TEXGS_WEIGHTS), in the caches of the hubs, and then downloaded with
-    a progress bar, at a pinned revision or with a known checksum, into the cache.
+    a line that says so and a progress bar, at a pinned revision or with a known checksum, into the cache.
 
     Args:
         name: of the catalogue, such as "vgg16" or "clip-vit-base-patch32".
@@ -127,6 +128,7 @@ def _download_file(name: str, entry: Single) -> Path:
     import pooch
 
     pooch.get_logger().setLevel("WARNING")
+    _announce(name, entry)
     folder = cache_folder() / "weights"
     try:
         downloaded = pooch.retrieve(file.url, f"sha256:{file.sha256}", file.name, folder, progressbar=True)
@@ -141,12 +143,18 @@ def _download_snapshot(name: str, entry: Snapshot) -> Path:
         from huggingface_hub import snapshot_download
     except ImportError as error:
         raise _missing(name, entry, [name], entry.megabytes, error) from error
+    _announce(name, entry)
     try:
         return Path(
             snapshot_download(entry.repository, revision=entry.revision, allow_patterns=list(entry.patterns))
         )
     except (OSError, ValueError, RuntimeError) as error:  # the hub's own errors are of these kinds
         raise _missing(name, entry, [name], entry.megabytes, error) from error
+
+
+def _announce(name: str, entry: Single | Snapshot) -> None:
+    """Say what the progress bar that follows is about."""
+    print(f"{name}: downloading its weights ({entry.megabytes:g} MB) from {entry.source}", file=sys.stderr)
 
 
 def _missing(

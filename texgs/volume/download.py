@@ -1,12 +1,13 @@
 """Download volumes once, compared with their checksums."""
 
+import sys
 from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 
 
 def download(url: str, sha256: str, path: Path) -> None:
-    """Download a file with a progress bar, unless it is there and whole.
+    """Download a file with a line that says so and a progress bar, unless it is there and whole.
 
     Args:
         url: http or https address.
@@ -22,6 +23,8 @@ def download(url: str, sha256: str, path: Path) -> None:
     if not url.startswith(("http://", "https://")):
         raise ArgumentError(f"{url}: expected an address that begins with https:// or http://")
     pooch.get_logger().setLevel("WARNING")
+    if not path.exists():
+        print(f"{path}: downloading it from {url}", file=sys.stderr)
     try:
         pooch.retrieve(url, f"sha256:{sha256.lower()}", path.name, path.parent, progressbar=True)
     except OSError as error:
