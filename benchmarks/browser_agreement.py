@@ -7,7 +7,6 @@ with the rasterizer twice: for the numbers in the page, and for the scene as it 
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Iterator
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import machine
+from benchmarks.command import call
 from tests.viewer.browser import browser
 from tests.viewer.drawing import composed_of, drawn, open_renderer
 from texgs.core.camera import Camera, orbit
@@ -153,4 +153,4 @@ def sizes(scene: Scene, folder: Path) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    call(main)

@@ -8,7 +8,6 @@ longer.
 from __future__ import annotations
 
 import csv
-import sys
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -19,6 +18,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from benchmarks.command import call
 from texgs.config.phase import CommonRates
 from texgs.core.camera import Camera
 from texgs.core.light import HEADLIGHT
@@ -136,4 +136,4 @@ def draw(rows: list[tuple[Any, ...]], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    call(main)

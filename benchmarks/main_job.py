@@ -20,6 +20,7 @@ from typing import Any
 import torch
 
 from benchmarks import machine
+from benchmarks.command import call
 from benchmarks.load import Load
 from texgs.report.metrics_files import COPIES, read
 
@@ -55,4 +56,4 @@ def seconds_of(*words: str) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    call(main)

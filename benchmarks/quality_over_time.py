@@ -9,7 +9,6 @@ do not count. Rows that OUTPUT.csv has of other recipes stay, so that recipes ca
 from __future__ import annotations
 
 import csv
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from pathlib import Path
 from typing import NamedTuple
 from unittest.mock import patch
 
+from benchmarks.command import call
 from texgs.cli.result import METRICS
 from texgs.cli.stage import ensure
 from texgs.cli.stages import phase
@@ -158,4 +158,4 @@ def draw(looks: list[Look], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    call(main)

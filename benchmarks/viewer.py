@@ -22,6 +22,7 @@ from typing import Any
 import torch
 
 from benchmarks import machine
+from benchmarks.command import call
 from benchmarks.viewer_client import turned
 from benchmarks.websocket_proxy import Arrivals, proxied
 from tests.viewer.browser import SOFTWARE, browser
@@ -121,4 +122,4 @@ def viser(source: str) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    call(main)

@@ -7,12 +7,12 @@ a client is rendered and becomes the background of its page.
 
 from __future__ import annotations
 
-import sys
 import threading
 
 import torch
 import viser
 
+from benchmarks.command import call
 from texgs.core.camera import Camera, intrinsics
 from texgs.core.rotation import quats_to_matrices
 from texgs.scene.session import Session
@@ -55,4 +55,4 @@ def camera_of(seen: viser.CameraHandle) -> Camera:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    call(main)

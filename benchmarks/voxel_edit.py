@@ -18,6 +18,7 @@ from typing import Any
 import torch
 
 from benchmarks import machine
+from benchmarks.command import call
 from texgs.core.camera import Camera
 from texgs.fields.voxels.file import read_voxels
 from texgs.raster import native
@@ -29,6 +30,7 @@ from texgs.volume.view_set import read_views
 
 SIZE = 400  # pixels
 ROUNDS, RUNS, EVERY = 2, 2, 90  # visits, timed steps of a view, and which test views
+VISIT = "import sys; from benchmarks.voxel_edit import tell; tell(*sys.argv[1:])"
 PHASES = ("render", "gradient", "optimiser")
 RATES = VoxelRates(*[1e-12] * 3)  # the grid stays as it is
 
@@ -55,8 +57,13 @@ def main(before: str, after: str, path: str, *scenes: str) -> None:
 
 def visit(library: str, grid: str, views: str) -> dict[str, dict[str, list[float]]]:
     """Milliseconds by degree and phase, measured in a process of its own."""
-    command = [sys.executable, "-m", "benchmarks.voxel_edit", "--visit", library, grid, views]
+    command = [sys.executable, "-c", VISIT, library, grid, views]
     return json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+
+
+def tell(*words: str) -> None:
+    """Print what a visit has measured."""
+    print(json.dumps(measure(*words)))
 
 
 def measure(library: str, path: str, views: str) -> dict[int, dict[str, list[float]]]:
@@ -99,7 +106,4 @@ def steps(grid: VoxelGrid, march: March, cameras: list[Camera]) -> dict[str, lis
 
 
 if __name__ == "__main__":
-    if sys.argv[1] == "--visit":
-        print(json.dumps(measure(*sys.argv[2:])))
-    else:
-        main(*sys.argv[1:])
+    call(main)

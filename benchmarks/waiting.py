@@ -14,6 +14,8 @@ from pathlib import Path
 from statistics import median
 from time import perf_counter
 
+from benchmarks.command import call
+
 SPINS = (0, 300, 1000, 3000, 300_000)  # the last one is what GCC's OpenMP does if nobody says anything
 ROUNDS, SECONDS, WARM = 3, 4.0, 20
 SIZE, SURFELS = 400, 15_000
@@ -40,7 +42,7 @@ def main(output: str) -> None:
 def milliseconds(spins: int, processes: int) -> float:
     """Of a step, mean over the processes, which run at once."""
     environment = {**os.environ, "OMP_WAIT_POLICY": "passive", "GOMP_SPINCOUNT": str(spins)}
-    command = [sys.executable, "-m", "benchmarks.waiting"]
+    command = [sys.executable, "-c", "from benchmarks.waiting import train; train()"]
     started = [
         subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
         for _ in range(processes)
@@ -65,4 +67,4 @@ def train() -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:]) if sys.argv[1:] else train()
+    call(main)

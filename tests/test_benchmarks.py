@@ -9,10 +9,13 @@ from pathlib import Path
 import pytest
 import torch
 
+from benchmarks.command import call
 from benchmarks.growth import doubling, slope
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import SECTIONS, parse
+from benchmarks.speeds import Sample, factor, scaled
 from benchmarks.timing import Case, measure
+from texgs.cli.forecast import Speed
 
 ROOT = Path(__file__).parents[1]
 TINY = ("--quick", "--sizes", "64", "--surfels", "500", "--scenes", "opaque", "--threads", "1")
@@ -123,3 +126,40 @@ def test_exponents_and_ratios():
     ratio = a.over(b, "a / b")
     assert (ratio.unit, ratio.median, ratio.min) == ("ratio", pytest.approx(7 / 1.5), 6)
     assert Section([a, b]).find("time", by="b") is b
+
+
+def test_speeds_are_scaled_to_what_jobs_took():
+    """By one factor, so that all jobs together take as long as they did, and work counts as it did."""
+    speed, truth = Speed(3.0, 10.0, 0.05), Speed(1.5, 5.0, 0.025)
+    work = [(0.04, 100), (0.16, 2000)]
+    some = [Sample(*each, truth.seconds(*each)) for each in work]
+    assert vars(scaled(speed, factor(speed, some))) == pytest.approx(vars(truth))
+    late = [some[0], some[1]._replace(seconds=2 * some[1].seconds)]
+    told = scaled(speed, factor(speed, late))
+    assert sum(told.seconds(*each) for each in work) == pytest.approx(sum(each.seconds for each in late))
+
+
+def called(monkeypatch, *words):
+    """What a benchmark with two words and any number of others was called with."""
+    calls = []
+
+    def main(output: str, name: str, *overrides: str) -> None:
+        calls.append((output, name, *overrides))
+
+    monkeypatch.setattr(sys, "argv", ["benchmark", *words])
+    call(main)
+    return calls
+
+
+def test_words_of_a_command_line_are_the_arguments(monkeypatch, capsys):
+    assert called(monkeypatch, "a.json", "engine", "fit=quick") == [("a.json", "engine", "fit=quick")]
+    assert called(monkeypatch, "a.json", "--help") == []
+    assert __doc__ in capsys.readouterr().out
+
+
+def test_words_that_do_not_fit_are_answered_with_the_help(monkeypatch, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        called(monkeypatch, "a.json")
+    told = capsys.readouterr().err
+    assert __doc__ in told
+    assert "missing a required argument: 'name'" in told

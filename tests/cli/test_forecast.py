@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from tests.workflow.project import TINY
 from texgs.cli import forecast
 from texgs.cli.main import main
 from texgs.config.experiments import selected
@@ -19,7 +20,7 @@ def empty(tmp_path, monkeypatch):
 
 
 def test_each_stage_has_a_speed_and_no_other():
-    assert set(forecast.speeds()) == set(STAGES)
+    assert set(forecast.speeds()) == {*STAGES, forecast.PROBE}
 
 
 def test_seconds_follow_pixels_and_iterations():
@@ -39,13 +40,22 @@ def test_the_jobs_of_a_run_are_counted_each_once():
     orbital = {"volume": 1, "transfer": 1, "views": 2, "surfels": 2, "texture": 2, "edit_text": 1}
     assert {name: expected.to_do[name] for name in orbital} == orbital
     assert expected.done == 0
-    by_hand = sum(
-        forecast.speeds()[job.stage.name].seconds(
+    by_hand = forecast.START_SECONDS + sum(
+        forecast.STEP_SECONDS
+        + forecast.speeds()[job.stage.name].seconds(
             config.views.width * config.views.height / 1e6, forecast.iterations(job.settings)
         )
         for job, config in forecast.planned_jobs(selected(words, lambda config: ()))
     )
     assert expected.seconds == pytest.approx(by_hand)
+
+
+def test_what_comes_from_results_that_will_be_replaced_is_to_do():
+    """A sheet of views does not depend on their settings, but on the views."""
+    words = TINY.split()
+    assert main(["sheet", *words, "tf=TF01"]) == 0
+    assert forecast.forecast((*words, "tf=TF01")).to_do["sheet"] == 0
+    assert forecast.forecast((*words, "tf=TF01", "views.width=20")).to_do["sheet"] == 1
 
 
 def test_of_a_sweep_the_jobs_are_counted_that_a_run_goes_through():

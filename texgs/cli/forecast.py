@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from texgs.cli.job import Job
     from texgs.config.experiments import Selection
 
-PROBE_SECONDS = 0.005  # of one probe, see `probe`, on the two cores that speeds.csv was measured on
+PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
+START_SECONDS = 8  # of a run, before its first job; there as well
+STEP_SECONDS = 0.8  # between two jobs of a run
 REPEATS = 15  # of the probe; the median counts
 
 
@@ -36,7 +38,7 @@ class Forecast:
 
 @dataclass(frozen=True)
 class Speed:
-    """Seconds of the jobs of a stage, measured on quick recipes at 400x400 pixels."""
+    """Seconds of the jobs of a stage, as `benchmarks/speeds.py` has measured them."""
 
     constant: float
     per_megapixel: float  # of one view
@@ -54,19 +56,24 @@ def forecast(words: tuple[str, ...]) -> Forecast:
         ConfigError, ArgumentError: for a mistake in the words.
     """
     from texgs.cli.absent import lacking
+    from texgs.cli.earlier import is_replaced
     from texgs.config.experiments import selected
     from texgs.config.product import as_sweep
 
     selection = selected(as_sweep(words), lacking)
     table, seconds, done = speeds(), 0.0, 0
     to_do: Counter[str] = Counter()
-    for job, config in planned_jobs(selection):
-        if job.is_done():
+    planned = list(planned_jobs(selection))
+    by_folder = {job.output.as_posix(): job for job, _ in planned}
+    known: dict[str, bool] = {}
+    for job, config in planned:
+        if job.is_done() and not is_replaced(job.output.as_posix(), by_folder, known):
             done += 1
             continue
-        pixels = config.views.width * config.views.height / config.fit.reduce**2
         to_do[job.stage.name] += 1
-        seconds += table[job.stage.name].seconds(pixels / 1e6, iterations(job.settings))
+        seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, config))
+    if to_do:
+        seconds += START_SECONDS
     return Forecast(selection, to_do, done, seconds)
 
 
@@ -102,6 +109,12 @@ def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
     yield from ((job, configs[folder]) for folder, job in by_folder.items() if folder in run)
 
 
+def work_of(job: Job, config: DictConfig) -> tuple[float, int]:
+    """Megapixels of a view of a job, and its iterations."""
+    pixels = config.views.width * config.views.height / config.fit.reduce**2
+    return pixels / 1e6, iterations(job.settings)
+
+
 def iterations(settings: Any) -> int:
     """All iterations and steps that the settings of a job name."""
     if isinstance(settings, Mapping):
@@ -111,7 +124,7 @@ def iterations(settings: Any) -> int:
 
 
 def speeds() -> dict[str, Speed]:
-    """The measured speeds by stage."""
+    """The measured speeds by stage, and that of the probe."""
     text = files("texgs.cli").joinpath("speeds.csv").read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
@@ -155,10 +168,10 @@ def show(words: tuple[str, ...]) -> int:
         print(f"missing  {line}")
     kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
     print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
-    slower = probe() / PROBE_SECONDS
+    slower = probe() / speeds()[PROBE].constant
     print(
         f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on other "
-        f"scenes and how fast this machine rasterizes ({1 / slower:.1f} times as fast as two cores)"
+        f"scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as the one they are of"
     )
     return 1 if stops else 0
 

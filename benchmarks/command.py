@@ -1,0 +1,21 @@
+"""The command line of a benchmark whose words are the arguments of its `main`."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+
+
+def call(main: Callable[..., None]) -> None:
+    """Give it the words of the command line; on --help, or where they do not fit, print its module's text."""
+    words, text = sys.argv[1:], sys.modules[main.__module__].__doc__
+    if not {"-h", "--help"}.isdisjoint(words):
+        print(text)
+        return
+    try:
+        inspect.signature(main).bind(*words)
+    except TypeError as error:
+        print(f"{text}\nexpected other words: {error}", file=sys.stderr)
+        sys.exit(2)
+    main(*words)
