@@ -55,6 +55,16 @@ def test_a_changed_tf_reruns_only_its_views(project):
     assert project.planned(overrides=changed) == ["sheet TF01", "transfer", "views TF01"]
 
 
+def test_results_of_other_settings_are_named_before_they_are_replaced(project):
+    changed = "dataset.basic_tfs.TF01.color=[[0.3,1,0,0]]"
+    said = "results of other settings, which this run replaces; results=FOLDER keeps both"
+    told = project.snakemake("-n", overrides=changed).stderr.splitlines()
+    assert [line for line in told if said in line] == [
+        f"texgs: results/turbulence/TF01/views and 1 more hold {said}"
+    ]
+    assert said not in project.snakemake("-n").stderr
+
+
 def test_tracking_and_profiles_rerun_nothing(project):
     profile = project.sources / "workflow" / "profiles" / "local"
     assert project.planned("--workflow-profile", str(profile), config=("tracking=mlflow",)) == []
@@ -124,7 +134,7 @@ def test_a_failing_job_says_why_and_leaves_nothing_half_written(project, tmp_pat
         overrides="dataset.basic_tfs.TF01.opacity=[[0.001,0],[0.002,0.001],[0.003,0]]",
     )
     assert done.returncode != 0
-    assert "expected to see something" in done.stdout + done.stderr
+    assert re.fullmatch("texgs views: .*expected to see something.*", done.stderr.splitlines()[-1])
     views = other.work / "results" / "turbulence" / "TF01" / "views"
     assert not (views / "transforms_train.json").exists()
     assert not (views / "metrics.json").exists()

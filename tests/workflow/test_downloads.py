@@ -47,3 +47,13 @@ def test_a_volume_is_downloaded_by_a_job_of_its_own(source, tmp_path, monkeypatc
     assert (project.work / VOLUME).exists()
     assert file.stat().st_mtime_ns == at
     assert project.planned(targets=(VOLUME,), overrides=source) == []
+
+
+def test_a_download_that_fails_ends_the_run_with_its_reason(source, tmp_path, monkeypatch):
+    monkeypatch.setenv("TEXGS_CACHE", str(tmp_path / "cache"))
+    project = Project(tmp_path)
+    done = project.snakemake(targets=(VOLUME,), overrides=source.replace("/a.npy ", "/none.npy "))
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("texgs download: http://127.0.0.1:")
+    assert last.endswith("get a.npy elsewhere and name its folder by data_folder=FOLDER or TEXGS_DATA")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.cli.result import METRICS, fingerprint, is_complete, stamped
 from texgs.config.experiments import LeftOut
+from texgs.config.stage import settings_digest
 from texgs.config.stages import STAGES
 from texgs.core.io import read_json
 from texgs.report.metrics_files import below
@@ -46,6 +47,16 @@ def earlier(
         else:
             digests[file.as_posix()] = checksums.of(file)
     return digests, outdated
+
+
+def of_other_settings(jobs: Iterable[Job]) -> list[str]:
+    """The folders of jobs that hold results of other settings, which the jobs will replace."""
+    return [
+        job.output.as_posix()
+        for job in jobs
+        if (job.output / METRICS).exists()
+        and (stamped(job.output) or {}).get("settings") != settings_digest(job.settings)
+    ]
 
 
 def is_other(

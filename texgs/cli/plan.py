@@ -46,6 +46,7 @@ class Plan:
     code: dict[str, str]  # digests of modules that are no stages
     left_out: str  # file that tells what the run goes on without
     earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
+    replaced: list[str]  # folders with results of other settings, in whose place the run puts its own
 
     def done(self, *places: str, sweep: str = "") -> list[str]:
         """The metrics files of all jobs that have one of some places, of a sweep or of none."""
@@ -102,7 +103,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
 def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
     from texgs.cli.absent import lacking, left_out, missing_weights
-    from texgs.cli.earlier import earlier
+    from texgs.cli.earlier import earlier, of_other_settings
     from texgs.config.compose import compose
     from texgs.config.experiments import apart, selected
     from texgs.core.checksum import Checksums
@@ -131,6 +132,7 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         {module: code_digest(module) for module in OTHER_CODE},
         left_out({**selection.left_out, **outdated}, results),
         others,
+        of_other_settings(run.values()),
     )
     checksums.save()
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, first_line
 
 
 def download(url: str, sha256: str, path: Path) -> None:
@@ -29,7 +29,8 @@ def download(url: str, sha256: str, path: Path) -> None:
         pooch.retrieve(url, f"sha256:{sha256.lower()}", path.name, path.parent, progressbar=True)
     except OSError as error:
         raise ArgumentError(
-            f"{url}: cannot be downloaded ({error}); get the file elsewhere and put it into data_folder"
+            f"{url}: cannot be downloaded ({first_line(error)}); "
+            f"get {path.name} elsewhere and name its folder by data_folder=FOLDER or TEXGS_DATA"
         ) from error
     except ValueError as error:
         raise ArgumentError(

@@ -1,11 +1,12 @@
 # The plan of the run, and what the command lines of all jobs share.
+import atexit
 import os
 import re
 import shlex
 import sys
 from pathlib import Path
 
-from texgs.cli import fork_client, parents
+from texgs.cli import fork_client, last_words, parents
 from texgs.cli.plan import planned, words_of
 from texgs.config.places import PLACES
 from texgs.core.errors import TexgsError
@@ -29,6 +30,14 @@ if MISSING:
     print("\n".join(f"texgs: {line}" for line in MISSING), file=sys.stderr)
     if not any(re.fullmatch(NOTHING_IS_MADE, word) for word in sys.argv):
         sys.exit(2)
+
+if PLAN.replaced and workflow.is_main_process:
+    first, *others = PLAN.replaced
+    print(
+        f"texgs: {first}{f' and {len(others)} more hold' if others else ' holds'} results of other settings, which "
+        "this run replaces; results=FOLDER keeps both",
+        file=sys.stderr,
+    )
 
 PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
