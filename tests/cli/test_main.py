@@ -34,6 +34,23 @@ def test_an_error_is_one_sentence_and_code_2(monkeypatch, capsys):
     assert capsys.readouterr().err == "texgs doctor: size: expected at least 1 pixel, got 0\n"
 
 
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["rnu"], "texgs: error: no verb rnu, did you mean run?"),
+        (["zzz", "a song"], "texgs: error: no verb zzz; texgs --help lists all"),
+        (["doctor", "--bogus"], "texgs doctor: error: unrecognized arguments: --bogus"),
+        (["segment", "a.yaml", "TF01"], "texgs segment: error: unrecognized arguments: TF01"),
+    ],
+)
+def test_a_wrong_word_is_told_below_the_usage_of_its_verb(capsys, words, message):
+    with pytest.raises(SystemExit, match="2"):
+        main(words)
+    told = capsys.readouterr().err.splitlines()
+    assert told[-1] == message
+    assert told[0].startswith(f"usage: {message.partition(':')[0]} ")
+
+
 def test_the_command_line_starts_without_heavy_imports():
     """Help must answer at once: torch alone takes seconds to import."""
     code = (

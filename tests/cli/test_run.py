@@ -85,6 +85,8 @@ def test_a_dry_run_with_words_anywhere(tmp_path):
         (["nonsense=1"], 2, "texgs: nonsense: no such key"),
         (["--bogus"], 2, "unrecognized arguments: --bogus"),
         (["nosuchtarget"], 1, "nosuchtarget"),
+        (["dataset", "engine"], 2, "dataset: expected dataset=engine in one word, got dataset alone"),
+        (["datset=engine"], 2, "datset: no such key, did you mean dataset?"),
     ],
 )
 def test_exit_codes(tmp_path, words, code, message):

@@ -179,13 +179,20 @@ def test_a_mistake_in_a_sweep_is_one_sentence(words, message):
 
 
 @pytest.mark.parametrize(
-    "word", ["fit.seed=0,1", "fit.seed=range(3)", "dataset=engine,fuel", "fit.seed=choice(1,2)"]
+    ("word", "example"),
+    [
+        ("dataset.volume.dims=4,5,6", ", as in 'dataset.volume.dims=[4,5,6]'"),
+        ("fit.seed=range(3)", ""),
+        ("dataset=engine,fuel", ""),
+        ("fit.seed=choice(1,2)", ""),
+    ],
 )
-def test_a_verb_of_one_stage_names_the_one_that_sweeps(word):
+def test_a_verb_of_one_stage_names_lists_and_the_verb_that_sweeps(word, example):
     with pytest.raises(ConfigError) as error:
         compose((word,))
-    assert f"{word}: expected one value, got several, which are a sweep: texgs run {word};" in str(
-        error.value
+    assert str(error.value) == (
+        f"{word}: expected one value, got several; a list stands in brackets{example}, "
+        f"a text with a comma in quotes, and for a sweep there is texgs run {word}"
     )
 
 

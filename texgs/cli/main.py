@@ -1,6 +1,7 @@
 """`texgs VERB`: picks the verb and turns errors into one sentence and an exit code."""
 
 import argparse
+import difflib
 import importlib
 import io
 import os
@@ -72,19 +73,24 @@ def parser() -> argparse.ArgumentParser:
         about = f"{summary[0].upper()}{summary[1:]}." if name in STAGE_VERBS else module.__doc__
         verb = verbs.add_parser(name, help=summary, description=about, conflict_handler="resolve")
         module.add_arguments(verb)
-        verb.set_defaults(run=module.run)
+        verb.set_defaults(run=module.run, refuse=verb.error)
     return top
 
 
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The arguments; KEY=VALUE may stand anywhere, also behind options, where argparse alone gives up."""
     top = parser()
+    word = next(iter(argv), "-")
+    if not word.startswith("-") and word not in VERBS:
+        similar = difflib.get_close_matches(word, VERBS, n=1)
+        hint = f", did you mean {similar[0]}?" if similar else "; texgs --help lists all"
+        top.error(f"no verb {word}{hint}")
     if argv[:1] == ["run"] and argv[1:2] not in (["-h"], ["--help"]):
         argv = ["run", "--", *argv[1:]]  # its options are those of snakemake
     arguments, rest = top.parse_known_args(joined(argv))
     overrides: list[str] | None = getattr(arguments, "overrides", None)
     if rest and (overrides is None or any(word.startswith("-") for word in rest)):
-        top.error(f"unrecognized arguments: {' '.join(rest)}")
+        arguments.refuse(f"unrecognized arguments: {' '.join(rest)}")
     if rest:
         arguments.overrides = [*(overrides or ()), *rest]
     return arguments

@@ -13,6 +13,7 @@ import shlex
 import signal
 import sys
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from types import FrameType
 
@@ -58,11 +59,13 @@ def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; whether it ended well.
 
     Raises:
+        ArgumentError: for a key without its value.
         SystemExit: for a mistake that snakemake or the Snakefile has told.
     """
     from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
 
     given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
+    require_pairs([word for word in words if word in given.targets])
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
     rest = [word for word in words if word not in chosen]
     sys.argv = ["snakemake", *rest]  # the Snakefile looks there
@@ -75,6 +78,19 @@ def snakemake(words: Sequence[str]) -> bool:
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
     return bool(args_to_api(options, parser))
+
+
+def require_pairs(words: Sequence[str]) -> None:
+    """Require that none of the words is the key of a choice alone, as in `dataset engine`.
+
+    Raises:
+        ArgumentError: naming the key.
+    """
+    from texgs.cli.plan import GROUPS
+
+    for word, after in pairwise((*words, "NAME")):
+        if word in GROUPS:
+            raise ArgumentError(f"{word}: expected {word}={after} in one word, got {word} alone")
 
 
 def defaults(given: argparse.Namespace) -> list[str]:

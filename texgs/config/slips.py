@@ -54,9 +54,12 @@ def told(error: Exception) -> str:
 
 def several_values(word: str) -> str:
     """What to say about a key with several values."""
+    key, _, values = word.partition("=")
+    is_list = "." in key and "(" not in values  # names of groups are no lists
+    brackets = f", as in '{key}=[{values}]'" if is_list else ""
     return (
-        f"{word}: expected one value, got several, which are a sweep: texgs run {word}; "
-        "a list stands in brackets, a text with a comma in quotes"
+        f"{word}: expected one value, got several; a list stands in brackets{brackets}, "
+        f"a text with a comma in quotes, and for a sweep there is texgs run {word}"
     )
 
 
@@ -68,7 +71,9 @@ def full_key(error: Exception) -> str:
 
 def no_such_key(name: str) -> str:
     """What to say about a key that the schema does not have."""
-    return f"{name}: no such key{close(name, [entry.name for entry in keys()])}; texgs views --help lists all"
+    names = [entry.name for entry in keys()]
+    groups = dict.fromkeys(each.partition(".")[0] for each in names)
+    return f"{name}: no such key{close(name, [*groups, *names])}; texgs views --help lists all"
 
 
 def close(word: str, known: list[str] | tuple[str, ...]) -> str:

@@ -19,6 +19,7 @@ from texgs.fields.bounds import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 
+WHOLE = 0.9  # share of a model, from which a segment may be more than what was meant
 CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
 AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
 HEADLIGHT = Light("headlight")
@@ -35,8 +36,12 @@ class Lifted:
 
     @property
     def basis(self) -> str:
-        """How many views it rests on, in words."""
-        return f"masks of {self.used} of {self.used + self.left_out} views"
+        """How many views it rests on, in words; and whether it holds almost the whole model."""
+        views = f"masks of {self.used} of {self.used + self.left_out} views"
+        share = float(self.mask.float().mean())
+        if share < WHOLE:
+            return views
+        return f"{views} hold {share:.0%} of the model; if that is too much, click beside the object as well"
 
 
 @torch.no_grad()
