@@ -20,6 +20,7 @@ help:
 	@echo "The first of them creates $(VENV) with $(PYTHON) (3.11 to 3.13) and compiles the native library."
 
 install: $(VENV)/installed
+	@echo "texgs is installed in $(VENV). Next: source $(BIN)/activate, and then texgs doctor or make demo."
 
 # All tests: a worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
 test: $(VENV)/installed
