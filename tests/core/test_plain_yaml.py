@@ -30,3 +30,15 @@ def test_what_grows_is_refused():
     for tagged in ("!!bool x", "a: !!timestamp x", "!!int ''", "!!python/object:os.system {}"):
         with pytest.raises(ArgumentError, match=r"expected values, got the tag .* in line 1; leave it out"):
             parse_yaml(tagged)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("a: 1\n\n`b`: 2", r"got a mistake in line 3 \(found character '`' that cannot start any token\)"),
+        ("a: [1, 2\nb: 3", "got a mistake in line 2"),
+    ],
+)
+def test_what_is_no_yaml_is_one_sentence_with_its_line(text, message):
+    with pytest.raises(ArgumentError, match=f"^expected YAML, {message}.*; correct it$"):
+        parse_yaml(text)

@@ -102,7 +102,7 @@ def test_files_that_are_no_scene(folder):
     with pytest.raises(ArgumentError, match="no such file; texgs compose writes one"):
         read_scene(folder / "none.yaml")
     (folder / "bad.yaml").write_text("a: [1")
-    with pytest.raises(ArgumentError, match=r"bad\.yaml: expected a scene in YAML"):
+    with pytest.raises(ArgumentError, match=r"bad\.yaml: expected YAML, got a mistake in line 1"):
         read_scene(folder / "bad.yaml")
     (folder / "text.yaml").write_text("hello")
     with pytest.raises(ArgumentError, match="the scene: expected a table of keys and values, got 'hello'"):

@@ -46,8 +46,15 @@ def parse_yaml(text: str) -> Any:
     """The values of a text.
 
     Raises:
-        ArgumentError: if it has aliases, tags, or values in one another without end.
-        yaml.YAMLError: if it is no YAML.
+        ArgumentError: if it is no YAML, or has aliases, tags, or values in one another without end.
+        yaml.YAMLError: if it has characters that no text has.
         ValueError: if a value is none, such as the date 2001-99-99.
     """
-    return yaml.load(text, PlainLoader)
+    try:
+        return yaml.load(text, PlainLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f" in line {mark.line + 1}" if mark else ""
+        raise ArgumentError(
+            f"expected YAML, got a mistake{line} ({error.problem or error.context}); correct it"
+        ) from error
