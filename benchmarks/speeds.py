@@ -12,6 +12,7 @@ import csv
 import shlex
 from collections import defaultdict
 from collections.abc import Sequence
+from dataclasses import fields
 from importlib.resources import files
 from pathlib import Path
 from statistics import median
@@ -38,21 +39,21 @@ class Sample(NamedTuple):
     seconds: float
 
 
-def main(*runs: str) -> None:
+def main(first: str, *others: str) -> None:
     """Write the file and print how far off it was."""
-    measured = samples(runs)
+    measured = samples([first, *others])
     before, now = speeds(), median(probe() for _ in range(PROBES))
     factors = {stage: factor(before[stage], some) for stage, some in measured.items()}
-    others = now / before[PROBE].constant  # also of the probe itself
-    table = {stage: scaled(speed, factors.get(stage, others)) for stage, speed in before.items()}
+    by_probe = now / before[PROBE].constant  # also of the probe itself
+    table = {stage: scaled(speed, factors.get(stage, by_probe)) for stage, speed in before.items()}
     note = [line for line in FILE.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
     with FILE.open("w", encoding="utf-8", newline="") as file:
         file.writelines(f"{line}\n" for line in note)
         writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["stage", *Speed.__dataclass_fields__])
+        writer.writerow(["stage", *(field.name for field in fields(Speed))])
         for stage, speed in table.items():
             writer.writerow([stage, *(f"{value:.{DIGITS}g}" for value in vars(speed).values())])
-    print(f"probe: {others:.2f} times as long")
+    print(f"probe: {by_probe:.2f} times as long")
     for stage, by in factors.items():
         print(f"{stage}: {len(measured[stage])} jobs took {by:.2f} times as long as the file said")
 

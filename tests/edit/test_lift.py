@@ -7,7 +7,7 @@ from tests.edit.lift_scenes import BLUE, RED, cameras, joined, nested, overlap, 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.edit.clicks import Clicks, is_visible, prompts_at
-from texgs.edit.lift import HEADLIGHT, ViewMasks, lift, middle_of
+from texgs.edit.lift import HEADLIGHT, Lifted, ViewMasks, lift, middle_of
 from texgs.edit.preview import preview
 from texgs.models.grabcut import GrabCut
 
@@ -179,3 +179,11 @@ def test_a_preview_shows_the_mask_and_the_clicks():
     far[y0 - 3 : y0 + 4, x0 - 3 : x0 + 4] = False
     torch.testing.assert_close(picture[far], 0.4 * full[far] + 0.6 * torch.tensor([1.0, 0.1, 0.1]))
     assert torch.equal(picture[0], full[0]), "the background stays"
+
+
+def test_a_segment_of_almost_the_whole_model_is_told():
+    part, whole = (Lifted(torch.arange(20) < count, torch.ones(1, 1) > 0, 40, 2) for count in (17, 19))
+    assert part.basis == "masks of 40 of 42 views"
+    assert whole.basis.startswith(
+        "masks of 40 of 42 views hold 95% of the model; if that is too much, click "
+    )

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from texgs.config.experiments import Selection
 
 PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
-START_SECONDS = 8  # of a run, before its first job; there as well
+START_SECONDS = 8  # of a run before its first job, on that machine
 STEP_SECONDS = 0.8  # between two jobs of a run
 REPEATS = 15  # of the probe; the median counts
 
@@ -171,7 +171,7 @@ def show(words: tuple[str, ...]) -> int:
     slower = probe() / speeds()[PROBE].constant
     print(
         f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on other "
-        f"scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as the one they are of"
+        f"scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as theirs"
     )
     return 1 if stops else 0
 

@@ -1,7 +1,6 @@
 """`texgs VERB`: picks the verb and turns errors into one sentence and an exit code."""
 
 import argparse
-import difflib
 import importlib
 import io
 import os
@@ -15,6 +14,7 @@ from texgs.config.fields import kinds
 from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import collect_rarely, keep_freed_memory, told
+from texgs.core.names import close
 from texgs.core.waiting import waiting
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
@@ -80,11 +80,8 @@ def parser() -> argparse.ArgumentParser:
 def parse(argv: Sequence[str]) -> argparse.Namespace:
     """The arguments; KEY=VALUE may stand anywhere, also behind options, where argparse alone gives up."""
     top = parser()
-    word = next(iter(argv), "-")
-    if not word.startswith("-") and word not in VERBS:
-        similar = difflib.get_close_matches(word, VERBS, n=1)
-        hint = f", did you mean {similar[0]}?" if similar else "; texgs --help lists all"
-        top.error(f"no verb {word}{hint}")
+    if argv and not argv[0].startswith("-") and argv[0] not in VERBS:
+        top.error(f"no verb {argv[0]}{close(argv[0], VERBS) or '; texgs --help lists all'}")
     if argv[:1] == ["run"] and argv[1:2] not in (["-h"], ["--help"]):
         argv = ["run", "--", *argv[1:]]  # its options are those of snakemake
     arguments, rest = top.parse_known_args(joined(argv))

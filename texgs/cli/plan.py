@@ -48,6 +48,17 @@ class Plan:
     earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
     replaced: list[str]  # folders with results of other settings, in whose place the run puts its own
 
+    def warning(self) -> str:
+        """What a user should know before the run begins; empty where there is nothing."""
+        if not self.replaced:
+            return ""
+        others = len(self.replaced) - 1
+        verb = f"and {others} more hold" if others else "holds"
+        return (
+            f"{self.replaced[0]} {verb} results of other settings, which this run replaces; "
+            "results=FOLDER keeps both"
+        )
+
     def done(self, *places: str, sweep: str = "") -> list[str]:
         """The metrics files of all jobs that have one of some places, of a sweep or of none."""
         folders = self.sweeps.get(sweep, ())

@@ -9,8 +9,8 @@ from omegaconf import DictConfig
 from texgs.config.describe import Key, keys
 from texgs.config.files import origin, shortened
 from texgs.config.keys import numbers
-from texgs.config.slips import close
 from texgs.core.errors import ConfigError
+from texgs.core.names import close
 
 RESERVED = (
     "volume",

@@ -6,8 +6,8 @@ from texgs.config.inputs import scene_before
 from texgs.config.locate import tf_names
 from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
-from texgs.config.slips import close
 from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.names import close
 
 OF_ONE = ("edit.name=", "edit.method=", "edit.base=", "edit.parts=")  # not of what an edit starts from
 

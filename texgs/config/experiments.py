@@ -16,11 +16,11 @@ from texgs.config.methods import method_of
 from texgs.config.places import edit_folder
 from texgs.config.project import members
 from texgs.config.schema import Config
-from texgs.config.slips import close
 from texgs.config.stages import STAGES
 from texgs.config.sweep import variants
 from texgs.config.variants import changes, is_of_edits
 from texgs.core.errors import ConfigError
+from texgs.core.names import close
 
 Words = tuple[str, ...]
 OF_A_UNION = ("experiments", "each", "aimed", "missing")  # all that an experiment of experiments sets

@@ -9,9 +9,9 @@ from texgs.config.inputs import with_recipe
 from texgs.config.locate import tf_names
 from texgs.config.methods import method_of
 from texgs.config.project import members
-from texgs.config.slips import close
 from texgs.config.variants import changes as swept
 from texgs.core.errors import ConfigError
+from texgs.core.names import close
 
 ANYWHERE = ("background", "light")  # changes of the whole scene
 

@@ -1,6 +1,5 @@
 """What is wrong with a configuration, in one sentence: the key, or the file of conf/ and its line."""
 
-import difflib
 import re
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from omegaconf.errors import OmegaConfBaseException
 from texgs.config.describe import keys
 from texgs.config.files import files, lines, place, shortened, slip
 from texgs.config.project import folders, members
+from texgs.core.names import close
 
 
 def sentence(error: Exception) -> str:
@@ -74,12 +74,6 @@ def no_such_key(name: str) -> str:
     names = [entry.name for entry in keys()]
     groups = dict.fromkeys(each.partition(".")[0] for each in names)
     return f"{name}: no such key{close(name, [*groups, *names])}; texgs views --help lists all"
-
-
-def close(word: str, known: list[str] | tuple[str, ...]) -> str:
-    """A hint at the known word that is most like the given one."""
-    similar = difflib.get_close_matches(str(word), known, n=1, cutoff=0.6)
-    return f", did you mean {similar[0]}?" if similar else ""
 
 
 def file_of(error: Exception) -> Path | None:

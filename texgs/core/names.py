@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from itertools import count
 from pathlib import Path
 from unicodedata import category
@@ -102,3 +104,9 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
     if not is_path or not all(each.isprintable() or category(each) == SPACES for each in str(path)):
         raise ArgumentError(f"{where}: expected the path of {kind}, got {path!r:.100}")
     return folder / str(path)
+
+
+def close(word: object, known: Iterable[str]) -> str:
+    """A hint at the known word that is most like the given one; empty where none is."""
+    similar = difflib.get_close_matches(str(word), list(known), n=1)
+    return f", did you mean {similar[0]}?" if similar else ""

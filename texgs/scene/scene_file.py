@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Callable, Collection
 from dataclasses import asdict, fields
@@ -14,7 +13,7 @@ import yaml
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 from texgs.core.light import Light
-from texgs.core.names import label, named_file, require_name
+from texgs.core.names import close, label, named_file, require_name
 from texgs.core.numbers import is_number
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.reading import reading, reading_as
@@ -161,6 +160,5 @@ def known(values: Any, keys: Collection[str] | None, where: str) -> None:
         raise ArgumentError(f"{where}: expected a table of keys and values, got {values!r}")
     for key in values if keys is not None else ():
         if key not in keys:  # type: ignore[operator]
-            like = difflib.get_close_matches(str(key), list(keys or ()), n=1)
-            hint = f", did you mean {like[0]}?" if like else f"; expected {', '.join(keys or ())}"
+            hint = close(key, keys or ()) or f"; expected {', '.join(keys or ())}"
             raise ArgumentError(f"{where}: no such key {key!r}{hint}")

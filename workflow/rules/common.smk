@@ -31,13 +31,8 @@ if MISSING:
     if not any(re.fullmatch(NOTHING_IS_MADE, word) for word in sys.argv):
         sys.exit(2)
 
-if PLAN.replaced and workflow.is_main_process:
-    first, *others = PLAN.replaced
-    print(
-        f"texgs: {first}{f' and {len(others)} more hold' if others else ' holds'} results of other settings, which "
-        "this run replaces; results=FOLDER keeps both",
-        file=sys.stderr,
-    )
+if workflow.is_main_process and (warning := PLAN.warning()):
+    print(f"texgs: {warning}", file=sys.stderr)
 
 PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
