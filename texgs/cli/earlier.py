@@ -51,12 +51,12 @@ def earlier(
 
 def of_other_settings(jobs: Iterable[Job]) -> list[str]:
     """The folders of jobs that hold results of other settings, which the jobs will replace."""
-    return [
+    return sorted(
         job.output.as_posix()
         for job in jobs
         if (job.output / METRICS).exists()
         and (stamped(job.output) or {}).get("settings") != settings_digest(job.settings)
-    ]
+    )
 
 
 def is_other(
