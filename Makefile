@@ -50,7 +50,7 @@ lint: $(VENV)/dependencies
 	$(BIN)/snakemake --lint
 	$(BIN)/python -m pytest tests/test_layers.py
 
-$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/config/native_sources.py $(NATIVE)
+$(VENV)/installed: $(VENV)/dependencies pyproject.toml CMakeLists.txt texgs/core/native_sources.py $(NATIVE)
 	@echo "Compiling the native library (some minutes on two cores, with CUDA twice as many) and installing texgs"
 	@$(PIP) install --no-build-isolation --no-deps --editable .
 	@touch $@

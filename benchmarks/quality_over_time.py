@@ -19,11 +19,8 @@ from typing import NamedTuple
 from unittest.mock import patch
 
 from benchmarks.command import call
-from texgs.cli.result import METRICS
 from texgs.cli.stage import ensure
-from texgs.cli.stages import phase
 from texgs.config.compose import compose
-from texgs.config.stages import STAGES
 from texgs.core.memory import keep_freed_memory
 from texgs.core.progress import progress
 from texgs.fields.harmonics import join
@@ -32,6 +29,9 @@ from texgs.fit.loop import Fit
 from texgs.metrics.quality import evaluate, mean
 from texgs.report.metrics_files import read
 from texgs.volume.view_set import View, read_views
+from texgs.workflow.result import METRICS
+from texgs.workflow.stage_table import STAGES
+from texgs.workflow.stages import phase
 
 PHASES = ("surfels", "shading", "texture")
 GROWTH, FIRST = 1.25, 0.5  # of the seconds between looks

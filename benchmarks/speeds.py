@@ -1,7 +1,7 @@
 """Speeds of the stages for `texgs doctor --experiment`, from what runs on this machine have taken.
 
-`python -m benchmarks.speeds "WORDS OF A RUN" ...` scales `texgs/cli/speeds.csv` to those jobs of these runs
-that are done, such as `python -m benchmarks.speeds "dataset=engine fit=quick results=/tmp/run/results"`. Each
+`python -m benchmarks.speeds "WORDS OF A RUN" ...` scales `texgs/workflow/speeds.csv` to those jobs of these
+runs that are done, such as `python -m benchmarks.speeds "dataset=engine fit=quick results=/tmp/run/results"`. Each
 stage gets one factor, so that pixels and iterations keep the weights that longer runs have given them. Stages
 that no run has are scaled as the probe says that this machine is faster or slower than that of the file.
 """
@@ -19,14 +19,14 @@ from statistics import median
 from typing import NamedTuple
 
 from benchmarks.command import call
-from texgs.cli.absent import lacking
-from texgs.cli.forecast import PROBE, Speed, planned_jobs, probe, speeds, work_of
-from texgs.cli.result import METRICS
-from texgs.config.experiments import selected
-from texgs.config.product import as_sweep
 from texgs.core.io import read_json
+from texgs.workflow.absent import lacking
+from texgs.workflow.experiments import selected
+from texgs.workflow.forecast import PROBE, Speed, planned_jobs, probe, speeds, work_of
+from texgs.workflow.product import as_sweep
+from texgs.workflow.result import METRICS
 
-FILE = Path(str(files("texgs.cli").joinpath("speeds.csv")))
+FILE = Path(str(files("texgs.workflow").joinpath("speeds.csv")))
 PROBES = 5  # times that the probe is asked; the median counts
 DIGITS = 2
 

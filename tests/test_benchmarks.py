@@ -15,7 +15,7 @@ from benchmarks.report import Measurement, Section
 from benchmarks.settings import SECTIONS, parse
 from benchmarks.speeds import Sample, factor, scaled
 from benchmarks.timing import Case, measure
-from texgs.cli.forecast import Speed
+from texgs.workflow.forecast import Speed
 
 ROOT = Path(__file__).parents[1]
 TINY = ("--quick", "--sizes", "64", "--surfels", "500", "--scenes", "opaque", "--threads", "1")

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 LEFT = {
     "core": set(),
     "config": {"core"},
-    **{name: {"config", "core"} for name in ("raster", "track")},
+    "raster": {"core"},
     "volume": {"config", "core", "raster"},
     **{name: {"config", "core", "volume", "raster"} for name in ("fields", "models")},
 }
@@ -21,7 +21,8 @@ for name in ("fit", "edit", "metrics"):
 LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
 for name in ("methods", "kinds", "viewer"):
     LEFT[name] = LEFT["report"] | {"report"}
-LEFT["cli"] = LEFT["methods"] | {"methods", "kinds", "track", "viewer"}
+LEFT["workflow"] = LEFT["methods"] | {"methods", "kinds"}
+LEFT["cli"] = LEFT["workflow"] | {"workflow", "viewer"}
 
 
 def package_of(path: Path) -> str:

@@ -8,8 +8,6 @@ is unlocked by hand. Times, tables of times and numbers of runs are not compared
 """
 
 import argparse
-import hashlib
-import json
 import os
 import random
 import signal
@@ -19,9 +17,7 @@ import time
 from pathlib import Path
 
 import psutil
-
-TIMES = ("seconds", "_ms", "milliseconds", "minutes", "peak_memory", "run", "git_sha")
-NOT_COMPARED = ("logs", "tables", "mlartifacts", "report.html", "mlflow.db")
+from compare_results import contents, different
 
 
 def start(folder: Path, words: list[str]) -> subprocess.Popen[str]:
@@ -60,32 +56,6 @@ def kill(folder: Path, words: list[str], chance: random.Random, inside_job: bool
     return was_running
 
 
-def without_times(value: object) -> object:
-    """Numbers of a job that are the same each time."""
-    if isinstance(value, dict):
-        return {
-            key: without_times(entry)
-            for key, entry in value.items()
-            if not any(word in key for word in TIMES)
-        }
-    return value
-
-
-def contents(results: Path) -> dict[str, str]:
-    """Digests of all files that have to be equal, by their paths."""
-    digests = {}
-    for path in sorted(results.rglob("*")):
-        name = path.relative_to(results).as_posix()
-        hidden = any(part.startswith(".") for part in path.relative_to(results).parts)
-        if not path.is_file() or hidden or name.startswith(NOT_COMPARED) or path.name == "times.json":
-            continue
-        data = path.read_bytes()
-        if path.name == "metrics.json":
-            data = json.dumps(without_times(json.loads(data)["numbers"]), sort_keys=True).encode()
-        digests[name] = hashlib.sha256(data).hexdigest()
-    return digests
-
-
 def statuses(results: Path) -> dict[str, int]:
     """How many tracked runs have which status."""
     from mlflow import MlflowClient
@@ -116,13 +86,14 @@ def main() -> int:
         else:  # it had ended: begin again with something to do
             (killed / "results" / "orbital" / "volume" / "volume.nrrd").unlink(missing_ok=True)
     codes = [start(folder, arguments.words).wait() for folder in (killed, undisturbed)]
-    one, two = (contents(folder / "results") for folder in (killed, undisturbed))
-    different = sorted(name for name in one.keys() | two.keys() if one.get(name) != two.get(name))
+    names = different(killed / "results", undisturbed / "results")
     left = [str(path) for path in (killed / "results").rglob(".*") if path.suffix in (".work", ".old")]
     counts = statuses(killed / "results")
     print(f"{done[0]} kills at any moment, {done[1]} inside a job; exit codes {codes}")
-    print(f"{len(two)} files compared, different: {different}; left behind: {left}; runs: {counts}")
-    return int(bool(different or left or any(codes) or "RUNNING" in counts))
+    print(
+        f"{len(contents(undisturbed / 'results'))} files compared, different: {names}; left behind: {left}; runs: {counts}"
+    )
+    return int(bool(names or left or any(codes) or "RUNNING" in counts))
 
 
 if __name__ == "__main__":

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from texgs.cli import result
-from texgs.cli.earlier import earlier
 from texgs.core.checksum import Checksums
 from texgs.core.io import write_json
+from texgs.workflow import result
+from texgs.workflow.earlier import earlier
 
 VIEWS, FIT, EDIT = (
     Path("results/engine", name) for name in ("TF01/views", "TF01/quick/texture", "edits/gold")

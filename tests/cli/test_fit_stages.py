@@ -152,7 +152,7 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
 
 
 def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatch):
-    from texgs.cli.stages import figure
+    from texgs.workflow.stages import figure
 
     drawn = []
     write = figure.write_fit_figure
@@ -169,7 +169,7 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatc
 
 
 def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
-    from texgs.cli.stages import figure
+    from texgs.workflow.stages import figure
 
     shown = []
     read = figure.read_views

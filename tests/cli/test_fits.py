@@ -6,9 +6,9 @@ from dataclasses import replace
 import pytest
 
 from texgs.cli.main import main
-from texgs.cli.plan import make
 from texgs.config.fields import kinds
 from texgs.core.errors import ConfigError, TexgsError
+from texgs.workflow.plan import make
 
 ON_A_GPU = ("fit=plenoxels", "device=cuda")
 CPU_ONLY = "device: expected cpu for fit=plenoxels, which fits voxels, got cuda"

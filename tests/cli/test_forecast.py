@@ -5,10 +5,10 @@ import re
 import pytest
 
 from tests.workflow.project import TINY
-from texgs.cli import forecast
 from texgs.cli.main import main
-from texgs.config.experiments import selected
-from texgs.config.stages import STAGES
+from texgs.workflow import forecast
+from texgs.workflow.experiments import selected
+from texgs.workflow.stage_table import STAGES
 
 
 @pytest.fixture(autouse=True)

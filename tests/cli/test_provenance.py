@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from texgs.cli.provenance import device, seed
+from texgs.workflow.provenance import device, seed
 
 
 class Cuda:

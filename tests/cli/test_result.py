@@ -7,10 +7,10 @@ import time
 
 import pytest
 
-from texgs.cli import result
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
+from texgs.workflow import result
 
 MINE, OTHER = {"stage": "views", "settings": "a"}, {"stage": "views", "settings": "b"}
 

@@ -5,8 +5,6 @@ import pytest
 
 from tests.cli.test_volume_scene import HIGH, LOW
 from tests.fields.surfels.test_composition import ball
-from texgs.cli.stages.settings import FitLabel, OfScene
-from texgs.cli.stages.shots import Shot, Studio
 from texgs.config.dataset import BasicTF
 from texgs.config.views import Shading, ViewKeys
 from texgs.core.camera import orbit
@@ -20,6 +18,8 @@ from texgs.scene.session import Session
 from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
+from texgs.workflow.stages.settings import FitLabel, OfScene
+from texgs.workflow.stages.shots import Shot, Studio
 
 SIZE = 48
 VIEW = [20.0, 10.0]

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from texgs.cli.main import main
-from texgs.cli.result import METRICS
-from texgs.cli.stages import views as views_stage
 from texgs.core.image import read_png
 from texgs.volume.view_set import read_views
+from texgs.workflow.result import METRICS
+from texgs.workflow.stages import views as views_stage
 
 TINY = [
     "dataset=sphere",
@@ -168,8 +168,8 @@ def test_a_killed_job_goes_on_where_it_was(folder, tmp_path, monkeypatch):
 
 def test_a_job_of_the_workflow(folder, capsys):
     from texgs.config.compose import compose
-    from texgs.config.stage import settings_file
-    from texgs.config.stages import STAGES
+    from texgs.workflow.stage import settings_file
+    from texgs.workflow.stage_table import STAGES
 
     settings = settings_file(STAGES["volume"].settings(compose(tuple(TINY))), "results")
     output = folder / "elsewhere"

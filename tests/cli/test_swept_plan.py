@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from texgs.cli.parents import WHOLE, of_sweep, owner
-from texgs.cli.plan import made, make, note_results, words_of
 from texgs.core.errors import ConfigError
+from texgs.workflow.parents import WHOLE, of_sweep, owner
+from texgs.workflow.plan import made, make, note_results, words_of
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
 

@@ -4,16 +4,16 @@ import json
 
 import pytest
 
-from texgs.cli.job import Job
-from texgs.cli.tracked import RUNS, Tracking, curves, name, of_workflow, scalars, tags
 from texgs.config.compose import compose
-from texgs.config.product import as_sweep
-from texgs.config.stage import for_tf
-from texgs.config.stages import STAGES
-from texgs.config.sweep import variants
 from texgs.core.checksum import Checksums
 from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
-from texgs.track import PARENT
+from texgs.workflow.job import Job
+from texgs.workflow.product import as_sweep
+from texgs.workflow.stage import for_tf
+from texgs.workflow.stage_table import STAGES
+from texgs.workflow.sweep import variants
+from texgs.workflow.tracked import RUNS, Tracking, curves, name, of_workflow, scalars, tags
+from texgs.workflow.tracking import PARENT
 
 GOLD = ("edit=gold", "edit.text.size=64,128")
 IDENTITY = {"settings": "0123", "code": "4567"}

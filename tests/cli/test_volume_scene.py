@@ -3,9 +3,6 @@ import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
-from texgs.cli.stages.pse import Step, compared
-from texgs.cli.stages.settings import FitLabel, OfScene
-from texgs.cli.stages.volume_scene import VolumeScene, edited
 from texgs.config.dataset import BasicTF
 from texgs.config.views import Shading, ViewKeys
 from texgs.core.camera import orbit
@@ -18,6 +15,9 @@ from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
 from texgs.volume.transfer import TransferFunction
+from texgs.workflow.stages.pse import Step, compared
+from texgs.workflow.stages.settings import FitLabel, OfScene
+from texgs.workflow.stages.volume_scene import VolumeScene, edited
 
 TF = TransferFunction(((0, 0), (1, 0.5), (2, 0.9)), ((0, 0.2, 0.4, 0.6), (2, 0.4, 0.6, 0.8)))
 LOW = {"opacity": [[0.2, 0.0], [0.3, 0.4], [0.4, 0.0]], "color": [[0.2, 0.2, 0.3, 0.8]]}

@@ -3,13 +3,13 @@
 import pytest
 
 from texgs.cli.main import main
-from texgs.cli.weights import missing, require_same, weights_of
 from texgs.config.compose import compose
-from texgs.config.stage import settings_digest
-from texgs.config.stages import STAGES
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.models import weights
+from texgs.workflow.stage import settings_digest
+from texgs.workflow.stage_table import STAGES
+from texgs.workflow.weights import missing, require_same, weights_of
 
 CLIP = "clip-vit-base-patch32"
 

@@ -2,10 +2,10 @@ import shutil
 
 import pytest
 
-from texgs.config import code
 from texgs.config.compose import compose
-from texgs.config.sources import CACHE, Sources, WithoutWords
-from texgs.config.stages import STAGES
+from texgs.workflow import code
+from texgs.workflow.sources import CACHE, Sources, WithoutWords
+from texgs.workflow.stage_table import STAGES
 
 
 def forget():

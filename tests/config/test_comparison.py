@@ -3,7 +3,7 @@
 import pytest
 
 from texgs.config.compose import compose
-from texgs.config.stages import STAGES
+from texgs.workflow.stage_table import STAGES
 
 WORDS = ("dataset=engine", "tf=TF01", "fits=[quick,gaussians_quick]", "fit.seed=3")
 COMPARISON = STAGES["comparison"]

@@ -107,7 +107,7 @@ def test_every_key_says_what_it_means():
 def test_config_is_light():
     """A Snakefile imports it in every job."""
     code = (
-        "import sys; import texgs.config.stage, texgs.config.compose;"
+        "import sys; import texgs.workflow.stage, texgs.config.compose;"
         "heavy = {'torch', 'kornia', 'numpy', 'mlflow', 'pyvista', 'vtkmodules'};"
         "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )

@@ -11,11 +11,11 @@ import yaml
 
 from tests.real_data import real_data
 from tests.shipped import DATASETS, ROOT, tracked
-from texgs.cli.stages.tf import check_basic_tfs, in_data_values
 from texgs.config.compose import compose
-from texgs.config.locate import source_file, tf_names, views_folder
 from texgs.core.errors import ConfigError
 from texgs.volume.sources import open_source
+from texgs.workflow.locate import source_file, tf_names, views_folder
+from texgs.workflow.stages.tf import check_basic_tfs, in_data_values
 
 # The paper's Tables 1 and 8: samples along x, y, z; width of views; basic scenes.
 PAPER = {

@@ -1,10 +1,10 @@
 import pytest
 
 from texgs.config.compose import compose
-from texgs.config.edits import edits
 from texgs.config.project import members
-from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
+from texgs.workflow.edits import edits
+from texgs.workflow.stage_table import STAGES
 
 
 def names(*words):

@@ -7,13 +7,13 @@ import pytest
 
 from texgs.config.compose import ALONE, compose, configuration
 from texgs.config.composition import composition
-from texgs.config.experiments import LeftOut, selected
-from texgs.config.locate import tf_names
-from texgs.config.places import fit_folder
 from texgs.config.project import ROOT, folders
-from texgs.config.stage import for_tf
-from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError, MissingDataError
+from texgs.workflow.experiments import LeftOut, selected
+from texgs.workflow.locate import tf_names
+from texgs.workflow.places import fit_folder
+from texgs.workflow.stage import for_tf
+from texgs.workflow.stage_table import STAGES
 
 
 def nothing(_config):

@@ -7,8 +7,8 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.config.project import members
-from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
+from texgs.workflow.stage_table import STAGES
 
 GALLERY = STAGES["gallery"]
 ENGINE = ("dataset=engine", "fit=quick")

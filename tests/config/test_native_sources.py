@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from texgs.config import native_sources
-from texgs.config.native_sources import native_digest
+from texgs.core import native_sources
+from texgs.core.native_sources import native_digest
 
 SOURCES = {
     "maths.h": "// The sum.\ninline float sum(float a, float b) { return a + b; }\n",

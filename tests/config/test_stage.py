@@ -2,10 +2,10 @@ import pytest
 from omegaconf import OmegaConf
 
 from texgs.config.compose import compose
-from texgs.config.locate import source_file, tf_names, views_folder
-from texgs.config.stage import settings_digest, settings_file
-from texgs.config.stages import STAGES
 from texgs.core.errors import ConfigError
+from texgs.workflow.locate import source_file, tf_names, views_folder
+from texgs.workflow.stage import settings_digest, settings_file
+from texgs.workflow.stage_table import STAGES
 
 
 def digest(stage, *overrides):

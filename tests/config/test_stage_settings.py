@@ -7,8 +7,8 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.config.project import members
-from texgs.config.stages import STAGES
-from texgs.config.typed import typed
+from texgs.core.typed import typed
+from texgs.workflow.stage_table import STAGES
 
 TF = ("dataset=turbulence", "tf=TF01")
 WORDS = {  # of stages that read more than the data set

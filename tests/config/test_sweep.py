@@ -1,15 +1,15 @@
 import pytest
 
 from texgs.config.compose import compose
-from texgs.config.inputs import scene_before
-from texgs.config.places import edit_folder, fit_folder
-from texgs.config.product import as_sweep
 from texgs.config.project import members
-from texgs.config.stage import for_tf
-from texgs.config.stages import STAGES
-from texgs.config.sweep import variants
-from texgs.config.variants import swept
 from texgs.core.errors import ConfigError
+from texgs.workflow.inputs import scene_before
+from texgs.workflow.places import edit_folder, fit_folder
+from texgs.workflow.product import as_sweep
+from texgs.workflow.stage import for_tf
+from texgs.workflow.stage_table import STAGES
+from texgs.workflow.sweep import variants
+from texgs.workflow.variants import swept
 
 
 def test_without_a_sweep_there_are_the_given_words():

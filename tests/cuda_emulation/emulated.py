@@ -17,9 +17,9 @@ from unittest.mock import patch
 import torch
 from filelock import FileLock
 
-from texgs.config.code import library_sources
 from texgs.raster import grid_abi, losses_abi, native
 from texgs.volume import caster
+from texgs.workflow.code import library_sources
 
 SOURCE = Path(__file__).parent
 BUILD = SOURCE.parents[1] / "build" / "cuda_emulation"

@@ -3,7 +3,6 @@ import pytest
 from tests.report.studies import study
 from tests.report.written import lines, metrics, records
 from texgs.cli.main import main
-from texgs.config.places import PLACES
 from texgs.core.errors import ArgumentError
 from texgs.report.ballots import Ballot, Votes, votes_beside
 from texgs.report.left_out import LeftOut
@@ -12,6 +11,7 @@ from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
 from texgs.report.study import write_key
 from texgs.report.tables import specs, tables_of
+from texgs.workflow.places import PLACES
 
 TABLES = specs()
 

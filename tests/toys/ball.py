@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from texgs.config.fields import Kind
-from texgs.config.keys import key
+from texgs.core.keys import key
 
 
 @dataclass

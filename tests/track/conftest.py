@@ -3,7 +3,7 @@ import shutil
 import pytest
 from mlflow import MlflowClient
 
-from texgs.track.sqlite import prepare
+from texgs.workflow.tracking.sqlite import prepare
 
 
 @pytest.fixture(scope="session")

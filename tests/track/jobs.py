@@ -12,7 +12,7 @@ import mlflow.artifacts
 import mlflow.store.db.utils
 import mlflow.store.tracking.sqlalchemy_store  # noqa: F401
 
-from texgs.track import run
+from texgs.workflow.tracking import run
 
 N_JOBS = 8
 N_METRICS = 20

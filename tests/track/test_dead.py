@@ -12,15 +12,15 @@ import psutil
 import pytest
 
 from texgs.core.io import write_json
-from texgs.track import close_dead_runs, process_tags, run
-from texgs.track.dead import HOST, PROCESS, is_alive
+from texgs.workflow.tracking import close_dead_runs, process_tags, run
+from texgs.workflow.tracking.dead import HOST, PROCESS, is_alive
 
 ROOT = Path(__file__).parents[2]
 # A job that says when its run is there, and then works for long.
 JOB = """
 import sys, time
 from pathlib import Path
-from texgs.track import process_tags, run
+from texgs.workflow.tracking import process_tags, run
 tags = process_tags(Path(sys.argv[2]))
 with run(sys.argv[1], experiment="texgs", name="job", tags=tags, params={}) as recorded:
     print(recorded.id, flush=True)

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mlflow.utils.validation import _validate_metric_name
 
-from texgs.track import fields
+from texgs.workflow.tracking import fields
 
 
 def test_nested_parameters_become_dotted_names_and_text():

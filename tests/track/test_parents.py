@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.track import PARENT, Parent, close_dead_runs, open_parents, run
+from texgs.workflow.tracking import PARENT, Parent, close_dead_runs, open_parents, run
 
 ROOT = Path(__file__).parents[2]
 RUNS = {
@@ -18,7 +18,7 @@ RUNS = {
 }
 KILLED = """
 import os, signal, sys
-from texgs.track import Parent, open_parents
+from texgs.workflow.tracking import Parent, open_parents
 open_parents(sys.argv[1], "texgs", "k", {"": Parent("a", {}, {})})
 os.kill(os.getpid(), signal.SIGKILL)
 """

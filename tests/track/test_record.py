@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.track import TrackingError, record, run
+from texgs.workflow.tracking import TrackingError, record, run
 
 ROOT = Path(__file__).parents[2]
 JOB = {"experiment": "texgs", "name": "fit", "tags": {"git.sha": "0f3c"}, "params": {"fit": {"steps": 7}}}
@@ -106,7 +106,7 @@ def test_metrics_arrive_while_the_job_runs(uri, client, monkeypatch):
 def test_tracking_off_records_nothing_and_loads_nothing():
     code = (
         "import sys\n"
-        "from texgs.track import run\n"
+        "from texgs.workflow.tracking import run\n"
         "with run(None, experiment='a', name='b', tags={}, params={}) as job:\n"
         "    job.log({'loss': 1.0}, 3)\n"
         "    job.artifact('image.png', 'images')\n"
@@ -119,7 +119,7 @@ def test_tracking_off_records_nothing_and_loads_nothing():
 def test_nothing_is_printed_and_no_usage_reported(uri):
     code = (
         "import sys\n"
-        "from texgs.track import run\n"
+        "from texgs.workflow.tracking import run\n"
         "with run(sys.argv[1], experiment='a', name='b', tags={}, params={'long': 'x' * 9000}) as job:\n"
         "    job.log({'loss': 1.0})\n"
         "    job.artifact('README.md')\n"

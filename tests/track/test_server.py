@@ -9,7 +9,7 @@ import urllib.request
 import pytest
 
 from tests.track.eight import assert_eight_jobs_lose_nothing
-from texgs.track import TrackingError, record, run
+from texgs.workflow.tracking import TrackingError, record, run
 
 JOB = {"experiment": "texgs", "name": "fit", "tags": {}, "params": {}}
 

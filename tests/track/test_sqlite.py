@@ -12,7 +12,7 @@ from mlflow.artifacts import download_artifacts
 
 from tests.track.eight import assert_eight_jobs_lose_nothing
 from texgs.core.errors import ArgumentError
-from texgs.track import TrackingError, run, sqlite
+from texgs.workflow.tracking import TrackingError, run, sqlite
 
 JOB = {"experiment": "texgs", "name": "fit", "tags": {}, "params": {}}
 

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Print every finding as soon as it is known; 1 if something texgs cannot work without is missing."""
     if arguments.experiment or arguments.words:
-        from texgs.cli import forecast
+        from texgs.workflow import forecast
 
         chosen = (f"experiment={arguments.experiment}",) if arguments.experiment else ()
         return forecast.show((*chosen, *arguments.words))

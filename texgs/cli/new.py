@@ -193,9 +193,9 @@ def check_document(text: str, config: DictConfig) -> None:
     """
     from omegaconf import OmegaConf
 
-    from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
     from texgs.core.errors import ConfigError
+    from texgs.workflow.stages.tf import check_basic_tfs
 
     name = config.dataset.name
     with tempfile.TemporaryDirectory() as folder:

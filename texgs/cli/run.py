@@ -86,7 +86,7 @@ def require_pairs(words: Sequence[str]) -> None:
     Raises:
         ArgumentError: naming the key.
     """
-    from texgs.cli.plan import GROUPS
+    from texgs.workflow.plan import GROUPS
 
     for word, after in pairwise((*words, "NAME")):
         if word in GROUPS:

@@ -11,7 +11,7 @@ from texgs.core.errors import ArgumentError
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
-    from texgs.config.stage import Stage
+    from texgs.workflow.stage import Stage
 
 
 class HelpWithKeys(argparse.Action):
@@ -56,12 +56,12 @@ def run(arguments: argparse.Namespace) -> int:
             "--input, --output: expected only with --settings, as the workflow runs a job; by hand, "
             "results=FOLDER says where results go"
         )
-    from texgs.cli.edits import require_base
-    from texgs.cli.fits import require_fit
-    from texgs.cli.stages.tf import check_basic_tfs
     from texgs.config.compose import compose
-    from texgs.config.locate import tf_names
-    from texgs.config.stages import STAGES
+    from texgs.workflow.edit_checks import require_base
+    from texgs.workflow.fit_checks import require_fit
+    from texgs.workflow.locate import tf_names
+    from texgs.workflow.stage_table import STAGES
+    from texgs.workflow.stages.tf import check_basic_tfs
 
     config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
@@ -84,11 +84,11 @@ def ensure_fits(words: tuple[str, ...]) -> None:
         ConfigError: if there are not several, or one is not fitted on the device.
         ArgumentError: if settings of one do not fit each other.
     """
-    from texgs.cli.fits import check_fit
     from texgs.config.compose import compose
-    from texgs.config.inputs import last_phase
-    from texgs.config.locate import tf_names
     from texgs.core.errors import ConfigError
+    from texgs.workflow.fit_checks import check_fit
+    from texgs.workflow.inputs import last_phase
+    from texgs.workflow.locate import tf_names
 
     config = compose(words)
     if len(config.fits) < 2:
@@ -107,9 +107,9 @@ def require_edit(stage: Stage, config: DictConfig) -> None:
     Raises:
         ConfigError, ArgumentError: naming what is not as it should be.
     """
-    from texgs.cli.edits import check_edit
     from texgs.config.methods import methods
     from texgs.core.errors import ConfigError
+    from texgs.workflow.edit_checks import check_edit
 
     own = [name for name, method in methods().items() if method.stage == stage.name]
     expected = own or [name for name, method in methods().items() if method.is_look]
@@ -127,8 +127,8 @@ def fetch_weights(config: DictConfig) -> None:
     Raises:
         MissingDataError, ArgumentError: if they are not to be had, or damaged.
     """
-    from texgs.cli.weights import needed
     from texgs.models.weights import locate
+    from texgs.workflow.weights import needed
 
     for name in needed(config):
         locate(name)
@@ -140,8 +140,8 @@ def fetch_volume(config: DictConfig) -> None:
     Raises:
         ArgumentError: if it cannot be had, or is not the one expected.
     """
-    from texgs.config.locate import cached_volume, source_file
     from texgs.volume.download import download
+    from texgs.workflow.locate import cached_volume, source_file
 
     volume, path = config.dataset.volume, source_file(config)
     if path is not None and volume.url and path == cached_volume(volume) and not path.exists():
@@ -150,12 +150,12 @@ def fetch_volume(config: DictConfig) -> None:
 
 def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
     """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
-    from texgs.cli.job import Job, execute
-    from texgs.cli.tracked import Tracking
-    from texgs.config.locate import tf_names
-    from texgs.config.stage import for_tf
-    from texgs.config.stages import STAGES
     from texgs.core.checksum import Checksums
+    from texgs.workflow.job import Job, execute
+    from texgs.workflow.locate import tf_names
+    from texgs.workflow.stage import for_tf
+    from texgs.workflow.stage_table import STAGES
+    from texgs.workflow.tracked import Tracking
 
     stage = STAGES[name]
     if name == "volume":
@@ -183,9 +183,9 @@ def run_settings(arguments: argparse.Namespace) -> int:
     from omegaconf import OmegaConf
     from yaml import YAMLError
 
-    from texgs.cli.job import Job, execute
-    from texgs.cli.tracked import of_workflow
-    from texgs.config.stages import STAGES
+    from texgs.workflow.job import Job, execute
+    from texgs.workflow.stage_table import STAGES
+    from texgs.workflow.tracked import of_workflow
 
     if arguments.overrides or arguments.force or arguments.output is None:
         raise ArgumentError("a job: expected --settings and --output, no KEY=VALUE or --force; see --help")

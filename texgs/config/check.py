@@ -8,8 +8,8 @@ from omegaconf import DictConfig
 
 from texgs.config.describe import Key, keys
 from texgs.config.files import origin, shortened
-from texgs.config.keys import numbers
 from texgs.core.errors import ConfigError
+from texgs.core.keys import numbers
 from texgs.core.names import close
 
 RESERVED = (

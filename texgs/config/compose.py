@@ -17,8 +17,8 @@ from texgs.config.check import check, check_below
 from texgs.config.composition import Places, Words, composition, schema
 from texgs.config.project import folders
 from texgs.config.slips import sentence
-from texgs.config.typed import Written
 from texgs.core.errors import ConfigError
+from texgs.core.typed import Written
 
 NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
 ALONE = ("fit", "edit")  # groups that depend on no other one but the experiment

@@ -16,10 +16,10 @@ from hydra.plugins.search_path_plugin import SearchPathPlugin
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.describe import keys
-from texgs.config.kept import fingerprint
 from texgs.config.schema import Config
-from texgs.config.sources import sha256
 from texgs.core.folders import cache_folder
+from texgs.workflow.kept import fingerprint
+from texgs.workflow.sources import sha256
 
 Words = tuple[str, ...]
 Places = tuple[Path, ...]

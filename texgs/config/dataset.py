@@ -5,7 +5,7 @@ from typing import Any
 
 from omegaconf import II, MISSING
 
-from texgs.config.keys import key
+from texgs.core.keys import key
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 

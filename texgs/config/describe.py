@@ -10,8 +10,8 @@ from typing import Any
 
 from omegaconf import DictConfig, OmegaConf
 
-from texgs.config.keys import Bounds
 from texgs.config.schema import Config
+from texgs.core.keys import Bounds
 
 
 @dataclass(frozen=True)

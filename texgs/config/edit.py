@@ -5,8 +5,8 @@ from typing import Any
 
 from omegaconf import MISSING
 
-from texgs.config.keys import key
 from texgs.config.methods import NO_METHOD, methods
+from texgs.core.keys import key
 
 
 @dataclass

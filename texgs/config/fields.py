@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args
 
-from texgs.config.specifications import specifications
 from texgs.core.errors import ConfigError
+from texgs.core.specifications import specifications
 
 PACKAGE = "texgs.kinds"
 Settings = TypeVar("Settings")

@@ -4,8 +4,8 @@ from dataclasses import dataclass, make_dataclass
 from typing import Any
 
 from texgs.config.fields import kinds
-from texgs.config.keys import key
 from texgs.config.phase import Material, Phase, Seeds, TextureKeys
+from texgs.core.keys import key
 
 
 @dataclass

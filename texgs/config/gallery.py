@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from texgs.config.keys import key
+from texgs.core.keys import key
 
 SECTIONS = ("pse", "relight", "image", "text", "parts", "ablations", "more")  # of the report
 AS_FITTED = "none"  # the edit of a scene that nothing has edited

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from texgs.config.keys import key
+from texgs.core.keys import key
 
 
 @dataclass

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, Generic, TypeVar
 
 from texgs.config.fields import kinds
-from texgs.config.specifications import specifications
-from texgs.config.typed import typed
+from texgs.core.specifications import specifications
+from texgs.core.typed import typed
 
 PACKAGE = "texgs.methods"
 NO_METHOD = "none"  # of scenes as they are fitted

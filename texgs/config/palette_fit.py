@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from texgs.config.keys import key
 from texgs.config.voxel_fit import GridStage, VoxelKeys
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
 
 
 def _voxels() -> VoxelKeys:

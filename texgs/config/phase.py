@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from texgs.config.keys import key
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
 
 
 @dataclass

@@ -13,9 +13,9 @@ from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
 from texgs.config.gallery import GalleryKeys
-from texgs.config.keys import key
 from texgs.config.mesh import MeshKeys
 from texgs.config.views import ViewKeys
+from texgs.core.keys import key
 
 
 @dataclass

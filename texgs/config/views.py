@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from omegaconf import II
 
-from texgs.config.keys import key
+from texgs.core.keys import key
 from texgs.core.lens import Lens
 
 LENS = Lens()

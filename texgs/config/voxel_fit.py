@@ -4,8 +4,8 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from math import pi, sin
 
-from texgs.config.keys import key
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
 
 
 @dataclass

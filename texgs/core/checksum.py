@@ -27,6 +27,11 @@ def sha256(path: str | Path) -> str:
         raise ArgumentError(f"{path}: cannot be read ({error.strerror})") from error
 
 
+def digest(text: str) -> str:
+    """Return the first 12 hexadecimal digits of the SHA-256 of a text."""
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
+
+
 def combined(parts: Iterable[tuple[str, str]]) -> str:
     """One checksum of several names with their checksums, in any order."""
     return hashlib.sha256(json.dumps(sorted(parts)).encode()).hexdigest()

@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.config.fields import Kind
-from texgs.config.keys import key
 from texgs.config.phase import CommonRates, Densify, Losses, Phase, Rates, Seeds
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
 
 if TYPE_CHECKING:
     from torch import Tensor

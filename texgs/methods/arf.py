@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from texgs.config.keys import key
+from texgs.core.keys import key
 from texgs.methods import style
 from texgs.methods.style import FeatureKeys
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.clip import BACKBONES
-from texgs.config.keys import key
 from texgs.config.methods import Method
+from texgs.core.keys import key
 from texgs.methods import style
 from texgs.methods.style import StyleKeys
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from texgs.config.keys import key
+from texgs.core.keys import key
 from texgs.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
 
 if TYPE_CHECKING:

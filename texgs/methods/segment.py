@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.keys import key
 from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.keys import key
 from texgs.core.lens import Lens
 from texgs.core.names import require_name
 from texgs.methods.shares import MASKS, mask_weights, shares

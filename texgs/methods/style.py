@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from texgs.config.keys import key
 from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
 from texgs.methods.shares import MASKS, mask_weights, shares
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.keys import key
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import key
 from texgs.methods import style
 from texgs.methods.style import FeatureKeys
 

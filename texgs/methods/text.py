@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.keys import key
 from texgs.config.methods import Method
+from texgs.core.keys import key
 from texgs.methods.instruction import PICTURE, SHOWN, InstructionKeys
 
 if TYPE_CHECKING:

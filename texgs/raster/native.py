@@ -18,9 +18,9 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.config.code import SUFFIX, built_from, library_sources
 from texgs.core import memory
 from texgs.core.errors import ArgumentError, DeviceError, NativeError, OutOfMemoryError
+from texgs.core.native_sources import SUFFIX, built_from, library_sources
 
 ABI_VERSION = 3
 FOLDER = Path(__file__).parent / "_native"

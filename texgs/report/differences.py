@@ -14,8 +14,8 @@ from omegaconf import OmegaConf
 from texgs.config.compose import compose
 from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
-from texgs.config.typed import typed
 from texgs.core.plain_yaml import parse_yaml
+from texgs.core.typed import typed
 from texgs.report.table import Column, Row, Table
 
 COLUMNS = (

@@ -8,9 +8,9 @@ from pathlib import Path
 
 from omegaconf.errors import OmegaConfBaseException
 
-from texgs.config.typed import typed
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
+from texgs.core.typed import typed
 
 
 @dataclass(frozen=True)
@@ -19,7 +19,7 @@ class LeftOut:
 
     what: str  # such as "data set wood"
     why: str  # one sentence
-    places: list[str]  # of the jobs that there are none of, keys of `texgs.config.places.PLACES`
+    places: list[str]  # of the jobs that there are none of, keys of `texgs.workflow.places.PLACES`
 
     def __str__(self) -> str:
         why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from texgs.config.typed import typed
+from texgs.core.typed import typed
 
 
 @dataclass(frozen=True)

@@ -14,10 +14,10 @@ from pathlib import Path
 from string import ascii_uppercase as LETTERS
 from typing import Any
 
-from texgs.config.typed import typed
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
 from texgs.core.reading import reading
+from texgs.core.typed import typed
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SceneResult
 
@@ -162,7 +162,7 @@ def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) ->
 
 
 def fit_of(record: Record[Any]) -> str:
-    """The folder of a job's fit, see `texgs.config.places`: variants of an edit have the same."""
+    """The folder of a job's fit, see `texgs.workflow.places`: variants of an edit have the same."""
     return record.path.parents[2 if isinstance(record.result, EditResult) else 1].name
 
 

@@ -34,7 +34,7 @@ class TableSpec:
     title: str
     caption: str
     section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
-    places: tuple[str, ...]  # of the jobs that it reads, keys of `texgs.config.places.PLACES`
+    places: tuple[str, ...]  # of the jobs that it reads, keys of `texgs.workflow.places.PLACES`
     make: Callable[[Iterable[Record[Any]]], Table]
     number: int | None = None  # among the paper's tables; none for ours
     paper: str = ""  # where the paper has it

@@ -6,9 +6,9 @@ import shlex
 import sys
 from pathlib import Path
 
-from texgs.cli import fork_client, last_words, parents
-from texgs.cli.plan import planned, words_of
-from texgs.config.places import PLACES
+from texgs.workflow import fork_client, last_words, parents
+from texgs.workflow.plan import planned, words_of
+from texgs.workflow.places import PLACES
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
 from texgs.core.memory import collect_rarely
@@ -91,8 +91,8 @@ def any_of(names, otherwise="none"):
 def begin():
     """Hold the results, begin the tracked runs that hold those of jobs, and start what forks the jobs."""
     global RUN_LOCK, FORK_SERVER, PARENTS
-    from texgs.cli import fork_server
-    from texgs.cli.result import run_alone
+    from texgs.workflow import fork_server
+    from texgs.workflow.result import run_alone
 
     try:
         RUN_LOCK = run_alone(RESULTS)  # it goes with the process, however that ends

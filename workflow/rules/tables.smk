@@ -1,7 +1,7 @@
 # Tables and the report, from the metrics files of jobs.
 
 
-from texgs.cli.plan import SWEPT
+from texgs.workflow.plan import SWEPT
 from texgs.report.table_files import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 

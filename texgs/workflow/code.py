@@ -1,0 +1,58 @@
+"""Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
+
+Read from the source without importing it, see sources.py. Code that calls the native library has the digest
+of the C++ and CUDA sources in it; a module that reads texts of its package has these in it.
+"""
+
+from functools import cache
+from pathlib import Path
+
+from texgs.core.checksum import digest
+from texgs.core.native_sources import library_sources
+from texgs.workflow.sources import Sources
+
+ROOT = Path(__file__).parents[2]
+NATIVE = "texgs.raster.native"  # the module that calls the native library
+READS_TEXTS = b"importlib.resources"  # in modules that do
+TEXTS = (".css", ".csv", ".html", ".j2", ".js", ".yaml")
+SOURCES = Sources()
+
+
+@cache
+def code_digest(module: str) -> str:
+    """Digest of a module such as ``texgs.volume.render`` and what it imports from texgs."""
+    seen: dict[str, str] = {}
+    waiting = [module]
+    while waiting:
+        name = waiting.pop()
+        if name in seen or (read := essence(name)) is None:
+            continue
+        seen[name], imported = read
+        waiting += imported
+    SOURCES.save()
+    parts = [f"{name}\n{seen[name]}" for name in sorted(seen)]
+    return digest("\n".join([*parts, library_sources()] if NATIVE in seen else parts))
+
+
+@cache
+def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
+    """Digest of what counts of a module, and what it imports; None for a name that is no module."""
+    path = source(module)
+    if path is None:
+        return None
+    text = path.read_bytes()
+    what, *imported = SOURCES.of(text)
+    return digest(what + texts_beside(path)) if READS_TEXTS in text else what, tuple(imported)
+
+
+def texts_beside(path: Path) -> str:
+    """The texts that are no modules in the folder of a module and below: templates, published numbers."""
+    files = sorted(each for each in path.parent.rglob("*") if each.suffix in TEXTS)
+    return "".join(f"{each.name}\n{each.read_text(encoding='utf-8')}" for each in files)
+
+
+def source(module: str) -> Path | None:
+    """The file of a module of texgs; None for a name that is no module."""
+    path = ROOT.joinpath(*module.split("."))
+    candidates = (path.with_suffix(".py"), path / "__init__.py")
+    return next((candidate for candidate in candidates if candidate.is_file()), None)

@@ -1,0 +1,194 @@
+"""What a run would find on this machine, what it would do, and about how long that takes."""
+
+from __future__ import annotations
+
+import csv
+import statistics
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.errors import MissingDataError
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.workflow.experiments import Selection
+    from texgs.workflow.job import Job
+
+PROBE = "probe"  # the row of speeds.csv with the seconds of `probe` on the same machine
+START_SECONDS = 8  # of a run before its first job, on that machine
+STEP_SECONDS = 0.8  # between two jobs of a run
+REPEATS = 15  # of the probe; the median counts
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """A run before it is started."""
+
+    selection: Selection
+    to_do: Mapping[str, int]  # jobs by stage
+    done: int  # jobs whose results are there
+    seconds: float  # of what is to be done, on the machine of speeds.csv
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Seconds of the jobs of a stage, as `benchmarks/speeds.py` has measured them."""
+
+    constant: float
+    per_megapixel: float  # of one view
+    per_iteration: float  # and megapixel
+
+    def seconds(self, megapixels: float, iterations: int) -> float:
+        """Of one job."""
+        return self.constant + megapixels * (self.per_megapixel + iterations * self.per_iteration)
+
+
+def forecast(words: tuple[str, ...]) -> Forecast:
+    """What a run with these words would do. Nothing is written.
+
+    Raises:
+        ConfigError, ArgumentError: for a mistake in the words.
+    """
+    from texgs.workflow.absent import lacking
+    from texgs.workflow.earlier import is_replaced
+    from texgs.workflow.experiments import selected
+    from texgs.workflow.product import as_sweep
+
+    selection = selected(as_sweep(words), lacking)
+    table, seconds, done = speeds(), 0.0, 0
+    to_do: Counter[str] = Counter()
+    planned = list(planned_jobs(selection))
+    by_folder = {job.output.as_posix(): job for job, _ in planned}
+    known: dict[str, bool] = {}
+    for job, config in planned:
+        if job.is_done() and not is_replaced(job.output.as_posix(), by_folder, known):
+            done += 1
+            continue
+        to_do[job.stage.name] += 1
+        seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, config))
+    if to_do:
+        seconds += START_SECONDS
+    return Forecast(selection, to_do, done, seconds)
+
+
+def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
+    """The jobs that a run goes through, with their configurations; not those whose files are not there.
+
+    Raises:
+        ConfigError, ArgumentError: for what would stop the run, as `texgs.workflow.plan.add_jobs`.
+    """
+    from texgs.core.checksum import Checksums
+    from texgs.workflow.fit_checks import check_fit
+    from texgs.workflow.job import Job
+    from texgs.workflow.plan import made
+    from texgs.workflow.stage_table import jobs
+    from texgs.workflow.stages.tf import check_basic_tfs
+
+    checksums = Checksums.load()
+    by_folder: dict[str, Job] = {}
+    configs: dict[str, DictConfig] = {}
+    sweeps: dict[str, list[str]] = defaultdict(list)
+    for sweep, config in ((name, each) for name, some in selection.by_sweep.items() for each in some):
+        check_basic_tfs(config.dataset)
+        check_fit(config)
+        try:
+            for stage, each in jobs(config):
+                folder = stage.output(each).as_posix()
+                if folder not in by_folder:
+                    by_folder[folder], configs[folder] = Job.of(stage, each, checksums), each
+                sweeps[sweep].append(folder)
+        except MissingDataError:  # told where the selection is shown
+            continue
+    run = made(sweeps, by_folder)
+    yield from ((job, configs[folder]) for folder, job in by_folder.items() if folder in run)
+
+
+def work_of(job: Job, config: DictConfig) -> tuple[float, int]:
+    """Megapixels of a view of a job, and its iterations."""
+    pixels = config.views.width * config.views.height / config.fit.reduce**2
+    return pixels / 1e6, iterations(job.settings)
+
+
+def iterations(settings: Any) -> int:
+    """All iterations and steps that the settings of a job name."""
+    if isinstance(settings, Mapping):
+        own = [value for key, value in settings.items() if key == "iterations" or key.endswith("steps")]
+        return sum(each for each in own if isinstance(each, int)) + sum(map(iterations, settings.values()))
+    return sum(map(iterations, settings)) if isinstance(settings, list) else 0
+
+
+def speeds() -> dict[str, Speed]:
+    """The measured speeds by stage, and that of the probe."""
+    text = files("texgs.workflow").joinpath("speeds.csv").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
+
+
+def probe() -> float:
+    """Seconds of one view of 20,000 surfels with its gradients at 400x400 pixels, on all threads."""
+    import torch
+
+    from texgs.raster import rasterize
+
+    generator = torch.Generator().manual_seed(0)
+    means = torch.rand(20000, 3, generator=generator) - 0.5
+    colors = torch.rand(20000, 3, generator=generator).requires_grad_()
+    quats = torch.randn(20000, 4, generator=generator)
+    scales, opacities = torch.full((20000, 2), 0.01), torch.full((20000,), 0.5)
+    viewmat, K = torch.eye(4), torch.tensor([[750.0, 0, 200], [0, 750, 200], [0, 0, 1]])
+    viewmat[2, 3] = 2.0
+    times = []
+    for _ in range(REPEATS):
+        begin = time.perf_counter()
+        shown = rasterize(means, quats, scales, opacities, viewmat, K, 400, 400, features=colors)
+        shown.color.sum().backward()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def show(words: tuple[str, ...]) -> int:
+    """Print a forecast, a line for each thing; 1 if the run would not start."""
+    expected = forecast(words)
+    selection = expected.selection
+    configs = [each for some in selection.by_sweep.values() for each in some]
+    for config in {config.dataset.name: config for config in configs[::-1]}.values():  # of its fits
+        if selection.skips or not selection.lacking(config):
+            print(f"ok       data set {config.dataset.name:16} {source(config)}")
+    for entry in selection.left_out:
+        print(f"left out {entry.what}: {entry.why}")
+    needed = () if selection.skips else configs
+    stops = dict.fromkeys(line for config in needed for line in selection.lacking(config))
+    for line in stops:
+        print(f"missing  {line}")
+    kinds = ", ".join(f"{count} {stage}" for stage, count in expected.to_do.items())
+    print(f"jobs     {sum(expected.to_do.values())} to do ({kinds or 'none'}), {expected.done} done")
+    slower = probe() / speeds()[PROBE].constant
+    print(
+        f"time     about {duration(expected.seconds * slower)}: an estimate, from speeds measured on other "
+        f"scenes; just now this machine rasterizes {1 / slower:.1f} times as fast as theirs"
+    )
+    return 1 if stops else 0
+
+
+def duration(seconds: float) -> str:
+    """In minutes or hours, as one says it."""
+    if seconds < 2 * 3600:
+        return f"{max(1, round(seconds / 60))} min"
+    return f"{seconds / 3600:.0f} hours" if seconds < 48 * 3600 else f"{seconds / 86400:.0f} days"
+
+
+def source(config: DictConfig) -> str:
+    """Where the data of a data set come from."""
+    volume = config.dataset.volume
+    if config.dataset.views_folder is not None:
+        return str(Path(config.data_folder, config.dataset.views_folder))
+    if volume.generator is not None:
+        return f"generated: {volume.generator}"
+    path = Path(config.data_folder, volume.file)
+    return str(path) if path.exists() else f"to be downloaded from {volume.url}"

@@ -1,0 +1,144 @@
+"""Run one job: a stage with its settings, in a folder of its own, tracked, its numbers in metrics.json."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from omegaconf import DictConfig
+from omegaconf.errors import OmegaConfBaseException
+
+from texgs.config.slips import sentence
+from texgs.core.checksum import Checksums
+from texgs.core.errors import ArgumentError
+from texgs.core.io import write_json
+from texgs.core.typed import typed
+from texgs.report.results import plain
+from texgs.workflow import result, tracked
+from texgs.workflow import tracking as track
+from texgs.workflow.provenance import record
+from texgs.workflow.stage import Stage, settings_digest
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.tracked import Tracking
+from texgs.workflow.variants import swept
+from texgs.workflow.weights import require_same, weights_of
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Job:
+    """A stage with everything it needs."""
+
+    stage: Stage
+    settings: dict[str, Any]
+    inputs: Mapping[str, Path]
+    output: Path
+    checksums: Checksums = field(default_factory=Checksums, compare=False)  # what is known of files
+    swept: Mapping[str, str] = field(default_factory=dict, compare=False)  # see workflow/variants.py
+
+    @classmethod
+    def of(cls, stage: Stage, config: DictConfig, checksums: Checksums) -> Job:
+        """The job that a configuration describes; its settings name the weights that it works with.
+
+        Raises:
+            ConfigError: if the configuration does not fit the stage.
+            MissingDataError: if a file from elsewhere is not there.
+        """
+        settings, weights = stage.settings(config), weights_of(stage, config, checksums)
+        named = {} if weights is None else {"weights": weights}
+        files = stage.inputs(config), stage.output(config)
+        return cls(stage, {**settings, **named}, *files, checksums, swept(config))
+
+    def identity(self) -> dict[str, Any]:
+        """What the job's result depends on: settings, code and the contents of input files."""
+        files = {name: result.fingerprint(path, self.checksums) for name, path in self.inputs.items()}
+        return {
+            "stage": self.stage.name,
+            "settings": settings_digest(self.settings),
+            "code": self.stage.code(self.settings),
+            "inputs": files,
+        }
+
+    def made_from(self) -> dict[str, Path]:
+        """The inputs that are files of other results."""
+        files = self.inputs.items()
+        return {name: path for name, path in files if path.name in result.recorded(path.parent)}
+
+    def is_done(self) -> bool:
+        """Whether the folder holds the whole result of exactly this job."""
+        if not result.is_complete(self.output, self.checksums):
+            return False
+        return all(path.exists() for path in self.inputs.values()) and (
+            result.stamped(self.output) == self.identity()
+        )
+
+
+def execute(job: Job, tracking: Tracking, *, force: bool = False) -> bool:
+    """Run a job, unless its result is there; an interrupted run of the same job goes on.
+
+    The result before it stays until this one is complete.
+
+    Args:
+        job: what to run.
+        tracking: where its run is recorded.
+        force: whether to begin from nothing in any case.
+
+    Returns:
+        Whether there was something to do.
+
+    Raises:
+        TexgsError: for a mistake of the user.
+    """
+    with result.alone(job.output):
+        result.recover(job.output)
+        if not force and job.is_done():
+            return False
+        _execute(job, tracking, is_fresh=force)
+    return True
+
+
+def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
+    for name, path in job.inputs.items():
+        if not path.exists():
+            raise ArgumentError(
+                f"{name}: expected the file {path}, which is not there; run the stage that makes it"
+            )
+        result.require_intact(path)
+    require_same(job.settings.get("weights", {}))
+    module = importlib.import_module(job.stage.module)
+    settings = _typed(module.Settings, job)
+    identity = job.identity()
+    work = result.claim(job.output, identity, is_fresh=is_fresh)
+    with track.run(
+        tracking.uri,
+        experiment=tracking.experiment,
+        name=tracked.name(job),
+        tags=tracked.tags(job, identity, tracking.parent),
+        params={**job.swept, **job.settings},
+    ) as run:
+        start = time.perf_counter()
+        outcome: Outcome = module.work(settings, dict(job.inputs), work)
+        seconds = time.perf_counter() - start
+        metrics = {
+            **record(job.settings, identity, job.made_from(), seconds),
+            "run": run.id,
+            "result": type(outcome.result).__name__,
+            "numbers": plain(outcome.result),
+            "pictures": dict(outcome.pictures),
+        }
+        write_json(work / result.METRICS, metrics)
+        result.publish(job.output)
+        tracked.tell(run, job, metrics)
+
+
+def _typed(kind: type[T], job: Job) -> T:
+    """A job's settings as the dataclass of its stage."""
+    try:
+        return typed(kind, job.settings)
+    except OmegaConfBaseException as error:
+        raise ArgumentError(f"settings of a {job.stage.name} job: {sentence(error)}") from error

@@ -1,0 +1,256 @@
+"""The plan of a run: its jobs with their settings, code and files, in plain values that a file can hold.
+
+Snakemake reads the Snakefile again in each job on a cluster. There the plan comes from the file that the run
+wrote before it submitted the job, so that nothing is composed, digested or looked up again.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.config.project import folders
+from texgs.core.checksum import digest
+from texgs.core.errors import ConfigError, MissingDataError
+from texgs.workflow.code import ROOT, code_digest
+from texgs.workflow.kept import fingerprint, keep, recall
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.core.checksum import Checksums
+    from texgs.workflow.job import Job
+
+GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
+SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places that are shown of a sweep
+OTHER_CODE = ("texgs.cli.tables", "texgs.cli.report")  # of rules that are no stages
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What the rules read."""
+
+    results: str
+    tracking: str | None  # URI of the store
+    experiment: str  # of the store
+    mapper_gpu: int  # GPUs that a job of views takes
+    fit_gpu: int  # and a job of the fits and edits
+    jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
+    sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
+    downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
+    wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
+    code: dict[str, str]  # digests of modules that are no stages
+    left_out: str  # file that tells what the run goes on without
+    earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
+    replaced: list[str]  # folders with results of other settings, in whose place the run puts its own
+
+    def warning(self) -> str:
+        """What a user should know before the run begins; empty where there is nothing."""
+        if not self.replaced:
+            return ""
+        others = len(self.replaced) - 1
+        verb = f"and {others} more hold" if others else "holds"
+        return (
+            f"{self.replaced[0]} {verb} results of other settings, which this run replaces; "
+            "results=FOLDER keeps both"
+        )
+
+    def done(self, *places: str, sweep: str = "") -> list[str]:
+        """The metrics files of all jobs that have one of some places, of a sweep or of none."""
+        folders = self.sweeps.get(sweep, ())
+        return sorted(f"{folder}/metrics.json" for folder in folders if self.jobs[folder]["place"] in places)
+
+
+def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
+    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep.
+
+    Raises:
+        ConfigError: for a key that it has not, a value that cannot be split into words, or two sweeps.
+    """
+    from texgs.workflow.product import as_sweep
+
+    if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
+        expected = ", ".join(GROUPS)
+        raise ConfigError(
+            f'--config: expected {expected} or overrides="KEY=VALUE ...", got {", ".join(unknown)}'
+        )
+    lists = [group for group in GROUPS if not isinstance(config.get(group, ""), str)]
+    if lists:
+        raise ConfigError(
+            f"{lists[0]}: expected one name, got {config[lists[0]]}; several data sets go to datasets=[...]"
+        )
+    groups = [f"{group}={config[group]}" for group in GROUPS if group in config]
+    try:
+        words = shlex.split(str(config.get("overrides", "")))
+    except ValueError as error:
+        raise ConfigError(f"overrides: {error}; put a word in quotes before the last one") from error
+    return as_sweep((*groups, *words))
+
+
+def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
+    """The plan of a run, and a sentence for each thing that is missing for some of its jobs.
+
+    Args:
+        words: overrides of the configuration.
+        is_job: whether this is a job of a run that has left its plan.
+
+    Raises:
+        ConfigError, ArgumentError: for a mistake in the configuration.
+    """
+    path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
+    data = os.environ.get("TEXGS_DATA", "")
+    key = digest("\n".join([*words, data, fingerprint(ROOT / "texgs", *folders())]))
+    if is_job and (kept := recall(path, key)):
+        return Plan(**kept), []
+    plan, missing = make(words)
+    keep(path, key, asdict(plan))
+    return plan, missing
+
+
+def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
+    """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
+    from texgs.config.compose import compose
+    from texgs.core.checksum import Checksums
+    from texgs.workflow.absent import lacking, left_out, missing_weights
+    from texgs.workflow.earlier import earlier, of_other_settings
+    from texgs.workflow.experiments import apart, selected
+
+    checksums, selection = Checksums.load(), selected(words, lacking)
+    configs = [each for some in selection.by_sweep.values() for each in some]
+    config = compose(apart(words)[0])
+    results = Path(config.results).as_posix()  # as the folders of the jobs have it
+    jobs: dict[str, Job] = {}
+    missing: list[str] = []
+    sweeps = {sweep: add_jobs(some, checksums, jobs, missing) for sweep, some in selection.by_sweep.items()}
+    run = {folder: jobs[folder] for folder in made(sweeps, jobs)}
+    others, outdated = earlier(results, run, checksums)
+    plain_jobs = {folder: plain(job, results) for folder, job in jobs.items()}
+    note_results(jobs.values(), [each["settings"] for each in plain_jobs.values()])
+    plan = Plan(
+        results,
+        config.tracking.uri,
+        config.tracking.experiment,
+        int(any(each.views.mapper == "gpu" for each in configs)),
+        int(any(each.device.name == "cuda" for each in configs)),
+        plain_jobs,
+        sweeps,
+        downloads(configs),
+        wildcards(configs),
+        {module: code_digest(module) for module in OTHER_CODE},
+        left_out({**selection.left_out, **outdated}, results),
+        others,
+        of_other_settings(run.values()),
+    )
+    checksums.save()
+    return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
+
+
+def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
+    """What the wildcards of rules stand for in these configurations."""
+    from texgs.workflow.places import edit_folder, fit_folder
+    from texgs.workflow.stage_table import STAGES
+
+    values = {
+        "dataset": {each.dataset.name for each in configs},
+        "views": {each.views.name for each in configs},
+        "fit": {fit_folder(each) for each in configs},
+        "edit": {edit_folder(each) for each in configs},
+        "gallery": {each.gallery.name for each in configs},
+        "phase": {stage.name for stage in STAGES.values() if stage.place == "phase"},
+    }
+    return {name: sorted(own) for name, own in values.items()}
+
+
+def add_jobs(
+    configs: Iterable[DictConfig], checksums: Checksums, jobs: dict[str, Job], missing: list[str]
+) -> list[str]:
+    """Add the jobs of some configurations to those by folder, and what is missing for some; their folders.
+
+    Raises:
+        ConfigError: if two different jobs have one folder, or a field is not fitted on the device.
+        ArgumentError: if settings of a fit do not fit each other.
+    """
+    from texgs.workflow import stage_table as stages
+    from texgs.workflow.fit_checks import check_fit
+    from texgs.workflow.job import Job
+    from texgs.workflow.stages.tf import check_basic_tfs
+
+    folders = []
+    for config in configs:
+        check_basic_tfs(config.dataset)
+        check_fit(config)
+        try:
+            all_jobs = stages.jobs(config)
+        except MissingDataError as error:
+            missing.append(str(error))
+            continue
+        for stage, each in all_jobs:
+            try:
+                job = Job.of(stage, each, checksums)
+            except MissingDataError as error:
+                missing.append(str(error))
+                job = Job(stage, stage.settings(each), {}, stage.output(each))
+            folders.append(job.output.as_posix())
+            known = jobs.setdefault(folders[-1], job)
+            if known != job:
+                raise ConfigError(f"{job.output}: two variants go there; give one another name")
+            jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
+    return list(dict.fromkeys(folders))
+
+
+def made(sweeps: Mapping[str, Iterable[str]], jobs: Mapping[str, Job]) -> set[str]:
+    """The folders of the jobs that a run goes through: of a sweep what is shown, and what that needs."""
+    shown = [folder for sweep in sweeps.values() for folder in sweep if jobs[folder].stage.place in SWEPT]
+    waiting, folders = [*sweeps.get("", ()), *shown], set[str]()
+    while waiting:
+        folder = waiting.pop()
+        if folder in jobs and folder not in folders:
+            folders.add(folder)
+            waiting += [path.parent.as_posix() for path in jobs[folder].inputs.values()]
+    return folders
+
+
+def plain(job: Job, results: str) -> dict[str, Any]:
+    """A job in plain values; its settings file is written."""
+    from texgs.workflow.stage import settings_file
+
+    settings = settings_file(job.settings, results)
+    inputs = {name: path.as_posix() for name, path in job.inputs.items()}
+    return {
+        "stage": job.stage.name,
+        "place": job.stage.place,
+        "settings": settings,
+        "code": job.stage.code(job.settings),
+        "inputs": inputs,
+        "swept": dict(job.swept),
+    }
+
+
+def note_results(jobs: Iterable[Job], settings: Iterable[str]) -> None:
+    """Note in the settings files of jobs whether a result that is there is not theirs; several may share one.
+
+    Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the
+    result before it in place, it learns by this: it takes a file for changed where its contents are.
+    """
+    from texgs.workflow.result import METRICS
+    from texgs.workflow.stage import note_result
+
+    wrong: dict[str, list[str]] = {}
+    for job, file in zip(jobs, settings, strict=True):
+        if (job.output / METRICS).exists():
+            wrong.setdefault(file, []).extend([] if job.is_done() else [str(job.output)])
+    for file, outputs in wrong.items():
+        note_result(file, f"{', '.join(outputs)}: not whole, or of another job" if outputs else None)
+
+
+def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:
+    """Address and checksum of the volumes that are not in the data folder, by the files they go to."""
+    from texgs.workflow.locate import cached_volume
+
+    volumes = [(config.data_folder, config.dataset.volume) for config in configs]
+    absent = [each for folder, each in volumes if each.url and not Path(folder, each.file).exists()]
+    return {cached_volume(each).as_posix(): (each.url, each.sha256) for each in absent}

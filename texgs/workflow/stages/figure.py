@@ -1,0 +1,66 @@
+"""Stage `figure`: show what a fit is worth, its phases beside views it has not seen."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from texgs.fields.files import open_field
+from texgs.fields.surfels.model import Surfels
+from texgs.report.fit_figure import write_fit_figure
+from texgs.report.results import FigureResult
+from texgs.volume.view_set import View, ViewSet, read_views
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.settings import OfTF, Recipe
+
+SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
+
+
+@dataclass
+class ShownFit(Recipe):
+    """What the figure says of a fit."""
+
+    surfels_iterations: int
+
+
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: ShownFit
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write figure.png.
+
+    Args:
+        settings: of the job.
+        inputs: the models of all phases by their names, and `views`, the transforms_train.json; without test
+            views training views are shown.
+        output: folder.
+    """
+    fit, shown = settings.fit, shown_views(read_views(inputs["views"].parent))
+    models = {phase: open_field(path) for phase, path in inputs.items() if phase != "views"}
+    last = next(reversed(models.values()))
+    counts = {last.kind: len(last)}
+    if isinstance(last, Surfels):
+        counts["texels"] = len(last.parameters["texels"])
+    title = f"{settings.dataset}/{settings.tf}, recipe {fit.name}: "
+    title += ", ".join(f"{count:,} {things}" for things, count in counts.items())
+    write_fit_figure(
+        output / "figure.png",
+        {phase: model if is_fitted(phase, fit) else None for phase, model in models.items()},
+        shown,
+        fit.reduce,
+        title,
+    )
+    return Outcome(FigureResult(list(shown), len(last)), {"figure.png": SHOWN})
+
+
+def shown_views(views: ViewSet) -> dict[str, View]:
+    """Two test views by the names that stand beside them; training views where there are none."""
+    split, candidates = ("test", views.test) if views.test else ("training", views.train)
+    return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
+
+
+def is_fitted(phase: str, fit: ShownFit) -> bool:
+    """Whether a phase does more than seed."""
+    return phase != "surfels" or fit.surfels_iterations > 0

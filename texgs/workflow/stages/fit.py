@@ -1,0 +1,66 @@
+"""Stages of fits in one phase: a field of another kind than surfels, from the views alone."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from texgs.config.fields import kinds
+from texgs.core.device import torch_device
+from texgs.core.errors import ArgumentError
+from texgs.core.typed import typed
+from texgs.fit import checkpoint
+from texgs.fit.task import FitTask, Fitted
+from texgs.report.results import FitResult
+from texgs.volume.images import load
+from texgs.volume.view_set import read_views
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.phase import gpu_memory, quality, training_quality
+from texgs.workflow.stages.settings import OfTF, Recipe
+
+
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: Recipe
+    keys: Any  # of the kind, whose dataclass its specification names
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write model.safetensors.
+
+    Args:
+        settings: of the job.
+        inputs: `views`, the transforms_train.json.
+        output: folder.
+    """
+    kind, fit = kinds()[settings.stage], settings.fit
+    if kind.settings is None or kind.fit is None:
+        raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
+    title = f"{settings.dataset}/{settings.tf}: {kind.name}"
+    device, views = torch_device(fit.device), read_views(inputs["views"].parent)
+    task: FitTask[Any] = FitTask(
+        typed(kind.settings, settings.keys),
+        views,
+        load(views.train, fit.reduce),
+        output,
+        device,
+        fit.seed,
+        title,
+        {"dataset": settings.dataset, "tf": settings.tf},
+    )
+    fitted: Fitted = kind.fit(task)
+    kind.write(output / "model.safetensors", fitted.field)
+    result = FitResult(
+        fitted.seconds,
+        len(fitted.field),
+        fitted.iterations,
+        list(fitted.losses),
+        sizes=fitted.field.sizes(),
+        notes=dict(fitted.notes),
+        **quality(fitted.field, views, fit.reduce, title),
+        **training_quality(fitted.field, views, fit.reduce, title),
+        peak_gpu_memory_mib=gpu_memory(device),
+    )
+    checkpoint.discard(output / checkpoint.FOLDER)
+    return Outcome(result)

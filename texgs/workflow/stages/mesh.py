@@ -1,0 +1,106 @@
+"""Stage `mesh`: the surface of a fit beside that of its volume, as the paper compares 3DGS and 2DGS."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+
+from texgs.config.dataset import BasicTF
+from texgs.config.fields import kinds
+from texgs.config.mesh import MeshKeys
+from texgs.core.camera import Camera
+from texgs.core.device import torch_device
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
+from texgs.fields.field import Field
+from texgs.fields.files import open_field
+from texgs.metrics.surface import compare, sample, seen
+from texgs.raster import Render
+from texgs.report.mesh_figure import write_mesh_figure
+from texgs.report.results import MeshResult
+from texgs.scene.mesh import fuse, write_mesh
+from texgs.volume.isosurface import Mesh, surface_of
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.reduced import smaller
+from texgs.volume.view_set import read_views
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.settings import Distance, OfTF, Recipe
+from texgs.workflow.stages.tf import in_data_values
+
+SHOWN = "The isosurface of the volume, the mesh of the fit, and its distance from it."
+MEASURED = 200_000  # points on each surface
+VISIBLE = 200  # pixels of the views that decide what can be seen
+
+
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    fit: Recipe
+    tf_values: str
+    points: BasicTF
+    mesh: MeshKeys
+    lens: Distance
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write mesh.ply, reference.ply and mesh.png.
+
+    Args:
+        settings: of the job.
+        inputs: `model`, of the last phase of a fit; `views`, the transforms_train.json; `volume`.
+        output: folder.
+    """
+    keys, views = settings.mesh, read_views(inputs["views"].parent)
+    cameras = [smaller(view.camera, settings.fit.reduce) for view in views.train]
+    reference = reference_of(settings, inputs["volume"])
+    field = open_field(inputs["model"]).to(torch_device(settings.fit.device))
+    start = time.perf_counter()
+    mesh = fuse(shown_by(field), [camera.to(field.device) for camera in cameras], keys.voxel)
+    seconds = time.perf_counter() - start
+    write_mesh(output / "mesh.ply", mesh)
+    write_mesh(output / "reference.ply", reference)
+    points, whole = sample(mesh, MEASURED), sample(reference, MEASURED)
+    small = [smaller(camera, max(1, camera.width // VISIBLE)) for camera in cameras]
+    visible = seen(whole, small, 2 * keys.voxel)
+    errors = compare(points, whole[visible], keys.tolerance)
+    title = f"{settings.dataset}/{settings.tf}, recipe {settings.fit.name}: {len(mesh.triangles):,} triangles"
+    write_mesh_figure(output / "mesh.png", mesh, reference, whole[visible], settings.lens.lens, title)
+    result = MeshResult(
+        chamfer=errors.chamfer,
+        accuracy=errors.accuracy,
+        completeness=errors.completeness,
+        f_score=errors.f_score,
+        normal_angle=errors.normal_angle,
+        vertices=len(mesh.vertices),
+        triangles=len(mesh.triangles),
+        mesh_seconds=seconds,
+        tolerance=keys.tolerance,
+        visible=float(visible.double().mean()),
+    )
+    return Outcome(result, {"mesh.png": SHOWN})
+
+
+def reference_of(settings: Settings, volume: Path) -> Mesh:
+    """The surface that the basic TF makes of the volume."""
+    grid, summary = open_grid(volume), read_json(volume.with_name("volume.json"))
+    tf = in_data_values(
+        settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
+    )
+    return surface_of(grid, tf, settings.mesh.opacity)
+
+
+def shown_by(field: Field) -> Callable[[Camera], Render]:
+    """What renders a field with the depth that its meshes are made of.
+
+    Raises:
+        ArgumentError: for a field without depth.
+    """
+    output = kinds()[field.kind].depth
+    if not output:
+        able = " or ".join(name for name, kind in kinds().items() if kind.depth)
+        raise ArgumentError(f"mesh: expected a fit of {able}, got one of {field.kind}, which has no depth")
+    black = torch.zeros(3, device=field.device)
+    return lambda camera: field.render(camera, background=black, outputs=(output,))

@@ -1,0 +1,145 @@
+"""Stage `pse`: the photorealistic edits of the paper's figure, beside the same edits of the volume."""
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from statistics import fmean
+from typing import Any
+
+import numpy as np
+import torch
+
+from texgs.config.fields import kinds
+from texgs.core.camera import Camera
+from texgs.core.device import torch_device
+from texgs.core.light import Light
+from texgs.core.progress import progress
+from texgs.fields.field import Composed
+from texgs.metrics.image import psnr, ssim
+from texgs.report.error_map import ERROR, signed_error
+from texgs.report.results import Comparison, PseResult
+from texgs.report.strip import write_strip
+from texgs.scene.scene import Scene
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.session import Session
+from texgs.volume.cameras import orbit_path
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.settings import OfScene as Settings
+from texgs.workflow.stages.volume_scene import VolumeScene
+
+PICTURES = {
+    "pse.png": "Edits of opacity, colour and light, each on top of those before it",
+    "relight.png": "A light in front that moves from below to above, by its azimuth and polar angle",
+}
+BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
+COMPARED = 6  # views around the object, one of which is shown
+POLAR = 20.0  # of these views, degrees
+LEFT = Light("directional", -150.0, 20.0)
+SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
+
+
+@dataclass(frozen=True)
+class Step:
+    """One edited scene."""
+
+    title: str
+    scene: Scene
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write a scene file for each edit, pse.png and relight.png.
+
+    Args:
+        settings: of the job.
+        inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
+        output: folder.
+    """
+    scene = read_scene(inputs["scene"])
+    composition = scene.open(torch_device(settings.fit.device))
+    volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
+    cameras = orbit_path(COMPARED, POLAR, *settings.views.lens)
+    done: dict[str, list[Comparison]] = {}
+    can = kinds()[settings.fit.field].can
+    groups = {
+        "pse": chain(scene, composition.palettes, can),
+        "relight": light_sweep(scene),
+    }
+    for group, steps in groups.items():
+        rows: dict[str, list[np.ndarray]] = {}
+        done[group] = []
+        for step in progress(steps, title=f"{settings.dataset}: {group}", unit="edit"):
+            write_scene(output / f"{group}-{len(done[group])}.yaml", step.scene)
+            comparison, shown = compared(step, composition, volume, cameras)
+            done[group].append(comparison)
+            for name, image in shown.items():
+                rows.setdefault(name, []).append(image)
+        titles = [caption(entry) for entry in done[group]]
+        write_strip(output / f"{group}.png", rows, titles)
+    end = BELOW if volume else "."
+    return Outcome(PseResult(COMPARED, **done), {name: words + end for name, words in PICTURES.items()})
+
+
+def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:
+    """The edits of the paper's figure in its order: opacity, colour, magnitude and direction of the light.
+
+    Each is on top of those before it. What fields of a kind cannot do is left out, but for the direction of
+    the light: without shading it changes nothing.
+    """
+    names, steps = list(scene.models), [Step("as fitted", scene)]
+    changes: list[tuple[str, Mapping[str, Mapping[str, Any]]]] = [
+        (f"+ opacity of {names[0]} x 0.4", {names[0]: {"opacity": 0.4}})
+    ]
+    if "palette" in can:
+        turned = {name: {"palette": (b, r, g)} for name, (r, g, b) in zip(names, fitted, strict=True)}
+        changes.append(("+ other colours", turned))
+    if "relight" in can:
+        magnitude = {"ambient": 0.7, "diffuse": 1.2, "specular": 2.0}
+        changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
+    for title, change in changes:
+        steps.append(Step(title, edited(steps[-1].scene, change)))
+    return [*steps, Step("+ light from the left", replace(steps[-1].scene, light=LEFT))]
+
+
+def light_sweep(scene: Scene) -> list[Step]:
+    """A light that moves from below the object to above it."""
+    lights = {f"light at (-90°, {polar:g}°)": Light("directional", -90.0, polar) for polar in SWEEP}
+    return [Step(title, replace(scene, light=light)) for title, light in lights.items()]
+
+
+def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
+    """The scene with edits of some models changed."""
+    session = Session(scene)
+    for part, values in changes.items():
+        for key, value in values.items():
+            session.set(part, key, value)
+    return session.scene
+
+
+def compared(
+    step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
+) -> tuple[Comparison, dict[str, np.ndarray]]:
+    """PSNR and SSIM against the volume over some views, and of the first view all pictures [H, W, 3]."""
+    scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
+    shown: dict[str, np.ndarray] = {}
+    background = torch.tensor(step.scene.background, device=composition.device)
+    for camera in cameras if volume else cameras[:1]:
+        image = composition.render(
+            camera.to(background.device), step.scene.light, step.scene.edits, background=background
+        ).color
+        image = image.cpu()
+        shown.setdefault("scene", image.clamp(0, 1).numpy())
+        if volume is not None:
+            rgba = torch.from_numpy(volume.render(camera, step.scene, composition.palettes))
+            truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
+            shown.setdefault("volume", truth.clamp(0, 1).numpy())
+            shown.setdefault("error", ERROR(signed_error(image, truth)).numpy())
+            scores["psnr"].append(psnr(image, truth))
+            scores["ssim"].append(ssim(image, truth))
+    means = {name: fmean(values) for name, values in scores.items() if values}
+    return Comparison(step.title, **means), shown
+
+
+def caption(entry: Comparison) -> str:
+    """Title of a picture, with the mean PSNR of all views where it was measured."""
+    measured = "" if entry.psnr is None else f"\nmean of {COMPARED} views: {entry.psnr:.1f} dB"
+    return entry.title + measured

@@ -1,0 +1,108 @@
+"""Pictures of a scene or of its volume: from where, under which light, with which changes, and which part."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from texgs.cli.edit import apply_all
+from texgs.core.camera import Camera, orbit
+from texgs.core.device import torch_device
+from texgs.core.light import Light
+from texgs.metrics.image import psnr
+from texgs.report.error_map import ERROR, signed_error
+from texgs.scene.scene_file import read_scene
+from texgs.scene.session import Session
+from texgs.workflow.stages.settings import OfScene
+from texgs.workflow.stages.volume_scene import VolumeScene
+
+
+@dataclass
+class Shot:
+    """What the configuration says of one picture, see `texgs.config.gallery`."""
+
+    scene: str  # its name among the inputs
+    show: str  # scene, volume, error, or "" for nothing
+    view: list[float]
+    fov_y: float | None
+    box: list[float]
+    pixels: int | None
+    light: list[float]
+    changes: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class Taken:
+    """A picture, or nothing."""
+
+    pixels: np.ndarray | None = None  # [H, W, 3] in [0, 1]
+    psnr: float | None = None  # against the volume, where the picture shows the difference, dB
+
+
+class Studio:
+    """Takes pictures. A scene stays open until one of another is taken.
+
+    Args:
+        settings: of a job that shows scenes and their volume.
+        inputs: scene files by name, and `volume` where one is shown.
+        size: pixels of each side of a picture.
+    """
+
+    def __init__(self, settings: OfScene, inputs: Mapping[str, Path], size: int) -> None:
+        self._device, self._lens = torch_device(settings.fit.device), settings.views.lens
+        self._inputs, self._size = inputs, size
+        self._volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
+        self._open: tuple[str, Session] | None = None
+
+    def take(self, shot: Shot) -> Taken:
+        """One picture.
+
+        Raises:
+            TexgsError: for a change that the scene cannot show, or a file that is not as it should be.
+        """
+        if not shot.show:
+            return Taken()
+        session = self._session(shot.scene)
+        try:
+            apply_all(session, shot.changes)
+            if shot.light:
+                session.set_light(Light("directional", *shot.light))
+            scene = self._frame(session, shot) if shot.show != "volume" else None
+            volume = self._volume_frame(session, shot) if shot.show != "scene" else None
+        finally:
+            while session.undo():
+                pass
+        if scene is None or volume is None:
+            return Taken(volume if scene is None else scene)
+        image, truth = torch.from_numpy(scene), torch.from_numpy(volume)
+        return Taken(ERROR(signed_error(image, truth)).numpy(), psnr(image, truth))
+
+    def _session(self, name: str) -> Session:
+        if self._open is None or self._open[0] != name:
+            self._open = (name, Session(read_scene(self._inputs[name]), self._device))
+        return self._open[1]
+
+    def _frame(self, session: Session, shot: Shot) -> np.ndarray:
+        return self._cut(session.frame(self._camera(shot)), shot).astype(np.float32) / 255
+
+    def _volume_frame(self, session: Session, shot: Shot) -> np.ndarray:
+        assert self._volume is not None, "an input where a place shows it"
+        scene = session.scene
+        rgba = self._volume.render(self._camera(shot), scene, session.composition.palettes)
+        color = rgba[..., :3] + (1 - rgba[..., 3:]) * np.asarray(scene.background, dtype=np.float32)
+        return self._cut(color.clip(0, 1), shot)
+
+    def _camera(self, shot: Shot) -> Camera:
+        """Of the whole view."""
+        size = shot.pixels or round(self._size / (shot.box[2] if shot.box else 1))
+        azimuth, polar = shot.view
+        return orbit(azimuth, polar, self._lens.radius, shot.fov_y or self._lens.fov_y, size, size)
+
+    def _cut(self, image: np.ndarray, shot: Shot) -> np.ndarray:
+        """The part of a view that is shown, as large as a picture, each pixel with that of its place."""
+        left, top, side = shot.box or (0, 0, 1)
+        across = (np.arange(self._size) + 0.5) / self._size * side * len(image)
+        rows, columns = ((across + start * len(image)).astype(int) for start in (top, left))
+        return image[rows[:, None], columns]

@@ -1,0 +1,49 @@
+"""Stage `transfer`: compare a data set's basic TFs with its values, plot them, and export them."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from texgs.config.dataset import BasicTF
+from texgs.core.io import read_json
+from texgs.report.results import TransferResult
+from texgs.volume.basic_tfs import check_disjoint
+from texgs.volume.tf_files import write_paraview
+from texgs.volume.tf_plot import plot
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.settings import OfDataset
+from texgs.workflow.stages.tf import in_data_values
+
+SHOWN = "Histogram of the volume with the basic transfer functions."
+
+
+@dataclass
+class Settings(OfDataset):
+    """What the stage reads of the configuration."""
+
+    title: str
+    tf_values: str
+    basic_tfs: dict[str, BasicTF]
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write transfer.png, the histogram with the basic TFs over it, and each TF for ParaView.
+
+    Args:
+        settings: of the job.
+        inputs: `volume`, the volume.nrrd; volume.json is beside it.
+        output: folder.
+    """
+    summary = read_json(inputs["volume"].with_name("volume.json"))
+    low, high = summary["minimum"], summary["maximum"]
+    basic = {
+        name: in_data_values(name, points, settings.tf_values, low, high)
+        for name, points in settings.basic_tfs.items()
+    }
+    check_disjoint(basic)
+    plot(output / "transfer.png", np.array(summary["histogram"]), low, high, basic, settings.title)
+    for name, tf in basic.items():
+        write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
+    ranges = {name: list(tf.support) for name, tf in basic.items()}
+    return Outcome(TransferResult(len(basic), ranges), {"transfer.png": SHOWN})

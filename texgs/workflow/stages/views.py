@@ -1,0 +1,184 @@
+"""Stage `views`: render the training and test views of one basic TF, and a turntable."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from functools import partial
+from pathlib import Path
+from statistics import mean, median
+from typing import Any, Literal
+
+import numpy as np
+from PIL import Image
+
+from texgs.config.dataset import BasicTF
+from texgs.config.views import CameraPath, ViewKeys
+from texgs.core.camera import Camera
+from texgs.core.device import torch_device
+from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json, write_atomic
+from texgs.core.lens import Lens
+from texgs.core.light import Light
+from texgs.core.progress import progress
+from texgs.report.results import ViewsResult
+from texgs.volume.appearance import Appearance
+from texgs.volume.cameras import icosphere, orbit_path, spiral
+from texgs.volume.caster import Caster
+from texgs.volume.grid import Grid
+from texgs.volume.nrrd_file import open_grid
+from texgs.volume.render import Mapper, Times, render_views
+from texgs.volume.sheet import write_animation
+from texgs.volume.transfer import TransferFunction
+from texgs.volume.view_set import View, write_transforms
+from texgs.workflow.result import TIMES
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.settings import OfTF
+from texgs.workflow.stages.tf import in_data_values
+
+SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
+TURNTABLE = 320  # pixels of its longer side
+
+
+@dataclass
+class Settings(OfTF):
+    """What the stage reads of the configuration."""
+
+    tf_values: str
+    points: BasicTF
+    views: ViewKeys
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write the folder of views: train/, test/, transforms_*.json, turntable.png, and times.json.
+
+    Views that are in the folder already, from an interrupted run of the same job, are kept, and so are
+    their times.
+
+    Args:
+        settings: of the job.
+        inputs: `volume`, the volume.nrrd; volume.json is beside it.
+        output: folder.
+    """
+    views, title = settings.views, f"{settings.dataset}/{settings.tf}"
+    grid, summary = open_grid(inputs["volume"]), read_json(inputs["volume"].with_name("volume.json"))
+    tf = in_data_values(
+        settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
+    )
+    appearance = appearance_of(views)
+    mapper = mapper_for(views.mapper, grid, appearance)
+    times, coverages = Times(output / TIMES), []
+    shots = {split: views_of(views, split, output) for split in SPLITS}
+    for split, shot in shots.items():
+        render_views(mapper, tf, shot, f"{title}: {split} views", times)
+        coverages += [coverage(view) for view in shot]
+        if not any(coverages):  # the training views come first
+            raise ArgumentError(
+                f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
+            )
+    turntable(mapper, tf, views, output, title)
+    if views.geometry:
+        caster = mapper if isinstance(mapper, Caster) else Caster(grid, appearance)
+        write_geometry(caster, tf, shots["test"], output / "geometry", title)
+    for split, shot in shots.items():
+        write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
+    return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
+
+
+def appearance_of(views: ViewKeys) -> Appearance:
+    """How the volume looks in views."""
+    return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
+
+
+def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
+    """The caster on the CPU or a GPU, or VTK."""
+    if kind == "vtk":
+        from texgs.volume.vtk_mapper import VtkMapper  # takes a second
+
+        return VtkMapper(grid, appearance)
+    return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
+
+
+def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
+    """The cameras of one arrangement."""
+    if path.kind == "icosphere":
+        return icosphere(path.frequency, *lens)
+    if path.kind == "spiral":
+        return spiral(path.count, *lens)
+    return orbit_path(path.count, path.polar, *lens)
+
+
+def views_of(views: ViewKeys, split: Literal["train", "test"], output: Path) -> list[View]:
+    """Cameras, lights and files of the training or the test views."""
+    path, chosen = views.train, views.lights
+    if split == "test":
+        path, chosen = views.test, views.test_lights or views.lights
+    lights = [Light(**asdict(light)) for light in chosen]
+    if not lights:
+        raise ArgumentError("views.lights: expected at least one light, got none")
+    return [
+        View(camera, output / split / f"r_{index:04}.png", lights[index % len(lights)])
+        for index, camera in enumerate(cameras(path, views.lens))
+    ]
+
+
+def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Path, title: str) -> None:
+    """Write turntable.png, an animation of one turn under a headlight."""
+    scale = min(1.0, TURNTABLE / max(views.width, views.height))
+    small = [max(1, round(scale * size)) for size in (views.width, views.height)]
+    around = orbit_path(views.turntable, 15.0, views.radius, views.fov_y, *small)
+    shot = [
+        View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
+        for index, camera in enumerate(around)
+    ]
+    render_views(mapper, tf, shot, f"{title}: turntable")
+    write_animation(output / "turntable.png", [Image.fromarray(view.load().numpy()) for view in shot])
+
+
+def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folder: Path, title: str) -> None:
+    """Write depth and normals of views as .npz, the arrays `depth` [H, W] and `normal` [H, W, 3]."""
+    for view in progress(shot, title=f"{title}: depth and normals", unit="view"):
+        path = folder / f"{view.path.stem}.npz"
+        if path.exists():
+            continue
+        seen = caster.cast(tf, view.camera, view.light, ("depth", "normal"))
+        planes = {"depth": seen.depth, "normal": seen.normal}
+        arrays = {name: x.cpu().numpy() for name, x in planes.items() if x is not None}
+        write = partial(
+            np.savez_compressed, depth=arrays["depth"], normal=arrays["normal"].astype(np.float16)
+        )
+        write_atomic(path, write)
+
+
+def describe(settings: Settings, tf: TransferFunction, grid: Grid, mapper: Mapper) -> dict[str, Any]:
+    """What transforms_*.json says about the images beside cameras and lights."""
+    views = settings.views
+    return {
+        "volume": settings.dataset,
+        "tf": {"name": settings.tf, **tf.to_dict()},
+        "aabb": [list(corner) for corner in grid.aabb],
+        "shading": {"model": "blinn-phong", "local_viewer": mapper.local_viewer, **asdict(views.shading)},
+        "mapper": views.mapper,
+        "step": views.step,
+        "opacity_unit": views.opacity_unit,
+    }
+
+
+def coverage(view: View) -> float:
+    """Share of pixels that show something."""
+    return float((view.load()[..., 3] > 0).float().mean())
+
+
+def result_of(shots: Mapping[Any, list[View]], times: Times, coverages: list[float]) -> ViewsResult:
+    """Counts, sizes, mean coverage, and the time per view over all runs that this job took."""
+    camera = shots["train"][0].camera
+    result = ViewsResult(
+        len(shots["train"]), len(shots["test"]), camera.width, camera.height, mean(coverages)
+    )
+    if not times.others:
+        return result
+    return replace(
+        result,
+        frame_ms=median(times.others),
+        frame_max_ms=max(times.others),
+        first_frame_ms=times.first[0],
+        frames_ms=times.others,
+    )

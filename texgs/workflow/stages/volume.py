@@ -1,0 +1,80 @@
+"""Stage `volume`: make or read a scalar field, check it, and write the one file that later stages read."""
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from texgs.config.dataset import Volume
+from texgs.core.io import write_json
+from texgs.core.memory import MIB
+from texgs.core.progress import progress
+from texgs.report.results import VolumeResult
+from texgs.volume.download import require_whole
+from texgs.volume.generate import GENERATORS, RANDOM
+from texgs.volume.prepare import prepare
+from texgs.volume.slabs import ArraySource, Source
+from texgs.volume.sources import open_source
+from texgs.workflow.locate import cached_volume
+from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.settings import OfDataset
+
+
+@dataclass
+class Settings(OfDataset):
+    """What the stage reads of the configuration."""
+
+    volume: Volume
+
+
+def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+    """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, range and histogram.
+
+    Args:
+        settings: of the job.
+        inputs: `source`, the volume's file, where it is not generated.
+        output: folder.
+    """
+    volume = settings.volume
+
+    def slabs(steps: Iterable[tuple[int, int]], total: int) -> Iterable[tuple[int, int]]:
+        return progress(steps, total, title=f"{settings.dataset}: volume", unit="slab")
+
+    summary = prepare(
+        source(volume, inputs["source"]) if volume.generator is None else generated(volume, volume.generator),
+        output / "volume.nrrd",
+        crop=volume.crop and tuple(volume.crop),  # type: ignore[arg-type]
+        reduce=volume.reduce,
+        method=volume.method,
+        up=volume.up,
+        nan_value=volume.nan_value,
+        progress=slabs,
+    )
+    write_json(output / "volume.json", asdict(summary))
+    return Outcome(
+        VolumeResult(
+            list(summary.dims),
+            summary.dtype,
+            list(summary.spacing),
+            list(summary.origin),
+            summary.minimum,
+            summary.maximum,
+            summary.voxels,
+            volume_mib=(output / "volume.nrrd").stat().st_size / MIB,
+        )
+    )
+
+
+def generated(volume: Volume, generator: str) -> Source:
+    """The field of a generator."""
+    options = {"seed": volume.seed} if generator in RANDOM else {}
+    return ArraySource(GENERATORS[generator](volume.size, **options), generator)
+
+
+def source(volume: Volume, path: Path) -> Source:
+    """The field of a file; one that was downloaded is compared with its checksum."""
+    if volume.url and path == cached_volume(volume):
+        require_whole(path, volume.sha256 or "")
+    given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
+    triples: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
+    return open_source(path, dtype=volume.dtype, endian=volume.endian, skip=volume.skip, **triples)
