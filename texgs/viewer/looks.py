@@ -74,7 +74,7 @@ class Looks:
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
         if asked.style:
             style = self._styles.source(asked.style)
-            recipes = ("preview",) if asked.is_preview else FULL
+            recipes = ("preview",) if asked.preview else FULL
             choices = [{"image": {"style": style, "recipe": recipe}} for recipe in recipes]
         else:
             said = asked.instruction
