@@ -19,7 +19,7 @@ from texgs.raster import native
 def device(request):
     """A device to put tensors on. TEXGS_REQUIRE_CUDA=1 turns tests that would be skipped into failures.
 
-    "emulated cuda" is the CPU, with the CUDA kernels compiled for it (docs/cuda_emulation.md).
+    "emulated cuda" is the CPU, with the CUDA kernels compiled for it (docs/api.md).
     """
     if request.param == "emulated cuda":
         if request.node.get_closest_marker("large"):

@@ -19,7 +19,7 @@ from texgs.cli.main import main
 ROOT = Path(__file__).parents[1]
 PAGES = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("usage", "data", "fits", "scenes", "looks", "workflow", "rasterizer")),
+    *(f"docs/{name}.md" for name in ("usage", "data", "fits", "scenes", "looks", "workflow", "api")),
 )
 OTHERS = {path.relative_to(ROOT).as_posix() for path in [ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]}
 ALL = (*PAGES, *sorted(OTHERS - set(PAGES)))  # later pages use what earlier ones wrote
