@@ -14,6 +14,8 @@ from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.spherical_harmonics import spherical_harmonics
 from texgs.raster.ssim import l1_dssim
 
+pytestmark = pytest.mark.emulated
+
 SEEDS = range(4)
 
 
