@@ -34,6 +34,7 @@ def everything(tmp_path_factory):
     return done.stdout, json.loads(file.read_text())
 
 
+@pytest.mark.packaging
 def test_the_machine_is_described(everything):
     machine = everything[1]["machine"]
     wanted = {"date", "processor", "processors", "instruction_set", "torch", "texgs", "revision", "threads"}
@@ -41,6 +42,7 @@ def test_the_machine_is_described(everything):
     assert all(machine[name] for name in wanted)
 
 
+@pytest.mark.packaging
 @pytest.mark.parametrize("name", SECTIONS)
 def test_section(everything, name):
     printed, report = everything
@@ -57,6 +59,7 @@ def test_section(everything, name):
     assert all(skipped["name"] and skipped["reason"] for skipped in section["skipped"])
 
 
+@pytest.mark.packaging
 def test_what_is_measured_of_rasterize(everything):
     names = {m["name"] for m in everything[1]["sections"]["rasterize"]["measurements"]}
     passes = {"project", "sort", "bin", "forward", "backward", "reduce"}
@@ -64,6 +67,7 @@ def test_what_is_measured_of_rasterize(everything):
     assert names == {"forward", "step"} | steps | {f"pass {name}" for name in passes}
 
 
+@pytest.mark.packaging
 def test_every_peer_is_measured_or_skipped(everything):
     section = everything[1]["sections"]["peers"]
     peers = [m["parameters"]["peer"] for m in section["measurements"]] + [
@@ -73,12 +77,14 @@ def test_every_peer_is_measured_or_skipped(everything):
         assert any(peer in name for name in peers), peer
 
 
+@pytest.mark.packaging
 def test_peers_render_the_same(everything):
     measurements = everything[1]["sections"]["peers"]["measurements"]
     differences = [m["median"] for m in measurements if m["name"] == "mean difference of images"]
     assert all(difference < 1e-5 for difference in differences)
 
 
+@pytest.mark.packaging
 def test_sections_can_be_left_out(tmp_path):
     file = tmp_path / "results.json"
     assert run(*TINY, "--sections", "rasterize", "--json", str(file)).returncode == 0
@@ -90,6 +96,7 @@ def test_sections_can_be_left_out(tmp_path):
     }
 
 
+@pytest.mark.packaging
 def test_a_missing_gpu_is_reported():
     if torch.cuda.is_available():
         pytest.skip("this machine has a GPU")

@@ -9,6 +9,8 @@ import pytest
 
 from tests.workflow.project import Project
 
+pytestmark = pytest.mark.workflow
+
 # A method and a field that are one file each, as a user would add them.
 TOYS = Path(__file__).parents[1] / "toys"
 BALL = "defaults: [default]\nname: ball\nfield: ball\nball: {radius: 0.45}\n"
