@@ -23,13 +23,14 @@ def process_tags(metrics: Path | None = None) -> dict[str, str]:
     return own if metrics is None else {**own, METRICS: str(metrics.absolute())}
 
 
-def close_dead(client: MlflowClient, experiment_id: str) -> None:
+def close_dead(client: MlflowClient) -> None:
     """End the runs of this machine whose process is gone.
 
     A run whose metrics are in place is FINISHED: its process was killed after its work. Others are KILLED.
     """
     words = f"attributes.status = 'RUNNING' AND tags.`{HOST}` = '{platform.node()}'"
-    for run in client.search_runs([experiment_id], words):
+    experiments = [experiment.experiment_id for experiment in client.search_experiments()]
+    for run in client.search_runs(experiments, words):
         if not is_alive(run.data.tags.get(PROCESS, "")):
             client.set_terminated(run.info.run_id, "FINISHED" if is_recorded(run) else "KILLED")
 

@@ -144,7 +144,7 @@ def begin(
     client, experiment_id = connect(uri, experiment)
     with translated(uri):
         if PARENT not in tags:
-            close_dead(client, experiment_id)
+            close_dead(client)
         own = {allowed_name(x): str(value) for x, value in {**process_tags(), **tags}.items()}
         known = client.search_runs([experiment_id], f"tags.`{KEY}` = '{key}'", max_results=1) if key else []
         if known:
