@@ -87,6 +87,19 @@ def view_loss(
     return target.share * loss
 
 
+def render_view(parameters: Mapping[str, Tensor], shading: Shading, target: Target) -> Tensor:
+    """Render the colours [H, W, 3] of a view over white."""
+    camera = target.camera
+    colors = cast(Tensor, shading.colors(parameters, camera, target.light))
+    return rasterize(
+        *geometry(parameters),
+        *(camera.viewmat, camera.K, camera.width, camera.height),
+        features=colors,
+        background=white(colors),
+        options=shading.options,
+    ).color
+
+
 def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:
     """L1 + D-SSIM of alpha [H, W], or D-SSIM alone at the same weight."""
     if weights.alpha_l1:

@@ -163,6 +163,9 @@ class PaletteFit:
         loss, error = palette_loss(rays, target, geometry, self.parameters, self.colors, self.settings)
         return loss, error.detach()
 
+    def psnr(self) -> None:
+        """Return nothing: the losses of the parts are of other kinds than errors of images."""
+
     def state(self) -> dict[str, Tensor]:
         """Everything a resumed run needs, as tensors, between two steps."""
         grid = {f"voxels.{name}": x for name, x in self.voxels.state().items()}

@@ -9,8 +9,10 @@ from typing import Protocol
 
 from torch import Tensor
 
+from texgs.core import curves
 from texgs.core.progress import progress
 from texgs.fit import checkpoint
+from texgs.fit.loop import CHECKED_EVERY
 
 SAVED_EVERY = 30.0  # seconds between checkpoints
 
@@ -20,6 +22,7 @@ class Resumable(checkpoint.Stateful, Protocol):
 
     seconds: float  # that earlier runs have taken
     unit: str  # what an iteration is of, for the progress bar
+    losses: list[float]  # every CHECKED_EVERY iterations and at the end
 
     @property
     def iterations(self) -> int:
@@ -32,6 +35,10 @@ class Resumable(checkpoint.Stateful, Protocol):
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
         """Go on from what `state` returned."""
+        ...
+
+    def psnr(self) -> float | None:
+        """Return the PSNR in dB of training images as they are now, where it is known."""
         ...
 
 
@@ -57,7 +64,9 @@ def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
     start = saved - fit.seconds
     steps = fit.iterations - fit.iteration
     run = fit.run()  # to its end even where no steps are left: something may follow the last one
+    n_told = _tell(fit, 0)
     for _ in progress(run, steps, title=title, unit=fit.unit) if steps else run:
+        n_told = _tell(fit, n_told)
         if time.monotonic() - saved > SAVED_EVERY:
             fit.seconds = time.monotonic() - start
             checkpoint.save(folder, fit)
@@ -69,3 +78,14 @@ def restore(fit: Resumable, folder: Path) -> None:
     """Go on from the last checkpoint, if there is one; only the fit's own copy of it stays in memory."""
     if (state := checkpoint.latest(folder)) is not None:
         fit.restore(state)
+
+
+def _tell(fit: Resumable, n_told: int) -> int:
+    """Tell who hears the losses from one on, with the PSNR of now at the last; returns how many there are."""
+    count = len(fit.losses)
+    if count > n_told and curves.is_heard():
+        for index, loss in enumerate(fit.losses[n_told:], n_told + 1):
+            curves.point({"loss": loss}, min(index * CHECKED_EVERY, fit.iterations))
+        if (psnr := fit.psnr()) is not None:
+            curves.point({"train_view_psnr": psnr}, fit.iteration)
+    return count

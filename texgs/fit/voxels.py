@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 
@@ -145,6 +146,10 @@ class VoxelFit:
             require_finite(self.iteration, {"loss": loss, "density": self.grid.density})
             self.losses.append(float(loss))
         return VoxelProgress(self.iteration, len(self.grid), None if loss is None else float(loss))
+
+    def psnr(self) -> float:
+        """Return the PSNR in dB of the training rays that were looked at last."""
+        return -10 * math.log10(max(self.losses[-1], 1e-10))
 
     def rates(self) -> VoxelRates:
         """Learning rates of the step to come."""

@@ -32,7 +32,11 @@ def forked(name: str, words: list[str]) -> int | None:
         try:
             code = server.recv(1)
         except OSError:
-            code = b""  # the server was killed, and perhaps the job with it
+            code = b""
+    if not code:
+        print(
+            "texgs: the process of this job crashed or was killed, as when memory runs out", file=sys.stderr
+        )
     return code[0] if code else 1
 
 

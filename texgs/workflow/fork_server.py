@@ -2,27 +2,30 @@
 
 Importing torch and MLflow takes 6 CPU seconds, more than many a job. A forked job is the process of a job in
 all else: its own memory, threads, working directory, environment and exit code. It belongs to the process
-group of the run, so that Ctrl-C and a kill of the group reach it. Linux only: elsewhere a fork of a process
-with such libraries is not safe, and jobs start as programs do.
+group of the run, so that Ctrl-C and a kill of the group reach it, and it ends where the server or its client
+is killed. Linux only: elsewhere a fork of a process with such libraries is not safe, and jobs are programs.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import ctypes
+import fcntl
 import gc
 import importlib
 import json
 import os
 import secrets
-import selectors
+import select
 import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
+import traceback
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NoReturn
 
 from texgs.cli.main import main as texgs
 from texgs.core.memory import collect_rarely
@@ -39,6 +42,7 @@ LIBRARIES = (
 )
 TRACKING = ("mlflow", "mlflow.store.tracking.sqlalchemy_store")
 ONE_THREAD = {"OPENBLAS_NUM_THREADS": "1"}  # a pool of threads would not outlive a fork
+PR_SET_PDEATHSIG = 1  # of prctl: the signal that a process gets when its parent ends
 
 
 @dataclass(frozen=True)
@@ -49,15 +53,7 @@ class Request:
     folder: str  # working directory
     environment: dict[str, str]
     files: tuple[int, ...]  # standard input, output and error
-
-
-@dataclass(frozen=True)
-class Running:
-    """A job and whoever waits for its exit code."""
-
-    process: int
-    descriptor: int  # of the process; readable when it has ended
-    client: socket.socket  # readable when the client has gone
+    client: socket.socket  # which waits for the exit code
 
 
 def start(environment: Mapping[str, str]) -> subprocess.Popen[bytes] | None:
@@ -88,83 +84,43 @@ def start(environment: Mapping[str, str]) -> subprocess.Popen[bytes] | None:
     return server
 
 
-class Server:
-    """The loop of the server."""
+def serve(listener: socket.socket, run: int) -> Request | None:
+    """Fork for every request that comes to a socket, until the other end of the pipe `run` is closed.
 
-    def __init__(self, listener: socket.socket, run: int) -> None:
-        """Serve requests that come to a socket until the other end of the pipe `run` is closed."""
-        self._events = selectors.DefaultSelector()
-        self._listener, self._run = listener, run
-        self._jobs: list[Running] = []
-        for source, call in ((listener, self._begin), (run, self._close)):
-            self._events.register(source, selectors.EVENT_READ, call)
-
-    def serve(self) -> Request | None:
-        """Fork for every request.
-
-        Returns:
-            In each forked process its request; in the server None, when the run and all jobs have ended.
-        """
-        while self._events.get_map():
-            key, _ = self._events.select()[0]  # one at a time: an event may close what others are about
-            request: Request | None = key.data()
-            if request is not None:
+    Returns:
+        In each forked process its request; in the server None, when the run and all jobs have ended.
+    """
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # the system forgets jobs that have ended
+    server = os.getpid()
+    while run not in select.select([listener.fileno(), run], [], [])[0]:
+        client, _ = listener.accept()
+        if os.fork() == 0:
+            signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+            end_with(server, client)
+            listener.close()
+            os.close(run)
+            if request := receive(client):
                 return request
-        return None
-
-    def _begin(self) -> Request | None:
-        client, _ = self._listener.accept()
-        request = receive(client)
-        if request is None:
-            client.close()
-            return None
-        process = os.fork()
-        if process == 0:
-            self._leave(client)
-            return request
-        for file in request.files:
-            os.close(file)
-        job = Running(process, os.pidfd_open(process), client)
-        self._jobs.append(job)
-        self._events.register(job.descriptor, selectors.EVENT_READ, lambda: self._end(job))
-        self._events.register(client, selectors.EVENT_READ, lambda: self._stop(job))
-        return None
-
-    def _end(self, job: Running) -> None:
-        """Tell the client how a job has ended, as a shell would."""
-        code = os.waitstatus_to_exitcode(os.waitpid(job.process, 0)[1])
-        if job.client in self._events.get_map():
-            self._events.unregister(job.client)
-            with contextlib.suppress(OSError):  # it may have gone in this moment
-                job.client.sendall(bytes([code if code >= 0 else 128 - code]))
-        self._events.unregister(job.descriptor)
-        os.close(job.descriptor)
-        job.client.close()
-        self._jobs.remove(job)
-
-    def _stop(self, job: Running) -> None:
-        """End a job whose client was killed."""
-        self._events.unregister(job.client)
-        os.kill(job.process, signal.SIGTERM)
-
-    def _close(self) -> None:
-        """Take no more requests."""
-        for source in (self._listener, self._run):
-            self._events.unregister(source)
-        self._listener.close()
-
-    def _leave(self, client: socket.socket) -> None:
-        """Close what a forked process has of the server."""
-        self._events.close()
-        self._listener.close()
-        for job in self._jobs:
-            os.close(job.descriptor)
-            job.client.close()
+            os._exit(1)
         client.close()
+    listener.close()
+    with contextlib.suppress(ChildProcessError):  # there is none left
+        while True:
+            os.waitpid(-1, 0)
+    return None
+
+
+def end_with(server: int, client: socket.socket) -> None:
+    """Let this process get SIGTERM when the server or the client ends: nobody would hear of its result."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    fcntl.fcntl(client, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(client, fcntl.F_SETSIG, signal.SIGTERM)
+    if os.getppid() != server:
+        os._exit(1)
 
 
 def receive(client: socket.socket) -> Request | None:
-    """The request of a client; None where it is of another user, or has gone before it was complete."""
+    """Return the request of a client; None where it is of another user, or goes before its job begins."""
     peer = client.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, 12)
     if int.from_bytes(peer[4:8], sys.byteorder) != os.getuid():
         return None
@@ -174,7 +130,10 @@ def receive(client: socket.socket) -> Request | None:
             body: dict[str, Any] = json.loads(stream.read(int.from_bytes(length, "big")))
     except (OSError, ValueError):
         return None
-    return Request(body["arguments"], body["folder"], body["environment"], tuple(files))
+    fcntl.fcntl(client, fcntl.F_SETFL, fcntl.fcntl(client, fcntl.F_GETFL) | os.O_ASYNC)
+    if select.select([client], [], [], 0)[0]:  # it says no more, unless it has gone
+        return None
+    return Request(body["arguments"], body["folder"], body["environment"], tuple(files), client)
 
 
 def become(request: Request) -> None:
@@ -202,6 +161,25 @@ def use_threads(count: int) -> None:
         sys.modules["torch"].set_num_threads(count)
 
 
+def run(request: Request, call: Callable[[], int]) -> NoReturn:
+    """Run the job in this forked process, and tell its client the exit code."""
+    become(request)
+    try:
+        code = call()
+    except SystemExit as error:
+        code = error.code if isinstance(error.code, int) else int(error.code is not None)
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    fcntl.fcntl(request.client, fcntl.F_SETFL, 0)  # that the client goes now is right
+    with contextlib.suppress(OSError):  # it may have been killed
+        request.client.sendall(bytes([code]))
+    os._exit(code)  # to take apart all that the libraries have made takes longer than many a job
+
+
 def main() -> int:
     """Serve, or in a forked process run the job."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # its jobs hear of it themselves
@@ -210,15 +188,10 @@ def main() -> int:
         importlib.import_module(library)
     gc.freeze()  # a collection in a job would copy each page that it looks at
     with socket.socket(fileno=int(sys.argv[1])) as listener:
-        request = Server(listener, sys.stdin.fileno()).serve()
-    if request is None:
-        return 0
-    become(request)
-    code = texgs()
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        stream.flush()
-    os._exit(code)  # to take apart all that the libraries have made takes longer than many a job
+        request = serve(listener, sys.stdin.fileno())
+    if request is not None:
+        run(request, texgs)
+    return 0
 
 
 if __name__ == "__main__":

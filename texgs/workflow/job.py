@@ -14,6 +14,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.slips import sentence
 from texgs.core.checksum import Checksums
+from texgs.core.curves import heard
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.core.typed import typed
@@ -122,7 +123,8 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
         params={**job.swept, **job.settings},
     ) as run:
         start = time.perf_counter()
-        outcome: Outcome = module.work(settings, dict(job.inputs), work)
+        with heard(run.log if run.id else None):
+            outcome: Outcome = module.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         metrics = {
             **record(job.settings, identity, job.made_from(), seconds),

@@ -89,16 +89,18 @@ def tell(run: track.Run, job: Job, metrics: Mapping[str, Any]) -> None:
 
 
 def curves(numbers: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, float]]]:
-    """Steps and values of what has several: times of frames, and losses over iterations."""
+    """Yield steps and values of what has several: times of frames, and losses of edits over iterations.
+
+    Losses of fits are told while they run.
+    """
     for key, listed in numbers.items():
         if isinstance(listed, list) and key.endswith("_ms"):
             yield from ((step, {key: float(value)}) for step, value in enumerate(listed))
-    losses = numbers.get("losses", [])
-    by_name = {f"loss/{name}": each for name, each in losses.items()} if isinstance(losses, dict) else {}
-    for name, listed in (by_name or {"loss": losses}).items():
+    losses = numbers.get("losses")
+    for name, listed in losses.items() if isinstance(losses, dict) else ():
         total = numbers.get("iterations") or len(listed)
-        for index, loss in enumerate(listed):
-            yield round(total * (index + 1) / len(listed)), {name: float(loss)}
+        for index, loss in enumerate(listed, 1):
+            yield round(total * index / len(listed)), {f"loss/{name}": float(loss)}
 
 
 def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
