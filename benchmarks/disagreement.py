@@ -26,12 +26,12 @@ from texgs.core.memory import keep_freed_memory
 from texgs.core.plots import words
 from texgs.edit.dataset_update import update_field
 from texgs.edit.field_views import field_views
+from texgs.edit.methods import dge, igs2gs, in2n
 from texgs.edit.text import edit_by_text
 from texgs.fields.field import Field
 from texgs.fields.files import open_field
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.methods import dge, igs2gs, in2n
 from texgs.metrics.consistency import LONG, SHORT, SeenFrame, consistency
 from texgs.metrics.sharpness import sharpness
 from texgs.models.disagreement import Disagreeing

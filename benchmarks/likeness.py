@@ -21,12 +21,12 @@ from torch.nn import functional as F
 from texgs.core.camera import Camera
 from texgs.core.image import write_png
 from texgs.core.light import Light
+from texgs.edit.methods.style import picture_of
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import stylize
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model
-from texgs.methods.style import picture_of
 from texgs.metrics.style import ON_OBJECT, gram, likeness, mean
 from texgs.models.vgg import Vgg
 from texgs.volume.reduced import smaller

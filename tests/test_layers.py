@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 # Package: the packages it may import from, besides itself.
 LEFT = {
     "core": set(),
-    "config": {"core"},
+    "config": {"core", "edit", "models"},
     "raster": {"core"},
     "volume": {"config", "core", "raster"},
     **{name: {"config", "core", "volume", "raster"} for name in ("fields", "models")},
@@ -19,9 +19,9 @@ LEFT["scene"] = LEFT["fields"] | {"fields"}
 for name in ("fit", "edit", "metrics"):
     LEFT[name] = LEFT["scene"] | {"scene", "models"}
 LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
-for name in ("methods", "kinds", "viewer"):
+for name in ("kinds", "viewer"):
     LEFT[name] = LEFT["report"] | {"report"}
-LEFT["workflow"] = LEFT["methods"] | {"methods", "kinds"}
+LEFT["workflow"] = LEFT["kinds"] | {"kinds"}
 LEFT["cli"] = LEFT["workflow"] | {"workflow", "viewer"}
 
 

@@ -80,7 +80,7 @@ def test_stages_exist_and_differ():
     [
         ("texgs.fields.surfels.composition", {"compose", "timing", "edit_text", "edit_metrics"}),
         ("texgs.fields.gaussians.composition", set()),
-        ("texgs.methods.text", {"edit_text", "edit_metrics"}),
+        ("texgs.edit.methods.text", {"edit_text", "edit_metrics"}),
     ],
 )
 def test_what_settings_name_counts(monkeypatch, changed, stages):
