@@ -5,8 +5,8 @@ from omegaconf import OmegaConf
 
 from texgs.config.compose import compose
 from texgs.config.describe import keys
-from texgs.config.methods import methods
 from texgs.core.errors import ConfigError
+from texgs.edit.method import methods
 from texgs.report.differences import ALL, compared, differences, published, text
 
 

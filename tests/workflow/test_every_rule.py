@@ -211,7 +211,7 @@ def test_what_is_damaged_is_made_again_and_nothing_else(project):
 def test_a_failed_edit_keeps_the_earlier_one(project, sources):
     folder = project.work / "results" / "sphere" / "scene" / "demo" / "edits" / "red"
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    sources("texgs/methods/text.py", "task.settings.opened(", "task.settings.no_guidance(")
+    sources("texgs/edit/methods/text.py", "task.settings.opened(", "task.settings.no_guidance(")
     failed = project.snakemake(**OPTIONS)
     assert failed.returncode != 0
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 
 from texgs import __version__
 from texgs.config.fields import kinds
-from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import collect_rarely, keep_freed_memory, told
 from texgs.core.names import close
 from texgs.core.waiting import waiting
+from texgs.edit.method import methods
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;

@@ -107,8 +107,8 @@ def require_edit(stage: Stage, config: DictConfig) -> None:
     Raises:
         ConfigError, ArgumentError: naming what is not as it should be.
     """
-    from texgs.config.methods import methods
     from texgs.core.errors import ConfigError
+    from texgs.edit.method import methods
     from texgs.workflow.edit_checks import check_edit
 
     own = [name for name, method in methods().items() if method.stage == stage.name]

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from omegaconf import DictConfig
 
 from texgs.config.fields import kinds
-from texgs.config.methods import NO_METHOD, methods
+from texgs.edit.method import NO_METHOD, methods
 from texgs.workflow.inputs import with_recipe
 from texgs.workflow.variants import changes
 

@@ -11,12 +11,12 @@ from yaml import YAMLError
 
 from texgs.config.check import is_scene_file
 from texgs.config.compose import Same, changed, compose
-from texgs.config.edit import EditKeys
 from texgs.config.fields import kinds
-from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.core.plain_yaml import parse_yaml
+from texgs.edit.keys import EditKeys
+from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.locate import source_file, tf_names, views_folder
 from texgs.workflow.looks import captions, looks_of
 from texgs.workflow.places import edit_folder, folder_of, made

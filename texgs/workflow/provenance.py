@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from texgs import __version__
-from texgs.config.methods import NO_METHOD
 from texgs.core.memory import MIB, peak_memory
+from texgs.edit.method import NO_METHOD
 
 PACKAGES = (  # whose code decides results
     *("torch", "numpy", "scipy", "kornia", "opencv-python-headless", "pillow", "matplotlib", "av"),

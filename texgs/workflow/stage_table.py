@@ -3,7 +3,7 @@
 from omegaconf import DictConfig
 
 from texgs.config.fields import Kind, kinds
-from texgs.config.methods import Method, methods
+from texgs.edit.method import Method, methods
 from texgs.workflow.applies import (
     has_gallery,
     has_mesh,

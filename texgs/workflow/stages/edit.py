@@ -10,8 +10,8 @@ import numpy as np
 
 from texgs.config.edit import Edit
 from texgs.config.fields import kinds
-from texgs.config.methods import method_of
 from texgs.core.device import torch_device
+from texgs.edit.method import method_of
 from texgs.edit.parts import parts_of
 from texgs.edit.task import Task
 from texgs.report.before_after import write_before_and_after

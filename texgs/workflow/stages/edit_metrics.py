@@ -11,12 +11,12 @@ import torch
 from torch import Tensor
 
 from texgs.config.fields import kinds
-from texgs.config.methods import method_of
 from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
+from texgs.edit.method import method_of
 from texgs.edit.parts import parts_of
 from texgs.fields.field import Composed
 from texgs.fields.surfels.texels import lean

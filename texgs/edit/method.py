@@ -1,4 +1,4 @@
-"""What a method of editing is, and the methods that there are: the modules of texgs/methods.
+"""What a method of editing is, and the methods that there are: the modules of texgs/edit/methods.
 
 All that has to know of methods reads their specifications: the schema, the command line, the plan of the
 workflow, the check of weights, the tables. A method is one file there, and a file of conf/edit for each set
@@ -16,7 +16,7 @@ from texgs.config.fields import kinds
 from texgs.core.specifications import specifications
 from texgs.core.typed import typed
 
-PACKAGE = "texgs.methods"
+PACKAGE = "texgs.edit.methods"
 NO_METHOD = "none"  # of scenes as they are fitted
 Settings = TypeVar("Settings")
 

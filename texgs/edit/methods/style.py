@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.methods.shares import MASKS, mask_weights, shares
+from texgs.edit.method import Method
+from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, shares
 
 if TYPE_CHECKING:
     from torch import Tensor

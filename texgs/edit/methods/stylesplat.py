@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.methods import style
-from texgs.methods.style import FeatureKeys
+from texgs.edit.methods import style
+from texgs.edit.methods.style import FeatureKeys
 
 if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe

@@ -6,10 +6,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.methods.instruction import PICTURE, SHOWN, InstructionKeys
+from texgs.edit.method import Method
+from texgs.edit.methods.instruction import PICTURE, SHOWN, InstructionKeys
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from texgs.config.phase import CommonRates
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.methods.igs2gs import rates
-from texgs.methods.updates import UpdateKeys, edit_by_updates, update_method
+from texgs.edit.methods.igs2gs import rates
+from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, update_method
 
 if TYPE_CHECKING:
     from texgs.edit.closeness import Closeness

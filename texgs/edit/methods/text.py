@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.methods import Method
 from texgs.core.keys import key
-from texgs.methods.instruction import PICTURE, SHOWN, InstructionKeys
+from texgs.edit.method import Method
+from texgs.edit.methods.instruction import PICTURE, SHOWN, InstructionKeys
 
 if TYPE_CHECKING:
     import numpy as np

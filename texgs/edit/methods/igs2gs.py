@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from texgs.config.phase import CommonRates
 from texgs.core.keys import key
-from texgs.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
+from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
 
 if TYPE_CHECKING:
     from texgs.edit.closeness import Closeness

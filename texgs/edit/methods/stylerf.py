@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
-from texgs.methods import style
-from texgs.methods.style import FeatureKeys
+from texgs.edit.methods import style
+from texgs.edit.methods.style import FeatureKeys
 
 if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
+from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
 
 if TYPE_CHECKING:
     from texgs.edit.closeness import Closeness

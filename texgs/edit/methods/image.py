@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.clip import BACKBONES
-from texgs.config.methods import Method
 from texgs.core.keys import key
-from texgs.methods import style
-from texgs.methods.style import StyleKeys
+from texgs.edit.method import Method
+from texgs.edit.methods import style
+from texgs.edit.methods.style import StyleKeys
+from texgs.models.catalogue import CLIP_BACKBONES
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -40,9 +40,9 @@ class ImageKeys(StyleKeys):
         None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
     )
     clip: str = key(
-        BACKBONES[0],
+        CLIP_BACKBONES[0],
         "backbone of the CLIP term, where lambda_s is below 1; metrics have their own",
-        choices=BACKBONES,
+        choices=CLIP_BACKBONES,
     )
     pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
     start: str | None = key(

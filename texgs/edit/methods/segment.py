@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.methods import Method
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.keys import key
 from texgs.core.lens import Lens
 from texgs.core.names import require_name
-from texgs.methods.shares import MASKS, mask_weights, shares
+from texgs.edit.method import Method
+from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, shares
 
 if TYPE_CHECKING:
     import torch
