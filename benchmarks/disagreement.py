@@ -19,7 +19,6 @@ import torch
 from torch import Tensor
 
 from benchmarks.command import call
-from texgs.config.phase import CommonRates
 from texgs.core.camera import Camera
 from texgs.core.light import HEADLIGHT
 from texgs.core.memory import keep_freed_memory
@@ -31,6 +30,7 @@ from texgs.fields.field import Field
 from texgs.fields.files import open_field
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
+from texgs.fit.settings import CommonRates
 from texgs.methods import dge, igs2gs, in2n
 from texgs.metrics.consistency import LONG, SHORT, SeenFrame, consistency
 from texgs.metrics.sharpness import sharpness

@@ -64,7 +64,7 @@ class Watch:
         self.looks: list[Look] = []
 
     def run_to_end(self, fit: Fit, _folder: Path, title: str) -> float:
-        """In place of `texgs.fit.resumable.run_to_end`, without checkpoints."""
+        """In place of `texgs.fit.checkpoint.run_to_end`, without checkpoints."""
         seconds, start = 0.0, time.monotonic()
         for _ in progress(fit.run(), fit.iterations, title=title, unit="view"):
             if self.before + seconds + time.monotonic() - start >= self.next:

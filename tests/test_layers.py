@@ -10,7 +10,7 @@ ROOT = Path(__file__).parents[1]
 # Package: the packages it may import from, besides itself.
 LEFT = {
     "core": set(),
-    "config": {"core"},
+    "config": {"core", "fields", "fit"},
     "raster": {"core"},
     "volume": {"config", "core", "raster"},
     **{name: {"config", "core", "volume", "raster"} for name in ("fields", "models")},
@@ -18,10 +18,11 @@ LEFT = {
 LEFT["scene"] = LEFT["fields"] | {"fields"}
 for name in ("fit", "edit", "metrics"):
     LEFT[name] = LEFT["scene"] | {"scene", "models"}
+LEFT["edit"] |= {"fit"}
 LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
-for name in ("methods", "kinds", "viewer"):
+for name in ("methods", "viewer"):
     LEFT[name] = LEFT["report"] | {"report"}
-LEFT["workflow"] = LEFT["methods"] | {"methods", "kinds"}
+LEFT["workflow"] = LEFT["methods"] | {"methods"}
 LEFT["cli"] = LEFT["workflow"] | {"workflow", "viewer"}
 
 

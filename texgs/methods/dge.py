@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from texgs.config.phase import CommonRates
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
+from texgs.fit.settings import CommonRates
 from texgs.methods.igs2gs import rates
 from texgs.methods.updates import UpdateKeys, edit_by_updates, update_method
 

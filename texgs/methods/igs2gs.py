@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from texgs.config.phase import CommonRates
 from texgs.core.keys import key
+from texgs.fit.settings import CommonRates
 from texgs.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
 
 if TYPE_CHECKING:
