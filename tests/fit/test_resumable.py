@@ -6,7 +6,7 @@ import weakref
 import torch
 
 from texgs.fit import checkpoint
-from texgs.fit.resumable import run_to_end
+from texgs.fit.checkpoint import run_to_end
 
 
 class Counter:

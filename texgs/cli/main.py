@@ -10,12 +10,12 @@ import sys
 from collections.abc import Sequence
 
 from texgs import __version__
-from texgs.config.fields import kinds
 from texgs.core.errors import TexgsError
 from texgs.core.memory import collect_rarely, keep_freed_memory, told
 from texgs.core.names import close
 from texgs.core.waiting import waiting
 from texgs.edit.method import methods
+from texgs.fit.kinds import fit_specs
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
@@ -28,7 +28,7 @@ STAGE_VERBS = {
     "surfels": "seed surfels and fit them with spherical harmonics",
     "shading": "fit relightable surfels with Blinn-Phong shading",
     "texture": "give relightable surfels textures",
-    **{kind.name: kind.summary for kind in kinds().values() if kind.fit is not None},
+    **{kind.name: kind.summary for kind in fit_specs().values() if kind.fit is not None},
     "figure": "show a fit beside test views, with its maps",
     "comparison": "show the fits of several recipes side by side in test views",
     "mesh": "make a mesh of a fit, and compare it with the isosurface of its volume",

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from texgs.config.fields import kinds
 from texgs.core.specifications import specifications
 from texgs.core.typed import typed
+from texgs.fields.kinds import kinds
 
 PACKAGE = "texgs.edit.methods"
 NO_METHOD = "none"  # of scenes as they are fitted
@@ -37,7 +37,7 @@ class Method(Generic[Settings]):
     weights: Callable[[Settings], Mapping[str, str]]
     """Names of the weights that it needs, each with the word of its settings that does without; or ""."""
     needs: frozenset[str] = frozenset()
-    """What fields have to be capable of, of `texgs.config.fields.Capability`."""
+    """What fields have to be capable of, of `texgs.fields.kinds.Capability`."""
     fields: frozenset[str] = frozenset()
     """Kinds of field that it is made for; empty: all that can what it needs."""
     check_fit: Callable[[Settings, Any], None] = lambda settings, fit: None

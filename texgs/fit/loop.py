@@ -9,15 +9,15 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Phase
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.bounds import visible_part
 from texgs.fields.harmonics import join
 from texgs.fields.optimizer import Optimizer
-from texgs.fields.rates import extent, rates
 from texgs.fit.densify import DensityControl
 from texgs.fit.losses import Shading, render_view, view_loss
+from texgs.fit.rates import extent, rates
+from texgs.fit.settings import Phase
 from texgs.volume.images import Images
 
 CHECKED_EVERY = 100  # iterations between looks at the loss and all parameters

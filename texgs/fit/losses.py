@@ -8,11 +8,11 @@ from typing import Protocol, cast
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Losses
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.model import geometry
 from texgs.fields.surfels.shading import ShadingModel, material
+from texgs.fit.settings import Losses
 from texgs.raster import Options, Render, Texture, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.shading import MATERIAL

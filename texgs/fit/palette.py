@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass
 import torch
 from torch import Tensor
 
-from texgs.config.palette_fit import PaletteKeys
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import new_networks
 from texgs.fields.palette.rendering import Geometry
+from texgs.fit.kinds.palette import PaletteKeys
 from texgs.fit.loop import require_finite
 from texgs.fit.palette_losses import base_loss, grid_loss, palette_loss
 from texgs.fit.palette_start import object_palette, places

@@ -9,9 +9,9 @@ from dataclasses import dataclass, fields
 import torch
 from torch import Tensor
 
-from texgs.config.voxel_fit import GridStage, VoxelKeys
 from texgs.core.errors import FitError
 from texgs.fields.voxels.rays import training_rays
+from texgs.fit.kinds.voxels import GridStage, VoxelKeys
 from texgs.fit.loop import require_finite
 from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import VoxelGrid

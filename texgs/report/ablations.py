@@ -6,7 +6,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from texgs.config.fields import kinds
+from texgs.fit.kinds import fit_specs
 from texgs.report.means import mean
 from texgs.report.metrics_files import Record, of, paper
 from texgs.report.published import (
@@ -78,7 +78,7 @@ def row_of(runs: Sequence[Run], sweep: str, published: Mapping[Key, Line]) -> Ou
 
 def end_of(run: Run) -> Record[FitResult] | None:
     """The last phase of a fit; None where one is missing, or its kind of field is not known here."""
-    kind = kinds().get(next(iter(run.values())).field)
+    kind = fit_specs().get(next(iter(run.values())).field)
     return run[kind.phases[-1]] if kind and set(kind.phases) <= set(run) else None
 
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
-from texgs.config.fields import kinds
+from texgs.fields.kinds import kinds
 from texgs.report.means import mean_rows
 from texgs.report.metrics_files import Record, of, paper
 from texgs.report.published import THEIRS, in_order, numbers

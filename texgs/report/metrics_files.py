@@ -11,9 +11,9 @@ from typing import Any, Generic, TypeVar
 
 from omegaconf.errors import OmegaConfBaseException
 
-from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
+from texgs.fit.kinds import fit_specs
 from texgs.report.results import Result, result_of
 from texgs.workflow.variants import NO_SWEEP
 
@@ -103,7 +103,7 @@ def is_aside(folder: str) -> bool:
 
 def phases() -> list[str]:
     """The phases of all kinds of fields, in their order."""
-    return [phase for kind in kinds().values() for phase in kind.phases]
+    return [phase for kind in fit_specs().values() for phase in kind.phases]
 
 
 def paper(name: str, keys: int = 1) -> dict[tuple[str, ...], dict[str, str]]:

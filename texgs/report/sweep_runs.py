@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
+from texgs.fit.kinds import fit_specs
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditMeasures, EditResult, FitResult
 
@@ -85,7 +85,7 @@ def fits(records: Iterable[Record[FitResult]]) -> list[Run]:
 
 def measures_of_fit(phases: dict[str, Record[FitResult]]) -> dict[str, float | None]:
     """What was measured of a fit; nothing where a phase is missing."""
-    last = next((kind.phases[-1] for kind in kinds().values() if set(kind.phases) <= set(phases)), None)
+    last = next((kind.phases[-1] for kind in fit_specs().values() if set(kind.phases) <= set(phases)), None)
     if last is None:
         return {}
     result, records = phases[last].result, phases.values()

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 from omegaconf import DictConfig
 
-from texgs.config.fields import kinds
 from texgs.edit.method import NO_METHOD, methods
+from texgs.fields.kinds import kinds
 from texgs.workflow.inputs import with_recipe
 from texgs.workflow.variants import changes
 

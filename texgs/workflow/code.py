@@ -46,7 +46,7 @@ def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
 
 
 def data_beside(path: Path) -> str:
-    """Name the files that are no modules beside a module and below, with their checksums: templates, pictures."""
+    """Name the files beside a module and below that are no modules, with their checksums."""
     files = sorted(each for each in path.parent.rglob("*") if each.suffix in DATA)
     return "".join(f"{each.name}\n{sha256(each)}\n" for each in files)
 

@@ -11,12 +11,12 @@ from yaml import YAMLError
 
 from texgs.config.check import is_scene_file
 from texgs.config.compose import Same, changed, compose
-from texgs.config.fields import kinds
 from texgs.config.project import members
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.core.plain_yaml import parse_yaml
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD, method_of
+from texgs.fit.kinds import fit_specs
 from texgs.workflow.locate import source_file, tf_names, views_folder
 from texgs.workflow.looks import captions, looks_of
 from texgs.workflow.places import edit_folder, folder_of, made
@@ -64,7 +64,7 @@ def all_models(config: DictConfig) -> dict[str, Path]:
 
 def last_phase(config: DictConfig) -> str:
     """The phase of a fit that makes what scenes are composed of."""
-    return str(kinds()[config.fit.field].phases[-1])
+    return str(fit_specs()[config.fit.field].phases[-1])
 
 
 def scene_and_volume(config: DictConfig) -> dict[str, Path]:
@@ -138,7 +138,7 @@ def view_settings(config: DictConfig) -> dict[str, Any]:
 
 def models(config: DictConfig) -> dict[str, Path]:
     """The models that the phases of the fit write, and the views."""
-    phases = kinds()[config.fit.field].phases
+    phases = fit_specs()[config.fit.field].phases
     return {
         **{name: made("phase", config, name) for name in phases},
         **view_set(config),

@@ -14,10 +14,10 @@ from typing import Any, cast
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.compose import changed
-from texgs.config.fields import kinds
 from texgs.core.checksum import digest
 from texgs.core.io import write_atomic
 from texgs.edit.method import methods
+from texgs.fields.kinds import kinds
 from texgs.workflow.code import code_digest
 from texgs.workflow.places import PLACES, folder_of
 

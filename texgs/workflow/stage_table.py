@@ -2,8 +2,8 @@
 
 from omegaconf import DictConfig
 
-from texgs.config.fields import Kind, kinds
 from texgs.edit.method import Method, methods
+from texgs.fit.kinds import FitSpec, fit_specs
 from texgs.workflow.applies import (
     has_gallery,
     has_mesh,
@@ -39,7 +39,7 @@ from texgs.workflow.inputs import (
 from texgs.workflow.locate import basic_tf, tf_names
 from texgs.workflow.stage import Stage, for_tf
 
-LAST_PHASES = tuple(kind.phases[-1] for kind in kinds().values())  # which need those before
+LAST_PHASES = tuple(kind.phases[-1] for kind in fit_specs().values())  # which need those before
 EDITS = tuple(method.stage for method in methods().values())
 AFTER_SHADING = ("texture",)  # keys of a recipe that jobs read after a phase
 AFTER_SURFELS = ("materials", "first_material", "shading", *AFTER_SHADING)
@@ -58,7 +58,7 @@ def edit_stage(method: Method) -> Stage:
     )
 
 
-def fit_stage(kind: Kind) -> Stage:
+def fit_stage(kind: FitSpec) -> Stage:
     """The stage of a kind of field that is fitted in one phase."""
     return Stage(
         kind.name,
@@ -145,7 +145,7 @@ ROWS = (
         needs=("shading", "views"),
         applies=is_fit_of("surfels"),
     ),
-    *(fit_stage(kind) for kind in kinds().values() if kind.fit is not None),
+    *(fit_stage(kind) for kind in fit_specs().values() if kind.fit is not None),
     Stage(
         "figure",
         "texgs.workflow.stages.figure",

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from texgs.config.phase import CommonRates
 from texgs.core.keys import key
 from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
+from texgs.fit.settings import CommonRates
 
 if TYPE_CHECKING:
     from texgs.edit.closeness import Closeness

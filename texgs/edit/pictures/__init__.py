@@ -1,6 +1,6 @@
 """Style pictures of texgs, files beside this one: own work, in which nobody else has a right.
 
-For demonstrations and tests: brush strokes, stained glass, polished marble, cloth, painted dots, printed fans.
+For demonstrations and tests: brush strokes, stained glass, polished marble, cloth, dots and printed fans.
 """
 
 from __future__ import annotations

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from texgs.config.edit import Edit
-from texgs.config.fields import kinds
 from texgs.core.device import torch_device
 from texgs.edit.method import method_of
 from texgs.edit.parts import parts_of
 from texgs.edit.task import Task
+from texgs.fields.kinds import kinds
 from texgs.report.before_after import write_before_and_after
 from texgs.report.convergence import write_convergence
 from texgs.report.results import EditResult

@@ -10,7 +10,6 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.config.fields import kinds
 from texgs.config.views import ViewKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
@@ -19,6 +18,7 @@ from texgs.core.progress import progress
 from texgs.edit.method import method_of
 from texgs.edit.parts import parts_of
 from texgs.fields.field import Composed
+from texgs.fields.kinds import kinds
 from texgs.fields.surfels.texels import lean
 from texgs.metrics.clip import clip_scores
 from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of

@@ -4,12 +4,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from texgs.config.fields import kinds
 from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.typed import typed
 from texgs.fit import checkpoint
-from texgs.fit.task import FitTask, Fitted
+from texgs.fit.kinds import FitTask, Fitted, fit_specs
 from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.view_set import read_views
@@ -34,7 +33,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `views`, the transforms_train.json.
         output: folder.
     """
-    kind, fit = kinds()[settings.stage], settings.fit
+    kind, fit = fit_specs()[settings.stage], settings.fit
     if kind.settings is None or kind.fit is None:
         raise ArgumentError(f"{kind.name}: expected a kind of field that is fitted in one phase")
     title = f"{settings.dataset}/{settings.tf}: {kind.name}"
@@ -50,7 +49,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         {"dataset": settings.dataset, "tf": settings.tf},
     )
     fitted: Fitted = kind.fit(task)
-    kind.write(output / "model.safetensors", fitted.field)
+    kind.field.write(output / "model.safetensors", fitted.field)
     result = FitResult(
         fitted.seconds,
         len(fitted.field),

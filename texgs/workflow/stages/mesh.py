@@ -8,7 +8,6 @@ from pathlib import Path
 import torch
 
 from texgs.config.dataset import BasicTF
-from texgs.config.fields import kinds
 from texgs.config.mesh import MeshKeys
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
@@ -16,6 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.fields.field import Field
 from texgs.fields.files import open_field
+from texgs.fields.kinds import kinds
 from texgs.metrics.surface import compare, sample, seen
 from texgs.raster import Render
 from texgs.report.mesh_figure import write_mesh_figure

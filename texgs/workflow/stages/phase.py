@@ -7,16 +7,15 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Phase
 from texgs.core.memory import MIB
 from texgs.core.morton import z_order_of
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
-from texgs.fit.checkpoint import FOLDER
+from texgs.fit.checkpoint import FOLDER, run_to_end
 from texgs.fit.densify import is_shared
 from texgs.fit.loop import Fit
-from texgs.fit.resumable import run_to_end
+from texgs.fit.settings import Phase
 from texgs.metrics.quality import evaluate, mean
 from texgs.volume.images import Images
 from texgs.volume.reduced import smaller

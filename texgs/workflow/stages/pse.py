@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from texgs.config.fields import kinds
 from texgs.core.camera import Camera
 from texgs.core.device import torch_device
 from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.fields.field import Composed
+from texgs.fields.kinds import kinds
 from texgs.metrics.image import psnr, ssim
 from texgs.report.error_map import ERROR, signed_error
 from texgs.report.results import Comparison, PseResult

@@ -3,13 +3,13 @@
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from texgs.config.phase import Material, Phase
 from texgs.core.device import torch_device
 from texgs.fields.harmonics import base_color
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.shading import material, raw_material
 from texgs.fit import checkpoint
+from texgs.fit.settings import Material, Phase
 from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.view_set import read_views

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from texgs.cli.edit import apply_all
 from texgs.core.camera import Camera, orbit
 from texgs.core.device import torch_device
 from texgs.core.light import Light
 from texgs.metrics.image import psnr
 from texgs.report.error_map import ERROR, signed_error
+from texgs.scene.changes import apply_all
 from texgs.scene.scene_file import read_scene
 from texgs.scene.session import Session
 from texgs.workflow.stages.settings import OfScene

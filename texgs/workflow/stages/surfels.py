@@ -5,7 +5,6 @@ from pathlib import Path
 
 import torch
 
-from texgs.config.phase import Phase, Seeds
 from texgs.core.device import torch_device
 from texgs.fields.harmonics import join, split, zeroth
 from texgs.fields.surfels.model import Surfels
@@ -13,6 +12,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit import checkpoint
 from texgs.fit.seeds import seed_surfels
+from texgs.fit.settings import Phase, Seeds
 from texgs.report.results import FitResult
 from texgs.volume.images import load
 from texgs.volume.nrrd_file import open_grid

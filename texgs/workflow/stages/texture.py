@@ -4,9 +4,9 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from texgs.config.phase import TextureKeys
 from texgs.core.device import torch_device
 from texgs.fields.surfels.model_file import read_model, write_model
+from texgs.fit.settings import TextureKeys
 from texgs.fit.texels import texturize
 from texgs.report.results import FitResult
 from texgs.volume.images import load

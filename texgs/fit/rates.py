@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Rates
 from texgs.core.camera import Camera
 from texgs.fields.optimizer import Rate
+from texgs.fit.settings import Rates
 from texgs.raster.shading import MATERIAL
 
 USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
