@@ -77,4 +77,5 @@ def source(volume: Volume, path: Path) -> Source:
         require_whole(path, volume.sha256 or "")
     given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
     triples: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
-    return open_source(path, dtype=volume.dtype, endian=volume.endian, skip=volume.skip, **triples)
+    raw: dict[str, Any] = {name: getattr(volume, name) for name in ("dtype", "endian", "skip", "series")}
+    return open_source(path, **raw, **triples)
