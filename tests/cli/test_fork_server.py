@@ -7,14 +7,14 @@ import time
 
 import pytest
 
-from texgs.workflow import fork_client, fork_server
+from texgs.cli import fork_client, fork_server
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the fork server is for Linux")
 
 # A server whose jobs run their first word as Python, instead of texgs.
 SERVER = """
 import socket, sys
-from texgs.workflow.fork_server import run, serve
+from texgs.cli.fork_server import run, serve
 with socket.socket(fileno=int(sys.argv[1])) as listener:
     request = serve(listener, 0)
 if request is not None:
@@ -131,7 +131,7 @@ import os
 os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 import numpy, torch
 from threadpoolctl import threadpool_info
-from texgs.workflow.fork_server import use_threads
+from texgs.cli.fork_server import use_threads
 use_threads(3)
 print(torch.get_num_threads(), {pool["num_threads"] for pool in threadpool_info()})
 """

@@ -1,19 +1,32 @@
 """What jobs tell about their results: stages make these, `metrics.json` holds them, tables read them.
 
-What was not measured is None, and is left out of the file. Units are in the names.
+What was not measured is None, and is left out of the file. Units are in the names. A result that no table
+reads is in the module of its stage.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 from texgs.core.typed import typed
 
 
+class Result:
+    """What a job tells, a dataclass; files name it by its class."""
+
+    kinds: ClassVar[dict[str, type[Any]]] = {}
+    pictured_in: ClassVar[str]  # section of the report for the job's pictures
+
+    def __init_subclass__(cls, section: str = "more") -> None:
+        """Make a kind of result known, with the section of the report that its pictures belong to."""
+        cls.pictured_in = section
+        Result.kinds[cls.__name__] = cls
+
+
 @dataclass(frozen=True)
-class VolumeResult:
+class VolumeResult(Result, section="data"):
     """A volume, checked and in one file."""
 
     dims: list[int]  # samples along x, y, z
@@ -27,15 +40,7 @@ class VolumeResult:
 
 
 @dataclass(frozen=True)
-class TransferResult:
-    """Basic transfer functions over a histogram."""
-
-    basic_tfs: int
-    ranges: dict[str, list[float]]  # lowest and highest value of each
-
-
-@dataclass(frozen=True)
-class ViewsResult:
+class ViewsResult(Result, section="data"):
     """Views of a basic transfer function."""
 
     train: int  # views
@@ -50,7 +55,7 @@ class ViewsResult:
 
 
 @dataclass(frozen=True)
-class SheetResult:
+class SheetResult(Result, section="data"):
     """A contact sheet of views."""
 
     train: int  # views there are
@@ -60,7 +65,7 @@ class SheetResult:
 
 
 @dataclass(frozen=True)
-class FitResult:
+class FitResult(Result, section="fitting"):
     """A phase of a fit."""
 
     fit_seconds: float
@@ -81,15 +86,7 @@ class FitResult:
 
 
 @dataclass(frozen=True)
-class FigureResult:
-    """A figure of a fit."""
-
-    shown: list[str]  # views
-    primitives: int
-
-
-@dataclass(frozen=True)
-class ComparisonResult:
+class ComparisonResult(Result, section="fitting"):
     """Fits side by side."""
 
     recipes: list[str]
@@ -107,7 +104,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class GalleryResult:
+class GalleryResult(Result):
     """Scenes side by side."""
 
     section: str  # of the report
@@ -115,7 +112,7 @@ class GalleryResult:
 
 
 @dataclass(frozen=True)
-class MeshResult:
+class MeshResult(Result, section="fitting"):
     """The surface of a fit against that of its volume; lengths in world units."""
 
     chamfer: float  # mean of the next two
@@ -131,7 +128,7 @@ class MeshResult:
 
 
 @dataclass(frozen=True)
-class SceneResult:
+class SceneResult(Result, section="pse"):
     """Fields as one scene."""
 
     models: int
@@ -148,7 +145,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class PseResult:
+class PseResult(Result, section="pse"):
     """Edits by numbers, and a light that moves."""
 
     views: int
@@ -157,7 +154,7 @@ class PseResult:
 
 
 @dataclass(frozen=True)
-class TimingResult:
+class TimingResult(Result):
     """Frames of a scene, and of its volume in the same job."""
 
     frame_mean_ms: float
@@ -172,7 +169,7 @@ class TimingResult:
 
 
 @dataclass(frozen=True)
-class PageResult:
+class PageResult(Result, section="scenes"):
     """A scene as a page for a browser."""
 
     edit: str  # or "none"
@@ -182,7 +179,7 @@ class PageResult:
 
 
 @dataclass(frozen=True)
-class EditResult:
+class EditResult(Result, section="parts"):
     """A scene with a new look or a new part."""
 
     edit: str
@@ -198,7 +195,7 @@ class EditResult:
 
 
 @dataclass(frozen=True)
-class EditMeasures:
+class EditMeasures(Result):
     """What was measured of an edited scene."""
 
     edit: str
@@ -222,36 +219,17 @@ class EditMeasures:
     clip_missing: str | None = None  # why CLIP measured nothing
 
 
-Result = (
-    VolumeResult
-    | TransferResult
-    | ViewsResult
-    | SheetResult
-    | FitResult
-    | FigureResult
-    | ComparisonResult
-    | GalleryResult
-    | MeshResult
-    | SceneResult
-    | PseResult
-    | TimingResult
-    | PageResult
-    | EditResult
-    | EditMeasures
-)
-KINDS: dict[str, type[Any]] = {kind.__name__: kind for kind in Result.__args__}
-
-
 def plain(result: Result) -> dict[str, Any]:
-    """A result for JSON, without what was not measured."""
-    return {name: value for name, value in asdict(result).items() if value is not None}
+    """Return a result for JSON, without what was not measured."""
+    values: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
+    return {name: value for name, value in values.items() if value is not None}
 
 
 def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
-    """The result that `plain` made these numbers of.
+    """Return the result that `plain` made these numbers of.
 
     Raises:
         KeyError, OmegaConfBaseException: if they are those of no result.
     """
-    result: Result = typed(KINDS[kind], numbers)
+    result: Result = typed(Result.kinds[kind], numbers)
     return result

@@ -1,7 +1,8 @@
 """Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
 
-Read from the source without importing it, see sources.py. Code that calls the native library has the digest
-of the C++ and CUDA sources in it; a module that reads files of its package has these in it.
+Read from the source without importing it, see sources.py. The rest of texgs/workflow does not count. Code
+that calls the native library has the digest of the C++ and CUDA sources in it; a module that reads files of
+its package has these in it.
 """
 
 from functools import cache
@@ -12,6 +13,8 @@ from texgs.core.native_sources import library_sources
 from texgs.workflow.sources import Sources
 
 ROOT = Path(__file__).parents[2]
+STAGES = "texgs.workflow.stages."
+PLANNING = "texgs.workflow."  # what else is there decides settings and inputs, which jobs are known by anyway
 NATIVE = "texgs.raster.native"  # the module that calls the native library
 READS_DATA = b"importlib.resources"  # in modules that do
 DATA = (".css", ".csv", ".html", ".j2", ".js", ".png", ".yaml")
@@ -25,7 +28,8 @@ def code_digest(module: str) -> str:
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name in seen or (read := essence(name)) is None:
+        is_planning = name.startswith(PLANNING) and not name.startswith(STAGES)
+        if name in seen or is_planning or (read := essence(name)) is None:
             continue
         seen[name], imported = read
         waiting += imported

@@ -7,7 +7,6 @@ from texgs.core.typed import typed
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.material import require_material
 from texgs.fit.kinds import fit_specs
-from texgs.workflow.places import PLACES
 from texgs.workflow.stage import Stage
 
 
@@ -37,7 +36,7 @@ def require_fit(stage: Stage, config: DictConfig) -> None:
         ConfigError: if its field goes through other phases, has no surface, or is not fitted on the device.
         ArgumentError: if settings of the fit do not fit each other.
     """
-    if "{fit}" not in PLACES[stage.place].folder:
+    if "{fit}" not in stage.rule.folder:
         return
     fit, kind = config.fit, fit_specs()[config.fit.field]
     if stage.place == "phase" and stage.name not in kind.phases:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,8 +21,7 @@ from texgs.report.results import plain
 from texgs.workflow import result, tracked
 from texgs.workflow import tracking as track
 from texgs.workflow.provenance import record
-from texgs.workflow.stage import Stage, settings_digest
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stage import Outcome, Stage, settings_digest
 from texgs.workflow.tracked import Tracking
 from texgs.workflow.variants import swept
 from texgs.workflow.weights import require_same, weights_of
@@ -111,8 +109,7 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
             )
         result.require_intact(path)
     require_same(job.settings.get("weights", {}))
-    module = importlib.import_module(job.stage.module)
-    settings = _typed(module.Settings, job)
+    settings = _typed(job.stage.schema, job)
     identity = job.identity()
     work = result.claim(job.output, identity, is_fresh=is_fresh)
     with track.run(
@@ -124,7 +121,7 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
     ) as run:
         start = time.perf_counter()
         with heard(run.log if run.id else None):
-            outcome: Outcome = module.work(settings, dict(job.inputs), work)
+            outcome: Outcome = job.stage.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         metrics = {
             **record(job.settings, identity, job.made_from(), seconds),

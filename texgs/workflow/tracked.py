@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow import tracking as track
-from texgs.workflow.places import PLACES
 from texgs.workflow.provenance import edit, git_revision, recipe, seed, user
 from texgs.workflow.variants import NO_SWEEP
 
@@ -82,7 +81,7 @@ def tell(run: track.Run, job: Job, metrics: Mapping[str, Any]) -> None:
     for step, values in curves(metrics["numbers"]):
         run.log(values, step)
     checksums = result.recorded(job.output)
-    for file in PLACES[job.stage.place].files[:1]:
+    for file in job.stage.rule.files[:1]:
         run.tag({"file": (job.output / file).as_posix(), "file.sha256": checksums[file]})
     for picture in (*metrics["pictures"], result.METRICS):
         run.artifact(job.output / picture)

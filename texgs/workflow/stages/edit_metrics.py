@@ -1,38 +1,25 @@
 """Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import isfinite
+from __future__ import annotations
+
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
-from typing import Any
-
-import torch
-from torch import Tensor
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.views import ViewKeys
-from texgs.core.camera import Camera
-from texgs.core.device import torch_device
-from texgs.core.memory import MIB
-from texgs.core.progress import progress
-from texgs.edit.method import method_of
-from texgs.edit.parts import parts_of
-from texgs.fields.field import Composed
+from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
-from texgs.fields.surfels.texels import lean
-from texgs.metrics.clip import clip_scores
-from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
-from texgs.metrics.style import likeness
-from texgs.models.clip import Clip
-from texgs.models.lpips import Lpips
-from texgs.models.vgg import Vgg
 from texgs.report.results import EditMeasures
-from texgs.scene.scene import Scene
-from texgs.scene.scene_file import read_scene
-from texgs.volume.cameras import spiral, spread
+from texgs.workflow.inputs import view_settings, with_recipe
+from texgs.workflow.places import made
+from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
 from texgs.workflow.stages.edit import Settings as EditSettings
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.edit import edit_settings, edited_scene
 from texgs.workflow.stages.timing import FRAMES, milliseconds
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 
 @dataclass
@@ -52,6 +39,11 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.edit.measures import agreement, clip_numbers, is_geometry_kept, megabytes, style_distance
+    from texgs.scene.scene_file import read_scene
+    from texgs.volume.cameras import spiral, spread
+
     edit, views, weights = settings.edit, settings.views, settings.weights
     title, kind = f"{settings.dataset}: {edit.name}", kinds()[settings.fit.field]
     device = torch_device(settings.fit.device)
@@ -79,121 +71,42 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(result)
 
 
-def megabytes(scene: Scene) -> float:
-    """Of all models, as the paper's tables of edits count."""
-    return sum(lean(entry.open()[0]).sizes()["files_mib"] for entry in scene.models.values()) * MIB / 1e6
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    measures = {"compared": config.metric.views, "clip": config.metric.clip}
+    return {**edit_settings(config), **measures, "views": view_settings(config)}
 
 
-@torch.no_grad()
-def is_geometry_kept(after: Composed, before: Composed, cameras: Sequence[Camera], has_normals: bool) -> bool:
-    """Whether depth, alpha and, where there are any, normals of all views are the same, bit for bit."""
-    outputs = ("depth", "normal") if has_normals else ("depth",)
-    pairs = [[scene.render(camera, outputs=outputs) for scene in (after, before)] for camera in cameras]
-    return all(
-        torch.equal(one.alpha, two.alpha)
-        and torch.equal(one.depth, two.depth)  # type: ignore[arg-type]
-        and (not has_normals or torch.equal(one.normal, two.normal))  # type: ignore[arg-type]
-        for one, two in pairs
-    )
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the scene as edited and as fitted, what says where its surfaces are, and the views of all TFs.
 
-
-def without_hidden(geometry: Scene, scene: Scene) -> Scene:
-    """The models of the geometry but those that the scene hides; all of them where it hides everything."""
-    hidden = {name for name, model in scene.models.items() if not model.edit.visible}
-    shown = {name: model for name, model in geometry.models.items() if name not in hidden}
-    return replace(geometry, models=shown or geometry.models)
-
-
-@torch.no_grad()
-def agreement(
-    composition: Composed,
-    scene: Scene,
-    geometry: Path,
-    cameras: Sequence[Camera],
-    count: int,
-    weights: Mapping[str, str | None],
-) -> dict[str, Any]:
-    """Consistency of views in the middle of the path, near and far, as they look with the scene's light.
-
-    Fields that have light in their colours can be compared with others so. Nothing where no two views see the
-    same, as of a scene that is nowhere opaque.
+    Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
     """
-    start = max(0, (len(cameras) - count - LONG) // 2)
-    some = cameras[start : start + count + LONG]
-    surfaces = without_hidden(read_scene(geometry), scene)
-    depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
-    shown = surfaces.open(composition.device)
-    frames = list(frames_of(composition, some, scene.light, scene.edits, shown, depth))
-    perceptual = None
-    if weights["vgg16"] and weights["lpips_vgg"]:
-        perceptual = Lpips.load(device=composition.device).to
-    apart = [each for each in (SHORT, LONG) if each < len(frames)]
-    measures: dict[str, Any] = {}
-    for each, measured in consistency(frames, apart, perceptual).items():
-        name = "short" if each == SHORT else "long"
-        measures |= {f"{name}_rmse": measured.rmse, f"{name}_lpips": measured.perceptual}
-    return measures
+    first = with_recipe(config, config.fits[0]) if config.fits else config
+    scenes = {"scene": made("edit", config), "before": made("compose", config)}
+    return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
 
 
-def style_distance(
-    settings: Settings,
-    scene: Scene,
-    cameras: Sequence[Camera],
-    device: torch.device,
-    title: str,
-) -> dict[str, Any]:
-    """NNFM and Gram distances of the models with a style, means over them.
-
-    None of segments, of looks by words or by several pictures, or where a model is nowhere opaque.
-    """
-    edit = settings.edit
-    parts, method = parts_of(scene, edit.parts), method_of(edit)
-    if method.style is None or any(part.segment for part in parts) or not settings.weights["vgg16"]:
-        return {}
-    vgg, likenesses = Vgg.load(device=device, dtype=torch.float32), []
-    for part in parts:
-        picture = method.style(method.of(edit, settings.followed.get(part.model)))
-        if picture is None:
-            return {}
-        style = picture.scaled(max(cameras[0].width, cameras[0].height))
-        likenesses.append(
-            likeness(
-                scene.models[part.model].open()[0].to(device),
-                cameras,
-                [scene.light] * len(cameras),
-                style.image,
-                vgg,
-                style.region,
-                f"{title}, {part.name}",
-            )
-        )
-    means = {
-        "style_nnfm": fmean(each.nnfm for each in likenesses),
-        "style_gram": fmean(each.gram for each in likenesses),
-    }
-    return {name: value for name, value in means.items() if isfinite(value)}
+def applies(config: DictConfig) -> bool:
+    """Return whether the configuration is of an edit that makes the scene look different."""
+    method = methods().get(config.edit.method)
+    return config.tf is None and method is not None and method.is_look
 
 
-@torch.no_grad()
-def clip_numbers(
-    settings: Settings,
-    scenes: tuple[Scene, Scene],
-    compositions: tuple[Composed, Composed],
-    cameras: Sequence[Camera],
-    title: str,
-) -> dict[str, Any]:
-    """CLIP's similarity and directional similarity over all views, or why they were not measured."""
-    edit, backbone = settings.edit, settings.clip
-    if settings.weights[backbone] is None:
-        return {"clip_missing": f"the weights of {backbone} are not on this machine"}
-    if not edit.source_caption or not edit.target_caption:
-        return {"clip_missing": "the edit has no captions"}
-    clip = Clip.load(backbone, compositions[0].device)
-
-    def views_of(scene: Scene, composition: Composed) -> Iterator[Tensor]:
-        for camera in progress(cameras, title=f"{title}, CLIP", unit="view"):
-            yield composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
-
-    edited, originals = map(views_of, scenes, compositions)
-    scores = clip_scores(clip, edited, originals, edit.source_caption, edit.target_caption)
-    return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}
+STAGE = Stage(
+    "edit_metrics",
+    order=180,
+    help="measure an edited scene: CLIP, style, consistency, time, size",
+    rule=Rule(
+        "edit_metrics",
+        "{dataset}/scene/{fit}/edit_metrics/{edit}",
+        target="edits",
+        threads=EVERY,  # it measures frames, too
+        gpu=("fit",),
+    ),
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=applies,
+)

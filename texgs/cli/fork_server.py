@@ -75,7 +75,7 @@ def start(environment: Mapping[str, str]) -> subprocess.Popen[bytes] | None:
         listener.listen(128)
         words = [str(listener.fileno()), *LIBRARIES, *(TRACKING if "TEXGS_TRACKING" in environment else ())]
         server = subprocess.Popen(
-            [sys.executable, "-P", "-m", "texgs.workflow.fork_server", *words],
+            [sys.executable, "-P", "-m", "texgs.cli.fork_server", *words],
             stdin=subprocess.PIPE,
             pass_fds=[listener.fileno()],
             env={**os.environ, **environment, **ONE_THREAD},
