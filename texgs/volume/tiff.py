@@ -1,30 +1,35 @@
-"""TIFF files with a page per slice, and folders of single TIFFs, as sources; read by OpenCV, page by page."""
+"""TIFF files with a page per slice, and folders of single TIFFs, as sources."""
 
 from __future__ import annotations
 
+import logging
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import SLICES
-from texgs.core.reading import ADVICE, reading_as
-from texgs.volume.grid import Dims, Triple, check_lattice
-from texgs.volume.slabs import SLAB_BYTES
+from texgs.core.reading import reading_as
+from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of, require_room
+from texgs.volume.slabs import ArraySource, RawSource, Source
 
-HEAD = 1 << 16  # bytes in which ImageJ's description of a stack is
-CHANNELS = re.compile(rb"ImageJ=[^\0]*\nchannels=(\d+)")
+READABLE = (1, 8, 32773, 32946, 34925)  # none, deflate, packbits and LZMA: others need imagecodecs
+PAGES = 2  # in memory at a time: one as it is decoded, and its place in the slab
 
 
 @dataclass(frozen=True, eq=False)
 class PageSource:
-    """Slices that are pages of one TIFF file, or files of one page, decoded when they are asked for."""
+    """Slices that are pages of TIFF files, decoded when they are asked for."""
 
     path: Path
-    files: tuple[Path, ...]  # one, or one for each slice
-    dims: Dims
+    pages: tuple[tuple[Path, int], ...]  # file and page of every z slice
+    shape: tuple[int, int]  # Y, X
     dtype: np.dtype
     spacing: Triple
     origin: Triple
@@ -37,85 +42,119 @@ class PageSource:
         """Name of the file or folder."""
         return self.path.name
 
+    @property
+    def dims(self) -> Dims:
+        """Number of samples along x, y, z."""
+        return self.shape[1], self.shape[0], len(self.pages)
+
     def slices(self, start: int, stop: int) -> np.ndarray:
         """Samples [stop - start, Y, X]; row 0 of a page is y = 0."""
-        values = np.empty((stop - start, *self.dims[1::-1]), self.dtype)
-        if len(self.files) > 1:
-            for place, file in zip(values, self.files[start:stop], strict=True):
-                self._copy(place[None], file, 0)
-            return values
-        step = max(1, SLAB_BYTES // values[0].nbytes)
-        for low in range(0, stop - start, step):
-            self._copy(values[low : low + step], self.path, start + low)
+        values = np.empty((stop - start, *self.shape), self.dtype)
+        for k, (file, page) in enumerate(self.pages[start:stop]):
+            values[k] = self._page(file, page)
         return values
 
-    def _copy(self, places: np.ndarray, file: Path, first: int) -> None:
-        """Fill [n, Y, X] with pages of a file, which must be like the first."""
-        where = "" if file == self.path else f"{file}: "
-        for place, page in zip(places, read_pages(file, first, len(places)), strict=True):
-            if page.shape != place.shape or page.dtype != self.dtype:
-                raise ArgumentError(
-                    f"{where}expected a page {list(place.shape)} of {self.dtype} as the first one, "
-                    f"got {list(page.shape)} of {page.dtype}"
-                )
-            place[:] = page
+    def _page(self, file: Path, page: int) -> np.ndarray:
+        """One slice, which must be like the first."""
+        import tifffile
+
+        try:
+            with reading_as("a TIFF file"), _complaints():
+                values = tifffile.imread(file, key=page)
+        except ArgumentError as error:
+            raise ArgumentError(f"{file}: {error}") from error
+        if values.shape != self.shape or values.dtype != self.dtype:
+            raise ArgumentError(
+                f"{file}: expected a page {list(self.shape)} of {self.dtype} as the first one, "
+                f"got {list(values.shape)} of {values.dtype}"
+            )
+        return values
 
 
-def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> PageSource:
-    """Open a TIFF file with a page per z slice, or a folder of single TIFFs in natural order.
+def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+    """A TIFF file with a page per z slice, or a folder of single TIFFs in natural order.
 
     TIFF says nothing dependable about the lattice: spacing is 1 unless given.
 
     Raises:
-        ArgumentError: if a file is damaged or there is no scalar volume.
+        ArgumentError, ShapeError: if a file is damaged or there is no scalar volume.
     """
-    files = tuple(tiffs_in(path)) if path.is_dir() else (path,)
-    count = page_count(files[0])
-    if path.is_dir() and count != 1:
-        raise ArgumentError(f"expected one page per file, got {count} in {files[0].name}")
-    page = read_pages(files[0], 0, 1)[0]
-    with files[0].open("rb") as file:
-        channels = CHANNELS.search(file.read(HEAD))
-    n_components = page.shape[2] if page.ndim > 2 else int(channels[1]) if channels else 1
-    if n_components > 1:
-        raise ArgumentError(f"expected a scalar volume, got {n_components} components per sample")
-    dims = (page.shape[1], page.shape[0], len(files) if path.is_dir() else count)
-    return PageSource(path, files, dims, page.dtype, spacing or (1.0, 1.0, 1.0), origin or (0.0, 0.0, 0.0))
+    lattice = (spacing or (1.0, 1.0, 1.0), origin or (0.0, 0.0, 0.0))
+    return _open_folder(path, *lattice) if path.is_dir() else _open_file(path, *lattice)
 
 
-def tiffs_in(folder: Path) -> list[Path]:
-    """Return the TIFF files of a folder in natural order."""
-    return sorted((file for file in folder.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
+def _open_folder(path: Path, spacing: Triple, origin: Triple) -> PageSource:
+    """Single TIFFs; only the first is opened now."""
+    import tifffile
+
+    files = sorted((file for file in path.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
+    if not files:
+        raise ArgumentError(f"expected a folder of TIFFs ({', '.join(SLICES)}), found none in it")
+    what = f"TIFF files, but {files[0].name} is none"
+    with reading_as(what), _complaints(), tifffile.TiffFile(files[0]) as tiff:
+        shape, dtype = _page_type(tiff)
+        if len(tiff.pages) != 1:
+            raise ArgumentError(f"expected one page per file, got {len(tiff.pages)} in {files[0].name}")
+    return PageSource(path, tuple((file, 0) for file in files), shape, dtype, spacing, origin)
 
 
-def page_count(file: Path) -> int:
-    """Count the pages of a TIFF file."""
-    import cv2
+def _open_file(path: Path, spacing: Triple, origin: Triple) -> Source:
+    """Pages of one file: as they are where they follow one another uncompressed, else decoded on demand."""
+    import tifffile
 
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)  # what is wrong is raised here
-    try:
-        str(file).encode()
-    except UnicodeEncodeError as error:  # OpenCV would crash
-        raise ArgumentError("expected a path in UTF-8; rename it") from error
-    with reading_as(f"TIFF files, but {file.name} is none" if file.name else "a TIFF file"):
-        return int(cv2.imcount(str(file)))
+    with reading_as("a TIFF file"), _complaints(), tifffile.TiffFile(path) as tiff:
+        shape, dtype = _page_type(tiff)
+        series = tiff.series[0]
+        for axis, size in zip(series.axes, series.shape, strict=False):
+            if axis in "CS" and size > 1:
+                raise ArgumentError(f"expected a scalar volume, got {size} components per sample")
+        if len(tiff.series) == 1 and series.ndim > 2:
+            dims = dims_of(series.shape)
+            if series.dataoffset is not None:
+                stored = dtype.newbyteorder(tiff.byteorder)
+                return RawSource(path, dims, stored, series.dataoffset, spacing, origin)
+            if len(tiff.pages) != dims[2]:
+                require_room(dims, dtype)
+                return ArraySource(Grid(series.asarray(), spacing, origin), path.name)
+        pages = tuple((path, page) for page in range(len(tiff.pages)))
+    return PageSource(path, pages, shape, dtype, spacing, origin)
 
 
-def read_pages(file: Path, first: int, count: int) -> list[np.ndarray]:
-    """Read pages of a TIFF file, each [Y, X] or [Y, X, C].
-
-    Raises:
-        ArgumentError: if there are fewer, or one of them is damaged.
-    """
-    import cv2
-
-    with reading_as("a TIFF file"):
-        _, pages = cv2.imreadmulti(str(file), first, count, flags=cv2.IMREAD_UNCHANGED)
-    if len(pages) != count:
+def _page_type(tiff: Any) -> tuple[tuple[int, int], np.dtype]:
+    """Shape (Y, X) and sample type of the first page."""
+    page = tiff.pages[0]
+    if page.samplesperpixel != 1:
+        raise ArgumentError(f"expected a scalar volume, got {page.samplesperpixel} components per sample")
+    if page.compression not in READABLE and find_spec("imagecodecs") is None:
         raise ArgumentError(
-            f"{file}: expected a TIFF file, but page {first + len(pages)} cannot be decoded; {ADVICE}"
+            f"expected samples that are uncompressed or deflated, got {page.compression.name}; save them so, "
+            "or pip install imagecodecs"
         )
-    return list(pages)
+    require_room((page.imagewidth, page.imagelength, PAGES), np.dtype(page.dtype))
+    return (page.imagelength, page.imagewidth), np.dtype(page.dtype)
+
+
+@contextmanager
+def _complaints() -> Iterator[None]:
+    """Raise what tifffile only logs: lost pages, for one. Warnings are about metadata and are dropped."""
+    records: list[logging.LogRecord] = []
+
+    class Collector(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            records.append(record)
+
+    logger, collector = logging.getLogger("tifffile"), Collector(logging.WARNING)
+    propagates = logger.propagate
+    logger.addHandler(collector)
+    logger.propagate = False
+    try:
+        yield
+    finally:
+        logger.propagate = propagates
+        logger.removeHandler(collector)
+    for record in records:
+        if record.levelno >= logging.ERROR:
+            raise ArgumentError(f"the file is damaged or cut off, tifffile says: {record.getMessage()}")
 
 
 def natural_order(path: Path) -> list[tuple[str, int]]:
