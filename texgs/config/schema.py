@@ -17,6 +17,8 @@ from texgs.config.views import ViewKeys
 from texgs.core.keys import key
 from texgs.models.catalogue import CLIP_BACKBONES
 
+NO_SWEEP = "none"  # name of the sweep without variants
+
 
 @dataclass
 class Tracking:
@@ -62,7 +64,7 @@ class PageKeys:
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
-    name: str = key("none", "of the table")
+    name: str = key(NO_SWEEP, "of the table")
     seeds: list[int] = key([0], "random numbers of fits; each variant is fitted once with each")
     edit_seeds: list[int] = key([0], "random numbers of edits; each edit is made once with each")
     variants: dict[str, list[str]] = field(

@@ -9,12 +9,12 @@ import numpy as np
 import torch
 
 from texgs.core.camera import Camera
+from texgs.core.image_grid import write_strip
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
-from texgs.report.strip import write_strip
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.volume.cameras import orbit_path

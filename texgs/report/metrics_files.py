@@ -11,11 +11,11 @@ from typing import Any, Generic, TypeVar
 
 from omegaconf.errors import OmegaConfBaseException
 
+from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.fit.kinds import fit_specs
 from texgs.report.results import Result, result_of
-from texgs.workflow.variants import NO_SWEEP
 
 COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs, see texgs/track/sqlite.py
 R_co = TypeVar("R_co", bound=Result, covariant=True)

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
+from texgs.core.image_grid import DPI, content
 from texgs.core.plots import words
 from texgs.report.metrics_files import Record
-from texgs.report.strip import DPI, content
 from texgs.report.sweep import deviation, mean, measured, values
 from texgs.report.sweep_runs import DIGITS, Run, natural, number, runs_of
 

@@ -114,7 +114,8 @@ def fit_label(config: DictConfig, later: Sequence[str] = ()) -> dict[str, Any]:
         config: of a job.
         later: keys of the recipe that only later jobs read.
     """
-    from texgs.workflow.variants import NO_SWEEP, fit_variant
+    from texgs.config.schema import NO_SWEEP
+    from texgs.workflow.variants import fit_variant
 
     variant = fit_variant(config)
     return {

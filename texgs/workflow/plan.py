@@ -17,8 +17,8 @@ from texgs.config.project import folders
 from texgs.core.checksum import digest, sha256
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import write_atomic
-from texgs.workflow.code import ROOT, code_digest
-from texgs.workflow.kept import fingerprint, keep, recall
+from texgs.core.kept import fingerprint, keep, recall
+from texgs.workflow.code import ROOT
 from texgs.workflow.stage import LONG_AGO
 from texgs.workflow.stage_table import RULES, STAGES
 
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
 SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places that are shown of a sweep
-OTHER_CODE = ("texgs.cli.tables", "texgs.cli.report")  # of rules that are no stages
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,6 @@ class Plan:
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
-    code: dict[str, str]  # digests of modules that are no stages
     left_out: str  # file that tells what the run goes on without
     earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
     replaced: list[str]  # folders with results of other settings, in whose place the run puts its own
@@ -162,7 +160,6 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         sweeps,
         downloads(configs),
         wildcards(configs),
-        {module: code_digest(module) for module in OTHER_CODE},
         left_out({**selection.left_out, **outdated}, results),
         others,
         of_other_settings(run.values()),

@@ -10,11 +10,11 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+from texgs.config.schema import NO_SWEEP
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow import tracking as track
 from texgs.workflow.provenance import edit, git_revision, recipe, seed, user
-from texgs.workflow.variants import NO_SWEEP
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job

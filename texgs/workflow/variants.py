@@ -4,10 +4,10 @@ from collections.abc import Mapping, Sequence
 
 from omegaconf import DictConfig, OmegaConf
 
+from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ConfigError
 from texgs.workflow.product import ONLY_SEEDS, SEEDS, combinations, key_of, label
 
-NO_SWEEP = "none"  # name of the sweep without variants
 OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
 OF_EDITS = "edit"
 

@@ -14,6 +14,7 @@ from texgs.core.waiting import waiting
 from texgs.report.table_files import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 from texgs.workflow import last_words, parents
+from texgs.workflow.code import code_digest
 from texgs.workflow.plan import note_written, planned, words_of
 from texgs.workflow.stage_table import RULES
 

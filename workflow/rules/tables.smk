@@ -11,7 +11,7 @@ rule tables:
     log:
         "<logs>/tables.log",
     params:
-        code=PLAN.code["texgs.cli.tables"],
+        code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
         **BESIDE,
     shell:
@@ -28,7 +28,7 @@ rule report:
     log:
         "<logs>/report.log",
     params:
-        code=PLAN.code["texgs.cli.report"],
+        code=code_digest("texgs.cli.report"),
         **BESIDE,
     shell:
         "texgs report {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "

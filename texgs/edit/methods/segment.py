@@ -133,9 +133,9 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
     import torch
 
+    from texgs.core.image_grid import write_strip
     from texgs.edit.preview import overlay
     from texgs.fields.surfels.model import Surfels
-    from texgs.report.strip import write_strip
     from texgs.volume.cameras import orbit_path
 
     model, lifted = made.model, made.lifted

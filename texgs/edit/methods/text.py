@@ -41,10 +41,10 @@ class TextKeys(InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
+    from texgs.core.image_grid import write_strip
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.fields.surfels.texels import untextured
-    from texgs.report.strip import write_strip
     from texgs.volume.reduced import smaller
 
     settings, guidance = task.settings, task.settings.opened(task.device)

@@ -148,7 +148,7 @@ def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float]
 
 def _write_views(path: Path, updates: dict[str, Updated]) -> None:
     """A strip of views of each model that are apart from each other, before and after."""
-    from texgs.report.strip import write_strip
+    from texgs.core.image_grid import write_strip
 
     rows = {}
     for name, each in updates.items():

@@ -59,7 +59,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: scenes by the names that pictures have for them, and `volume` where one shows it.
         output: folder.
     """
-    from texgs.report.strip import write_strip
+    from texgs.core.image_grid import write_strip
 
     studio, shown, captions = Studio(settings, inputs, settings.size), [], {}
     for grid in settings.grids:

@@ -51,7 +51,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         output: folder.
     """
     from texgs.core.device import torch_device
-    from texgs.report.strip import write_strip
+    from texgs.core.image_grid import write_strip
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.volume.cameras import orbit_path
     from texgs.workflow.stages.volume_scene import VolumeScene

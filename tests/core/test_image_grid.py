@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from texgs.core.errors import ArgumentError
-from texgs.report.strip import DPI, INCHES, NOTE, content, write_strip
+from texgs.core.image_grid import DPI, INCHES, NOTE, content, write_strip
 
 
 def picture(rows, columns, size=(60, 80), value=0.2):
