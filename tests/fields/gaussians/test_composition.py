@@ -83,7 +83,7 @@ def test_what_is_no_scene_is_refused():
         JoinedGaussians([])
     with pytest.raises(ArgumentError, match="expected all with the antialiased filter or none, got both"):
         JoinedGaussians([sample(), sample(antialiased=True)])
-    with pytest.raises(ArgumentError, match="segments: 3D Gaussians have none"):
+    with pytest.raises(ArgumentError, match="segments: expected none of gaussians"):
         JoinedGaussians([sample()], [[torch.ones(7, dtype=torch.bool)]])
     with pytest.raises(ArgumentError, match="edits: expected one for each of 1 models, got 2"):
         JoinedGaussians([sample()]).render(CAMERA, edits=[PartEdit(), PartEdit()])

@@ -31,7 +31,9 @@ def close_dead(client: MlflowClient) -> None:
     words = f"attributes.status = 'RUNNING' AND tags.`{HOST}` = '{platform.node()}'"
     experiments = [experiment.experiment_id for experiment in client.search_experiments()]
     for run in client.search_runs(experiments, words):
-        if not is_alive(run.data.tags.get(PROCESS, "")):
+        if is_alive(run.data.tags.get(PROCESS, "")):
+            continue
+        if client.get_run(run.info.run_id).info.status == "RUNNING":  # else it has ended since the search
             client.set_terminated(run.info.run_id, "FINISHED" if is_recorded(run) else "KILLED")
 
 
