@@ -50,11 +50,23 @@ def test_a_result_is_complete_with_all_its_files_as_they_were(output):
     assert result.damaged(output, None) == ["train/r.png"]
 
 
-@pytest.mark.parametrize("name", [result.STAMP, result.FILES])
-def test_damaged_records_are_of_no_job(output, name):
+@pytest.mark.parametrize("damage", [None, "", "[1]", "{}", '{"train/r.p'])
+def test_a_result_whose_list_of_files_cannot_be_read_is_not_replaced(output, damage):
     make(output)
-    (output / name).write_text('{"stage": "vie')
-    assert result.stamped(output) is None or not result.is_complete(output, Checksums())
+    (output / "notes.txt").write_text("mine")
+    (output / result.FILES).unlink() if damage is None else (output / result.FILES).write_text(damage)
+    assert not result.is_complete(output, Checksums())
+    assert result.recorded(output) == {}
+    for identity in (MINE, OTHER):
+        with pytest.raises(ArgumentError, match=r"views/\.files\.json: cannot be read, .* yours; move those out"):
+            result.claim(output, identity)
+    assert (output / "notes.txt").read_text() == "mine"
+
+
+def test_a_damaged_stamp_is_of_no_job(output):
+    make(output)
+    (output / result.STAMP).write_text('{"stage": "vie')
+    assert result.stamped(output) is None
     make(output, content="two")
     assert result.is_complete(output, Checksums())
     assert result.stamped(output) == MINE

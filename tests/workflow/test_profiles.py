@@ -1,20 +1,20 @@
 """Profiles and their page name rules that exist: Snakemake takes other names without a word."""
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 import yaml
 
+from texgs.config.compose import compose
+from texgs.workflow.stage_table import RULES, STAGES
+
 ROOT = Path(__file__).parents[2]
-RULES = {
-    name
-    for path in (ROOT / "workflow" / "rules").glob("*.smk")
-    for name in re.findall(r"^rule (\w+):", path.read_text(), flags=re.MULTILINE)
-}
 PROFILES = sorted((ROOT / "workflow" / "profiles").glob("*/profile.yaml"))
 PAGE = (ROOT / "docs" / "workflow.md").read_text()
 BY_RULE = ("set-threads", "set-resources", "groups")
+NAMES = {*RULES, "tables", "report"}
 
 
 def named(settings: dict) -> set[str]:
@@ -25,7 +25,7 @@ def named(settings: dict) -> set[str]:
 @pytest.mark.parametrize("path", PROFILES, ids=lambda path: path.parent.name)
 def test_profiles_name_rules_that_exist(path):
     with_suggestions = re.sub(r"^  # ", "  ", path.read_text(), flags=re.MULTILINE)
-    assert named(yaml.safe_load(with_suggestions)) <= RULES
+    assert named(yaml.safe_load(with_suggestions)) <= NAMES
 
 
 def test_the_page_of_clusters_names_rules_that_exist():
@@ -35,12 +35,24 @@ def test_the_page_of_clusters_names_rules_that_exist():
     in_blocks = set().union(*(named(yaml.safe_load(block)) for block in blocks))
     assert in_words
     assert in_blocks
-    assert in_words | in_blocks <= RULES
+    assert in_words | in_blocks <= NAMES
 
 
 def test_every_rule_with_a_gpu_is_in_the_example_of_the_page():
-    rules = "\n".join(path.read_text() for path in (ROOT / "workflow" / "rules").glob("*.smk"))
-    bodies = re.split(r"^rule (\w+):", rules, flags=re.MULTILINE)[1:]
-    with_gpu = {name for name, body in zip(bodies[::2], bodies[1::2], strict=True) if "gpu=" in body}
+    with_gpu = {rule.name for rule in RULES.values() if rule.gpu}
     example = re.search(r"name it for these rules:\n\n```yaml\n(.*?)```", PAGE, flags=re.DOTALL)
     assert set(yaml.safe_load(example[1])["set-resources"]) == with_gpu
+
+
+def test_jobs_share_a_submission_only_with_those_that_they_wait_for():
+    """Snakemake asks for the time of one of several jobs side by side, and runs them one after another."""
+    profile = yaml.safe_load((ROOT / "workflow" / "profiles" / "slurm" / "profile.yaml").read_text())
+    assert "group-components" not in profile
+    config = compose(("dataset=turbulence", "tf=TF01"))
+    whole = compose(("dataset=turbulence",))
+    for group in set(profile["groups"].values()):
+        rules = [rule for rule in RULES if profile["groups"].get(rule) == group]
+        for before, after in pairwise(rules):
+            each = config if STAGES[after].per_tf else whole
+            read = {path.parent for path in STAGES[after].inputs(each).values()}
+            assert STAGES[before].output(each) in read, group

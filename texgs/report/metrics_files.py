@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
+from types import UnionType
 from typing import Any, Generic, TypeVar
 
 from omegaconf.errors import OmegaConfBaseException
@@ -18,6 +19,16 @@ from texgs.fit.kinds import fit_specs
 from texgs.report.results import Result, result_of
 
 COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs, see texgs/track/sqlite.py
+REQUIRED = ("stage", "dataset", "device", "seconds", "peak_memory_mib", "versions")
+OF_TYPES: dict[type | UnionType, tuple[str, ...]] = {  # what metrics files say of jobs beside their numbers
+    str: (
+        *("stage", "dataset", "tf", "recipe", "field", "variant", "sweep", "edit", "stand_in", "device"),
+        *("config_sha", "code_sha", "git_sha", "run", "result"),
+    ),
+    int: ("seed", "fit_seed"),
+    int | float: ("seconds", "peak_memory_mib"),
+    dict: ("numbers", "pictures", "versions", "inputs", "made_from", "weights", "machine"),
+}
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
@@ -119,16 +130,21 @@ def _record(path: Path) -> Record[Any]:
     facts = read_json(path)
     if not isinstance(facts, dict) or "numbers" not in facts:
         raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
+    for kind, names in OF_TYPES.items():
+        for name in names:
+            if facts.get(name) is not None and not isinstance(facts[name], kind):
+                expected, got = getattr(kind, "__name__", "number"), type(facts[name]).__name__
+                raise ArgumentError(f"{path}: {name}: expected {expected}, got {got}; run the job again")
     try:
         result = result_of(facts["result"], facts["numbers"])
-        stage, dataset = str(facts["stage"]), str(facts["dataset"])
-    except (KeyError, OmegaConfBaseException) as error:
+        stage, dataset, *_ = [facts[name] for name in REQUIRED]
+    except (KeyError, TypeError, ValueError, OmegaConfBaseException) as error:
         raise OtherVersionError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
-    variant, seed = facts.get("variant", ""), int(facts.get("seed") or 0)
-    fit = (label(facts), facts.get("field", ""), variant, facts.get("sweep", ""), seed)
-    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in", ""), result, facts)
+    variant, sweep, field = (facts.get(name) or "" for name in ("variant", "sweep", "field"))
+    fit = (label(facts), field, variant, sweep, facts.get("seed") or 0)
+    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in") or "", result, facts)
 
 
 def label(facts: Mapping[str, Any]) -> str:

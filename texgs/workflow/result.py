@@ -108,11 +108,10 @@ def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> 
 
 def _take_back(output: Path, work: Path) -> None:
     """Turn a damaged result into work that goes on, without its damaged files."""
-    for name in damaged(output, None):
-        (output / name).unlink(missing_ok=True)
-    for name in (FILES, METRICS):
-        (output / name).unlink(missing_ok=True)
-    output.rename(work)
+    lost = damaged(output, None)
+    output.rename(work)  # first: a folder without its records is taken for somebody else's
+    for name in (*lost, METRICS, FILES):
+        (work / name).unlink(missing_ok=True)
 
 
 def publish(output: Path) -> None:
@@ -144,8 +143,9 @@ def stamped(folder: Path) -> Any:
 
 
 def recorded(folder: Path) -> dict[str, str]:
-    """Checksums of the files of a complete result, by their names."""
-    return dict(_content(folder / FILES) or {})
+    """Return checksums of the files of a complete result, by their names; none where they cannot be read."""
+    known = _content(folder / FILES)
+    return known if isinstance(known, dict) else {}
 
 
 def _content(path: Path) -> Any:
@@ -165,13 +165,12 @@ def damaged(output: Path, checksums: Checksums | None) -> list[str]:
     """
     if not (output / FILES).exists():
         return []
-    recorded = _content(output / FILES)
-    if not isinstance(recorded, dict):
+    if not (known := recorded(output)):
         return [FILES]
     checksum = sha256 if checksums is None else checksums.of
     return [
         name
-        for name, expected in recorded.items()
+        for name, expected in known.items()
         if not (output / name).is_file() or checksum(output / name) != expected
     ]
 
@@ -195,9 +194,12 @@ def require_own(output: Path) -> None:
         raise ArgumentError(
             f"{output}: expected an empty folder or one of texgs, got other files; move them away"
         )
-    if (recorded := _content(output / FILES)) is None:
-        return  # not complete
-    own = {*recorded, STAMP, FILES}
+    if not (known := recorded(output)):
+        raise ArgumentError(
+            f"{output / FILES}: cannot be read, so nothing tells which files there are yours; move those out "
+            f"of {output}, then remove it"
+        )
+    own = {*known, STAMP, FILES}
     there = (path.relative_to(output) for path in output.rglob("*") if not path.is_dir())
     if foreign := sorted(path.as_posix() for path in there if not own & {path.as_posix(), path.parts[0]}):
         raise ArgumentError(
@@ -216,7 +218,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
         ArgumentError: if something cannot be read.
     """
     folder = path.parent
-    made_files = _content(folder / FILES) or {}
+    made_files = recorded(folder)
     is_foreign = path.exists() and path.name not in made_files
     if (folder / FILES).exists() and not is_foreign:
         made = [(name, sha) for name, sha in made_files.items() if name not in (METRICS, TIMES)]
