@@ -83,7 +83,7 @@ def made_again(before, after):
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     project = Project(tmp_path_factory.mktemp("every"))
-    for folder, toy in (("methods", "fade"), ("fields/kinds", "ball")):
+    for folder, toy in (("edit/methods", "fade"), ("fields/kinds", "ball")):
         shutil.copy(TOYS / f"{toy}.py", project.sources / "texgs" / folder)
     for name, text in EDITS.items():
         (project.sources / "conf" / "edit" / f"{name}.yaml").write_text(text)
