@@ -25,7 +25,7 @@ install: $(VENV)/installed
 
 # A worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
 WORKERS := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
-SLOW := workflow or docs or packaging or emulated or subprocess
+SLOW := workflow or stages or docs or packaging or emulated or subprocess
 test: $(VENV)/installed
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)

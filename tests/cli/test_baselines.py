@@ -66,6 +66,7 @@ def numbers(folder):
     return json.loads((folder / "metrics.json").read_text())["numbers"]
 
 
+@pytest.mark.stages
 def test_geometry_is_kept_and_colours_are_not(edited):
     folder, method = edited
     before, after = (
@@ -83,6 +84,7 @@ def test_geometry_is_kept_and_colours_are_not(edited):
     assert numbers(folder)["method"] == method
 
 
+@pytest.mark.stages
 def test_it_is_shown_and_measured(edited):
     folder, method = edited
     pictures = {"stylerf": ["style-TF01-1.png", "style-TF01-2.png"], "arf": ["style.png"]}.get(method, [])

@@ -16,6 +16,8 @@ from texgs.edit.methods.image import how
 from texgs.edit.recipe import DEFAULT, preset
 from texgs.scene.scene_file import read_scene
 
+pytestmark = pytest.mark.stages
+
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")
 CLICK = ("edit=lobe", "edit.segment.model=TF01", "edit.segment.points=[[0.6, 0.4]]")
 

@@ -9,7 +9,10 @@ import pytest
 
 from texgs.cli import fork_client, fork_server
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the fork server is for Linux")
+pytestmark = [
+    pytest.mark.subprocess,
+    pytest.mark.skipif(sys.platform != "linux", reason="the fork server is for Linux"),
+]
 
 # A server whose jobs run their first word as Python, instead of texgs.
 SERVER = """

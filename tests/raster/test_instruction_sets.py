@@ -21,6 +21,8 @@ from texgs.volume.caster import OUTPUTS, Caster
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction
 
+pytestmark = pytest.mark.subprocess
+
 CHILD = """
 import sys, torch
 from tests.raster.test_instruction_sets import computed

@@ -15,6 +15,8 @@ from texgs.core.io import write_json
 from texgs.workflow.tracking import begin, process_tags
 from texgs.workflow.tracking.dead import HOST, PROCESS, is_alive
 
+pytestmark = pytest.mark.subprocess
+
 ROOT = Path(__file__).parents[2]
 # A job that says when its run is there, and then works for long.
 JOB = """

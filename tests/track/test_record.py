@@ -109,6 +109,7 @@ def test_tracking_off_records_nothing_and_loads_nothing():
     assert python(code).stderr == "set() None\n"
 
 
+@pytest.mark.subprocess
 def test_nothing_is_printed_and_no_usage_reported(uri):
     code = (
         "with run(sys.argv[1], experiment='a', name='b', tags={}, params={'long': 'x' * 9000}) as job:\n"

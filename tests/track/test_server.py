@@ -11,6 +11,8 @@ import pytest
 from tests.track.eight import assert_eight_jobs_lose_nothing
 from texgs.workflow.tracking import TrackingError, begin, run
 
+pytestmark = pytest.mark.subprocess
+
 JOB = {"experiment": "texgs", "name": "fit", "tags": {}, "params": {}}
 
 

@@ -15,6 +15,8 @@ from mlflow.artifacts import download_artifacts
 from tests.track.eight import assert_eight_jobs_lose_nothing
 from texgs.workflow.tracking import TrackingError, begin, run
 
+pytestmark = pytest.mark.subprocess
+
 JOB = {"experiment": "texgs", "name": "fit", "tags": {}, "params": {}}
 
 DOWNGRADE = """
