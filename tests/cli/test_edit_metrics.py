@@ -8,6 +8,7 @@ import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.models.clips import write_clip
+from texgs.edit.measures import agreement, clip_numbers
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
@@ -16,7 +17,6 @@ from texgs.models.clip import Clip
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.cameras import spiral as path
-from texgs.workflow.stages.edit_metrics import agreement, clip_numbers
 
 CAMERAS = path(12, 4.0, 30.0, 32, 32)
 MISSING = {"vgg16": None, "lpips_vgg": None}

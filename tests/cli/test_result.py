@@ -58,7 +58,7 @@ def test_a_result_whose_list_of_files_cannot_be_read_is_not_replaced(output, dam
     assert not result.is_complete(output, Checksums())
     assert result.recorded(output) == {}
     for identity in (MINE, OTHER):
-        with pytest.raises(ArgumentError, match=r"views/\.files\.json: cannot be read, .* yours; move those out"):
+        with pytest.raises(ArgumentError, match=r"views/\.files\.json: cannot be read, .* move those out"):
             result.claim(output, identity)
     assert (output / "notes.txt").read_text() == "mine"
 

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from texgs.core.errors import ConfigError
-from texgs.workflow.parents import WHOLE, of_sweep, owner
+from texgs.workflow.parents import WHOLE, owner
 from texgs.workflow.plan import made, make, note_results, words_of
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
@@ -43,7 +43,6 @@ def test_jobs_know_the_values_that_are_theirs_alone(planned):
     assert told["volume"] == {}
     assert told["TF01/views-1"] == {frequency: "1"}
     assert told["TF01/demo-2-s1/texture"] == {frequency: "2", "fit.seed": "1"}
-    assert of_sweep(plan, "frequency").params == {"keys": f"fit.seed, {frequency}"}
 
 
 def test_jobs_of_one_sweep_are_in_its_run_and_others_in_that_of_all(planned):

@@ -11,7 +11,7 @@ from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
 from texgs.report.study import write_key
 from texgs.report.tables import specs, tables_of
-from texgs.workflow.places import PLACES
+from texgs.workflow.stage_table import RULES
 
 TABLES = specs()
 
@@ -26,7 +26,7 @@ def test_tables_are_in_the_papers_order_and_then_ours():
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
 def test_a_table_names_places_and_a_section_that_there_are(table):
-    assert set(table.places) <= set(PLACES)
+    assert set(table.places) <= set(RULES)
     assert table.section in SECTIONS
 
 
