@@ -45,7 +45,7 @@ def test_vtk_that_would_end_the_process_is_refused(tmp_path):
 def test_vtk_that_ends_its_process_is_a_sentence(tmp_path, monkeypatch):
     WRITERS["packed.vti"](tmp_path / "packed.vti", sample_values())
     monkeypatch.setattr("sys.executable", shutil.which("false"))
-    with pytest.raises(ArgumentError, match=r"packed\.vti: expected a \.vti file, but VTK broke off"):
+    with pytest.raises(ArgumentError, match=r"packed\.vti: expected a \.vti file, but its reader broke off"):
         open_source(tmp_path / "packed.vti")
 
 

@@ -83,12 +83,16 @@ def test_mistakes_in_the_path(tmp_path, monkeypatch):
     ):
         open_source("none.vti")
     (tmp_path / "v.dcm").touch()
-    with pytest.raises(ArgumentError, match=r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .*TIFFs"):
+    with pytest.raises(
+        ArgumentError, match=r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or DICOM slices"
+    ):
         open_source("v.dcm")
     (tmp_path / "v.raw.gz").touch()
     with pytest.raises(ArgumentError, match=r"unknown suffix '.raw.gz'"):
         open_source("v.raw.gz")
-    with pytest.raises(ArgumentError, match=r"expected a folder of TIFFs \(.tif, .tiff\), found none"):
+    with pytest.raises(
+        ArgumentError, match=r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"
+    ):
         open_source(tmp_path)
     np.save(tmp_path / "v.npy", sample_values())
     with pytest.raises(ArgumentError, match="this format has a header; leave them out"):
