@@ -123,3 +123,16 @@ def test_a_folder_without_permission_is_one_sentence(tmp_path, monkeypatch, func
     monkeypatch.setattr(Path, function, refuse)
     with pytest.raises(ArgumentError, match=r"cannot be read \(Permission denied\)"):
         open_source(tmp_path)
+
+
+def test_what_the_other_process_runs_counts_as_code_of_a_job():
+    from texgs.workflow.code import essence
+
+    seen, waiting = set(), ["texgs.workflow.stages.volume"]
+    while waiting:
+        name = waiting.pop()
+        read = essence(name)
+        if name not in seen and read is not None:
+            seen.add(name)
+            waiting += read[1]
+    assert {f"texgs.volume.{name}" for name in ("foreign_reader", "itk_image", "vtk_image", "dicom")} <= seen

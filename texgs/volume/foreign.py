@@ -17,6 +17,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.reading import reading_as
+from texgs.volume import foreign_reader  # imported here, so that it counts as code of a job
 from texgs.volume.grid import Grid, Triple, byte_count, require_room
 from texgs.volume.headers import METAIMAGE, NRRD, StoredSamples, stored_samples
 from texgs.volume.orientation import AS_STORED, closest, permuted_values
@@ -96,7 +97,7 @@ def _ask(
 ) -> tuple[dict[str, Any], np.ndarray]:
     """Let a process of its own read a file: what it says, and the samples [Z, Y, X]."""
     request = json.dumps({"path": str(path.absolute()), "series": series, "is_header_only": is_header_only})
-    command = [sys.executable, "-P", "-m", "texgs.volume.foreign_reader", request]
+    command = [sys.executable, "-P", "-m", foreign_reader.__name__, request]
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, **pipes) as child:  # type: ignore[call-overload]
         watchdog = Timer(SECONDS + _size(path) / RATE, child.kill)
