@@ -10,18 +10,20 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import named_file
 
 NRRD, METAIMAGE = (".nrrd", ".nhdr"), (".mhd", ".mha")  # suffixes
-# NRRD's words; all others are text.
-ENCODINGS = {"raw": "raw", "gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"}
+NUMBERS = ("elementspacing", "elementsize", "offset", "position", "origin", "transformmatrix", "rotation")
+ENCODINGS = {"raw": "raw", "gzip": "gzip", "gz": "gzip", "bzip2": "bzip2", "bz2": "bzip2"} | dict.fromkeys(
+    ("ascii", "ASCII", "text", "txt"), "text"
+)  # by NRRD's words
 LONGEST_HEADER = 1 << 20  # bytes; a foreign file may hold no line break for gigabytes
 
 
 class StoredSamples(NamedTuple):
-    """Samples in a file, binary."""
+    """Samples in a file."""
 
     path: Path
     offset: int  # bytes before them as they are stored; -1: they end the file
     skip: int  # bytes before them after decompression; -1: they end the stream
-    encoding: str  # raw, zlib, gzip or bzip2
+    encoding: str  # raw, zlib, gzip, bzip2 or text
     is_big_endian: bool
 
 
@@ -64,7 +66,7 @@ def samples_of(header: Path) -> Path | None:
 
 
 def stored_samples(path: Path) -> StoredSamples | None:
-    """Find the samples of a header; None where they are text.
+    """Find the samples of a header; None where they are text of MetaImage.
 
     Raises:
         ArgumentError: if the header is damaged, or the file that it names is not there.
@@ -75,12 +77,16 @@ def stored_samples(path: Path) -> StoredSamples | None:
         raise ArgumentError(f"no such file with samples: {samples}")
     offset = end if samples == path else 0
     if path.suffix.lower() in METAIMAGE:
+        for name in NUMBERS:  # ITK takes 1 where a word is no number
+            _ = [float(word) for word in fields.get(name, "").split()]
         is_big = _is_true(fields, "binarydatabyteordermsb") or _is_true(fields, "elementbyteordermsb")
         offset = int(fields.get("headersize", "0")) or offset
         encoding = "zlib" if _is_true(fields, "compresseddata") else "raw"
         is_text = "binarydata" in fields and not _is_true(fields, "binarydata")
         return None if is_text else StoredSamples(samples, offset, 0, encoding, is_big)
-    encoding = ENCODINGS.get(fields.get("encoding", ""), "text")
+    encoding = ENCODINGS.get(fields["encoding"], "")
+    if not encoding:
+        raise ArgumentError(f"encoding: expected raw, gzip, bzip2 or ascii, got {fields['encoding']}")
     skip = int(fields.get("byteskip", "0"))
     with samples.open("rb") as file:
         file.seek(offset)
@@ -91,7 +97,7 @@ def stored_samples(path: Path) -> StoredSamples | None:
     if encoding == "raw":
         offset, skip = -1 if skip == -1 else offset + skip, 0
     is_big = fields.get("endian") == "big"
-    return None if encoding == "text" else StoredSamples(samples, offset, skip, encoding, is_big)
+    return StoredSamples(samples, offset, skip, encoding, is_big)
 
 
 def _is_true(fields: dict[str, str], name: str) -> bool:

@@ -23,7 +23,7 @@ NRRD_SPACES = {
     "las": TO_RIGHT_FRONT,
     "3d-left-handed": (-1.0, 1.0, 1.0),
 }
-SOURCE_LINE = re.compile(r"^.*?(?:sitk::ERROR|ITK ERROR): (?:\w+\(0x[0-9a-f]+\): )?", re.DOTALL)
+SOURCE_LINE = re.compile(r"^.*?(?:sitk::ERROR|ITK ERROR|itk::ERROR): (?:\w+\(0x[0-9a-f]+\): )?", re.DOTALL)
 
 
 def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarray | None]:

@@ -1,6 +1,6 @@
-"""Samples in a compressed stream, unpacked as far as the header says and no further.
+"""Samples in a compressed stream or as text, read as far as the header says and no further.
 
-Not by ITK: it takes a stream that ends too early for whole, and fills up with zeros.
+Not by ITK: it takes a stream that ends too early for whole and fills up with zeros, and skips words.
 """
 
 from __future__ import annotations
@@ -30,6 +30,8 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
         ArgumentError: if there are fewer or more.
         OutOfMemoryError: if they do not fit into memory.
     """
+    if stored.encoding == "text":
+        return _from_text(stored, dims, dtype)
     n_bytes = byte_count(dims, dtype)
     # The stream is in memory beside what it unpacks to, which is copied once from the library's own blocks.
     require_room(dims, dtype, stored.path.stat().st_size - stored.offset + n_bytes)
@@ -46,6 +48,17 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
             f"{more}{len(samples)}"
         )
     return np.frombuffer(samples, dtype, prod(dims), start).reshape(dims[::-1])
+
+
+def _from_text(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
+    """Read samples [Z, Y, X] that are words."""
+    require_room(dims, dtype)
+    with stored.path.open("rb") as file:
+        file.seek(stored.offset + max(0, stored.skip))
+        values = np.fromfile(file, dtype, sep=" ")
+    if values.size != prod(dims):
+        raise ArgumentError(f"expected {prod(dims)} samples, found {values.size}; is it cut off?")
+    return values.reshape(dims[::-1])
 
 
 def _unpack(file: BinaryIO, encoding: str, most: int) -> bytes:
