@@ -128,6 +128,7 @@ def test_metaimage_axes_become_those_of_space(tmp_path, codes):
     affine = np.diag([-1.0, -1, 1, 1]) @ affine
     steps = np.linalg.norm(affine[:3, :3], axis=0)
     words = {
+        "NDims": [3],
         "DimSize": stored.shape[::-1],
         "ElementSpacing": steps,
         "TransformMatrix": (affine[:3, :3] / steps).T.ravel(),
@@ -224,7 +225,8 @@ def test_more_than_one_component_is_refused(tmp_path):
     nibabel.save(nibabel.Nifti1Image(np.zeros((4, 5, 6), pixel), np.eye(4)), tmp_path / "v.nii")
     np.save(tmp_path / "v.npy", colors)
     (tmp_path / "v.mha").write_text(
-        "DimSize = 6 5 4\nElementNumberOfChannels = 3\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+        "NDims = 3\nDimSize = 6 5 4\nElementNumberOfChannels = 3\n"
+        "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
     )
     for path in sorted(tmp_path.iterdir()):
         with pytest.raises((ArgumentError, ShapeError), match="3 components per sample"):
@@ -239,7 +241,8 @@ def test_other_than_three_axes_is_refused(tmp_path, shape):
     tifffile.imwrite(tmp_path / "v.tif", values, photometric="minisblack")
     np.save(tmp_path / "v.npy", values)
     (tmp_path / "v.mha").write_text(
-        f"DimSize = {' '.join(map(str, shape))}\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+        f"NDims = {len(shape)}\nDimSize = {' '.join(map(str, shape))}\n"
+        "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
     )
     for path in sorted(tmp_path.iterdir()):
         with pytest.raises((ArgumentError, ShapeError), match=r"expected .*(axes|shape|samples along)"):
@@ -247,7 +250,8 @@ def test_other_than_three_axes_is_refused(tmp_path, shape):
 
 
 def test_spacing_of_a_file_that_makes_no_sense_can_be_replaced(tmp_path):
-    text = "DimSize = 3 2 2\nElementSpacing = 1 0 1\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
+    text = "NDims = 3\nDimSize = 3 2 2\nElementSpacing = 1 0 1\n"
+    text += "ElementType = MET_UCHAR\nElementDataFile = LOCAL\n"
     (tmp_path / "v.mha").write_bytes(text.encode() + bytes(range(12)))
     with pytest.raises(ArgumentError, match=r"v.mha: spacing: expected .*, got \[1.0, 0.0, 1.0\]; set the"):
         open_source(tmp_path / "v.mha")

@@ -45,7 +45,7 @@ def test_vtk_that_would_end_the_process_is_refused(tmp_path):
 def test_vtk_that_ends_its_process_is_a_sentence(tmp_path, monkeypatch):
     WRITERS["packed.vti"](tmp_path / "packed.vti", sample_values())
     monkeypatch.setattr("sys.executable", shutil.which("false"))
-    with pytest.raises(ArgumentError, match=r"packed\.vti: expected a \.vti file, but VTK broke off"):
+    with pytest.raises(ArgumentError, match=r"packed\.vti: expected a \.vti file, but its reader broke off"):
         open_source(tmp_path / "packed.vti")
 
 
@@ -76,6 +76,19 @@ def test_a_stream_that_holds_more_than_the_header_says_is_not_unpacked(tmp_path)
     message, peak = done.stdout.splitlines()
     assert "expected 24 bytes of samples, found at least 25" in message
     assert int(peak) < 150e6
+
+
+def test_text_that_is_no_samples_is_refused(tmp_path):
+    for text in (b"1 2 x " + b"3 " * 21, b"1 " * 25):
+        with pytest.raises(ArgumentError, match=r"expected (24 samples, found 25|an? .?n?rrd file)"):
+            open_source(nrrd(tmp_path / "v.nrrd", encoding="ascii", data=text))
+
+
+def test_a_word_in_place_of_a_number_is_refused(tmp_path):
+    text = "NDims = 3\nDimSize = 3 2 2\nElementSpacing = 2 x 2\nElementType = MET_UCHAR\n"
+    (tmp_path / "v.mha").write_bytes(text.encode() + b"ElementDataFile = LOCAL\n" + bytes(range(12)))
+    with pytest.raises(ArgumentError, match="could not convert string to float: 'x'"):
+        open_source(tmp_path / "v.mha")
 
 
 @pytest.mark.parametrize("encoding", ["raw", "gzip", "ascii"])

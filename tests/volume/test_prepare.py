@@ -11,7 +11,7 @@ from texgs.core.errors import ArgumentError
 from texgs.volume import slabs
 from texgs.volume.grid import Grid
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.orientation import TURNS
+from texgs.volume.orientation import UPRIGHT
 from texgs.volume.prepare import prepare
 from texgs.volume.sources import ArraySource, open_source
 
@@ -59,7 +59,7 @@ def jobs(draw):
 
 
 @settings(max_examples=60, deadline=None)
-@given(job=jobs(), up=st.sampled_from(list(TURNS)), method=st.sampled_from(["mean", "sample"]))
+@given(job=jobs(), up=st.sampled_from(list(UPRIGHT)), method=st.sampled_from(["mean", "sample"]))
 def test_any_job_agrees_with_numpy_at_world_positions(tmp_path_factory, job, up, method):
     values, crop, reduce = job
     x0, x1, y0, y1, z0, z1 = crop
@@ -83,10 +83,10 @@ def test_any_job_agrees_with_numpy_at_world_positions(tmp_path_factory, job, up,
         assert grid.values[tuple(index[::-1])] == expected[z, y, x]
 
 
-@pytest.mark.parametrize("up", TURNS)
+@pytest.mark.parametrize("up", UPRIGHT)
 def test_up_is_a_rotation_that_points_up(up):
     matrix = np.zeros((3, 3))
-    for row, (axis, sign) in enumerate(TURNS[up]):
+    for row, (axis, sign) in enumerate(UPRIGHT[up]):
         matrix[row, axis] = sign
     np.testing.assert_array_equal(matrix @ [1, 2, 3], WORLD[up](1, 2, 3))
     assert np.linalg.det(matrix) == pytest.approx(1)

@@ -83,12 +83,16 @@ def test_mistakes_in_the_path(tmp_path, monkeypatch):
     ):
         open_source("none.vti")
     (tmp_path / "v.dcm").touch()
-    with pytest.raises(ArgumentError, match=r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .*TIFFs"):
+    with pytest.raises(
+        ArgumentError, match=r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or DICOM slices"
+    ):
         open_source("v.dcm")
     (tmp_path / "v.raw.gz").touch()
     with pytest.raises(ArgumentError, match=r"unknown suffix '.raw.gz'"):
         open_source("v.raw.gz")
-    with pytest.raises(ArgumentError, match=r"expected a folder of TIFFs \(.tif, .tiff\), found none"):
+    with pytest.raises(
+        ArgumentError, match=r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"
+    ):
         open_source(tmp_path)
     np.save(tmp_path / "v.npy", sample_values())
     with pytest.raises(ArgumentError, match="this format has a header; leave them out"):
@@ -119,3 +123,16 @@ def test_a_folder_without_permission_is_one_sentence(tmp_path, monkeypatch, func
     monkeypatch.setattr(Path, function, refuse)
     with pytest.raises(ArgumentError, match=r"cannot be read \(Permission denied\)"):
         open_source(tmp_path)
+
+
+def test_what_the_other_process_runs_counts_as_code_of_a_job():
+    from texgs.workflow.code import essence
+
+    seen, waiting = set(), ["texgs.workflow.stages.volume"]
+    while waiting:
+        name = waiting.pop()
+        read = essence(name)
+        if name not in seen and read is not None:
+            seen.add(name)
+            waiting += read[1]
+    assert {f"texgs.volume.{name}" for name in ("foreign_reader", "itk_image", "vtk_image", "dicom")} <= seen

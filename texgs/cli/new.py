@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The file, how to read it, and where transfer functions come from."""
-    parser.add_argument("file", type=Path, help="volume, or folder of TIFF slices")
+    parser.add_argument("file", type=Path, help="volume, or folder of TIFF or DICOM slices")
     parser.add_argument(
         "overrides",
         nargs="*",

@@ -19,7 +19,10 @@ class Volume:
     )
     size: int = key(128, "samples along each side of a generated field", least=16)
     seed: int = key(0, "random numbers of a generated field")
-    file: str | None = key(None, "file, or folder of TIFF slices; relative to data_folder")
+    file: str | None = key(None, "file, or folder of TIFF or DICOM slices; relative to data_folder")
+    series: str | None = key(
+        None, "number or UID of the series to read, where a folder of DICOM slices has several"
+    )
     url: str | None = key(None, "where the file is downloaded from when it is not there")
     sha256: str | None = key(None, "checksum of the download")
     obtain: str = key("", "how to get a file that cannot be downloaded")

@@ -1,74 +1,69 @@
-"""Samples in a compressed stream, unpacked as far as the header says and no further."""
+"""Samples in a compressed stream or as text, read as far as the header says and no further.
+
+Not by ITK: it takes a stream that ends too early for whole and fills up with zeros, and skips words.
+"""
 
 from __future__ import annotations
 
 import bz2
+import gzip
 import zlib
-from collections.abc import Callable, Iterator
-from functools import partial
 from math import prod
-from pathlib import Path
-from typing import Any
+from typing import BinaryIO
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, byte_count, require_room
-
-ZLIB_OR_GZIP = 47  # window bits: the largest window, header found by zlib
-Unpack = Callable[[bytes, int], bytes]  # of a stream, and how much of it at most
+from texgs.volume.headers import StoredSamples
 
 
-def deflated(packed: bytes, most: int) -> bytes:
-    """Bytes of zlib or gzip streams, one behind the other."""
-    return b"".join(streams(packed, most, partial(zlib.decompressobj, ZLIB_OR_GZIP)))
-
-
-def bzip2(packed: bytes, most: int) -> bytes:
-    """Bytes of bzip2 streams, one behind the other."""
-    return b"".join(streams(packed, most, bz2.BZ2Decompressor))
-
-
-def streams(packed: bytes, most: int, start: Callable[[], Any]) -> Iterator[bytes]:
-    """Bytes of each stream: programs that pack on several cores write many."""
-    magic = packed[:2]
-    while most > 0 and packed and packed.startswith(magic):
-        stream = start()
-        part = stream.decompress(packed, most)
-        yield part
-        packed, most = stream.unused_data, most - len(part)
-
-
-def unpacked(
-    path: Path, offset: int, dims: Dims, stored: np.dtype, unpack: Unpack = deflated, skip: int = 0
-) -> np.ndarray:
-    """Samples [Z, Y, X] of a stream in a file.
+def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
+    """Unpack samples [Z, Y, X].
 
     Args:
-        path: of the file.
-        offset: of the stream, bytes.
+        stored: where and how they are.
         dims: samples along x, y, z.
-        stored: sample type with byte order.
-        unpack: what reads the stream.
-        skip: bytes of the stream before the samples; -1: they end it.
+        dtype: sample type with byte order.
 
     Raises:
-        ArgumentError: if the stream is shorter or longer.
-        OutOfMemoryError: if the samples do not fit into memory.
+        ArgumentError: if there are fewer or more.
+        OutOfMemoryError: if they do not fit into memory.
     """
-    n_bytes = byte_count(dims, stored)
-    # The stream is in memory beside what it unpacks to, which zlib and bzip2 copy once from their own blocks.
-    require_room(dims, stored, path.stat().st_size - offset + n_bytes)
-    with path.open("rb") as file:
-        file.seek(offset)
-        # One byte more than there should be makes zlib go to the end of its stream, and compare its checksum.
-        most = 2 * n_bytes if skip == -1 else n_bytes + skip + 1
-        samples = unpack(file.read(), most)
-    start = len(samples) - n_bytes if skip == -1 else skip
+    if stored.encoding == "text":
+        return _from_text(stored, dims, dtype)
+    n_bytes = byte_count(dims, dtype)
+    # The stream is in memory beside what it unpacks to, which is copied once from the library's own blocks.
+    require_room(dims, dtype, stored.path.stat().st_size - stored.offset + n_bytes)
+    # One byte more than there should be makes the library go to the end of its stream, and compare checksums.
+    most = 2 * n_bytes if stored.skip == -1 else n_bytes + stored.skip + 1
+    with stored.path.open("rb") as file:
+        file.seek(stored.offset)
+        samples = _unpack(file, stored.encoding, most)
+    start = len(samples) - n_bytes if stored.skip == -1 else stored.skip
     if start < 0 or len(samples) != start + n_bytes:
         more = "at least " if len(samples) == most else ""
         raise ArgumentError(
             f"the file is cut off, or its header another's: expected {n_bytes} bytes of samples, found "
             f"{more}{len(samples)}"
         )
-    return np.frombuffer(samples, stored, prod(dims), start).reshape(dims[::-1])
+    return np.frombuffer(samples, dtype, prod(dims), start).reshape(dims[::-1])
+
+
+def _from_text(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
+    """Read samples [Z, Y, X] that are words."""
+    require_room(dims, dtype)
+    with stored.path.open("rb") as file:
+        file.seek(stored.offset + max(0, stored.skip))
+        values = np.fromfile(file, dtype, sep=" ")
+    if values.size != prod(dims):
+        raise ArgumentError(f"expected {prod(dims)} samples, found {values.size}; is it cut off?")
+    return values.reshape(dims[::-1])
+
+
+def _unpack(file: BinaryIO, encoding: str, most: int) -> bytes:
+    """Read a stream, or several behind each other, as programs write them that use several cores."""
+    if encoding == "zlib":
+        return zlib.decompressobj().decompress(file.read(), most)
+    with gzip.GzipFile(fileobj=file) if encoding == "gzip" else bz2.BZ2File(file) as stream:
+        return stream.read(most)

@@ -13,8 +13,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.volume.blocks import block_count, block_means, block_middles
 from texgs.volume.grid import Dims, Triple
-from texgs.volume.nrrd_file import open_nrrd, write_header
-from texgs.volume.orientation import Turn, turn_for, turn_lattice, turn_values
+from texgs.volume.nrrd_file import open_prepared, write_header
+from texgs.volume.orientation import AxisPermutation, permuted_lattice, permuted_values, upright
 from texgs.volume.slabs import Source, slab_bounds
 from texgs.volume.summary import Summary, summarize
 
@@ -68,8 +68,8 @@ def prepare(
         raise ArgumentError(f"method: expected one of {', '.join(REDUCERS)}, got {method!r}")
     if nan_value is not None and not abs(nan_value) <= np.finfo(np.float32).max:
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
-    bounds, turn = _bounds(source.dims, crop), turn_for(up)
-    dims, spacing, origin = turn_lattice(*_reduced_lattice(source, bounds, reduce), turn)
+    bounds, axes = _bounds(source.dims, crop), upright(up)
+    dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
     dtype = _kept_type(source.dtype)
     tally = _Tally(source.name)
 
@@ -81,11 +81,11 @@ def prepare(
             if reduce > 1:
                 block = REDUCERS[method](block, reduce)
             block = tally.extend(_convert(block, dtype, source.name))
-            _write_turned(file, offset, dims, turn, block, (start - bounds[2][0]) // reduce)
+            _write_permuted(file, offset, dims, axes, block, (start - bounds[2][0]) // reduce)
         tally.check()
 
     write_atomic(target, write)
-    return summarize(open_nrrd(target, None, None), tally.minimum, tally.maximum)
+    return summarize(open_prepared(target), tally.minimum, tally.maximum)
 
 
 class _Tally:
@@ -188,12 +188,14 @@ def _convert(block: np.ndarray, dtype: np.dtype, name: str) -> np.ndarray:
     return converted
 
 
-def _write_turned(file: BinaryIO, offset: int, dims: Dims, turn: Turn, block: np.ndarray, start: int) -> None:
-    """Write slices of the source, from its slice `start` on, to where the turn puts them."""
-    axis = next(axis for axis, (origin, _) in enumerate(turn) if origin == 2)  # y or z, never x
-    place = start if turn[axis][1] > 0 else dims[axis] - start - len(block)
+def _write_permuted(
+    file: BinaryIO, offset: int, dims: Dims, axes: AxisPermutation, block: np.ndarray, start: int
+) -> None:
+    """Write slices of the source, from its slice `start` on, to where the permutation of axes puts them."""
+    axis = next(axis for axis, (origin, _) in enumerate(axes) if origin == 2)  # y or z, never x
+    place = start if axes[axis][1] > 0 else dims[axis] - start - len(block)
     z, y = (place, 0) if axis == 2 else (0, place)
     little = block.dtype.newbyteorder("<")
-    for k, plane in enumerate(turn_values(block, turn)):
+    for k, plane in enumerate(permuted_values(block, axes)):
         file.seek(offset + ((z + k) * dims[1] + y) * dims[0] * little.itemsize)
         file.write(np.ascontiguousarray(plane, dtype=little).data)

@@ -3,36 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import prod
 from pathlib import Path
 
+import numpy as np
+
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.volume.formats import open_nifti, open_npy, open_raw
-from texgs.volume.grid import Dims, Triple
-from texgs.volume.metaimage import open_metaimage
-from texgs.volume.nrrd_file import open_nrrd
+from texgs.core.reading import reading_as
+from texgs.volume.foreign import open_foreign
+from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of
+from texgs.volume.nifti import open_nifti
 from texgs.volume.slabs import ArraySource, RawSource, Source
-from texgs.volume.slc import open_slc
-from texgs.volume.tiff import open_tiff
-from texgs.volume.vtk_files import open_vtk
+from texgs.volume.tiff import open_tiff, tiffs_in
 
 __all__ = ["ArraySource", "RawSource", "Source", "open_source"]
 
+ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 RAW_SUFFIXES = (".raw", ".bin", ".dat")
-# Suffix: function of the path, and of spacing and origin where they replace the file's.
-OPENERS: dict[str, Callable[[Path, Triple | None, Triple | None], Source]] = {
-    ".nrrd": open_nrrd,
-    ".nhdr": open_nrrd,
-    ".mhd": open_metaimage,
-    ".mha": open_metaimage,
-    ".vti": open_vtk,
-    ".vtk": open_vtk,
-    ".slc": open_slc,
-    ".nii": open_nifti,
-    ".nii.gz": open_nifti,
-    ".tif": open_tiff,
-    ".tiff": open_tiff,
-    ".npy": open_npy,
-}
+# Tried in this order where the size of a plain file does not fit the type given.
+COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
 
 
 def open_source(
@@ -44,23 +33,26 @@ def open_source(
     skip: int = 0,
     spacing: Triple | None = None,
     origin: Triple | None = None,
+    series: str | None = None,
 ) -> Source:
     """Open a volume without reading its samples where the format allows that.
 
-    Formats: .raw, .bin, .dat (plain samples, described by the arguments); .nrrd, .nhdr; .mhd, .mha; .slc;
-    .vti and .vtk (image data, first point array); .nii, .nii.gz; .tif, .tiff (one page per z slice, row 0 is
-    y = 0), or a folder of single TIFFs in natural order; .npy (an array [Z, Y, X]). x is the fastest axis
-    throughout. Axes are permuted and flipped to the closest ones of physical space where the format tells
-    about it: R, A, S of NIfTI. They are not resampled where they are oblique.
+    Formats: .raw, .bin, .dat (plain samples, described by the arguments); .npy (an array [Z, Y, X]); .tif,
+    .tiff (one page per z slice, row 0 is y = 0), or a folder of single TIFFs in natural order; a folder of
+    DICOM slices; .nrrd, .nhdr; .mhd, .mha; .nii, .nii.gz; .mrc; .gipl; .slc; .vti and .vtk (image data, first
+    point array). x is the fastest axis throughout. Axes are permuted and flipped to the closest ones
+    of physical space where the format tells about it: R, A, S of NIfTI; L, P, S of DICOM. They are not
+    resampled where they are oblique.
 
     Args:
-        path: file, or folder of TIFFs.
+        path: file, or folder of slices.
         dims: samples along x, y, z; plain samples only.
         dtype: numpy's name of the sample type, such as "uint16"; plain samples only.
         endian: "little" or "big"; plain samples only.
         skip: bytes before the first sample; plain samples only.
         spacing: replaces the file's, x, y, z.
         origin: replaces the file's, x, y, z.
+        series: number or UID of one of several series in a folder of DICOM slices.
 
     Raises:
         ArgumentError, ShapeError: if the file is missing, cannot be read, is unknown, damaged or no scalar
@@ -77,7 +69,7 @@ def open_source(
                 f"dims, dtype, endian and skip describe plain samples ({', '.join(RAW_SUFFIXES)}), but this "
                 "format has a header; leave them out"
             )
-        return _opener(path)(path, spacing, origin)
+        return _open_with_header(path, spacing, origin, series)
     except TexgsError as error:
         raise type(error)(f"{path}: {error}") from error
     except FileNotFoundError as error:
@@ -104,14 +96,87 @@ def _suffix(path: Path) -> str:
     return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
 
-def _opener(path: Path) -> Callable[[Path, Triple | None, Triple | None], Source]:
-    """Function that opens the format."""
-    if path.is_dir():
-        return open_tiff
-    try:
-        return OPENERS[_suffix(path)]
-    except KeyError as error:
+def _open_with_header(
+    path: Path, spacing: Triple | None, origin: Triple | None, series: str | None
+) -> Source:
+    """Open a format that says itself how its samples are stored, or a folder of slices."""
+    if path.is_dir() and not tiffs_in(path):
+        return open_foreign(path, spacing, origin, series)
+    if series is not None:
+        raise ArgumentError(
+            f"series: expected a folder of DICOM slices to choose {series!r} of; leave it out"
+        )
+    opener = open_tiff if path.is_dir() else OPENERS.get(_suffix(path))
+    if opener is None:
         known = ", ".join((*RAW_SUFFIXES, *OPENERS))
         raise ArgumentError(
-            f"unknown suffix {_suffix(path)!r}; expected {known}, or a folder of TIFFs"
-        ) from error
+            f"unknown suffix {_suffix(path)!r}; expected {known}, or a folder of TIFF or DICOM slices"
+        )
+    return opener(path, spacing, origin)
+
+
+def open_raw(
+    path: Path,
+    dims: Dims | None,
+    dtype: str | None,
+    endian: str,
+    skip: int,
+    spacing: Triple | None,
+    origin: Triple | None,
+) -> RawSource:
+    """Open plain samples; the file's size must fit exactly, the only check there is.
+
+    Raises:
+        ArgumentError: if something is missing or does not fit the file.
+    """
+    if dims is None or dtype is None:
+        missing = " and ".join(key for key, value in (("dims", dims), ("dtype", dtype)) if value is None)
+        raise ArgumentError(f"plain samples have no header; set {missing}, and endian and skip where needed")
+    if endian not in ("little", "big"):
+        raise ArgumentError(f"endian: expected little or big, got {endian!r}")
+    if skip < 0:
+        raise ArgumentError(f"skip: expected at least 0 bytes, got {skip}")
+    try:
+        stored = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
+    except TypeError as error:
+        raise ArgumentError(f"dtype: expected a name such as uint8 or float32, got {dtype!r}") from error
+    check_lattice(dims, stored, spacing or ONES, origin or ZEROS)
+    size = path.stat().st_size
+    expected = skip + prod(dims) * stored.itemsize
+    if size != expected:
+        x, y, z = dims
+        skipped = f" + {skip} skipped" if skip else ""
+        fits = [name for name in COMMON_TYPES if size == skip + prod(dims) * np.dtype(name).itemsize]
+        advice = f"dtype {fits[0]} would fit" if fits else "correct dims, dtype or skip"
+        raise ArgumentError(
+            f"expected {x} x {y} x {z} x {stored.itemsize} ({stored.name}){skipped} = {expected} bytes, "
+            f"found {size}; {advice}"
+        )
+    return RawSource(path, dims, stored, skip, spacing or ONES, origin or ZEROS)
+
+
+def open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+    """Open a NumPy array [Z, Y, X].
+
+    Raises:
+        ArgumentError, ShapeError: if the file is damaged or no scalar volume.
+    """
+    with reading_as("a .npy file"):
+        values = np.load(path, mmap_mode="r", allow_pickle=False)
+    if not isinstance(values, np.memmap):
+        raise ArgumentError("expected one array in a .npy file, got an archive or a pickle")
+    lattice = (spacing or ONES, origin or ZEROS)
+    if values.flags.c_contiguous:
+        return RawSource(path, dims_of(values.shape), values.dtype, values.offset, *lattice)
+    return ArraySource(Grid(values, *lattice), path.name)
+
+
+# Suffix: function of the path, and of spacing and origin where they replace the file's.
+OPENERS: dict[str, Callable[[Path, Triple | None, Triple | None], Source]] = {
+    ".tif": open_tiff,
+    ".tiff": open_tiff,
+    ".npy": open_npy,
+    **dict.fromkeys((".nii", ".nii.gz"), open_nifti),
+    **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
+    **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
+}

@@ -72,7 +72,7 @@ class PageSource:
 
 
 def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
-    """A TIFF file with a page per z slice, or a folder of single TIFFs in natural order.
+    """Open a TIFF file with a page per z slice, or a folder of single TIFFs in natural order.
 
     TIFF says nothing dependable about the lattice: spacing is 1 unless given.
 
@@ -84,12 +84,10 @@ def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
 
 
 def _open_folder(path: Path, spacing: Triple, origin: Triple) -> PageSource:
-    """Single TIFFs; only the first is opened now."""
+    """Open single TIFFs; only the first is opened now."""
     import tifffile
 
-    files = sorted((file for file in path.iterdir() if file.suffix.lower() in SLICES), key=natural_order)
-    if not files:
-        raise ArgumentError(f"expected a folder of TIFFs ({', '.join(SLICES)}), found none in it")
+    files = tiffs_in(path)
     what = f"TIFF files, but {files[0].name} is none"
     with reading_as(what), _complaints(), tifffile.TiffFile(files[0]) as tiff:
         shape, dtype = _page_type(tiff)
@@ -98,8 +96,14 @@ def _open_folder(path: Path, spacing: Triple, origin: Triple) -> PageSource:
     return PageSource(path, tuple((file, 0) for file in files), shape, dtype, spacing, origin)
 
 
+def tiffs_in(folder: Path) -> list[Path]:
+    """Return the TIFF files of a folder in natural order."""
+    files = (file for file in folder.iterdir() if file.suffix.lower() in SLICES)
+    return sorted(files, key=natural_order)
+
+
 def _open_file(path: Path, spacing: Triple, origin: Triple) -> Source:
-    """Pages of one file: as they are where they follow one another uncompressed, else decoded on demand."""
+    """Open pages of one file: as they are where they follow one another uncompressed, else on demand."""
     import tifffile
 
     with reading_as("a TIFF file"), _complaints(), tifffile.TiffFile(path) as tiff:
@@ -121,7 +125,7 @@ def _open_file(path: Path, spacing: Triple, origin: Triple) -> Source:
 
 
 def _page_type(tiff: Any) -> tuple[tuple[int, int], np.dtype]:
-    """Shape (Y, X) and sample type of the first page."""
+    """Return the shape (Y, X) and sample type of the first page."""
     page = tiff.pages[0]
     if page.samplesperpixel != 1:
         raise ArgumentError(f"expected a scalar volume, got {page.samplesperpixel} components per sample")

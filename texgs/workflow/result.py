@@ -22,10 +22,10 @@ from typing import Any
 from filelock import FileLock, Timeout
 
 from texgs.core.checksum import Checksums, combined, sha256
-from texgs.core.detached import samples_of
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, remove_scratch, write_json
 from texgs.core.names import POINTS, SLICES
+from texgs.volume.headers import samples_of
 
 STAMP = ".job.json"
 FILES = ".files.json"
@@ -227,7 +227,8 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
         members = [each for each in folder.rglob("*") if each.suffix in (".json", ".png")]
         members += [points for points in [folder / POINTS] if points.is_file()]
     elif path.is_dir():
-        members = [each for each in path.iterdir() if each.suffix.lower() in SLICES]
+        files = [each for each in path.iterdir() if each.is_file()]  # DICOM slices have any suffix, or none
+        members = [each for each in files if each.suffix.lower() in SLICES] or files
     elif samples := samples_of(path):
         return combined([(path.name, checksums.of(path)), (samples.name, checksums.of(samples))])
     else:

@@ -87,8 +87,9 @@ def source(volume: Volume, path: Path) -> Source:
     if volume.url and path == cached_volume(volume):
         require_whole(path, volume.sha256 or "")
     given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
-    triples: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
-    return open_source(path, dtype=volume.dtype, endian=volume.endian, skip=volume.skip, **triples)
+    said: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
+    said |= {"dtype": volume.dtype, "endian": volume.endian, "skip": volume.skip}
+    return open_source(path, series=volume.series, **said)
 
 
 def select(config: DictConfig) -> dict[str, Any]:

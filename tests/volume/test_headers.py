@@ -2,7 +2,7 @@
 
 import pytest
 
-from texgs.core.detached import samples_of
+from texgs.volume.headers import samples_of
 
 
 @pytest.mark.parametrize(
@@ -17,9 +17,9 @@ from texgs.core.detached import samples_of
 )
 def test_the_file_with_the_samples_is_named(tmp_path, name, line):
     header = tmp_path / name
-    header.write_text(f"first\n{line}\nlast\n")
+    header.write_text(f"NRRD0004\n{line}\nlast\n")
     assert samples_of(header) is None, "it is not there"
     (tmp_path / "v.raw").write_bytes(b"samples")
     assert samples_of(header) == tmp_path / "v.raw"
-    header.write_text(f"first\n{line.replace('v.raw', 'LOCAL')}\n")
+    header.write_text(f"NRRD0004\n{line.replace('v.raw', 'LOCAL')}\n")
     assert samples_of(header) is None

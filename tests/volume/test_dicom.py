@@ -1,0 +1,160 @@
+"""Folders of DICOM slices, as pydicom writes them."""
+
+import numpy as np
+import pydicom
+import pytest
+from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, JPEG2000Lossless, RLELossless, generate_uid
+
+from tests.volume.volume_files import sample_values
+from texgs.core.errors import ArgumentError
+from texgs.volume.sources import open_source
+
+AXIAL = (1, 0, 0, 0, 1, 0)
+SERIES = generate_uid()
+
+
+def write_series(folder, values, places=None, uid=SERIES, number=3, orientation=AXIAL, **tags):
+    """Write slices [Z, Y, X] of 16 bits as files whose names say nothing about their order."""
+    normal = np.cross(orientation[:3], orientation[3:])
+    places = [10 + 2.5 * z * normal for z in range(len(values))] if places is None else places
+    for z, (plane, place) in enumerate(zip(values, places, strict=True)):
+        data = pydicom.Dataset()
+        data.file_meta = pydicom.dataset.FileMetaDataset()
+        data.file_meta.TransferSyntaxUID = ExplicitVRLittleEndian
+        data.file_meta.MediaStorageSOPClassUID = data.SOPClassUID = CTImageStorage
+        data.file_meta.MediaStorageSOPInstanceUID = data.SOPInstanceUID = generate_uid()
+        data.SeriesInstanceUID, data.SeriesNumber, data.SeriesDescription = uid, number, "Bone"
+        data.Modality, data.InstanceNumber = "CT", z + 1
+        data.ImagePositionPatient, data.ImageOrientationPatient = [float(x) for x in place], list(orientation)
+        data.PixelSpacing = [2.0, 0.5]  # of rows, and of samples in a row
+        data.Rows, data.Columns = plane.shape
+        data.SamplesPerPixel, data.PhotometricInterpretation = 1, "MONOCHROME2"
+        data.BitsAllocated, data.BitsStored, data.HighBit, data.PixelRepresentation = 16, 16, 15, 0
+        data.PixelData = plane.astype("<u2").tobytes()
+        for name, value in tags.items():
+            setattr(data, name, value)
+        data.save_as(folder / f"{(7 * z) % 11:02}-{number}.ima", enforce_file_format=True)
+
+
+def test_slices_are_sorted_by_place_and_have_their_lattice(tmp_path):
+    write_series(tmp_path, sample_values())
+    source = open_source(tmp_path)
+    assert (source.dims, source.dtype) == ((13, 12, 11), np.uint16)
+    assert (source.spacing, source.origin) == ((0.5, 2, 2.5), (10, 10, 10))
+    np.testing.assert_array_equal(source.slices(0, 11), sample_values())
+    assert open_source(tmp_path, spacing=(1, 2, 3), origin=(4, 5, 6)).spacing == (1, 2, 3)
+
+
+def test_slope_and_intercept_are_applied(tmp_path):
+    write_series(tmp_path, sample_values(), RescaleSlope=2, RescaleIntercept=-1024)
+    expected = 2.0 * sample_values() - 1024
+    np.testing.assert_array_equal(open_source(tmp_path).slices(0, 11), expected)
+
+
+def test_slopes_that_differ_from_slice_to_slice(tmp_path):
+    """As in PET: the first slice alone would make integers of all."""
+    write_series(tmp_path, sample_values()[:1], number=3)
+    write_series(
+        tmp_path,
+        sample_values()[1:4],
+        [10 + 2.5 * z * np.array([0, 0, 1]) for z in (1, 2, 3)],
+        number=4,
+        RescaleSlope=0.25,
+        RescaleIntercept=0,
+    )
+    expected = sample_values()[:4] * np.array([1, 0.25, 0.25, 0.25])[:, None, None]
+    np.testing.assert_array_equal(open_source(tmp_path).slices(0, 4), expected)
+
+
+@pytest.mark.parametrize(
+    ("orientation", "axes", "flips"),
+    [((1, 0, 0, 0, 0, -1), (1, 0, 2), (1, -1, 1)), ((0, 1, 0, 0, 0, -1), (1, 2, 0), (-1, 1, -1))],
+    ids=["coronal", "sagittal"],
+)
+def test_directions_are_honoured(tmp_path, orientation, axes, flips):
+    """Rows, columns and slices become the axes of space: left, posterior, superior."""
+    write_series(tmp_path, sample_values(), orientation=orientation)
+    source = open_source(tmp_path)
+    steps = np.array([2.5, 2, 0.5])[list(axes)]  # of [Z, Y, X] as stored
+    assert source.spacing == tuple(steps[::-1])
+    directions = np.array([*np.reshape(orientation, (2, 3)), np.cross(orientation[:3], orientation[3:])])
+    stored = source.slices(0, source.dims[2])
+    corner = np.full(3, 10.0)
+    for z, y, x in [(0, 0, 0), (3, 4, 5), (10, 11, 12)]:
+        place = corner + np.array([0.5 * x, 2 * y, 2.5 * z]) @ directions
+        i, j, k = np.round((place - source.origin) / source.spacing).astype(int)
+        assert stored[k, j, i] == sample_values()[z, y, x]
+
+
+def test_one_of_several_series_is_chosen(tmp_path):
+    other = generate_uid()
+    write_series(tmp_path, sample_values())
+    write_series(tmp_path, sample_values()[:4] + 1, uid=other, number=5)
+    with pytest.raises(
+        ArgumentError, match=r"got several series; choose one by dataset\.volume\.series="
+    ) as e:
+        open_source(tmp_path)
+    assert all(text in str(e.value) for text in (SERIES, other, "3 (Bone, 11 files", "5 (Bone, 4 files"))
+    for choice in ("5", other):
+        np.testing.assert_array_equal(
+            open_source(tmp_path, series=choice).slices(0, 4), sample_values()[:4] + 1
+        )
+    with pytest.raises(ArgumentError, match="got 0 series for '7'"):
+        open_source(tmp_path, series="7")
+
+
+@pytest.mark.parametrize(
+    ("heights", "message"),
+    [
+        ([0, 2, 4, 8, 10], "slices 2 mm apart, got 4 mm: 1 missing"),
+        ([0, 2, 4, 7, 9], "slices 2 mm apart, got 3 mm: another"),
+        ([0, 2, 2, 4, 6], "slices at different places, got two at one"),
+    ],
+)
+def test_slices_that_are_no_lattice_are_refused(tmp_path, heights, message):
+    write_series(tmp_path, sample_values()[:5], [(0, 0, height) for height in heights])
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path)
+
+
+def test_a_tilted_gantry_is_refused(tmp_path):
+    write_series(tmp_path, sample_values(), [(0, 0.3 * z, 2.5 * z) for z in range(11)])
+    with pytest.raises(ArgumentError, match="correct the tilt of the gantry first"):
+        open_source(tmp_path)
+
+
+def test_other_slices_among_them_are_refused(tmp_path):
+    write_series(tmp_path, sample_values()[:4])
+    write_series(tmp_path, sample_values()[:1, :5], [(10, 10, 40)], number=9)
+    with pytest.raises(ArgumentError, match="expected the size, spacing and orientation of"):
+        open_source(tmp_path)
+
+
+def test_compressed_slices_are_read(tmp_path):
+    write_series(tmp_path, sample_values())
+    for path in tmp_path.iterdir():
+        data = pydicom.dcmread(path)
+        data.compress(RLELossless)
+        data.save_as(path)
+    np.testing.assert_array_equal(open_source(tmp_path).slices(0, 11), sample_values())
+
+
+def test_slices_that_cannot_be_decoded_are_refused(tmp_path, capfd):
+    write_series(tmp_path, sample_values())
+    for path in tmp_path.iterdir():
+        data = pydicom.dcmread(path)
+        data.file_meta.TransferSyntaxUID = JPEG2000Lossless
+        data.PixelData = pydicom.encaps.encapsulate([b"no such stream"])
+        data["PixelData"].is_undefined_length = True
+        data.save_as(path)
+    with pytest.raises(ArgumentError):
+        open_source(tmp_path)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_slice_that_is_cut_off_is_refused(tmp_path):
+    write_series(tmp_path, sample_values())
+    path = next(tmp_path.iterdir())
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(ArgumentError):
+        open_source(tmp_path)

@@ -1,0 +1,166 @@
+"""A folder of DICOM slices as one volume: which series, and whether its slices are a lattice."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import SimpleITK as sitk
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import require_room
+from texgs.volume.itk_image import require_volume, sentence
+
+NUMBER, DESCRIPTION, PLACE, ORIENTATION = "0020|0011", "0008|103e", "0020|0032", "0020|0037"  # tags
+UNEVEN = 0.05  # of the distance of slices: how much one may differ, as places are rounded in files
+TILT = 0.01  # of the distance of the outer slices: how far one may be shifted across it
+ROUNDING = 0.01  # mm
+
+
+class Slice(NamedTuple):
+    """One file of a series."""
+
+    path: Path
+    sizes: tuple[int, ...]
+    spacing: tuple[float, ...]
+    place: np.ndarray  # [3] of the first sample, mm: to the left, the back and the head
+    directions: np.ndarray  # [3, 3] in rows: along a row of samples, along a column, and from slice to slice
+    pixel_id: int
+    n_components: int
+
+    @property
+    def height(self) -> float:
+        """Where the slice is along the normal of its plane."""
+        return float(self.place @ self.directions[2])
+
+
+def read_dicom(folder: Path, series: str | None) -> tuple[dict[str, Any], np.ndarray]:
+    """Read the lattice and the samples [Z, Y, X], rescaled by slope and intercept.
+
+    Args:
+        folder: with a file for each slice.
+        series: number or UID of one of several.
+
+    Raises:
+        ArgumentError: if there is no such series, or its slices are no lattice.
+        OutOfMemoryError: if the samples do not fit into memory.
+    """
+    sitk.ProcessObject.GlobalWarningDisplayOff()
+    try:
+        files = chosen_files(folder, series)
+        slices = sorted((slice_of(Path(file)) for file in files), key=lambda each: each.height)
+        step = slice_distance(slices)
+        pixel_ids = {each.pixel_id for each in slices}
+        pixel_id = sitk.sitkFloat64 if len(pixel_ids) > 1 else pixel_ids.pop()
+        first = slices[0]
+        dims, dtype = require_volume([*first.sizes[:2], len(slices)], pixel_id, first.n_components)
+        require_room(dims, dtype)
+        reader = sitk.ImageSeriesReader()
+        reader.SetFileNames([str(each.path) for each in slices])
+        reader.SetOutputPixelType(pixel_id)
+        values = sitk.GetArrayFromImage(reader.Execute())
+    except RuntimeError as error:
+        raise ArgumentError(sentence(error)) from error
+    said = {
+        "dims": dims,
+        "dtype": values.dtype.name,
+        "spacing": (*first.spacing[:2], step),
+        "origin": first.place.tolist(),
+        "directions": first.directions.tolist(),
+    }
+    return said, values
+
+
+def chosen_files(folder: Path, series: str | None) -> list[str]:
+    """Return the files of the only series, or of the one that is asked for."""
+    files = {
+        uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid)
+        for uid in sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
+    }
+    numbers, titles = {}, []
+    for uid, names in files.items():
+        reader = information(Path(names[0]))
+        numbers[uid] = tag(reader, NUMBER)
+        titles.append(f"{numbers[uid]} ({tag(reader, DESCRIPTION)}, {len(names)} files, UID {uid})")
+    if not files:
+        raise ArgumentError("expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it")
+    fitting = [uid for uid in files if series is None or series in (uid, numbers[uid])]
+    if len(fitting) != 1:
+        found = "several series" if series is None else f"{len(fitting)} series for {series!r}"
+        raise ArgumentError(
+            f"expected one series of DICOM slices, got {found}; choose one by dataset.volume.series=NUMBER "
+            f"or UID, of {'; '.join(titles)}"
+        )
+    return list(files[fitting[0]])
+
+
+def slice_of(path: Path) -> Slice:
+    """Read the header of a slice."""
+    reader = information(path)
+    numbers = [
+        [float(number) for number in tag(reader, name).split("\\")] if tag(reader, name) else []
+        for name in (PLACE, ORIENTATION)
+    ]
+    if [len(each) for each in numbers] != [3, 6]:
+        raise ArgumentError(f"{path.name}: expected a slice with its position and orientation, found none")
+    if len(reader.GetSize()) > 2 and reader.GetSize()[2] != 1:
+        raise ArgumentError(f"{path.name}: expected one slice per file, got {reader.GetSize()[2]} frames")
+    row, column = np.reshape(numbers[1], (2, 3))
+    directions = np.stack([row, column, np.cross(row, column)])
+    if not np.allclose(directions @ directions.T, np.eye(3), atol=1e-3):
+        raise ArgumentError(f"{path.name}: expected rows and columns at right angles, got {numbers[1]}")
+    kind = reader.GetPixelIDValue(), reader.GetNumberOfComponents()
+    return Slice(path, reader.GetSize(), reader.GetSpacing(), np.array(numbers[0]), directions, *kind)
+
+
+def slice_distance(slices: list[Slice]) -> float:
+    """Return the distance from slice to slice, in mm, of a series in the order of its places.
+
+    Raises:
+        ArgumentError: if a slice is unlike the first, missing, there twice, or not behind the one before.
+    """
+    first = slices[0]
+    if len(slices) < 2:
+        raise ArgumentError("expected at least 2 slices, got 1")
+    for each in slices:
+        is_like = each.sizes[:2] == first.sizes[:2] and np.allclose(each.spacing[:2], first.spacing[:2])
+        if not is_like or not np.allclose(each.directions, first.directions, atol=1e-3):
+            raise ArgumentError(
+                f"{each.path.name}: expected the size, spacing and orientation of {first.path.name}, got "
+                "another"
+            )
+        shift = first.directions[:2] @ (each.place - first.place)
+        if np.abs(shift).max() > TILT * (each.height - first.height) + ROUNDING:
+            raise ArgumentError(
+                f"{each.path.name}: expected slices behind each other, got one {np.abs(shift).max():.3g} mm "
+                f"beside {first.path.name}; correct the tilt of the gantry first"
+            )
+    gaps = np.diff([each.height for each in slices])
+    step = float(np.sort(gaps)[(len(gaps) - 1) // 2])
+    for before, after, gap in zip(slices, slices[1:], gaps, strict=False):
+        between = f"{before.path.name} and {after.path.name}"
+        if gap < ROUNDING * step or gap <= 0:
+            raise ArgumentError(f"{between}: expected slices at different places, got two at one")
+        if abs(gap - step) > UNEVEN * step:
+            count = round(gap / step)
+            is_missing = count > 1 and abs(gap - count * step) <= UNEVEN * step
+            found = f"{count - 1} missing" if is_missing else "another"
+            raise ArgumentError(
+                f"{between}: expected slices {step:.6g} mm apart, got {gap:.6g} mm: {found}; "
+                "complete the series, or resample it"
+            )
+    return float(slices[-1].height - first.height) / (len(slices) - 1)
+
+
+def information(path: Path) -> sitk.ImageFileReader:
+    """Return a reader that has read a header."""
+    reader = sitk.ImageFileReader()
+    reader.SetFileName(str(path))
+    reader.ReadImageInformation()
+    return reader
+
+
+def tag(reader: sitk.ImageFileReader, name: str) -> str:
+    """Return the text of a tag; empty where there is none."""
+    return str(reader.GetMetaData(name)).strip() if reader.HasMetaDataKey(name) else ""

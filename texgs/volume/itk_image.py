@@ -1,0 +1,99 @@
+"""Images that SimpleITK reads, as lattice and samples."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import SimpleITK as sitk
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import Dims, check_lattice, require_room
+from texgs.volume.headers import NRRD, read_fields
+
+ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+# ITK's space runs to the left and the back, that of these NRRD files to the right and the front.
+TO_RIGHT_FRONT = (-1.0, -1.0, 1.0)
+NRRD_SPACES = {
+    "right-anterior-superior": TO_RIGHT_FRONT,
+    "ras": TO_RIGHT_FRONT,
+    "left-anterior-superior": TO_RIGHT_FRONT,
+    "las": TO_RIGHT_FRONT,
+    "3d-left-handed": (-1.0, 1.0, 1.0),
+}
+SOURCE_LINE = re.compile(r"^.*?(?:sitk::ERROR|ITK ERROR|itk::ERROR): (?:\w+\(0x[0-9a-f]+\): )?", re.DOTALL)
+
+
+def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarray | None]:
+    """Read the lattice in the file's own space, and samples [Z, Y, X] unless only the header is asked for.
+
+    Raises:
+        ArgumentError: if ITK cannot read the file, or it holds something else than a scalar volume.
+        OutOfMemoryError: if the samples do not fit into memory.
+    """
+    sitk.ProcessObject.GlobalWarningDisplayOff()
+    reader = sitk.ImageFileReader()
+    reader.SetFileName(str(path))
+    try:
+        reader.ReadImageInformation()
+        dims, dtype = require_volume(
+            list(reader.GetSize()), reader.GetPixelIDValue(), reader.GetNumberOfComponents()
+        )
+        fields = read_fields(path)[0] if path.suffix.lower() in NRRD else {}
+        signs = NRRD_SPACES.get(fields.get("space", "").lower(), ONES)
+        said = lattice_of(reader, np.array(signs))
+        if {"axismins", "axismaxs"} <= fields.keys() and "spacedirections" not in fields:
+            said |= {"spacing": said["spacing"] if "spacings" in fields else _steps(fields, dims)}
+            said |= {"origin": np.nan_to_num(np.array(fields["axismins"].split(), float)).tolist()}
+        if is_header_only:
+            return said | {"dims": dims, "dtype": dtype.name}, None
+        require_room(dims, dtype)
+        image = reader.Execute()
+    except RuntimeError as error:
+        raise ArgumentError(sentence(error)) from error
+    values = sitk.GetArrayFromImage(image)
+    return said | {"dims": dims, "dtype": values.dtype.name}, values
+
+
+def require_volume(
+    sizes: list[int], pixel_id: int, n_components: int
+) -> tuple[tuple[int, int, int], np.dtype]:
+    """Require three axes of scalar samples, and return dims and sample type.
+
+    Raises:
+        ArgumentError: if there are other axes or components, or samples are no real numbers.
+    """
+    if n_components != 1:
+        raise ArgumentError(f"expected a scalar volume, got {n_components} components per sample")
+    if len(sizes) != 3:
+        raise ArgumentError(f"expected 3 axes, got {len(sizes)}: sizes {sizes}")
+    dtype = sitk.GetArrayViewFromImage(sitk.Image([1, 1, 1], pixel_id)).dtype
+    dims = (sizes[0], sizes[1], sizes[2])
+    check_lattice(dims, dtype, ONES, ZEROS)
+    return dims, dtype
+
+
+def lattice_of(image: Any, signs: np.ndarray) -> dict[str, Any]:
+    """Return spacing, origin and directions of a volume."""
+    directions = np.reshape(image.GetDirection(), (3, 3)).T * signs
+    return {
+        "spacing": image.GetSpacing(),
+        "origin": (np.array(image.GetOrigin()) * signs + 0.0).tolist(),
+        "directions": directions.tolist(),
+    }
+
+
+def _steps(fields: dict[str, str], dims: Dims) -> list[float]:
+    """Return distances of samples by the ends of axes: places of the outer ones, or edges of cells."""
+    low, high = (np.array(fields[name].split(), float) for name in ("axismins", "axismaxs"))
+    words = fields.get("centerings", fields.get("centers", "node node node")).split()
+    gaps = [size - (word != "cell") for size, word in zip(dims, words, strict=True)]
+    steps = np.abs(high - low) / np.maximum(gaps, 1)
+    return np.where(np.isfinite(steps), steps, 1.0).tolist()
+
+
+def sentence(error: RuntimeError) -> str:
+    """Return what ITK says without the place in its source."""
+    return SOURCE_LINE.sub("", str(error).strip()).strip(" .!")

@@ -1,0 +1,85 @@
+"""Image data that VTK reads, as lattice and samples."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyvista
+from vtkmodules.vtkCommonCore import vtkLogger, vtkOutputWindow, vtkStringOutputWindow
+from vtkmodules.vtkCommonExecutionModel import vtkStreamingDemandDrivenPipeline as Pipeline
+
+from texgs.core.errors import ArgumentError
+from texgs.volume.grid import dims_of, require_room
+
+
+def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
+    """Read lattice and samples [Z, Y, X]: the scalars, or else the first point array.
+
+    Raises:
+        ArgumentError: if the file is damaged, or holds another kind of data set or no scalar field.
+        OutOfMemoryError: if the samples do not fit into memory.
+    """
+    window = vtkStringOutputWindow()
+    vtkOutputWindow.SetInstance(window)
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+    reader = pyvista.get_reader(str(path))
+    reader.reader.UpdateInformation()
+    check_claim(reader.reader)
+    image = reader.read()
+    if message := first_message(window):
+        raise ArgumentError(f"expected a {path.suffix} file, VTK says: {message}; is it damaged or cut off?")
+    if not isinstance(image, pyvista.ImageData):
+        kind = type(image).__name__
+        raise ArgumentError(f"expected image data (structured points), got {kind}; resample it to an image")
+    if not image.point_data:
+        raise ArgumentError("expected point data, found none; convert cell data to point data")
+    values = image.point_data.active_scalars
+    if values is None:
+        values = image.point_data[image.point_data.keys()[0]]
+    if values.ndim > 1:
+        raise ArgumentError(f"expected a scalar volume, got {values.shape[1]} components per sample")
+    shape = image.dimensions[::-1]
+    if values.size != np.prod(shape, dtype=np.int64):
+        raise ArgumentError(
+            f"expected image data of {list(shape)}, got {values.size} samples; is it damaged?"
+        )
+    samples = np.asarray(values).reshape(shape)
+    first = [0.0, 0.0, 0.0]
+    image.TransformIndexToPhysicalPoint(list(image.extent[::2]), first)
+    said = {
+        "dims": dims_of(samples.shape),
+        "dtype": samples.dtype.name,
+        "spacing": image.spacing,
+        "origin": first,
+        "directions": image.direction_matrix.T.tolist(),
+    }
+    return said, samples
+
+
+def check_claim(reader: Any) -> None:
+    """Require that what a header claims fits into memory; only headers of XML are read before samples."""
+    information = reader.GetOutputInformation(0)
+    if information is not None and information.Has(Pipeline.WHOLE_EXTENT()):
+        extent = information.Get(Pipeline.WHOLE_EXTENT())
+        sizes = [int(high) - int(low) + 1 for low, high in zip(extent[::2], extent[1::2], strict=True)]
+        if min(sizes) > 0:
+            require_room((sizes[0], sizes[1], sizes[2]), np.dtype(np.uint8))  # a byte each at least
+
+
+def first_message(window: Any) -> str:
+    """Return the first error or warning that VTK has printed instead of raising it; empty for none."""
+    output = window.GetOutput()  # bytes where a damaged file is quoted that is no text
+    text = output.decode(errors="replace") if isinstance(output, bytes) else output
+    return next((sentence(message) for message in text.split("\n\n") if message.strip()), "")
+
+
+def sentence(text: str) -> str:
+    """Return a message without the place in VTK's source and the address of the object."""
+    lines = [
+        line
+        for line in text.strip().splitlines()
+        if not line.startswith(("ERROR: In", "Warning: In", "Generic Warning: In"))
+    ]
+    return " ".join(lines).split("): ", 1)[-1].strip(" .!")
