@@ -22,7 +22,8 @@ LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
 for name in ("methods", "kinds", "viewer"):
     LEFT[name] = LEFT["report"] | {"report"}
 LEFT["workflow"] = LEFT["methods"] | {"methods", "kinds"}
-LEFT["cli"] = LEFT["workflow"] | {"workflow", "viewer"}
+LEFT["study"] = LEFT["report"] | {"report"}
+LEFT["cli"] = LEFT["workflow"] | {"workflow", "viewer", "study"}
 
 
 def package_of(path: Path) -> str:

@@ -1,19 +1,36 @@
-"""What jobs tell about their results: stages make these, `metrics.json` holds them, tables read them.
+"""Results of jobs: stages make these, `metrics.json` holds them, tables read them.
 
-What was not measured is None, and is left out of the file. Units are in the names.
+What was not measured is None, and is left out of the file. Units are in the names. A stage may define its
+result in its own module: every subclass of `Result` is known by its name once its module is imported.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from texgs.core.typed import typed
 
+NO_METHOD = "none"  # edit of a scene as it was fitted
+NO_SWEEP = "none"  # sweep of a job that is no variant
+
+
+class Result:
+    """What a job found out; subclasses are dataclasses."""
+
+    @classmethod
+    def of(cls, numbers: Mapping[str, Any]) -> Any:
+        """Return the result that `plain` made these numbers of.
+
+        Raises:
+            OmegaConfBaseException: for a key that is unknown or missing, or a value of another type.
+        """
+        return typed(cls, numbers)
+
 
 @dataclass(frozen=True)
-class VolumeResult:
+class VolumeResult(Result):
     """A volume, checked and in one file."""
 
     dims: list[int]  # samples along x, y, z
@@ -27,7 +44,7 @@ class VolumeResult:
 
 
 @dataclass(frozen=True)
-class TransferResult:
+class TransferResult(Result):
     """Basic transfer functions over a histogram."""
 
     basic_tfs: int
@@ -35,7 +52,7 @@ class TransferResult:
 
 
 @dataclass(frozen=True)
-class ViewsResult:
+class ViewsResult(Result):
     """Views of a basic transfer function."""
 
     train: int  # views
@@ -50,7 +67,7 @@ class ViewsResult:
 
 
 @dataclass(frozen=True)
-class SheetResult:
+class SheetResult(Result):
     """A contact sheet of views."""
 
     train: int  # views there are
@@ -60,7 +77,7 @@ class SheetResult:
 
 
 @dataclass(frozen=True)
-class FitResult:
+class FitResult(Result):
     """A phase of a fit."""
 
     fit_seconds: float
@@ -81,7 +98,7 @@ class FitResult:
 
 
 @dataclass(frozen=True)
-class FigureResult:
+class FigureResult(Result):
     """A figure of a fit."""
 
     shown: list[str]  # views
@@ -89,7 +106,7 @@ class FigureResult:
 
 
 @dataclass(frozen=True)
-class ComparisonResult:
+class ComparisonResult(Result):
     """Fits side by side."""
 
     recipes: list[str]
@@ -107,7 +124,7 @@ class Shown:
 
 
 @dataclass(frozen=True)
-class GalleryResult:
+class GalleryResult(Result):
     """Scenes side by side."""
 
     section: str  # of the report
@@ -115,7 +132,7 @@ class GalleryResult:
 
 
 @dataclass(frozen=True)
-class MeshResult:
+class MeshResult(Result):
     """The surface of a fit against that of its volume; lengths in world units."""
 
     chamfer: float  # mean of the next two
@@ -131,7 +148,7 @@ class MeshResult:
 
 
 @dataclass(frozen=True)
-class SceneResult:
+class SceneResult(Result):
     """Fields as one scene."""
 
     models: int
@@ -148,7 +165,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class PseResult:
+class PseResult(Result):
     """Edits by numbers, and a light that moves."""
 
     views: int
@@ -157,7 +174,7 @@ class PseResult:
 
 
 @dataclass(frozen=True)
-class TimingResult:
+class TimingResult(Result):
     """Frames of a scene, and of its volume in the same job."""
 
     frame_mean_ms: float
@@ -172,7 +189,7 @@ class TimingResult:
 
 
 @dataclass(frozen=True)
-class PageResult:
+class PageResult(Result):
     """A scene as a page for a browser."""
 
     edit: str  # or "none"
@@ -182,7 +199,7 @@ class PageResult:
 
 
 @dataclass(frozen=True)
-class EditResult:
+class EditResult(Result):
     """A scene with a new look or a new part."""
 
     edit: str
@@ -198,60 +215,34 @@ class EditResult:
 
 
 @dataclass(frozen=True)
-class EditMeasures:
+class EditMeasures(Result):
     """What was measured of an edited scene."""
 
     edit: str
     method: str
-    frame_mean_ms: float
-    frame_max_ms: float
-    primitives: int
-    megabytes: float  # of all models, as the paper counts
-    geometry_kept: bool
     width: int | None = None  # of the frames, pixels
     height: int | None = None
-    short_rmse: float | None = None  # between consecutive views, and views farther apart
-    short_lpips: float | None = None
-    long_rmse: float | None = None
-    long_lpips: float | None = None
-    style_nnfm: float | None = None
-    style_gram: float | None = None
-    clip: str | None = None  # backbone
-    similarity: float | None = None
-    direction: float | None = None
-    clip_missing: str | None = None  # why CLIP measured nothing
+    values: dict[str, Any] = field(default_factory=dict)  # of texgs/metrics/edits, by name
 
-
-Result = (
-    VolumeResult
-    | TransferResult
-    | ViewsResult
-    | SheetResult
-    | FitResult
-    | FigureResult
-    | ComparisonResult
-    | GalleryResult
-    | MeshResult
-    | SceneResult
-    | PseResult
-    | TimingResult
-    | PageResult
-    | EditResult
-    | EditMeasures
-)
-KINDS: dict[str, type[Any]] = {kind.__name__: kind for kind in Result.__args__}
+    @classmethod
+    def of(cls, numbers: Mapping[str, Any]) -> EditMeasures:
+        """Return the measures that `plain` made these numbers of; whoever has the metrics checks `values`."""
+        own = {each.name for each in fields(cls)} - {"values"}
+        known = {name: value for name, value in numbers.items() if name in own}
+        return typed(cls, {**known, "values": {k: v for k, v in numbers.items() if k not in own}})
 
 
 def plain(result: Result) -> dict[str, Any]:
-    """A result for JSON, without what was not measured."""
-    return {name: value for name, value in asdict(result).items() if value is not None}
+    """Return what `metrics.json` holds of a result: all that was measured, values by name side by side."""
+    told = asdict(result)  # type: ignore[call-overload]
+    told |= told.pop("values", {})
+    return {name: value for name, value in told.items() if value is not None}
 
 
-def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
-    """The result that `plain` made these numbers of.
+def result_of(kind: str, numbers: Mapping[str, Any]) -> Any:
+    """Return the result of one kind that `plain` made these numbers of.
 
     Raises:
         KeyError, OmegaConfBaseException: if they are those of no result.
     """
-    result: Result = typed(KINDS[kind], numbers)
-    return result
+    return {each.__name__: each for each in Result.__subclasses__()}[kind].of(numbers)

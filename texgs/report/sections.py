@@ -15,10 +15,16 @@ from urllib.parse import quote
 
 from PIL import Image
 
-from texgs.config.methods import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
-from texgs.report.results import ComparisonResult, EditResult, FitResult, GalleryResult, PageResult
+from texgs.report.results import (
+    NO_METHOD,
+    ComparisonResult,
+    EditResult,
+    FitResult,
+    GalleryResult,
+    PageResult,
+)
 
 SECTIONS = {
     "data": "Data sets and views",

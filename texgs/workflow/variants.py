@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.core.errors import ConfigError
+from texgs.report.results import NO_SWEEP
 from texgs.workflow.product import ONLY_SEEDS, SEEDS, combinations, key_of, label
 
-NO_SWEEP = "none"  # name of the sweep without variants
 OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
 OF_EDITS = "edit"
 

@@ -2,7 +2,7 @@
 
 
 from texgs.workflow.plan import SWEPT
-from texgs.report.table_files import DOCUMENT, FORMATS
+from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 
 SWEEPS = sorted(name for name in PLAN.sweeps if name and PLAN.done("phase", sweep=name))

@@ -1,16 +1,13 @@
 """Stage `timing`: how long a frame of the scene takes, beside one of the volume in the same minute."""
 
-import time
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean, median
 
 import torch
 
-from texgs.core.camera import Camera
 from texgs.core.device import torch_device
-from texgs.core.progress import progress
+from texgs.metrics.timing import FRAMES, milliseconds
 from texgs.report.results import TimingResult
 from texgs.scene.scene_file import read_scene
 from texgs.volume.cameras import spiral, spread
@@ -18,8 +15,7 @@ from texgs.workflow.stages.outcome import Outcome
 from texgs.workflow.stages.settings import OfScene as Settings
 from texgs.workflow.stages.volume_scene import VolumeScene
 
-WARM = 3  # frames before those that count
-FRAMES, VOLUME_FRAMES = 61, 12  # spread over the path: more say the same; the volume's take long
+VOLUME_FRAMES = 12  # spread over the path: they take long
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -58,23 +54,3 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         )
         result = replace(result, volume_mean_ms=fmean(of_volume), volume_max_ms=max(of_volume))
     return Outcome(result)
-
-
-def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:
-    """Milliseconds of each frame, the first ones not counted."""
-    for camera in cameras[:WARM]:
-        render(camera)
-    settle()
-    times = []
-    for camera in progress(cameras, title=title, unit="frame"):
-        start = time.perf_counter()
-        render(camera)
-        settle()
-        times.append(1e3 * (time.perf_counter() - start))
-    return times
-
-
-def settle() -> None:
-    """Wait for a GPU, where one is at work."""
-    if torch.cuda.is_initialized():
-        torch.cuda.synchronize()
