@@ -6,11 +6,12 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 NATIVE := $(shell find texgs/raster/csrc -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh' -o -name '*.txt')
 FORMATTED := $(filter-out %.txt,$(NATIVE)) $(shell find tests -name '*.h' -o -name '*.cpp' -o -name '*.cu' -o -name '*.cuh')
 
-.PHONY: help install test test-cluster bench lint demo lock clean
+.PHONY: help install test test-all test-cluster bench lint demo lock clean
 
 help:
 	@echo "make demo      from a small generated volume to an edited scene and results/report.html"
-	@echo "make test      run all tests; ARGS='-k name' picks some"
+	@echo "make test      test all but what the next one adds; ARGS='-k name' picks some of all tests"
+	@echo "make test-all  make test, then whole runs, commands of the documentation, wheel and emulated CUDA"
 	@echo "make test-cluster  run the cluster profile on a real SLURM on this machine, where that is installed"
 	@echo "make bench     measure speed and memory, write JSON under benchmarks/"
 	@echo "make lint      ruff, mypy, clang-format, snakefmt, snakemake --lint and the import layers"
@@ -22,13 +23,18 @@ help:
 install: $(VENV)/installed
 	@echo "texgs is installed in $(VENV). Next: source $(BIN)/activate, and then texgs doctor or make demo."
 
-# All tests: a worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
+# A worker for each core, with a thread each. Tests that ARGS picks: one process, without that overhead.
+WORKERS := OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+SLOW := workflow or docs or packaging or emulated or subprocess
 test: $(VENV)/installed
 ifdef ARGS
 	$(BIN)/python -m pytest $(ARGS)
 else
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist loadfile --no-loadscope-reorder
+	$(WORKERS) -m "not ($(SLOW))"
 endif
+
+test-all: test
+	$(WORKERS) -m "$(SLOW)"
 
 # Opt-in: it starts the daemons of SLURM. Without them it is skipped and says what to install.
 test-cluster: $(VENV)/installed

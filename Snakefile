@@ -13,24 +13,14 @@ container: "docker://python:3.11-bookworm"
 
 
 include: "workflow/rules/common.smk"
-include: "workflow/rules/volume.smk"
-include: "workflow/rules/views.smk"
-include: "workflow/rules/fit.smk"
-include: "workflow/rules/scene.smk"
-include: "workflow/rules/edit.smk"
+include: "workflow/rules/stages.smk"
 include: "workflow/rules/tables.smk"
 
 
 rule all:
     default_target: True
     input:
-        rules.volumes.input,
-        rules.sheets.input,
-        rules.figures.input,
-        rules.comparisons.input,
-        rules.meshes.input,
-        rules.scenes.input,
-        rules.galleries.input,
+        [PLAN.target(name) for name in TARGETS],
         rules.tables.output,
         rules.report.output,
 

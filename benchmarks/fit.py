@@ -11,7 +11,6 @@ from benchmarks import scenes
 from benchmarks.report import Measurement, Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import Light
@@ -19,6 +18,7 @@ from texgs.core.memory import keep_freed_memory
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
+from texgs.fit.settings import Densify, Losses, Phase, Rates
 from texgs.volume.images import Images
 
 SURFELS = {400: 15_000, 800: 40_000}  # by image size; for other sizes those of the settings

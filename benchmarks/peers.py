@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from benchmarks import gsplat_cpu, gsplat_cuda, instruction_sets, scalar
+from benchmarks import gsplat_cpu, gsplat_cuda, instruction_sets
 from benchmarks.report import Section
 from benchmarks.settings import Settings
 
 
 def run(settings: Settings) -> Section:
-    """On a CPU gsplat's torch functions, a scalar loop and weaker instruction sets; on a GPU gsplat."""
+    """Time gsplat's torch functions and weaker instruction sets on a CPU, and gsplat on a GPU."""
     section = Section()
     if settings.device.type == "cuda":
         gsplat_cuda.compare(settings, section)
     else:
-        for peer in (gsplat_cpu, scalar, instruction_sets):
+        for peer in (gsplat_cpu, instruction_sets):
             peer.compare(settings, section)
     return section

@@ -17,14 +17,12 @@ SECTIONS = (
     "primitives",
     "losses",
     "peers",
-    "growth",
     "memory",
     "views",
     "fit",
     "scene",
     "convolution",
     "style",
-    "segment",
     "voxels",
 )
 ROUNDS = 5  # visits to each case, see timing.py

@@ -1,9 +1,9 @@
 """Speeds of the stages for `texgs doctor --experiment`, from what runs on this machine have taken.
 
-`python -m benchmarks.speeds "WORDS OF A RUN" ...` scales `texgs/workflow/speeds.csv` to those jobs of these
-runs that are done, such as `python -m benchmarks.speeds "dataset=engine fit=quick results=/tmp/run/results"`. Each
-stage gets one factor, so that pixels and iterations keep the weights that longer runs have given them. Stages
-that no run has are scaled as the probe says that this machine is faster or slower than that of the file.
+`python -m benchmarks.speeds "WORDS OF A RUN" ...` scales `texgs/workflow/speeds.csv` to the jobs of these
+runs that are done. Words are such as "dataset=engine fit=quick results=/tmp/run/results". Each stage gets one
+factor, so that pixels and iterations keep the weights that longer runs have given them. Stages that no run
+has are scaled as the probe says that this machine is faster or slower than that of the file.
 """
 
 from __future__ import annotations

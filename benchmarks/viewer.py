@@ -1,124 +1,106 @@
-"""Frames a second and delays of `texgs view` in a browser that drags, beside viser with the same frames.
+"""Frames a second and delays of `texgs view`, by a client that turns around the scene and shows nothing.
 
-`python -m benchmarks.viewer SCENE OUTPUT.json` needs Playwright, a Chromium, and viser in the environment,
-see benchmarks/viser_viewer.py. The viewers take turns. Frames are counted in a proxy before the browser: a
-page may have its socket in a worker. `texgs view` is measured a second time behind 100 ms of round trip. The
-browser runs on the same cores, without a GPU: the page of viser then needs WebGL in software, that of texgs
-needs none. A client without a page is measured too: what it gets, a browser elsewhere can show.
+`python -m benchmarks.viewer SCENE OUTPUT.json` starts the viewer and asks for frames as fast as they come.
+What the client gets is what a browser on another machine can show: none runs on the same cores.
 """
 
 from __future__ import annotations
 
+import asyncio
 import json
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from statistics import median, quantiles
-from typing import Any
+from urllib.parse import urlsplit
 
+import aiohttp
 import torch
 
 from benchmarks import machine
 from benchmarks.command import call
-from benchmarks.viewer_client import turned
-from benchmarks.websocket_proxy import Arrivals, proxied
-from tests.viewer.browser import SOFTWARE, browser
 from texgs.scene.scene_file import read_scene
 
-PLAIN = ("--disable-gpu",)  # of a browser whose page needs no WebGL
-PAGE = 800  # pixels of either side of the picture
-PANEL = 310  # pixels beside it, of the page of texgs
-DRAG, STEPS = 5.0, 40  # seconds of a drag, and single moves
-LEAST = 2048  # bytes of a message that is a frame: small ones of a moving camera have some 3,500
-ROUNDS = 3
-PORT, TRIP = 8790, 0.1  # and seconds of a round trip
+SIZE, SECONDS, ROUNDS = 800, 5.0, 3  # pixels of either side, seconds of a round, and rounds
+WARM = 10  # frames before those that count: the resolution has settled then
 
 
 def main(source: str, output: str) -> None:
-    """Measure all viewers; write the file."""
-    rows: dict[str, list[dict[str, float]]] = {}
-    with texgs(source) as ours, viser(source) as other:
-        viewers = {
-            "texgs view": (ours, PANEL, 0.0, PLAIN),
-            "texgs view, 100 ms round trip": (ours, PANEL, TRIP, PLAIN),
-            "viser": (other, 0, 0.0, SOFTWARE),
-        }
-        for _ in range(ROUNDS):
-            rows.setdefault("texgs view, no browser", []).append(turned(ours, PAGE, DRAG))
-            for name, (address, panel, trip, args) in viewers.items():
-                arrivals = Arrivals(LEAST)
-                with browser(args) as chromium, proxied(address, PORT + 2, arrivals, trip) as near:
-                    rows.setdefault(name, []).append(measured(chromium, near, panel, arrivals))
-    facts = {
-        "machine": machine.describe(torch.device("cpu")),
-        "primitives": len(read_scene(source).open()),
-        "size": PAGE,
-    }
-    Path(output).write_text(json.dumps({**facts, "rounds": rows}, indent=1) + "\n")
-    for name, rounds in rows.items():
-        medians = {key: round(median(each[key] for each in rounds), 1) for key in rounds[0]}
-        print(name, medians)
-
-
-def measured(chromium: Any, address: str, panel: int, arrivals: Arrivals) -> dict[str, float]:
-    """Frames a second of a drag, and milliseconds from a move to the next frame and to the last one."""
-    page = chromium.new_page(viewport={"width": PAGE + panel, "height": PAGE + (44 if panel else 0)})
-    page.goto(address)
-    page.wait_for_timeout(5000)
-    page.mouse.move(PAGE / 2, PAGE / 2)
-    page.mouse.down()
-    start, x = time.perf_counter(), PAGE / 2
-    while time.perf_counter() - start < DRAG:
-        x = PAGE / 2 + (7 * (x - PAGE / 2 + 1)) % 200
-        page.mouse.move(x, PAGE / 2)
-        page.wait_for_timeout(8)
-    frames = len(arrivals.since(start))
-    first, last = [], []
-    for step in range(STEPS):
-        page.wait_for_timeout(400)
-        moved = time.perf_counter()
-        page.mouse.move(PAGE / 2 + 3 * step, PAGE / 2 + 2 * step)
-        page.wait_for_timeout(600)
-        if later := arrivals.since(moved):
-            first.append(1000 * later[0])
-            last.append(1000 * later[-1])
-    page.mouse.up()
-    if not first:
-        raise SystemExit(f"{address}: no frame came after {STEPS} moves of the pointer")
-    return {
-        "frames_per_second": frames / DRAG,
-        "first_ms": median(first),
-        "first_ms_95": quantiles(first, n=20)[-1],
-        "last_ms": median(last),
-        "answered": len(first),
-    }
-
-
-@contextmanager
-def texgs(source: str) -> Iterator[str]:
-    """Its viewer, and the address."""
-    words = [sys.executable, "-m", "texgs.cli.main", "view", source, "--no-browser", "--port", str(PORT)]
+    """Measure the viewer of a scene; print the medians and write all rounds."""
+    words = [sys.executable, "-m", "texgs.cli.main", "view", source, "--no-browser"]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         try:
-            yield process.stdout.readline().strip()
+            address = process.stdout.readline().strip()
+            rounds = [turned(address, SIZE, SECONDS) for _ in range(ROUNDS)]
         finally:
             process.terminate()
+    facts = {"machine": machine.describe(torch.device("cpu")), "primitives": len(read_scene(source).open())}
+    Path(output).write_text(json.dumps({**facts, "size": SIZE, "rounds": rounds}, indent=1) + "\n")
+    print({key: round(median(each[key] for each in rounds), 1) for key in rounds[0]})
 
 
-@contextmanager
-def viser(source: str) -> Iterator[str]:
-    """That of viser."""
-    port = PORT + 1
-    with subprocess.Popen([sys.executable, "-m", "benchmarks.viser_viewer", source, str(port)]) as process:
-        try:
-            time.sleep(10)
-            yield f"http://127.0.0.1:{port}"
-        finally:
-            process.terminate()
+def turned(address: str, size: int, seconds: float) -> dict[str, float]:
+    """Return frames a second, milliseconds from asking to the frame, and the sides of what came.
+
+    Args:
+        address: what the viewer printed.
+        size: pixels of either side of the picture.
+        seconds: how long to turn.
+    """
+    return asyncio.run(_turned(address, size, seconds))
+
+
+async def _turned(address: str, size: int, seconds: float) -> dict[str, float]:
+    parts = urlsplit(address)
+    headers = {"Origin": f"{parts.scheme}://{parts.netloc}"}
+    waits: list[float] = []
+    async with (
+        aiohttp.ClientSession() as session,
+        session.ws_connect(f"{address.rstrip('/')}/socket", headers=headers, max_msg_size=0) as socket,
+    ):
+        start, frame, number = time.perf_counter(), b"", 0
+        while number < WARM or time.perf_counter() - start < seconds:
+            if number == WARM:
+                start, waits = time.perf_counter(), []
+            number += 1
+            asked = time.perf_counter()
+            await socket.send_str(json.dumps(_view(number, size)))
+            while (message := await socket.receive(timeout=30)).type != aiohttp.WSMsgType.BINARY:
+                pass
+            waits.append(1000 * (time.perf_counter() - asked))
+            frame = message.data
+        elapsed = time.perf_counter() - start
+    return {
+        "frames_per_second": len(waits) / elapsed,
+        "first_ms": median(waits),
+        "first_ms_95": quantiles(waits, n=20)[-1],
+        "side": _side(frame),
+    }
+
+
+def _view(number: int, size: int) -> dict[str, object]:
+    """A view from a bit further on the way around the scene."""
+    camera = {
+        "azimuth": (2 * number) % 360 - 180,
+        "polar": 20,
+        "distance": 4,
+        "fov_y": 30,
+        "target": [0, 0, 0],
+        "width": size,
+        "height": size,
+    }
+    return {"type": "view", "id": number, "camera": camera, "mode": "shaded", "moving": True}
+
+
+def _side(frame: bytes) -> int:
+    """Pixels of a row of a frame: a header with its length before it, and a JPEG picture."""
+    import cv2
+    import numpy as np
+
+    length = int.from_bytes(frame[:4], "little")
+    return cv2.imdecode(np.frombuffer(frame[4 + length :], np.uint8), cv2.IMREAD_COLOR).shape[1]
 
 
 if __name__ == "__main__":

@@ -1,82 +1,155 @@
 """Rules of the design that the source can tell: layers import from their left, and functions are short."""
 
 import ast
+import re
+from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
+import networkx
 import pytest
 
 ROOT = Path(__file__).parents[1]
 
-# Package: the packages it may import from, besides itself.
-LEFT = {
-    "core": set(),
-    "config": {"core"},
-    "raster": {"core"},
-    "volume": {"config", "core", "raster"},
-    **{name: {"config", "core", "volume", "raster"} for name in ("fields", "models")},
-}
-LEFT["scene"] = LEFT["fields"] | {"fields"}
-for name in ("fit", "edit", "metrics"):
-    LEFT[name] = LEFT["scene"] | {"scene", "models"}
-LEFT["report"] = LEFT["fit"] | {"fit", "edit", "metrics"}
-for name in ("methods", "kinds", "viewer"):
-    LEFT[name] = LEFT["report"] | {"report"}
-LEFT["workflow"] = LEFT["methods"] | {"methods", "kinds"}
-LEFT["study"] = LEFT["report"] | {"report"}
-LEFT["cli"] = LEFT["workflow"] | {"workflow", "viewer", "study"}
+# From left to right; a layer may import all packages to its left, but not those on its own floor.
+FLOORS = (
+    ("core",),
+    ("raster",),
+    ("volume", "models"),
+    ("fields",),
+    ("fit", "scene"),
+    ("metrics",),
+    ("edit",),
+    ("config",),
+    ("report",),
+    ("viewer",),
+    ("study",),
+    ("workflow",),
+    ("cli",),
+)
+FLOOR = {package: number for number, packages in enumerate(FLOORS) for package in packages}
+ONLY_OF_CLI = "study"
+MODULE = re.compile(r"texgs(\.\w+)+(:\w+)?")  # a string that names a module, or an attribute of one
 
 
-def package_of(path: Path) -> str:
-    """The layer a file belongs to; "" for texgs/__init__.py."""
-    parts = path.relative_to(ROOT / "texgs").parts
-    return parts[0].removesuffix(".py").replace("__init__", "")
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Return the parsed source of each module of texgs, by its name."""
+    paths = sorted((ROOT / "texgs").rglob("*.py"))
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths]
+    return {
+        name.removesuffix(".__init__"): ast.parse(path.read_text())
+        for name, path in zip(names, paths, strict=True)
+    }
 
 
-def imports(tree: ast.AST, module: str) -> set[str]:
-    """Absolute names of all modules imported anywhere in a file."""
-    names = set()
+def package_of(module: str) -> str:
+    """Return the package below texgs that a module belongs to; "" for texgs itself."""
+    return module.partition(".")[2].partition(".")[0]
+
+
+def docstrings(tree: ast.Module) -> set[int]:
+    """Return the identities of the nodes that are docstrings."""
+    documented = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+    first = (node.body[0] for node in ast.walk(tree) if isinstance(node, documented) and node.body)
+    return {id(node.value) for node in first if isinstance(node, ast.Expr)}
+
+
+def imported(tree: ast.Module, module: str, is_package: bool = False) -> Iterator[str]:
+    """Yield the names that a module imports, wherever it does, or names in a string or an f-string."""
+    skipped = docstrings(tree)
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
+            yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            parent = ".".join(module.split(".")[: -node.level]) + "." if node.level else ""
-            base = f"{parent}{node.module or ''}".rstrip(".")
-            names |= {base} | {f"{base}.{alias.name}" for alias in node.names}
-    return names
+            above = module.split(".")[: len(module.split(".")) - node.level + is_package]
+            base = ".".join([*(above if node.level else []), *([node.module] if node.module else [])])
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.JoinedStr) and isinstance(node.values[0], ast.Constant):
+            start = str(node.values[0].value)
+            skipped |= {id(value) for value in node.values}
+            if re.match(r"texgs\.(\w+\.|$)", start):
+                yield start.rstrip(".")
+        elif isinstance(node, ast.Constant) and MODULE.fullmatch(str(node.value)) and id(node) not in skipped:
+            name = node.value.partition(":")[0]
+            yield from [name] if package_of(name) in FLOOR else []
 
 
-FILES = sorted((ROOT / "texgs").rglob("*.py"))
+def arrows(sources: dict[str, ast.Module]) -> set[tuple[str, str]]:
+    """Return pairs of a module and one of texgs that it imports, with names taken off that are no modules."""
+    packages = {name for name in sources if any(other.startswith(f"{name}.") for other in sources)}
+    pairs = set()
+    for module, tree in sources.items():
+        for name in imported(tree, module, module in packages):
+            while name not in sources and package_of(name) in FLOOR and name.count(".") > 1:
+                name = name.rpartition(".")[0]
+            if name.startswith("texgs") and name != "texgs.__version__":
+                pairs.add((module, name))
+    return pairs
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_point_to_the_left(path):
-    package = package_of(path)
-    module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
-    packages = {
-        name.split(".")[1]
-        for name in imports(ast.parse(path.read_text()), module)
-        if name.startswith("texgs.")
-    }
-    assert package == "" or package in LEFT, f"{package} is in no layer: add it to LEFT"
-    allowed = LEFT.get(package, set()) | {package, "__version__"}
-    assert packages <= allowed, (
-        f"{path} imports {sorted(packages - allowed)}; {package} may import {sorted(allowed)}"
-    )
+def is_allowed(module: str, name: str) -> bool:
+    """Whether a module may import another."""
+    here, there = package_of(module), package_of(name)
+    if here == there or there == "":
+        return True
+    if there == ONLY_OF_CLI:
+        return here == "cli"
+    return FLOOR.get(there, len(FLOORS)) < FLOOR.get(here, -1)
+
+
+def test_imports_point_to_the_left():
+    pairs = arrows(modules())
+    unknown = {package_of(module) for module in modules()} - set(FLOOR) - {""}
+    wrong = [f"texgs/{package} is in no layer: add it to FLOORS" for package in sorted(unknown)]
+    wrong += sorted(f"{module} imports {name}" for module, name in pairs if not is_allowed(module, name))
+    assert not wrong, "\n".join(wrong)
+
+
+def test_no_imports_in_circles_between_packages():
+    graph = networkx.DiGraph(sorted(arrows(modules())))
+    circles = networkx.strongly_connected_components(graph)
+    between = [sorted(circle) for circle in circles if len({package_of(module) for module in circle}) > 1]
+    assert not between
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from texgs.cli import main",
+        "def f():\n    import texgs.cli.main",
+        "import_module('texgs.cli.main')",
+        "NAME = 'texgs.cli.main:parse'",
+        "f'texgs.cli.{name}'",
+        "'texgs.cli'",
+        "from ..cli import main",
+        "from texgs import cli",
+    ],
+)
+def test_arrows_are_found(line):
+    sources = {name: ast.parse("") for name in ("texgs", "texgs.cli", "texgs.cli.main", "texgs.core")}
+    sources["texgs.core.io"] = ast.parse(f'"""Of texgs."""\n{line}')
+    ((module, name),) = arrows(sources)
+    assert name.startswith("texgs.cli")
+    assert not is_allowed(module, name)
+    assert not arrows({"texgs.core.io": ast.parse('"""texgs.cli"""\ndef f():\n    "texgs.cli"')})
 
 
 LONGEST = 40  # lines of a function without its docstring
 
 
 def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    """Lines of a function without its docstring."""
+    """Return how many lines a function has without its docstring."""
     first = function.body[0]
     docstring = first.end_lineno - first.lineno + 1 if ast.get_docstring(function) is not None else 0
     return function.end_lineno - function.lineno + 1 - docstring
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_functions_are_short(path):
-    nodes = ast.walk(ast.parse(path.read_text()))
-    functions = [node for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
-    long = [f"{each.name}: {lines_of(each)}" for each in functions if lines_of(each) > LONGEST]
-    assert not long, f"{path}: expected functions of at most {LONGEST} lines, got {', '.join(long)}"
+def test_functions_are_short():
+    long = [
+        f"{module}.{node.name}: {lines_of(node)}"
+        for module, tree in modules().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and lines_of(node) > LONGEST
+    ]
+    assert not long, f"expected functions of at most {LONGEST} lines, got {', '.join(long)}"

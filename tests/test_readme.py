@@ -1,4 +1,7 @@
-"""Every command of the README and of docs/ runs, on small volumes and with few iterations."""
+"""Every command of the README and of docs/ is one, and runs on small volumes and with few iterations.
+
+The default suite parses each command and composes its configuration; marked `docs`, each is run.
+"""
 
 import os
 import re
@@ -14,12 +17,13 @@ import pytest
 import pyvista
 
 from tests.one_thread import one_thread  # noqa: F401
-from texgs.cli.main import main
+from texgs.cli.main import STAGE_VERBS, main, parse
+from texgs.config.compose import compose
 
 ROOT = Path(__file__).parents[1]
 PAGES = (
     "README.md",
-    *(f"docs/{name}.md" for name in ("usage", "data", "fits", "scenes", "looks", "workflow", "rasterizer")),
+    *(f"docs/{name}.md" for name in ("usage", "data", "fits", "scenes", "looks", "workflow", "api")),
 )
 OTHERS = {path.relative_to(ROOT).as_posix() for path in [ROOT / "CONTRIBUTING.md", *ROOT.glob("docs/*.md")]}
 ALL = (*PAGES, *sorted(OTHERS - set(PAGES)))  # later pages use what earlier ones wrote
@@ -143,7 +147,46 @@ def small(words):
     return words
 
 
-@pytest.mark.parametrize(("page", "folder", "command"), COMMANDS, ids=[f"{p}: {c}" for p, _, c in COMMANDS])
+EACH = pytest.mark.parametrize(
+    ("page", "folder", "command"), COMMANDS, ids=[f"{page}: {command}" for page, _, command in COMMANDS]
+)
+
+
+def first_value(values):
+    """The first of the values of a sweep, with a whole number as one."""
+    try:
+        return f"={float(values[1]):g}"
+    except ValueError:
+        return f"={values[1]}"
+
+
+def overrides(words):
+    """The keys of a command with values that exist here; of several values the first."""
+    keys = [word for word in words if re.match(r"[a-z][\w.]*=", word) and "/" not in word.partition("=")[0]]
+    keys = [re.sub(r"=([^\[,]+),.*", first_value, word) for word in keys]
+    return tuple(word.replace("dataset=scan", "dataset=engine") for word in keys)
+
+
+@EACH
+def test_command_can_be_parsed_and_composed(page, folder, command):
+    if not command.startswith(("texgs", "snakemake")):
+        assert instead(command) is not None
+        return
+    program, *words = shlex.split(os.path.expandvars(command))
+    try:
+        verb = parse(words).verb if program == "texgs" else "run"
+    except SystemExit:  # of --help
+        assert words[-1] == "--help"
+        return
+    if program == "snakemake":
+        nested = [word.partition("=")[2] for word in words if word.startswith("overrides=")]
+        words = [word for word in words if not word.startswith("overrides=")] + shlex.split(" ".join(nested))
+    if verb == "run" or verb in STAGE_VERBS:
+        compose(overrides(words))
+
+
+@pytest.mark.docs
+@EACH
 def test_command_runs(page, folder, command, project, monkeypatch):
     """In their order: later ones use what earlier ones wrote."""
     if command.startswith("make") and shutil.which("make") is None:
@@ -203,6 +246,7 @@ def test_every_page_is_in_the_table_of_the_readme():
         assert f"({page})" in text, f"{page} is not linked"
 
 
+@pytest.mark.docs
 def test_python_example_runs(tmp_path):
     (example,) = [example for page in ALL for example in blocks(page, "python")]
     assert len(example.splitlines()) <= 20
@@ -211,6 +255,7 @@ def test_python_example_runs(tmp_path):
     assert (tmp_path / "surfels.png").stat().st_size > 10_000
 
 
+@pytest.mark.docs
 def test_the_script_without_parameters_runs_the_workflow(project, monkeypatch):
     """The files that it lists at its end are among those that the run makes."""
     text = (ROOT / "replicate.sh").read_text(encoding="utf-8").splitlines()[-1]

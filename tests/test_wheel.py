@@ -12,6 +12,8 @@ import pytest
 
 from tests.workflow.project import TINY
 
+pytestmark = pytest.mark.packaging
+
 ROOT = Path(__file__).parents[1]
 SDIST = "import sys; from scikit_build_core.build import build_sdist; print(build_sdist(sys.argv[1]))"
 SHORT = "fit.seeds.count=300 fit.shading.iterations=30 edits=[gold] ~dataset.basic_tfs.TF02 tracking=none"

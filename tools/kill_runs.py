@@ -90,9 +90,8 @@ def main() -> int:
     left = [str(path) for path in (killed / "results").rglob(".*") if path.suffix in (".work", ".old")]
     counts = statuses(killed / "results")
     print(f"{done[0]} kills at any moment, {done[1]} inside a job; exit codes {codes}")
-    print(
-        f"{len(contents(undisturbed / 'results'))} files compared, different: {names}; left behind: {left}; runs: {counts}"
-    )
+    print(f"{len(contents(undisturbed / 'results'))} files compared, different: {names}; left behind: {left}")
+    print(f"runs: {counts}")
     return int(bool(names or left or any(codes) or "RUNNING" in counts))
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from texgs.core.camera import Camera, orbit
+from texgs.core.image_grid import content, write_strip
 from texgs.core.lens import Lens
 from texgs.core.progress import progress
-from texgs.report.strip import content, write_strip
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
 

@@ -3,8 +3,8 @@
 python tools/plans.py FOLDER
 
 Each file holds the jobs of one experiment by their folders: stage, settings, input files and swept values. It
-also says which jobs belong to which sweep. Digests of code are left out, so that `diff -r BEFORE AFTER` compares
-two versions. Empty files stand in for data, so that plans do not depend on the machine.
+also says which jobs belong to which sweep. Digests of code are left out, so that `diff -r BEFORE AFTER`
+compares two versions. Empty files stand in for data, so that plans do not depend on the machine.
 """
 
 import argparse

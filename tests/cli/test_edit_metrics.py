@@ -19,7 +19,7 @@ from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.cameras import spiral as path
 
 CAMERAS = path(12, 4.0, 30.0, 32, 32)
-MISSING = {"vgg16": None, "lpips_vgg": None}
+MISSING = {"vgg16": None, "lpips_vgg": None, "none": None}
 
 
 @pytest.fixture

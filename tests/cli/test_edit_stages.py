@@ -12,8 +12,8 @@ from tests.cli.test_scene_stages import WORDS
 from tests.models.clips import write_clip
 from texgs.cli.main import main
 from texgs.core.errors import MissingDataError
+from texgs.edit.methods.image import how
 from texgs.edit.recipe import DEFAULT, preset
-from texgs.methods.image import how
 from texgs.scene.scene_file import read_scene
 
 FEW = ("edit.image.iterations=3", "edit.segment.views=12", "edit.segment.size=96", "edit.text.size=64")

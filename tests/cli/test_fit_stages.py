@@ -127,7 +127,7 @@ def test_same_seed_same_model(seeded):
 
 
 def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
-    from texgs.fit import resumable
+    from texgs.fit import checkpoint
     from texgs.fit.loop import Fit
 
     run = Fit.run
@@ -138,15 +138,13 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
             if done.iteration == 50:
                 raise KeyboardInterrupt
 
-    monkeypatch.setattr(resumable, "SAVED_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "SAVED_EVERY", 0.0)
     monkeypatch.setattr(Fit, "run", interrupted)
     assert main(["shading", *TINY]) == 130
     monkeypatch.setattr(Fit, "run", run)
-    state = resumable.checkpoint.latest(seeded / ".shading.work" / "checkpoint")
+    state = checkpoint.latest(seeded / ".shading.work" / "checkpoint")
     assert int(state["iteration"]) == 50
-    monkeypatch.setattr(
-        resumable.checkpoint, "latest", lambda _folder: {**state, "seconds": state["seconds"] + 1000}
-    )
+    monkeypatch.setattr(checkpoint, "latest", lambda _folder: {**state, "seconds": state["seconds"] + 1000})
     assert main(["shading", *TINY]) == 0
     assert numbers(seeded, "shading")["fit_seconds"] > 1000
 
@@ -191,9 +189,9 @@ def test_a_gpu_that_is_not_there_is_one_sentence(seeded, capsys, monkeypatch):
 
 
 def test_a_finished_phase_leaves_no_checkpoint(seeded, monkeypatch):
-    from texgs.fit import resumable
+    from texgs.fit import checkpoint
 
-    monkeypatch.setattr(resumable, "SAVED_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "SAVED_EVERY", 0.0)
     assert main(["shading", *TINY]) == 0
     assert sorted(path.name for path in (seeded / "shading").iterdir() if path.name[0] != ".") == [
         "metrics.json",

@@ -6,8 +6,8 @@ from dataclasses import replace
 import pytest
 
 from texgs.cli.main import main
-from texgs.config.fields import kinds
 from texgs.core.errors import ConfigError, TexgsError
+from texgs.fields.kinds import kinds
 from texgs.workflow.plan import make
 
 ON_A_GPU = ("fit=plenoxels", "device=cuda")

@@ -1,26 +1,24 @@
 """The server that forks jobs: a forked job is what a started program would be."""
 
 import os
-import signal
 import subprocess
 import sys
 import time
 
 import pytest
 
-from texgs.workflow import fork_client, fork_server
+from texgs.cli import fork_client, fork_server
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the fork server is for Linux")
 
 # A server whose jobs run their first word as Python, instead of texgs.
 SERVER = """
 import socket, sys
-from texgs.workflow.fork_server import Server, become
+from texgs.cli.fork_server import run, serve
 with socket.socket(fileno=int(sys.argv[1])) as listener:
-    request = Server(listener, 0).serve()
+    request = serve(listener, 0)
 if request is not None:
-    become(request)
-    exec(request.arguments[0])
+    run(request, lambda: exec(request.arguments[0], {}) or 0)
 """
 SAY = "import os, sys; print(os.getcwd(), os.environ['WORD'], os.environ.get('OTHER')); sys.exit(3)"
 WAIT = """
@@ -28,6 +26,7 @@ import pathlib, time
 print('ready', flush=True)
 while not pathlib.Path('go').exists():
     time.sleep(.01)
+pathlib.Path('published').touch()
 """
 
 
@@ -73,7 +72,9 @@ def test_a_mistake_and_a_crash_are_told(server):
     out, err = mistake.communicate(timeout=60)
     assert (mistake.returncode, out) == (1, "")
     assert "ValueError: a mistake" in err
-    assert client("import os; os.kill(os.getpid(), 11)").wait(60) == 128 + signal.SIGSEGV
+    crash = client("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
+    assert "crashed or was killed" in crash.communicate(timeout=60)[1]
+    assert crash.returncode == 1
     assert client("pass").wait(60) == 0  # the server goes on
 
 
@@ -91,6 +92,17 @@ time.sleep(60)
     killed.kill()
     assert killed.stdout.read() == ""  # the job has closed it, too
     assert (tmp_path / "ended").read_text() == "SIGTERM"
+
+
+def test_a_job_ends_where_its_server_is_killed(server, tmp_path):
+    """Else the orphan would publish what Snakemake makes again, with two finished runs."""
+    orphan = client(WAIT, cwd=tmp_path)
+    assert orphan.stdout.readline() == "ready\n"
+    server.kill()
+    assert orphan.wait(60) == 1
+    (tmp_path / "go").touch()
+    time.sleep(0.2)
+    assert not (tmp_path / "published").exists()
 
 
 def test_jobs_that_run_end_before_their_server(server, tmp_path):
@@ -119,7 +131,7 @@ import os
 os.environ |= {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 import numpy, torch
 from threadpoolctl import threadpool_info
-from texgs.workflow.fork_server import use_threads
+from texgs.cli.fork_server import use_threads
 use_threads(3)
 print(torch.get_num_threads(), {pool["num_threads"] for pool in threadpool_info()})
 """

@@ -50,6 +50,7 @@ def test_overrides_are_given_once():
         overrides(["dataset=engine"], ["overrides=views=small"])
 
 
+@pytest.mark.workflow
 @pytest.mark.parametrize(
     ("words", "profile"),
     [
@@ -71,6 +72,7 @@ def texgs(folder, *words, **options):
     )
 
 
+@pytest.mark.workflow
 def test_a_dry_run_with_words_anywhere(tmp_path):
     done = texgs(tmp_path, "run", "-n", "tracking=none", "--cores", "1", *TINY.split(), "volumes", "tf=TF01")
     assert done.returncode == 0, done.stderr
@@ -79,6 +81,7 @@ def test_a_dry_run_with_words_anywhere(tmp_path):
     assert not list(tmp_path.glob("results/turbulence"))
 
 
+@pytest.mark.workflow
 @pytest.mark.parametrize(
     ("words", "code", "message"),
     [
@@ -96,6 +99,7 @@ def test_exit_codes(tmp_path, words, code, message):
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.workflow
 def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     long = "views.train.frequency=3 views.width=300 views.height=300 views.step=0.1"
     words = ["run", "--cores", "1", "tracking=none", *TINY.split(), *long.split(), "sheets"]
@@ -112,6 +116,7 @@ def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     assert "Traceback" not in err
 
 
+@pytest.mark.workflow
 def test_a_run_for_one_target_names_no_report(tmp_path):
     words = ["run", "--cores", "1", "tracking=none", *TINY.split(), "volumes"]
     done = texgs(tmp_path, *words)

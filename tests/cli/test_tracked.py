@@ -49,7 +49,7 @@ def test_tags_are_of_what_a_job_is_and_leave_out_what_it_is_not():
 
 def test_losses_are_a_curve_over_iterations_and_times_one_over_frames():
     fit = FitResult(1.0, 10, iterations=30, losses=[0.3, 0.2, 0.1])
-    assert list(curves(plain(fit))) == [(10, {"loss": 0.3}), (20, {"loss": 0.2}), (30, {"loss": 0.1})]
+    assert not list(curves(plain(fit))), "told while it ran"
     edit = EditResult("glass", "image", "patches", 1.0, iterations=4, losses={"TF01/NNFM": [0.5, 0.25]})
     assert list(curves(plain(edit))) == [(2, {"loss/TF01/NNFM": 0.5}), (4, {"loss/TF01/NNFM": 0.25})]
     assert list(curves({"frames_ms": [4, 5]})) == [(0, {"frames_ms": 4.0}), (1, {"frames_ms": 5.0})]

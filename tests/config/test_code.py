@@ -80,7 +80,7 @@ def test_stages_exist_and_differ():
     [
         ("texgs.fields.surfels.composition", {"compose", "timing", "edit_text", "edit_metrics"}),
         ("texgs.fields.gaussians.composition", set()),
-        ("texgs.methods.text", {"edit_text", "edit_metrics"}),
+        ("texgs.edit.methods.text", {"edit_text", "edit_metrics"}),
     ],
 )
 def test_what_settings_name_counts(monkeypatch, changed, stages):
@@ -97,16 +97,17 @@ def test_what_settings_name_counts(monkeypatch, changed, stages):
     code.code_digest.cache_clear()
 
 
-def test_texts_beside_a_module_that_reads_some_count(tree, tmp_path):
+@pytest.mark.parametrize("ending", ["js", "png"])
+def test_files_beside_a_module_that_reads_some_count(tree, tmp_path, ending):
     edit, _ = tree
     (tmp_path / "texgs/core/web").mkdir()
-    page = tmp_path / "texgs/core/web/page.js"
-    page.write_text("let x = 1;")
+    page = tmp_path / f"texgs/core/web/page.{ending}"
+    page.write_bytes(b"\x89 1")
     before = edit("texgs/core/deep.py", "LIMIT = 3", "from importlib.resources import files\nLIMIT = 3")
-    page.write_text("let x = 2;")
+    page.write_bytes(b"\x89 2")
     after = edit("texgs/core/deep.py", "LIMIT = 3", "LIMIT = 3")
     assert after != before
-    page.with_suffix(".png").write_text("no text")
+    page.with_suffix(".orig").write_text("left by an editor")
     assert edit("texgs/core/deep.py", "LIMIT = 3", "LIMIT = 3") == after
 
 

@@ -184,7 +184,7 @@ def test_every_experiment_with_a_gallery_is_named_like_it_and_shows_scenes_of_it
 
 
 def test_the_example_of_the_page_works(tmp_path, monkeypatch):
-    page = (Path(__file__).parents[2] / "docs" / "figures.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs" / "report.md").read_text(encoding="utf-8")
     (example,) = re.findall("```yaml\n(.*?)```", page, flags=re.DOTALL)
     (tmp_path / "conf" / "experiment").mkdir(parents=True)
     (tmp_path / "conf" / "experiment" / "opacity.yaml").write_text(example)

@@ -1,4 +1,4 @@
-from texgs.workflow.kept import fingerprint, keep, recall
+from texgs.core.kept import fingerprint, keep, recall
 
 
 def test_what_is_kept_is_recalled_for_the_same_key_alone(tmp_path):

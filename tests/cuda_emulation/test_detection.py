@@ -7,6 +7,8 @@ import pytest
 
 from tests.cuda_emulation import emulated
 
+pytestmark = pytest.mark.emulated
+
 SEEDS = range(20)
 FAULTS = {
     "barrier missing": "shared memory",  # a race, or nothing written yet

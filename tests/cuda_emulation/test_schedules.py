@@ -5,22 +5,24 @@ import torch
 
 from tests.cuda_emulation import emulated
 from tests.raster import test_normals, test_shading, test_smoothness, test_ssim
+from tests.raster.agreement import evaluate
 from tests.raster.scenes import gaussians, random_scene, textured
-from tests.raster.test_determinism import everything
-from tests.raster.test_voxel_threads import everything as voxels
+from tests.raster.test_determinism import everything, voxels
 from texgs.raster.normals import normal_consistency
 from texgs.raster.shading import blinn_phong_texture
 from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.spherical_harmonics import spherical_harmonics
 from texgs.raster.ssim import l1_dssim
 
+pytestmark = pytest.mark.emulated
+
 SEEDS = range(4)
 
 
 def losses():
     """Values and gradients of all losses and of shading, by name."""
-    results = {"D-SSIM": test_ssim.evaluate(l1_dssim, *test_ssim.pair(33, 70, 3))}
-    results["smoothness"] = test_smoothness.evaluate(bilateral_smoothness, *test_smoothness.maps(33, 70, 2))
+    results = {"D-SSIM": evaluate(l1_dssim, *test_ssim.pair(33, 70, 3))}
+    results["smoothness"] = evaluate(bilateral_smoothness, *test_smoothness.maps(33, 70, 2))
     depth, normal, *constants = test_normals.view(33, 70)
     value, gradients = test_normals.gradients(
         lambda n, z: normal_consistency(n, z, *constants), normal, depth

@@ -10,7 +10,6 @@ from tests.edit.test_gaussian_style import ball as gaussians
 from tests.edit.test_voxel_style import seen
 from tests.fields.voxels.test_voxels import ball as voxels
 from tests.fit.scenes import HEADLIGHT, cameras
-from texgs.config.phase import CommonRates
 from texgs.core.errors import ArgumentError, FitError
 from texgs.edit.closeness import Closeness, differentiated
 from texgs.edit.dataset_update import azimuth, update_field
@@ -19,6 +18,7 @@ from texgs.edit.gaussian_learner import GaussianLearner, radii
 from texgs.edit.turns import Schedule
 from texgs.edit.voxel_learner import VoxelLearner, VoxelLearning, corner
 from texgs.fields.optimizer import Rate
+from texgs.fit.settings import CommonRates
 from texgs.raster.ssim import ssim
 from texgs.volume.boxes import Box
 from texgs.volume.images import Images

@@ -4,13 +4,13 @@ import pytest
 import torch
 
 from texgs.core.errors import ArgumentError
+from texgs.edit.methods.dge import DgeKeys
+from texgs.edit.methods.dge import schedule as dge
+from texgs.edit.methods.igs2gs import Igs2gsKeys
+from texgs.edit.methods.igs2gs import schedule as igs2gs
+from texgs.edit.methods.in2n import In2nKeys
+from texgs.edit.methods.in2n import schedule as in2n
 from texgs.edit.turns import Schedule, turns
-from texgs.methods.dge import DgeKeys
-from texgs.methods.dge import schedule as dge
-from texgs.methods.igs2gs import Igs2gsKeys
-from texgs.methods.igs2gs import schedule as igs2gs
-from texgs.methods.in2n import In2nKeys
-from texgs.methods.in2n import schedule as in2n
 
 
 def made(schedule, count, seed=0):

@@ -4,12 +4,12 @@ import math
 
 import torch
 
-from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.fit.seeds import surfels_at
+from texgs.fit.settings import Densify, Losses, Phase, Rates
 from texgs.volume.images import Images
 
 SIZE = 32

@@ -3,9 +3,9 @@ import math
 import pytest
 import torch
 
-from texgs.config.phase import Densify
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fit.densify import RESET_OPACITY, SHRINK, DensityControl
+from texgs.fit.settings import Densify
 
 from .scenes import logit
 

@@ -1,17 +1,17 @@
 import pytest
 import torch
 
-from texgs.config.phase import CommonRates, Densify, Seeds
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.fields.gaussians.model import Baked, Gaussians
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fit import checkpoint
 from texgs.fit.densify import SHRINK, DensityControl
-from texgs.fit.gaussian_seeds import seed_gaussians
+from texgs.fit.kinds import FitTask
+from texgs.fit.kinds.gaussians import FIT, GaussianKeys
 from texgs.fit.loop import Fit
-from texgs.fit.task import FitTask
-from texgs.kinds.gaussians import FIELD, GaussianKeys
+from texgs.fit.seeds import seed_gaussians
+from texgs.fit.settings import CommonRates, Densify, Seeds
 from texgs.metrics.quality import evaluate, mean
 from texgs.raster.spherical_harmonics import Y00
 from texgs.volume.view_set import View, ViewSet
@@ -42,8 +42,8 @@ def psnr_of(model, images, folder):
 
 def test_it_fits_a_ball(tmp_path):
     task = task_of(tmp_path)
-    fitted = FIELD.fit(task)
-    seeds = FIELD.fit(task_of(tmp_path / "none", iterations=0)).field
+    fitted = FIT.fit(task)
+    seeds = FIT.fit(task_of(tmp_path / "none", iterations=0)).field
     assert psnr_of(seeds, task.images, tmp_path) < 19
     assert psnr_of(fitted.field, task.images, tmp_path) > 24
     assert 80 < len(fitted.field) <= 150
@@ -56,21 +56,21 @@ def test_it_fits_a_ball(tmp_path):
     "keys", [{"antialiased": True}, {"alpha": 0.1}, {"sh_degree": 1}, {"dssim": 1.0}, {"sh_degree": 0}]
 )
 def test_keys_reach_the_fit(tmp_path, keys):
-    field = FIELD.fit(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
+    field = FIT.fit(task_of(tmp_path, iterations=40, sh_every=10, **keys)).field
     assert field.shading == Baked(keys.get("antialiased", False))
     assert field.parameters["sh"].shape[1] == HARMONICS[keys.get("sh_degree", 3)]
-    plain = FIELD.fit(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
+    plain = FIT.fit(task_of(tmp_path / "plain", iterations=40, sh_every=10)).field
     assert not torch.equal(field.parameters["means"], plain.parameters["means"])
 
 
 def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
-    whole = FIELD.fit(task_of(tmp_path / "whole", iterations=60)).field
+    whole = FIT.fit(task_of(tmp_path / "whole", iterations=60)).field
     task = task_of(tmp_path / "parts", iterations=60)
     start = seed_gaussians(task.images, task.views, SEEDS, 3, 0)
     half = run(Fit(start, Baked(), task.images, task.settings.phase, 0), 45)
     half.seconds = 1000.0
     checkpoint.save(task.output / checkpoint.FOLDER, half)
-    fitted = FIELD.fit(task)
+    fitted = FIT.fit(task)
     assert fitted.seconds > 1000
     for name, x in whole.parameters.items():
         assert torch.equal(fitted.field.parameters[name], x), name

@@ -1,17 +1,17 @@
 import pytest
 import torch
 
-from texgs.config.phase import Densify, Losses, Rates
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
 from texgs.fields.harmonics import split, zeroth
-from texgs.fields.rates import extent
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
 from texgs.fit import checkpoint
 from texgs.fit.loop import CHECKED_EVERY
+from texgs.fit.rates import extent
 from texgs.fit.seeds import seed_surfels
+from texgs.fit.settings import Densify, Losses, Rates
 from texgs.metrics.quality import evaluate, mean
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import load

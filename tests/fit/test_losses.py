@@ -5,11 +5,11 @@ import torch
 from torch.testing import assert_close
 
 from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
-from texgs.config.phase import Losses
 from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.losses import view_loss
+from texgs.fit.settings import Losses
 from texgs.raster.reference.losses import bilateral_smoothness, ssim
 
 OPTICS = ShadingModel()

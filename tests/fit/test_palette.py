@@ -6,17 +6,17 @@ import pytest
 import torch
 
 from tests.fit.scenes import ball_images, ball_planes, cameras, images_of
-from texgs.config.palette_fit import HashKeys, PaletteKeys
-from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.palette.networks import base_color, density, palette_color
 from texgs.fields.palette.rendering import points_on, view_harmonics
 from texgs.fit import checkpoint
+from texgs.fit.checkpoint import run_to_end
+from texgs.fit.kinds.palette import HashKeys, PaletteKeys
+from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
 from texgs.fit.palette import PaletteFit
 from texgs.fit.palette_losses import base_loss
 from texgs.fit.palette_start import object_palette
-from texgs.fit.resumable import run_to_end
 from texgs.metrics.image import psnr
 
 VOXELS = VoxelKeys(

@@ -5,8 +5,11 @@ import weakref
 
 import torch
 
+from texgs.core import curves
 from texgs.fit import checkpoint
-from texgs.fit.resumable import run_to_end
+from texgs.fit.checkpoint import run_to_end
+
+from .scenes import new_fit
 
 
 class Counter:
@@ -16,7 +19,7 @@ class Counter:
 
     def __init__(self):
         self.iteration, self.iterations, self.seconds = 0, 5, 0.0
-        self.rows = torch.zeros(4)
+        self.rows, self.losses = torch.zeros(4), []
         self.read, self.was_kept = None, None
 
     def state(self):
@@ -25,6 +28,9 @@ class Counter:
     def restore(self, state):
         self.read = weakref.ref(state["rows"])
         self.rows, self.iteration = state["rows"].clone(), int(state["iteration"])
+
+    def psnr(self):
+        return None
 
     def run(self):
         while self.iteration < self.iterations:
@@ -44,3 +50,23 @@ def test_a_resumed_fit_goes_on_and_lets_go_of_the_checkpoint(tmp_path):
     assert fit.rows.tolist() == [5] * 4
     assert fit.read is not None
     assert fit.was_kept is False
+
+
+def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):
+    """A resumed fit tells the losses before it as well."""
+    fits = [new_fit(iterations=210) for _ in range(2)]
+    run_to_end(fits[0], tmp_path / "unheard", "test")
+    first = new_fit(iterations=210)
+    for done in first.run():
+        if done.iteration == 150:
+            break
+    checkpoint.save(tmp_path / "heard", first)
+    told = []
+    with curves.heard(lambda values, step: told.append((step, values))):
+        run_to_end(fits[1], tmp_path / "heard", "test")
+    losses = {step: values["loss"] for step, values in told if "loss" in values}
+    assert losses == dict(zip((100, 200, 210), fits[1].losses, strict=True))
+    quality = {step: values["train_view_psnr"] for step, values in told if "train_view_psnr" in values}
+    assert list(quality) == [150, 200, 210]
+    assert 5 < quality[150] <= quality[210] + 1 < 60
+    assert all(torch.equal(x, fits[0].parameters[name]) for name, x in fits[1].parameters.items())

@@ -7,11 +7,11 @@ import torch
 from torch.testing import assert_close
 
 from tests.fit.scenes import HEADLIGHT, ball_seeds, cameras, images_of, new_fit, run, striped
-from texgs.config.phase import Densify
 from texgs.core.errors import FitError
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.shading import material
 from texgs.fields.surfels.texels import owners
+from texgs.fit.settings import Densify
 from texgs.fit.texels import textured, texturize, without_offset
 from texgs.fit.texture_adam import refine, texel_map
 from texgs.fit.texture_layout import sizes_for_budget

@@ -7,9 +7,9 @@ import torch
 from torch.testing import assert_close
 
 from tests.fit.scenes import HEADLIGHT, ball_seeds, cameras, images_of, new_fit, run, striped
-from texgs.config.phase import Densify
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
+from texgs.fit.settings import Densify
 from texgs.fit.texels import textured
 from texgs.fit.texture_layout import look, sizes_for_budget
 from texgs.fit.texture_solve import curvature, sampled_error, solve

@@ -8,13 +8,13 @@ import torch
 from tests.fit.scenes import RADIUS, ball_images, ball_planes, cameras, images_of
 from tests.real_data import real_data
 from texgs.config.compose import compose
-from texgs.config.voxel_fit import Decay, GridStage, VoxelKeys
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
 from texgs.core.typed import typed
 from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
 from texgs.fit import checkpoint
-from texgs.fit.resumable import run_to_end
+from texgs.fit.checkpoint import run_to_end
+from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
 from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
 from texgs.fit.voxels import VoxelFit
 from texgs.metrics.image import psnr

@@ -217,3 +217,29 @@ HARD_CASES: dict[str, Callable[[], Scene]] = {
     "1x200 image": lambda: few(width=1, height=200),
     "far off the image": lambda: few().with_leaves({"means": few().means + 4 * few().viewmat[0, :3]}),
 }
+
+
+SURFEL_OPTIONS = (
+    Options(low_pass=6.0),
+    Options(low_pass=64.0),
+    Options(low_pass=1e30),
+    Options(filter_sigma=1.0),
+    Options(filter_sigma=3.0),
+    Options(near=2.9),
+    Options(transmittance_min=0.3),
+)
+GAUSSIAN_OPTIONS = (
+    Options(dilation=0.1),
+    Options(dilation=3.0),
+    Options(antialiased=True),
+    Options(antialiased=True, dilation=1.0),
+    Options(near=2.9),
+    Options(transmittance_min=0.3),
+)
+OTHER_OPTIONS = (Options(near=0.01, far=1e10), Options(alpha_min=0.05))
+
+
+def described(options):
+    """Return what of the options is no default, as the name of a test."""
+    changed = {name: value for name, value in vars(options).items() if value != vars(DEFAULT_OPTIONS)[name]}
+    return ",".join(f"{name}={value:g}" for name, value in changed.items())

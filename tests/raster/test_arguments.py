@@ -90,9 +90,10 @@ def test_camera_and_background_are_constants(device, name):
         scene.render(rasterize)
 
 
-def test_a_colour_is_needed():
+@pytest.mark.parametrize("render", [rasterize, reference])
+def test_a_colour_is_needed(render):
     with pytest.raises(ArgumentError, match="expected features, a texture or both, got neither"):
-        replace(random_scene(), features=None).render(rasterize)
+        replace(random_scene(), features=None).render(render)
 
 
 @pytest.mark.parametrize("channels", [0, 30])

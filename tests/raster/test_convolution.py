@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.nn import functional as F
 
-from tests.raster.threads import with_threads
+from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.convolution import RectifiedConvolution
 
@@ -90,9 +90,7 @@ def test_the_same_bits_for_any_number_of_threads():
         outputs = convolution(images)
         return outputs.detach(), torch.autograd.grad(outputs.square().sum(), images)[0]
 
-    first = with_threads(1, run)
-    for threads in (2, 3, 7):
-        assert all(map(torch.equal, with_threads(threads, run), first))
+    require_same_bits(run, threads=(2, 3, 7))
 
 
 def test_what_is_no_number_stays_so():

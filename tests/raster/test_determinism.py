@@ -8,9 +8,12 @@ import torch
 from benchmarks.scenes import camera, surfels
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
 from tests.raster.scenes import Scene, gaussians, random_scene, textured, textured_with_features
-from tests.raster.threads import with_threads
+from tests.raster.threads import require_same_bits
+from tests.raster.voxel_scenes import voxel_scene
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
+from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_total_variation
+from texgs.raster.voxels import Samples, render_rays
 
 
 def everything(scene):
@@ -45,12 +48,8 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-@pytest.mark.parametrize("count", [2, 7])
-def test_threads(name, count):
-    scene = SCENES[name]()
-    alone = with_threads(1, everything, scene)
-    for quantity, value in with_threads(count, everything, scene).items():
-        assert torch.equal(value, alone[quantity]), quantity
+def test_threads(name):
+    require_same_bits(everything, SCENES[name]())
 
 
 @pytest.mark.parametrize(
@@ -82,3 +81,36 @@ def test_other_work_in_between_changes_nothing(device):
     gradient = torch.autograd.grad(first.color.sum(), means)[0]
     again = scene.with_leaves({"means": means}).render(rasterize)
     assert torch.equal(gradient, torch.autograd.grad(again.color.sum(), means)[0])
+
+
+def voxels(degree, size=(64, 40, 36), n_rays=20_000):
+    """A rendering, its gradient, the largest weights, total variation and a step of the optimiser."""
+    scene = voxel_scene(size=size, degree=degree, n_rays=n_rays)
+    rows = scene.grid.rows.requires_grad_()
+    rendered = render_rays(scene.grid, scene.rays, scene.march)
+    gradient = torch.autograd.grad(rendered.color.square().sum() + rendered.alpha.sum(), rows)[0]
+    weights = torch.zeros(len(rows))
+    Samples(scene.grid, scene.march, scene.rays).mark(weights)
+    rows.requires_grad_(False)
+    optimizer = VoxelOptimizer(scene.grid, "adam")
+    Samples(scene.grid, scene.march, scene.rays).add_gradient(rendered.color, None, optimizer.gradient)
+    add_total_variation(scene.grid, torch.arange(20), 1.0, 1.0, optimizer.gradient)
+    optimizer.step(VoxelRates(1.0, 0.1, 0.1))
+    scene.grid.refresh_occupancy()
+    return [*rendered, gradient, weights, rows.clone(), scene.grid.occupied, scene.grid.distance]
+
+
+@pytest.mark.parametrize("degree", [0, 2])
+def test_threads_of_voxels(degree):
+    require_same_bits(voxels, degree)
+
+
+def test_runs_of_voxels():
+    assert all(map(torch.equal, voxels(1), voxels(1)))
+
+
+def test_memory_of_voxels_is_given_back():
+    voxels(0)
+    native.release_memory()
+    native.peak_memory(reset=True)
+    assert native.peak_memory() == 0

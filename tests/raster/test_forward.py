@@ -6,7 +6,17 @@ import pytest
 import torch
 
 from tests.raster.agreement import decided, images, names_of, true_images
-from tests.raster.scenes import TEXTURE_SIZES, gaussians, random_scene, textured, textured_with_features
+from tests.raster.scenes import (
+    GAUSSIAN_OPTIONS,
+    OTHER_OPTIONS,
+    SURFEL_OPTIONS,
+    TEXTURE_SIZES,
+    described,
+    gaussians,
+    random_scene,
+    textured,
+    textured_with_features,
+)
 from texgs.raster.api import rasterize
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
@@ -15,12 +25,6 @@ from texgs.raster.types import DEFAULT_OPTIONS, Options
 TOLERANCE = {"color": 3e-5, "alpha": 3e-5, "depth": 3e-5, "median": 3e-5, "normal": 5e-5, "distortion": 1e-7}
 TEXEL = 2e-6  # more for each texel that the textures span, as their random colours change from texel to texel
 UNDECIDED = 0.15  # largest share of pixels that may sit on a threshold (or, textured, on a texel centre)
-
-
-def described(options):
-    """What of the options is no default, as the name of a test."""
-    changed = {name: value for name, value in vars(options).items() if value != vars(DEFAULT_OPTIONS)[name]}
-    return ",".join(f"{name}={value:g}" for name, value in changed.items())
 
 
 def check(scene, device, options=DEFAULT_OPTIONS):
@@ -47,39 +51,12 @@ def test_random_scenes(device, drawn, seed, n, width, height):
     check(drawn(random_scene(seed, n, width, height)), device)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        Options(low_pass=6.0),
-        Options(low_pass=64.0),
-        Options(low_pass=1e30),
-        Options(filter_sigma=1.0),
-        Options(filter_sigma=3.0),
-        Options(near=2.9),
-        Options(near=0.01, far=1e10),
-        Options(alpha_min=0.05),
-        Options(transmittance_min=0.3),
-    ],
-    ids=described,
-)
+@pytest.mark.parametrize("options", [*SURFEL_OPTIONS, *OTHER_OPTIONS], ids=described)
 def test_options(device, options):
     check(random_scene(4), device, options)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        Options(dilation=0.1),
-        Options(dilation=3.0),
-        Options(antialiased=True),
-        Options(antialiased=True, dilation=1.0),
-        Options(near=2.9),
-        Options(near=0.01, far=1e10),
-        Options(alpha_min=0.05),
-        Options(transmittance_min=0.3),
-    ],
-    ids=described,
-)
+@pytest.mark.parametrize("options", [*GAUSSIAN_OPTIONS, *OTHER_OPTIONS], ids=described)
 def test_options_of_gaussians(device, options):
     check(gaussians(random_scene(4)), device, options)
 

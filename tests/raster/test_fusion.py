@@ -1,7 +1,12 @@
+"""Lattices of signed distances, fused from views of depth, against brute force."""
+
+from operator import attrgetter
+
 import numpy as np
 import pytest
 import torch
 
+from tests.raster.threads import require_same_bits
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
@@ -61,16 +66,8 @@ def test_means_over_views():
 
 
 def test_threads_change_nothing():
-    several, before = list(views(3)), torch.get_num_threads()
-    try:
-        torch.set_num_threads(1)
-        one = fused(several, CHOSEN)
-        torch.set_num_threads(3)
-        three = fused(several, CHOSEN)
-    finally:
-        torch.set_num_threads(before)
-    for name in ("distance", "views", "color"):
-        assert torch.equal(getattr(one, name), getattr(three, name))
+    several = list(views(3))
+    require_same_bits(lambda: attrgetter("distance", "views", "color")(fused(several, CHOSEN)), threads=(3,))
 
 
 def test_what_does_not_fit_is_refused():

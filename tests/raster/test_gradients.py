@@ -14,10 +14,17 @@ from tests.raster.agreement import (
     relative,
     true_gradients,
 )
-from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
-from tests.raster.test_forward import described
+from tests.raster.scenes import (
+    GAUSSIAN_OPTIONS,
+    SURFEL_OPTIONS,
+    described,
+    gaussians,
+    random_scene,
+    textured,
+    textured_with_features,
+)
 from texgs.raster.api import rasterize
-from texgs.raster.types import DEFAULT_OPTIONS, Options
+from texgs.raster.types import DEFAULT_OPTIONS
 
 # Relative L2 per tensor. Colours enter linearly and only carry the rounding of the weights. Geometry is a sum
 # of terms that cancel, led by few tilted surfels whose intersections lose digits; the definition itself, in
@@ -81,35 +88,12 @@ def test_channels_beside_no_depth(device, drawn, channels):
     check(drawn(random_scene(5, channels=channels)), device)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        Options(low_pass=6.0),
-        Options(low_pass=64.0),
-        Options(low_pass=1e30),
-        Options(filter_sigma=1.0),
-        Options(filter_sigma=3.0),
-        Options(near=2.9),
-        Options(transmittance_min=0.3),
-    ],
-    ids=described,
-)
+@pytest.mark.parametrize("options", SURFEL_OPTIONS, ids=described)
 def test_options(device, options):
     check(random_scene(6), device, ("color", "depth", "normal"), options)
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        Options(dilation=0.1),
-        Options(dilation=3.0),
-        Options(antialiased=True),
-        Options(antialiased=True, dilation=1.0),
-        Options(near=2.9),
-        Options(transmittance_min=0.3),
-    ],
-    ids=described,
-)
+@pytest.mark.parametrize("options", GAUSSIAN_OPTIONS, ids=described)
 def test_options_of_gaussians(device, options):
     check(gaussians(random_scene(6)), device, ("color", "depth"), options)
 

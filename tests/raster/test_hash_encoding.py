@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tests.raster.threads import with_threads
+from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.hash_encoding import HashLevels, encode
 from texgs.raster.reference import hash_encoding as definition
@@ -80,9 +80,7 @@ def test_threads():
         features = encode(points, table.requires_grad_(), SMALL)
         return features.detach(), torch.autograd.grad(features.square().sum(), table)[0]
 
-    alone = with_threads(1, everything)
-    for count in (2, 7):
-        assert all(map(torch.equal, with_threads(count, everything), alone))
+    require_same_bits(everything)
 
 
 def test_levels_of_the_published_configuration():

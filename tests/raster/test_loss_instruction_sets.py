@@ -22,6 +22,7 @@ NAMES = (
 FILES = [str(Path(__file__).with_name(f"test_{name}.py")) for name in NAMES]
 
 
+@pytest.mark.subprocess
 @pytest.mark.parametrize("instruction_set", ["portable", "avx2", "avx512"])
 def test_losses_on(instruction_set):
     if instruction_set == native.instruction_set():

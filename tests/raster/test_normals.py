@@ -4,7 +4,7 @@ import pytest
 import torch
 from torch.nn.functional import normalize
 
-from tests.raster.threads import with_threads
+from tests.raster.threads import require_same_bits
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster.normals import depth_to_normal, normal_consistency
@@ -118,9 +118,7 @@ def test_any_number_of_threads_gives_the_same_bits():
         _, (by_depth,) = gradients(lambda z: (normal * depth_to_normal(z, viewmat, K)).sum(), depth)
         return [value, *derivatives, by_depth]
 
-    expected = with_threads(1, everything)
-    for n in (2, 7):
-        assert all(torch.equal(a, b) for a, b in zip(with_threads(n, everything), expected, strict=True))
+    require_same_bits(everything)
 
 
 def test_errors_name_the_argument():

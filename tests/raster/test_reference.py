@@ -8,7 +8,6 @@ import torch
 
 from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
 from tests.raster.scenes import random_scene, textured_with_features
-from texgs.core.errors import ArgumentError
 from texgs.core.rotation import quats_to_matrices
 from texgs.raster.reference.render import rasterize
 from texgs.raster.reference.surfels import project
@@ -97,14 +96,6 @@ def test_filter_sits_in_the_middle_of_the_projected_box(sigma):
     torch.testing.assert_close(centre, middle, atol=1e-6, rtol=0)
 
 
-def test_alpha_is_capped_and_the_cap_blocks_the_gradient():
-    surfel = view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[1.0])
-    surfel["opacities"].requires_grad_()
-    alpha = rasterize(**surfel, features=torch.ones(1, 1).double()).alpha[12, 15]
-    assert alpha == 0.99
-    assert torch.autograd.grad(alpha, surfel["opacities"])[0] == 0
-
-
 def test_known_texels():
     # 6 sigma = 24 px wide and high: texels of 4 x 6 px, whose centres fall on pixel centres
     texels = torch.rand(5 + 6 * 4, 3).double()
@@ -132,20 +123,6 @@ def bilinear(texel, x, y):
     return (1 - y) * top + y * ((1 - x) * texel[1, 0] + x * texel[1, 1])
 
 
-def test_shift_moves_the_projection():
-    surfels = view(means=[[0.1, 0, 2]], scales=[[0.3, 0.1]], opacities=[0.8], quats=[[0.8, 0.3, 0.5, 0.1]])
-    shifted = rasterize(
-        **surfels,
-        features=torch.ones(1, 1).double(),
-        shift=torch.tensor([[1.5, -0.75]]).double(),
-        outputs=OUTPUTS,
-    )
-    surfels["K"][:2, 2] += torch.tensor([1.5, -0.75])
-    moved = rasterize(**surfels, features=torch.ones(1, 1).double(), outputs=OUTPUTS)
-    for name in ("color", "alpha", "depth", "median", "normal", "distortion"):
-        torch.testing.assert_close(getattr(shifted, name), getattr(moved, name))
-
-
 def test_edge_on_surfel_is_drawn_by_the_low_pass_filter_alone():
     x, y = offsets()
     half_turn = math.sqrt(0.5)
@@ -163,11 +140,6 @@ def test_edge_on_surfel_is_drawn_by_the_low_pass_filter_alone():
         total, [surfel[n] for n in ("means", "quats", "scales", "opacities")]
     ):
         assert gradient.isfinite().all()
-
-
-def test_a_colour_is_needed():
-    with pytest.raises(ArgumentError, match="expected features, a texture or both, got neither"):
-        rasterize(**view(means=[[0, 0, 2]], scales=[[0.2, 0.2]], opacities=[0.8]))
 
 
 def test_features_beside_a_texture_follow_it():

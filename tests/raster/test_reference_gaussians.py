@@ -111,34 +111,3 @@ def test_antialiased_gaussians_keep_their_amount_of_light():
         assert amount.item() == pytest.approx(0.6 * (FOCAL / 2) ** 2 * 0.02 * 0.04, rel=1e-3)
     point = projected(Options(antialiased=True), **gaussian | {"scales": [[1e-9, 1e-9, 1e-9]]})
     assert point.opacity.item() == pytest.approx(0.6 * 0.005)  # the least factor, as in 3DGS
-
-
-def test_alpha_is_capped_and_the_cap_blocks_the_gradient():
-    gaussian = view(means=[[0, 0, 2]], scales=[[0.2, 0.2, 0.2]], opacities=[1.0])
-    gaussian["opacities"].requires_grad_()
-    alpha = rasterize(**gaussian, features=torch.ones(1, 1).double()).alpha[12, 15]
-    assert alpha == 0.99
-    assert torch.autograd.grad(alpha, gaussian["opacities"])[0] == 0
-
-
-def test_shift_moves_the_projection():
-    gaussians = view(
-        means=[[0.1, 0, 2]], scales=[[0.3, 0.1, 0.2]], opacities=[0.8], quats=[[0.8, 0.3, 0.5, 0.1]]
-    )
-    ones, pixels = torch.ones(1, 1).double(), torch.tensor([1.5, -0.75]).double()
-    shifted = rasterize(**gaussians, features=ones, shift=pixels[None], outputs=OUTPUTS)
-    gaussians["K"][:2, 2] += pixels
-    moved = rasterize(**gaussians, features=ones, outputs=OUTPUTS)
-    for name in ("color", "alpha", "depth", "median", "distortion"):
-        torch.testing.assert_close(getattr(shifted, name), getattr(moved, name))
-
-
-def test_gaussians_too_near_or_too_weak_are_skipped():
-    gaussians = view(
-        means=[[0, 0, 0.2], [0, 0, -2], [0, 0, 2], [0, 0, 2]],
-        scales=[[0.2, 0.2, 0.2]] * 4,
-        opacities=[0.9, 0.9, 0.0, 0.003],
-    )
-    image = rasterize(**gaussians, features=torch.ones(4, 1).double(), outputs=OUTPUTS)
-    assert image.alpha.count_nonzero() == 0
-    assert image.statistics.radii.count_nonzero() == 0

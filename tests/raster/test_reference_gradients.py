@@ -54,7 +54,7 @@ def test_gradients_of_every_output_of_gaussians(output, antialiased):
     torch.autograd.gradcheck(render, tuple(tensors.values()), fast_mode=True)
 
 
-@pytest.mark.parametrize("filter_sigma", [0.0, 1.0])
+@pytest.mark.parametrize("filter_sigma", [0.0, 1.0, 3.0])
 @pytest.mark.parametrize("output", ["color", "alpha", "depth", "normal", "distortion"])
 def test_gradients_of_every_output(output, filter_sigma):
     tensors = inputs()

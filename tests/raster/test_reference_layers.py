@@ -1,12 +1,17 @@
-"""The definition against closed forms: several surfels, and none."""
+"""The definition against closed forms: several primitives, and none; and what surfels and Gaussians share."""
 
+import pytest
 import torch
 
+from tests.raster.agreement import images
 from tests.raster.closed_form import HEIGHT, WIDTH, view
 from texgs.raster.reference.render import rasterize, splat
 from texgs.raster.types import OUTPUTS, Options
 
 SMOOTH = Options(alpha_min=0.0, transmittance_min=0.0)
+OF_GAUSSIANS = tuple(name for name in OUTPUTS if name != "normal")
+SCALES = {OUTPUTS: [0.3, 0.1], OF_GAUSSIANS: [0.3, 0.1, 0.2]}
+BOTH = pytest.mark.parametrize("outputs", SCALES, ids=["surfels", "gaussians"])
 
 
 def test_two_layers():
@@ -41,15 +46,35 @@ def test_pixel_ends_before_the_fragment_that_takes_the_last_light():
     torch.testing.assert_close(unended.alpha[12, 15].item(), 1 - 0.05**6)
 
 
-def test_surfels_too_near_or_too_weak_are_skipped():
-    surfels = view(
-        means=[[0, 0, 0.2], [0, 0, -2], [0, 0, 2], [0, 0, 2]],
-        scales=[[0.2, 0.2]] * 4,
-        opacities=[0.9, 0.9, 0.0, 0.003],
-    )
-    image = rasterize(**surfels, features=torch.ones(4, 1).double(), outputs=OUTPUTS)
+@BOTH
+def test_what_is_too_near_or_too_weak_is_skipped(outputs):
+    means, opacities = [[0, 0, 0.2], [0, 0, -2], [0, 0, 2], [0, 0, 2]], [0.9, 0.9, 0.0, 0.003]
+    primitives = view(means=means, scales=[SCALES[outputs]] * 4, opacities=opacities)
+    image = rasterize(**primitives, features=torch.ones(4, 1).double(), outputs=outputs)
     assert image.alpha.count_nonzero() == 0
     assert image.statistics.radii.count_nonzero() == 0
+
+
+@BOTH
+def test_alpha_is_capped_and_the_cap_blocks_the_gradient(outputs):
+    primitive = view(means=[[0, 0, 2]], scales=[SCALES[outputs]], opacities=[1.0])
+    primitive["opacities"].requires_grad_()
+    alpha = rasterize(**primitive, features=torch.ones(1, 1).double()).alpha[12, 15]
+    assert alpha == 0.99
+    assert torch.autograd.grad(alpha, primitive["opacities"])[0] == 0
+
+
+@BOTH
+def test_shift_moves_the_projection(outputs):
+    quats = [[0.8, 0.3, 0.5, 0.1]]
+    primitive = view(means=[[0.1, 0, 2]], scales=[SCALES[outputs]], opacities=[0.8], quats=quats)
+    ones, pixels = torch.ones(1, 1).double(), torch.tensor([1.5, -0.75]).double()
+    shifted = images(rasterize(**primitive, features=ones, shift=pixels[None], outputs=outputs))
+    primitive["K"][:2, 2] += pixels
+    moved = images(rasterize(**primitive, features=ones, outputs=outputs))
+    assert len(moved) == len(outputs) + 1
+    for name, image in moved.items():
+        torch.testing.assert_close(shifted[name], image)
 
 
 def test_coincident_depths_keep_the_order_of_the_inputs():

@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch.nn.functional import normalize
 
-from tests.raster.threads import with_threads
+from tests.raster.threads import require_same_bits
 from tests.volume.march import shade
 from texgs.core.camera import orbit_direction
 from texgs.core.errors import ArgumentError, ShapeError
@@ -232,9 +232,7 @@ def test_any_number_of_threads_gives_the_same_bits(light, facing):
         colors, by_sh = gradients(spherical_harmonics, sh, CAMERA)
         return [*values, *derivatives, *colors, *by_sh]
 
-    expected = with_threads(1, everything)
-    for n in (2, 7):
-        assert all(torch.equal(a, b) for a, b in zip(with_threads(n, everything), expected, strict=True))
+    require_same_bits(everything)
 
 
 def test_a_shininess_that_is_not_finite_is_seen(device):

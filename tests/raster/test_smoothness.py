@@ -5,7 +5,8 @@ import math
 import pytest
 import torch
 
-from tests.raster.threads import with_threads
+from tests.raster.agreement import evaluate
+from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster.reference import losses as definition
 from texgs.raster.smoothness import bilateral_smoothness
@@ -18,14 +19,6 @@ def maps(height, width, channels, device="cpu"):
     generator = torch.Generator().manual_seed(height * width)
     planes = torch.rand(channels + 4, height, width, generator=generator).to(device)
     return planes[:channels].permute(1, 2, 0), 0.3 * planes[channels:-1].permute(1, 2, 0), planes[-1]
-
-
-def evaluate(loss, attribute, *constants):
-    """Value and gradient of a loss."""
-    attribute = attribute.detach().requires_grad_()
-    value = loss(attribute, *constants)
-    (gradient,) = torch.autograd.grad(value, attribute)
-    return value.detach(), gradient
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -81,12 +74,7 @@ def test_a_guide_that_is_not_finite_is_seen(device):
 
 
 def test_any_number_of_threads_gives_the_same_bits():
-    inputs = maps(359, 641, 2)
-    value, gradient = with_threads(1, evaluate, bilateral_smoothness, *inputs)
-    for n in (2, 7):
-        other_value, other_gradient = with_threads(n, evaluate, bilateral_smoothness, *inputs)
-        assert value == other_value
-        assert torch.equal(gradient, other_gradient)
+    require_same_bits(evaluate, bilateral_smoothness, *maps(359, 641, 2))
 
 
 def test_errors_name_the_argument():

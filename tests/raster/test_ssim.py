@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 import torch
 
-from tests.raster.threads import with_threads
+from tests.raster.agreement import evaluate
+from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.reference import losses as definition
 from texgs.raster.ssim import l1_dssim, ssim
@@ -26,14 +27,6 @@ def pair(height, width, channels, device="cpu", noise=0.1):
 def distance(gradient, expected):
     """Of two gradients, relative to the length of the second."""
     return ((gradient - expected).norm() / expected.norm()).item()
-
-
-def evaluate(loss, image, target):
-    """Value and gradient of a loss."""
-    image = image.detach().requires_grad_()
-    value = loss(image, target)
-    (gradient,) = torch.autograd.grad(value, image)
-    return value.detach(), gradient
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -163,12 +156,7 @@ def test_nan_is_not_skipped(device):
 
 
 def test_any_number_of_threads_gives_the_same_bits():
-    image, target = pair(359, 641, 3)
-    value, gradient = with_threads(1, evaluate, l1_dssim, image, target)
-    for n in (2, 7):
-        other_value, other_gradient = with_threads(n, evaluate, l1_dssim, image, target)
-        assert value == other_value
-        assert torch.equal(gradient, other_gradient)
+    require_same_bits(evaluate, l1_dssim, *pair(359, 641, 3))
 
 
 @pytest.mark.parametrize(

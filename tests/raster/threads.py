@@ -1,13 +1,28 @@
 """Running a function on a number of threads."""
 
+from collections.abc import Mapping
+
 import torch
 
 
 def with_threads(n, function, *arguments):
-    """What function(*arguments) returns while torch, and the library with it, uses n threads."""
+    """Return what function(*arguments) does while torch, and the library with it, uses n threads."""
     before = torch.get_num_threads()
     torch.set_num_threads(n)
     try:
         return function(*arguments)
     finally:
         torch.set_num_threads(before)
+
+
+def require_same_bits(function, *arguments, threads=(2, 7)):
+    """Require that a function gives the same tensors, in a list or by name, for any number of threads."""
+    alone = by_name(with_threads(1, function, *arguments))
+    for n in threads:
+        for name, value in by_name(with_threads(n, function, *arguments)).items():
+            assert torch.equal(value, alone[name]), f"{name} with {n} threads"
+
+
+def by_name(tensors):
+    """Return tensors by their names, or by their numbers."""
+    return tensors if isinstance(tensors, Mapping) else dict(enumerate(tensors))

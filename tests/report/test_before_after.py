@@ -7,8 +7,8 @@ import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
-from texgs.config.fields import kinds
 from texgs.core.lens import Lens
+from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model_file import write_model
 from texgs.report import before_after
 from texgs.report.before_after import write_before_and_after

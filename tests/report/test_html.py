@@ -92,7 +92,7 @@ def paths(tmp_path):
             recipe=None,
         ),
         job(folder, "sheet", SheetResult(9, 2, 8, 4), ["sheet.png"], tf="TF01", recipe=None),
-        job(folder, "star_plot", SheetResult(9, 2, 8, 4), ["new.png"], recipe=None),
+        job(folder, "star_plot", timing, ["new.png"], recipe=None),
     ]
 
 

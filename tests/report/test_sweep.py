@@ -4,9 +4,9 @@ import pytest
 
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
+from texgs.core.image_grid import DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.metrics_files import read
-from texgs.report.strip import DPI
 from texgs.report.sweep_figure import ACROSS, PICTURE, WIDTH, sweep_figure
 from texgs.report.sweep_table import sweep
 from texgs.report.table import SOURCES, Table

@@ -15,7 +15,7 @@ from texgs.report.tables import specs, tables_of
 from texgs.study.ballots import Ballot, Votes, votes_beside
 from texgs.study.questions import write_key
 from texgs.study.votes import study_table
-from texgs.workflow.places import PLACES
+from texgs.workflow.stage_table import STAGES
 
 TABLES = specs()
 
@@ -30,7 +30,7 @@ def test_tables_are_in_the_papers_order_and_then_ours():
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
 def test_a_table_names_places_and_a_section_that_there_are(table):
-    assert set(table.places) <= set(PLACES)
+    assert set(table.places) <= {stage.place for stage in STAGES.values()}
     assert table.section in SECTIONS
 
 

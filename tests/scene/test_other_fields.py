@@ -59,7 +59,7 @@ def test_what_only_surfels_can(grid, change, message):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["render", "--mode", "unshaded", "--output", "a.png"], "look: expected shaded of voxels"),
+        (["render", "--mode", "unshaded", "--output", "a.png"], "look: expected shaded"),
         (["export", "--to", "a.ply"], "got voxels, which can be exported as mesh"),
         (["edit", "TF01.palette=#ff0000", "--output", "b.yaml"], "palette: expected a model that can change"),
         (

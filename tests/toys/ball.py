@@ -5,8 +5,9 @@ import time
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from texgs.config.fields import Kind
 from texgs.core.keys import key
+from texgs.fields.kinds import Functions, Kind
+from texgs.fit.kinds import FitSpec
 
 
 @dataclass
@@ -85,7 +86,7 @@ def write(path, ball):
 
 def fit(task):
     """The mean colour of what is opaque."""
-    from texgs.fit.task import Fitted
+    from texgs.fit.kinds import Fitted
 
     start = time.monotonic()
     planes = task.images.planes.float() / 255
@@ -96,13 +97,8 @@ def fit(task):
 
 FIELD = Kind(
     "ball",
-    "fit a ball",
     ("texgs-ball",),
     frozenset({"opacity"}),
-    read,
-    write,
-    lambda fields, segments: fields[0],
-    phases=("ball",),
-    settings=BallKeys,
-    fit=fit,
+    lambda: Functions(read, write, lambda fields, segments: fields[0]),
 )
+FIT = FitSpec(FIELD, "fit a ball", phases=("ball",), settings=BallKeys, fit=fit)

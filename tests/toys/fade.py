@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from texgs.config.methods import Method
 from texgs.core.keys import key
+from texgs.edit.method import Method
 
 
 @dataclass

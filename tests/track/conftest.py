@@ -1,16 +1,27 @@
+import logging
+import os
 import shutil
 
 import pytest
 from mlflow import MlflowClient
 
-from texgs.workflow.tracking.sqlite import prepare
+from texgs.workflow.tracking.store import SETTINGS, connect
+
+
+@pytest.fixture(scope="session", autouse=True)
+def patience_of_users():
+    """Put back what the first use of MLflow sets for the whole process, for other tests."""
+    before = dict(os.environ)
+    yield
+    for name in SETTINGS.keys() - before.keys():
+        os.environ.pop(name, None)
 
 
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory):
     """A store without runs; making one takes seconds, so that tests copy it."""
     database = tmp_path_factory.mktemp("store") / "mlflow.db"
-    prepare(database)
+    connect(f"sqlite:///{database}", "elsewhere")
     return database
 
 
@@ -29,3 +40,10 @@ def uri(database):
 def client(uri):
     """Reads the store with MLflow's own client."""
     return MlflowClient(tracking_uri=uri)
+
+
+@pytest.fixture
+def warnings(caplog):
+    """Lines of the logger of texgs."""
+    caplog.set_level(logging.WARNING, logger="texgs")
+    return lambda: [entry.getMessage() for entry in caplog.records if entry.name == "texgs"]

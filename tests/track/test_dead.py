@@ -12,7 +12,7 @@ import psutil
 import pytest
 
 from texgs.core.io import write_json
-from texgs.workflow.tracking import close_dead_runs, process_tags, run
+from texgs.workflow.tracking import begin, process_tags
 from texgs.workflow.tracking.dead import HOST, PROCESS, is_alive
 
 ROOT = Path(__file__).parents[2]
@@ -28,10 +28,10 @@ with run(sys.argv[1], experiment="texgs", name="job", tags=tags, params={}) as r
 """
 
 
-def statuses(client):
-    """Status of each run by its number."""
-    experiments = [each.experiment_id for each in client.search_experiments()]
-    return {each.info.run_id: each.info.status for each in client.search_runs(experiments)}
+def status_after_the_next(uri, client, killed):
+    """Status of a run when another one has begun."""
+    begin(uri, experiment="texgs", name="next", tags={}, params={})
+    return client.get_run(killed).info.status
 
 
 @pytest.fixture(scope="module")
@@ -60,34 +60,33 @@ def killed(killed_once):
     metrics.unlink(missing_ok=True)
 
 
-def test_the_next_run_closes_those_of_killed_processes(uri, client, killed, tmp_path):
-    assert statuses(client) == {killed[0]: "RUNNING"}
-    tags = process_tags(tmp_path / "metrics.json")
-    with run(uri, experiment="texgs", name="next", tags=tags, params={}) as following:
-        assert statuses(client) == {killed[0]: "KILLED", following.id: "RUNNING"}
-        close_dead_runs(uri, "texgs")
-        assert statuses(client)[following.id] == "RUNNING", "this process lives"
-    assert statuses(client) == {killed[0]: "KILLED", following.id: "FINISHED"}
+def test_the_next_run_closes_those_of_killed_processes(uri, client, killed):
+    assert client.get_run(killed[0]).info.status == "RUNNING"
+    following = begin(uri, experiment="texgs", name="next", tags={}, params={})
+    assert client.get_run(killed[0]).info.status == "KILLED"
+    assert status_after_the_next(uri, client, following.id) == "RUNNING", "this process lives"
 
 
-def test_a_run_whose_metrics_are_in_place_is_finished(uri, client, killed):
+@pytest.mark.parametrize(("named", "expected"), [(None, "FINISHED"), ("another", "KILLED")])
+def test_a_run_whose_metrics_are_in_place_is_finished(uri, client, killed, named, expected):
     recorded, metrics = killed
-    write_json(metrics, {"run": recorded})
-    close_dead_runs(uri, "texgs")
-    assert statuses(client) == {recorded: "FINISHED"}
-
-
-def test_metrics_of_another_run_do_not_count(uri, client, killed):
-    recorded, metrics = killed
-    write_json(metrics, {"run": "another"})
-    close_dead_runs(uri, "texgs")
-    assert statuses(client) == {recorded: "KILLED"}
+    write_json(metrics, {"run": named or recorded})
+    assert status_after_the_next(uri, client, recorded) == expected
 
 
 def test_runs_of_other_machines_are_left_alone(uri, client, killed):
     client.set_tag(killed[0], HOST, "another-node")
-    close_dead_runs(uri, "texgs")
-    assert statuses(client) == {killed[0]: "RUNNING"}
+    assert status_after_the_next(uri, client, killed[0]) == "RUNNING"
+
+
+def test_one_with_a_key_is_closed_and_gone_on_with(uri, client):
+    job = {"experiment": "texgs", "name": "job", "tags": {}, "params": {}, "key": "k"}
+    first = begin(uri, **job)
+    client.set_tag(first.id, PROCESS, "of a process that is gone")
+    assert status_after_the_next(uri, client, first.id) == "KILLED"
+    again = begin(uri, **job)
+    assert again.id == first.id
+    assert status_after_the_next(uri, client, first.id) == "RUNNING"
 
 
 def test_another_process_with_the_same_number_is_another(tmp_path):

@@ -121,7 +121,7 @@ def test_a_look_that_fails_leaves_folders_that_were_there(scene_file, tmp_path):
     (tmp_path / "here").mkdir()
     jobs, styles = Jobs(), Styles()
     looks = Looks(jobs, styles)
-    edit = looks.edit_of(Look(parts=("TF01",), style="dots", instruction="", is_preview=False))
+    edit = looks.edit_of(Look(parts=("TF01",), style="dots", instruction="", preview=False))
     stop = threading.Event()
     stop.set()
     watch = Watch(lambda *_: None, stop)
@@ -174,7 +174,7 @@ def test_a_picture_of_the_user_is_taken_in(scene_file, tmp_path):
         ({"style": "/etc/passwd"}, "style: expected one of strokes"),
         ({"instruction": "make it a cathedral"}, "instruction: expected one of"),
         ({"style": "dots", "parts": ["TF09"]}, "expected a model of the scene (TF01, TF02), got TF09"),
-        ({"style": "dots", "parts": "TF01"}, "parts: expected a list"),
+        ({"style": "dots", "parts": "TF01"}, "parts: expected a valid array"),
     ],
 )
 def test_what_cannot_be_is_told_before_a_job_begins(scene_file, values, message):

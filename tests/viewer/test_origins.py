@@ -65,7 +65,7 @@ def only(scene, name):
 
 
 def view(mode, azimuth=80.0, polar=10.0, width=SIZE):
-    return View(0, Orbit((0.0, 0.0, 0.0), azimuth, polar, 5.0, 40.0, width, SIZE), mode, False, False)
+    return View(Orbit((0.0, 0.0, 0.0), azimuth, polar, 5.0, 40.0, width, SIZE), mode=mode)
 
 
 def origins(scene):

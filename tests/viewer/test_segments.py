@@ -164,7 +164,7 @@ def test_a_segment_replaces_no_file(balls):
         ("other/red", [(RED, True)], "expected a model of the scene (balls), got other"),
         ("balls/red", [(BESIDE, True)], "expected a place on the model, got background"),
         ("balls/red", [(RED, False)], "points: expected a positive one at least, got none"),
-        ("balls/red", [], "points: expected 1 to 100 of them, got []"),
+        ("balls/red", [], "points: Tuple should have at least 1 item"),
     ],
 )
 def test_clicks_that_select_nothing_are_told(balls, part, points, message):

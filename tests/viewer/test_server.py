@@ -192,7 +192,7 @@ def test_frames_are_those_of_the_renderer(scene_file, tmp_path):
 
 def test_a_still_without_a_view_says_so(scene_file):
     async def work(browser, client):
-        for query, message in (("", "expected JSON"), ("[]", "view: expected a table"), ("{}", "camera")):
+        for query, message in (("", "JSON"), ("[]", "expected keys with values"), ("{}", "camera")):
             async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
                 assert answer.status == 400
                 assert message in await answer.text()

@@ -8,6 +8,8 @@ import pytest
 
 from tests.workflow.project import Project
 
+pytestmark = pytest.mark.workflow
+
 
 def half_written(folder):
     """Scratch files of `write_atomic`: the target's name between a dot and eight random characters."""

@@ -6,8 +6,8 @@ from omegaconf import OmegaConf
 from tests.report.written import rows
 from texgs.config.compose import compose
 from texgs.config.describe import keys
-from texgs.config.methods import methods
 from texgs.core.errors import ConfigError
+from texgs.edit.method import methods
 from texgs.workflow.differences import ALL, compared, differences, published, text
 
 

@@ -10,6 +10,8 @@ import pytest
 
 from tests.workflow.project import Project
 
+pytestmark = pytest.mark.workflow
+
 VOLUME = "results/turbulence/volume/metrics.json"
 
 

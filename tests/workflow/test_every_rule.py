@@ -9,6 +9,8 @@ import pytest
 
 from tests.workflow.project import Project
 
+pytestmark = pytest.mark.workflow
+
 # A method and a field that are one file each, as a user would add them.
 TOYS = Path(__file__).parents[1] / "toys"
 BALL = "defaults: [default]\nname: ball\nfield: ball\nball: {radius: 0.45}\n"
@@ -81,7 +83,7 @@ def made_again(before, after):
 @pytest.fixture(scope="module")
 def project(tmp_path_factory):
     project = Project(tmp_path_factory.mktemp("every"))
-    for folder, toy in (("methods", "fade"), ("kinds", "ball")):
+    for folder, toy in (("methods", "fade"), ("fields/kinds", "ball")):
         shutil.copy(TOYS / f"{toy}.py", project.sources / "texgs" / folder)
     for name, text in EDITS.items():
         (project.sources / "conf" / "edit" / f"{name}.yaml").write_text(text)
@@ -209,7 +211,7 @@ def test_what_is_damaged_is_made_again_and_nothing_else(project):
 def test_a_failed_edit_keeps_the_earlier_one(project, sources):
     folder = project.work / "results" / "sphere" / "scene" / "demo" / "edits" / "red"
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    sources("texgs/methods/text.py", "task.settings.opened(", "task.settings.no_guidance(")
+    sources("texgs/edit/methods/text.py", "task.settings.opened(", "task.settings.no_guidance(")
     failed = project.snakemake(**OPTIONS)
     assert failed.returncode != 0
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before

@@ -5,7 +5,11 @@ import os
 import signal
 import time
 
+import pytest
+
 from tests.workflow.project import Project
+
+pytestmark = pytest.mark.workflow
 
 LONG = "~dataset.basic_tfs.TF02 views.train.frequency=2 views.width=800 views.height=800 views.step=0.03"
 

@@ -3,7 +3,11 @@
 import itertools
 import json
 
+import pytest
+
 from tests.workflow.project import Project
+
+pytestmark = pytest.mark.workflow
 
 JOB = (
     "--mode",

@@ -13,7 +13,7 @@ RULES = {
     for name in re.findall(r"^rule (\w+):", path.read_text(), flags=re.MULTILINE)
 }
 PROFILES = sorted((ROOT / "workflow" / "profiles").glob("*/profile.yaml"))
-PAGE = (ROOT / "docs" / "cluster.md").read_text()
+PAGE = (ROOT / "docs" / "workflow.md").read_text()
 BY_RULE = ("set-threads", "set-resources", "groups")
 
 

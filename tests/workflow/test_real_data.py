@@ -8,6 +8,8 @@ from tests.real_data import FOLDER, real_data
 from tests.workflow.project import Project
 from texgs.volume.view_set import read_views
 
+pytestmark = pytest.mark.workflow
+
 FILES = {"engine": "engine.vti", "hydrogen": "hydrogen.vti", "frog": "frog.mhd"}
 SMALL = "views.width=48 views.height=48 views.train.frequency=1 views.test.count=2 views.turntable=2"
 

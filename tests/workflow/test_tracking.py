@@ -3,9 +3,12 @@
 import hashlib
 import json
 
+import pytest
 from mlflow import MlflowClient
 
 from tests.workflow.project import Project
+
+pytestmark = pytest.mark.workflow
 
 
 def test_every_job_has_a_finished_run(tmp_path):

@@ -10,36 +10,16 @@ import sys
 from collections.abc import Sequence
 
 from texgs import __version__
-from texgs.config.fields import kinds
-from texgs.config.methods import methods
 from texgs.core.errors import TexgsError
 from texgs.core.memory import collect_rarely, keep_freed_memory, told
 from texgs.core.names import close
 from texgs.core.waiting import waiting
+from texgs.workflow.stage_table import STAGES
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
 # the verbs of stages share the module texgs.cli.stage.
-STAGE_VERBS = {
-    "volume": "make or read the volume of a data set, and check it",
-    "transfer": "plot the histogram with the basic transfer functions, and export these",
-    "views": "render the training and test views of basic transfer functions",
-    "sheet": "show views on one contact sheet",
-    "surfels": "seed surfels and fit them with spherical harmonics",
-    "shading": "fit relightable surfels with Blinn-Phong shading",
-    "texture": "give relightable surfels textures",
-    **{kind.name: kind.summary for kind in kinds().values() if kind.fit is not None},
-    "figure": "show a fit beside test views, with its maps",
-    "comparison": "show the fits of several recipes side by side in test views",
-    "mesh": "make a mesh of a fit, and compare it with the isosurface of its volume",
-    "compose": "make one scene of the basic models of a data set",
-    "pse": "edit colours, opacities and lights of a scene beside those of its volume",
-    "timing": "measure how long frames of a scene and of its volume take",
-    **{method.stage: method.summary for method in methods().values()},
-    "page": "make a page of a scene that shows and edits it in a browser",
-    "gallery": "show all looks of a data set side by side",
-    "edit_metrics": "measure an edited scene: CLIP, style, consistency, time, size",
-}
+STAGE_VERBS = {stage.name: stage.help for stage in STAGES.values()}
 VERBS = {
     "init": "start a folder with configurations of your own",
     "new": "start a data set from a volume file of your own, with suggested transfer functions",

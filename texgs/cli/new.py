@@ -51,6 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.config.files import shown
     from texgs.config.project import members, own_folder
     from texgs.volume.tf_files import read_tf
+    from texgs.workflow.stage_table import STAGES
 
     name = arguments.name or re.sub(r"[^A-Za-z0-9_]+", "_", arguments.file.name.split(".")[0])
     check_name("--name", name)
@@ -62,10 +63,10 @@ def run(arguments: argparse.Namespace) -> int:
     for path in arguments.tf or ():
         read_tf(path)  # a mistake in it is told before the volume is read
     config = configuration(name, arguments.file, arguments.overrides)
-    ensure("volume", config)
+    ensure(STAGES["volume"], config)
     basic = basic_tfs(config, arguments.tf, arguments.count)
     config.dataset.basic_tfs = {key: BasicTF([*tf.opacity], [*tf.color]) for key, tf in basic.items()}
-    ensure("transfer", config)
+    ensure(STAGES["transfer"], config)
     text = document(config, ["file", *changed(arguments.overrides)])
     check_document(text, config)
     write_bytes(target, text.encode())

@@ -63,22 +63,24 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.workflow.stage_table import STAGES
     from texgs.workflow.stages.tf import check_basic_tfs
 
-    config, stage = compose(tuple(arguments.overrides)), STAGES[arguments.verb]
+    words = tuple(arguments.overrides)
+    config, stage = compose(words), STAGES[arguments.verb]
     check_basic_tfs(config.dataset)
     require_fit(stage, config)
     if stage.place == "edit" or stage.name == "edit_metrics":
         require_edit(stage, config)
-        require_base(tuple(arguments.overrides))
+        require_base(words)
     if stage.name == "comparison":
-        ensure_fits(tuple(arguments.overrides))
-    for name in tf_names(config) if stage.per_tf else [None]:
-        chosen = config if name is None else compose((*arguments.overrides, f"tf={name}"))
-        ensure(arguments.verb, chosen, force=arguments.force)
+        require_fits(words)
+    chosen = [compose((*words, f"tf={name}")) for name in tf_names(config)] if stage.per_tf else [config]
+    known = makers(words)
+    for each in chosen:
+        ensure(stage, each, known, force=arguments.force)
     return 0
 
 
-def ensure_fits(words: tuple[str, ...]) -> None:
-    """Run the fits of all recipes of an experiment, unless they are there already.
+def require_fits(words: tuple[str, ...]) -> None:
+    """Require several recipes, each without mistakes.
 
     Raises:
         ConfigError: if there are not several, or one is not fitted on the device.
@@ -87,18 +89,12 @@ def ensure_fits(words: tuple[str, ...]) -> None:
     from texgs.config.compose import compose
     from texgs.core.errors import ConfigError
     from texgs.workflow.fit_checks import check_fit
-    from texgs.workflow.inputs import last_phase
-    from texgs.workflow.locate import tf_names
 
-    config = compose(words)
-    if len(config.fits) < 2:
+    recipes = compose(words).fits
+    if len(recipes) < 2:
         raise ConfigError("fits: expected several recipes to compare, such as fits=[quick,demo]")
-    configs = [compose((*words, f"fit={recipe}")) for recipe in config.fits]
-    for each in configs:
-        check_fit(each)
-    for recipe, each in zip(config.fits, configs, strict=True):
-        for tf in tf_names(each):
-            ensure(last_phase(each), compose((*words, f"fit={recipe}", f"tf={tf}")))
+    for recipe in recipes:
+        check_fit(compose((*words, f"fit={recipe}")))
 
 
 def require_edit(stage: Stage, config: DictConfig) -> None:
@@ -107,8 +103,8 @@ def require_edit(stage: Stage, config: DictConfig) -> None:
     Raises:
         ConfigError, ArgumentError: naming what is not as it should be.
     """
-    from texgs.config.methods import methods
     from texgs.core.errors import ConfigError
+    from texgs.edit.method import methods
     from texgs.workflow.edit_checks import check_edit
 
     own = [name for name, method in methods().items() if method.stage == stage.name]
@@ -148,26 +144,45 @@ def fetch_volume(config: DictConfig) -> None:
         download(volume.url, volume.sha256, path)
 
 
-def ensure(name: str, config: DictConfig, *, force: bool = False) -> None:
-    """Run a stage, and before it the stages whose files it reads, unless their results are there already."""
+def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, DictConfig]]:
+    """Return the jobs that can make what a stage reads, by their folders."""
+    from texgs.config.compose import compose
+    from texgs.edit.method import NO_METHOD
+    from texgs.workflow.stage_table import jobs
+
+    config = compose(words)
+    fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
+    configs = [compose((*each, "edit=none")) for each in fits]
+    configs += [config] if config.edit.method != NO_METHOD else []
+    return {stage.output(each): (stage, each) for config in configs for stage, each in jobs(config)}
+
+
+def ensure(
+    stage: Stage,
+    config: DictConfig,
+    known: dict[Path, tuple[Stage, DictConfig]] | None = None,
+    *,
+    force: bool = False,
+) -> None:
+    """Run a stage, and before it the jobs whose files it reads, unless their results are there already.
+
+    Args:
+        stage: to run.
+        config: of one job.
+        known: jobs by their folders, of which those that were run are taken out; none for a stage alone.
+        force: whether to do the stage again even if nothing has changed.
+    """
     from texgs.core.checksum import Checksums
     from texgs.workflow.job import Job, execute
-    from texgs.workflow.locate import tf_names
-    from texgs.workflow.stage import for_tf
-    from texgs.workflow.stage_table import STAGES
     from texgs.workflow.tracked import Tracking
 
-    stage = STAGES[name]
-    if name == "volume":
+    if stage.name == "volume":
         fetch_volume(config)
-    inputs = stage.inputs(config)
-    for needed in stage.needs:
-        if STAGES[needed].place == "edit" and not STAGES[needed].applies(config):
-            continue
-        once_per_tf = STAGES[needed].per_tf and not stage.per_tf
-        for each in [for_tf(config, tf) for tf in tf_names(config)] if once_per_tf else [config]:
-            if any(path.is_relative_to(STAGES[needed].output(each)) for path in inputs.values()):
-                ensure(needed, each)
+    known = {} if known is None else known
+    known.pop(stage.output(config), None)
+    for path in stage.inputs(config).values():
+        if path.parent in known:
+            ensure(*known[path.parent], known)
     checksums = Checksums.load()
     job = Job.of(stage, config, checksums)
     if stage.place == "edit" and (force or not job.is_done()):

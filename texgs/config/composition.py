@@ -1,6 +1,7 @@
 """What Hydra makes of conf/ and overrides, kept for later processes: each takes 0.1 s, a run has hundreds."""
 
 import contextlib
+import hashlib
 import json
 import sqlite3
 from functools import cache, lru_cache
@@ -18,8 +19,7 @@ from omegaconf import DictConfig, OmegaConf
 from texgs.config.describe import keys
 from texgs.config.schema import Config
 from texgs.core.folders import cache_folder
-from texgs.workflow.kept import fingerprint
-from texgs.workflow.sources import sha256
+from texgs.core.kept import fingerprint
 
 Words = tuple[str, ...]
 Places = tuple[Path, ...]
@@ -53,7 +53,8 @@ def composition(overrides: Words, places: Places) -> dict[str, Any]:
         HydraException, OmegaConfBaseException, YAMLError: for what Hydra does not understand.
         ArithmeticError, OSError, RecursionError, TypeError, ValueError: for files that cannot be read.
     """
-    made_of = sha256(repr((overrides, places, fingerprint(*places), libraries())).encode())
+    depends_on = repr((overrides, places, fingerprint(*places), libraries()))
+    made_of = hashlib.sha256(depends_on.encode()).hexdigest()
     made = kept(made_of)
     if made is None:
         made = composed(overrides, places)

@@ -1,32 +1,11 @@
 """The schema of conf/edit: what all edits of a scene have, and a table of keys for each method."""
 
-from dataclasses import dataclass, make_dataclass
+from dataclasses import make_dataclass
 from typing import Any
 
-from omegaconf import MISSING
-
-from texgs.config.methods import NO_METHOD, methods
 from texgs.core.keys import key
-
-
-@dataclass
-class EditKeys:
-    """One edit of a scene. It may start from the result of another one."""
-
-    name: str = key(MISSING, "name, also of its folder; that of its file in conf/edit")
-    method: str = key(NO_METHOD, "how the scene is edited", choices=(NO_METHOD, *methods()))
-    base: str | None = key(
-        None, "edit whose scene this starts from, or a scene.yaml file; default the scene as fitted"
-    )
-    parts: list[str] = key(
-        [], "MODEL/SEGMENT, or models without their segments, that get the new look; default all models"
-    )
-    looks: bool = key(
-        False, "each model follows the picture or the instruction that dataset.looks has for its basic TF"
-    )
-    seed: int = key(0, "random numbers")
-    source_caption: str = key("", "the scene before, in words, for CLIP's metrics")
-    target_caption: str = key("", "the scene afterwards, in words, for CLIP's metrics")
+from texgs.edit.keys import EditKeys
+from texgs.edit.method import methods
 
 
 def _with_methods() -> Any:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 
 from omegaconf import II
 
-from texgs.config.clip import BACKBONES
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
 from texgs.config.fit import Fit
@@ -16,6 +15,9 @@ from texgs.config.gallery import GalleryKeys
 from texgs.config.mesh import MeshKeys
 from texgs.config.views import ViewKeys
 from texgs.core.keys import key
+from texgs.models.catalogue import CLIP_BACKBONES
+
+NO_SWEEP = "none"  # name of the sweep without variants
 
 
 @dataclass
@@ -43,9 +45,9 @@ class Metric:
     """What edited scenes are measured with, besides what needs no weights."""
 
     clip: str = key(
-        BACKBONES[0],
+        CLIP_BACKBONES[0],
         "backbone of CLIP's metrics, where its weights are on this machine; losses have their own",
-        choices=BACKBONES,
+        choices=CLIP_BACKBONES,
     )
     views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
 
@@ -62,7 +64,7 @@ class PageKeys:
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
-    name: str = key("none", "of the table")
+    name: str = key(NO_SWEEP, "of the table")
     seeds: list[int] = key([0], "random numbers of fits; each variant is fitted once with each")
     edit_seeds: list[int] = key([0], "random numbers of edits; each edit is made once with each")
     variants: dict[str, list[str]] = field(

@@ -13,7 +13,7 @@ def specifications(package: str, attribute: str) -> dict[str, Any]:
     The modules are imported, so they must stay light: what they run imports the rest when it is called.
 
     Args:
-        package: such as texgs.methods.
+        package: such as texgs.edit.methods.
         attribute: such as METHOD; modules without it are helpers of others.
     """
     folder = import_module(package).__path__

@@ -8,14 +8,14 @@ from dataclasses import asdict, replace
 import torch
 from torch import Tensor
 
-from texgs.config.phase import CommonRates, Rates
 from texgs.core.camera import Camera
 from texgs.edit.closeness import Closeness, differentiated
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.harmonics import join, split
 from texgs.fields.optimizer import Optimizer
-from texgs.fields.rates import extent, rates
 from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fit.rates import extent, rates
+from texgs.fit.settings import CommonRates, Rates
 from texgs.volume.images import Images
 
 PRUNE_EVERY = 100  # iterations

@@ -9,10 +9,10 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.names import part_file
 from texgs.fields.field import Field
+from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of
 from texgs.fields.surfels.texture_file import write_texture

@@ -10,10 +10,10 @@ from typing import Any, Generic, TypeVar
 import torch
 from torch import Tensor
 
-from texgs.config.edit import EditKeys
-from texgs.config.methods import method_of
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
+from texgs.edit.keys import EditKeys
+from texgs.edit.method import method_of
 from texgs.edit.parts import edit_fields, edit_parts
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels

@@ -21,7 +21,7 @@ class Field(Protocol):
     """One basic model, of whatever it is made."""
 
     kind: ClassVar[str]
-    """Name of its kind, one of `texgs.config.fields.kinds()`."""
+    """Name of its kind, one of `texgs.fields.kinds.kinds()`."""
 
     def __len__(self) -> int:
         """Primitives: surfels, Gaussians, voxels."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
-from texgs.config.fields import Kind, kinds
 from texgs.core.ply_file import is_ply, properties
 from texgs.fields.field import Field
+from texgs.fields.kinds import Kind, kinds
 
 LONGEST_HEADER = 1 << 20  # bytes; those of fields have a kilobyte
 FIRST = "surfels"  # whose reader says what is wrong with a file that is of no kind
@@ -25,7 +24,7 @@ def open_field(path: str | Path) -> Field:
     return field
 
 
-def kind_of(path: Path) -> Kind[Any]:
+def kind_of(path: Path) -> Kind:
     """The kind of the field in a file, by its header."""
     names, known = formats(path), kinds()
     return next((kind for kind in known.values() if names & {*kind.formats}), known[FIRST])

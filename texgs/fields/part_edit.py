@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
-from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError
 from texgs.core.numbers import is_number
+from texgs.fields.kinds import kinds
 
 MOST = 1000.0  # of a factor: what is larger is a typing error
 MOST_OPAQUE = 1 - 1e-6  # has a logit

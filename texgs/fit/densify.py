@@ -5,9 +5,9 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Densify
 from texgs.core.rotation import quats_to_matrices
 from texgs.fields.optimizer import Optimizer
+from texgs.fit.settings import Densify
 from texgs.raster.shading import MATERIAL
 
 CHILDREN = 2  # of a split

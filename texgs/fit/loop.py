@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Phase
 from texgs.core import check
 from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.bounds import visible_part
 from texgs.fields.harmonics import join
 from texgs.fields.optimizer import Optimizer
-from texgs.fields.rates import extent, rates
 from texgs.fit.densify import DensityControl
-from texgs.fit.losses import Shading, view_loss
+from texgs.fit.losses import Shading, render_view, view_loss
+from texgs.fit.rates import extent, rates
+from texgs.fit.settings import Phase
 from texgs.volume.images import Images
 
 CHECKED_EVERY = 100  # iterations between looks at the loss and all parameters
@@ -110,6 +111,13 @@ class Fit:
         self.optimizer.step(self.iteration / self.phase.iterations)
         self.control.step(self.iteration, self.optimizer, self.generator(2 * self.iteration + 1))
         return loss.detach()
+
+    @torch.no_grad()
+    def psnr(self) -> float:
+        """Return the PSNR in dB of the first training view as it is now."""
+        target = self.images.target(0, self.parameters["means"].device)
+        error = (render_view(join(self.parameters), self.shading, target).clamp(0, 1) - target.color).square()
+        return -10 * math.log10(max(float(error.mean()), 1e-10))
 
     def view_of(self, iteration: int) -> int:
         """The view of an iteration: every epoch a new order, without memory of the ones before."""

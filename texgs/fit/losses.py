@@ -8,11 +8,11 @@ from typing import Protocol, cast
 import torch
 from torch import Tensor
 
-from texgs.config.phase import Losses
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.model import geometry
 from texgs.fields.surfels.shading import ShadingModel, material
+from texgs.fit.settings import Losses
 from texgs.raster import Options, Render, Texture, rasterize
 from texgs.raster.normals import normal_consistency
 from texgs.raster.shading import MATERIAL
@@ -85,6 +85,19 @@ def view_loss(
         smoothness = bilateral_smoothness(attributes[0], target.color, target.alpha)
         loss = loss + weights.smoothness * SMOOTHED * smoothness
     return target.share * loss
+
+
+def render_view(parameters: Mapping[str, Tensor], shading: Shading, target: Target) -> Tensor:
+    """Render the colours [H, W, 3] of a view over white."""
+    camera = target.camera
+    colors = cast(Tensor, shading.colors(parameters, camera, target.light))
+    return rasterize(
+        *geometry(parameters),
+        *(camera.viewmat, camera.K, camera.width, camera.height),
+        features=colors,
+        background=white(colors),
+        options=shading.options,
+    ).color
 
 
 def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:

@@ -12,11 +12,11 @@ from dataclasses import asdict, dataclass
 import torch
 from torch import Tensor
 
-from texgs.config.palette_fit import PaletteKeys
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import new_networks
 from texgs.fields.palette.rendering import Geometry
+from texgs.fit.kinds.palette import PaletteKeys
 from texgs.fit.loop import require_finite
 from texgs.fit.palette_losses import base_loss, grid_loss, palette_loss
 from texgs.fit.palette_start import object_palette, places
@@ -162,6 +162,9 @@ class PaletteFit:
         rays, target = self.rays.draw(self.settings.rays, NEIGHBOURS, self.generator)
         loss, error = palette_loss(rays, target, geometry, self.parameters, self.colors, self.settings)
         return loss, error.detach()
+
+    def psnr(self) -> None:
+        """Return nothing: the losses of the parts are of other kinds than errors of images."""
 
     def state(self) -> dict[str, Tensor]:
         """Everything a resumed run needs, as tensors, between two steps."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from texgs.config.palette_fit import PaletteKeys
 from texgs.fields.palette.networks import (
     Parameters,
     base_color,
@@ -21,6 +20,7 @@ from texgs.fields.palette.rendering import (
     shown,
     view_harmonics,
 )
+from texgs.fit.kinds.palette import PaletteKeys
 
 SEEDS = 16_384  # voxels that a step of the start looks at
 

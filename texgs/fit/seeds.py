@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from texgs.config.phase import SEEDS
 from texgs.core.errors import ArgumentError
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
+from texgs.fields.harmonics import split, zeroth
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
+from texgs.fit.settings import SEEDS, Seeds
 from texgs.fit.visible import CANDIDATES, most_seen
 from texgs.volume.grid import Grid
 from texgs.volume.images import Images
@@ -86,6 +88,28 @@ def seed_surfels(
     if kind not in ("visible", "voxels"):
         return surfels, colors
     return most_seen(surfels, colors, images, count, seed)
+
+
+def seed_gaussians(images: Images, views: ViewSet, seeds: Seeds, degree: int, seed: int) -> dict[str, Tensor]:
+    """Return raw parameters of the first Gaussians: as surfels start, as thick as they are wide.
+
+    `sh` is apart from `sh_rest`, as they learn at different rates.
+
+    Args:
+        images: training views.
+        views: the same with their folder and metadata.
+        seeds: where; "voxels" needs a volume and is refused.
+        degree: of the spherical harmonics, those above the zeroth being zero.
+        seed: of random numbers.
+
+    Raises:
+        ArgumentError: as `seed_surfels`.
+    """
+    surfels, colors = seed_surfels(images, views, **asdict(seeds), seed=seed)
+    thickness = surfels["scales"].amin(dim=1, keepdim=True)  # seeds of surfels are round, or nearly so
+    zeros = torch.zeros(len(colors), (degree + 1) ** 2 - 1, 3)
+    sh = torch.cat([zeroth(colors), zeros], dim=1)
+    return {**surfels, "scales": torch.cat([surfels["scales"], thickness], dim=1), **split(sh)}
 
 
 def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> tuple[Tensor, Tensor]:

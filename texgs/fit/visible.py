@@ -8,10 +8,10 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d
 
-from texgs.config.phase import Densify, Losses, Phase, Rates
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
+from texgs.fit.settings import Densify, Losses, Phase, Rates
 from texgs.volume.images import Images
 from texgs.volume.reduced import smaller
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 
 import torch
 from torch import Tensor
 
-from texgs.config.voxel_fit import GridStage, VoxelKeys
 from texgs.core.errors import FitError
 from texgs.fields.voxels.rays import training_rays
+from texgs.fit.kinds.voxels import GridStage, VoxelKeys
 from texgs.fit.loop import require_finite
 from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
 from texgs.raster.voxel_grid import VoxelGrid
@@ -145,6 +146,10 @@ class VoxelFit:
             require_finite(self.iteration, {"loss": loss, "density": self.grid.density})
             self.losses.append(float(loss))
         return VoxelProgress(self.iteration, len(self.grid), None if loss is None else float(loss))
+
+    def psnr(self) -> float:
+        """Return the PSNR in dB of the training rays that were looked at last."""
+        return -10 * math.log10(max(self.losses[-1], 1e-10))
 
     def rates(self) -> VoxelRates:
         """Learning rates of the step to come."""

@@ -44,6 +44,8 @@ class Snapshot:
         return f"https://huggingface.co/{self.repository}"
 
 
+# Backbones of CLIP to choose from, for scores and for losses; the first one is the default.
+CLIP_BACKBONES = ("clip-vit-base-patch32", "clip-vit-large-patch14")
 TEXT_FILES = ("*.json", "*.txt")
 
 CATALOGUE: dict[str, Single | Snapshot] = {

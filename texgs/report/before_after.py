@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 
-from texgs.config.fields import Kind
 from texgs.core.camera import Camera
+from texgs.core.image_grid import write_strip
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
-from texgs.report.strip import write_strip
+from texgs.fields.kinds import Kind
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.volume.cameras import orbit_path
@@ -28,7 +27,7 @@ TURN = 36  # frames of the turntable
 
 
 def write_before_and_after(
-    before: Scene, after: Scene, kind: Kind[Any], lens: Lens, output: Path, device: torch.device, title: str
+    before: Scene, after: Scene, kind: Kind, lens: Lens, output: Path, device: torch.device, title: str
 ) -> None:
     """Write edit.png, views of both, also under another light where they can be relit, and turntable.mp4.
 

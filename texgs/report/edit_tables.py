@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from texgs.config.fields import kinds
+from texgs.fields.kinds import kinds
 from texgs.metrics.metric import Measure, metrics
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.fields import kinds
+from texgs.fit.kinds import fit_specs
 from texgs.report.metrics_files import Record, of, phases
 from texgs.report.published import (
     ALIKE,
@@ -121,7 +121,7 @@ def runs_of(records: Iterable[Record[Any]]) -> list[Run]:
 
 def end_of(run: Run) -> Record[FitResult] | None:
     """Return the last phase of a fit; None where one is missing, or its kind of field is not known here."""
-    return next((run[kind.phases[-1]] for kind in kinds().values() if set(kind.phases) <= set(run)), None)
+    return next((run[kind.phases[-1]] for kind in fit_specs().values() if set(kind.phases) <= set(run)), None)
 
 
 def measures_of(run: Run) -> dict[str, Any]:

@@ -9,11 +9,12 @@ from typing import Any, Generic, TypeVar
 
 from omegaconf.errors import OmegaConfBaseException, ValidationError
 
-from texgs.config.fields import kinds
+from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
+from texgs.fit.kinds import fit_specs
 from texgs.metrics.metric import metrics
-from texgs.report.results import NO_SWEEP, EditMeasures, Result, result_of
+from texgs.report.results import EditMeasures, Result, result_of
 
 COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs
 WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "result")
@@ -109,7 +110,7 @@ def is_aside(folder: str) -> bool:
 
 def phases() -> list[str]:
     """Return the phases of all kinds of fields, in their order."""
-    return [phase for kind in kinds().values() for phase in kind.phases]
+    return [phase for kind in fit_specs().values() for phase in kind.phases]
 
 
 def _record(path: Path) -> Record[Any]:

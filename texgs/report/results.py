@@ -1,23 +1,28 @@
-"""Results of jobs: stages make these, `metrics.json` holds them, tables read them.
+"""What jobs tell about their results: stages make these, `metrics.json` holds them, tables read them.
 
-What was not measured is None, and is left out of the file. Units are in the names. A stage may define its
-result in its own module: every subclass of `Result` is known by its name once its module is imported.
+What was not measured is None, and is left out of the file. Units are in the names. A result that no table
+reads is in the module of its stage.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
-from typing import Any
+from typing import Any, ClassVar
 
 from texgs.core.typed import typed
 
-NO_METHOD = "none"  # edit of a scene as it was fitted
-NO_SWEEP = "none"  # sweep of a job that is no variant
-
 
 class Result:
-    """What a job found out; subclasses are dataclasses."""
+    """What a job tells, a dataclass; files name it by its class."""
+
+    kinds: ClassVar[dict[str, type[Any]]] = {}
+    pictured_in: ClassVar[str]  # section of the report for the job's pictures
+
+    def __init_subclass__(cls, section: str = "more") -> None:
+        """Make a kind of result known, with the section of the report that its pictures belong to."""
+        cls.pictured_in = section
+        Result.kinds[cls.__name__] = cls
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Any:
@@ -30,7 +35,7 @@ class Result:
 
 
 @dataclass(frozen=True)
-class VolumeResult(Result):
+class VolumeResult(Result, section="data"):
     """A volume, checked and in one file."""
 
     dims: list[int]  # samples along x, y, z
@@ -44,15 +49,7 @@ class VolumeResult(Result):
 
 
 @dataclass(frozen=True)
-class TransferResult(Result):
-    """Basic transfer functions over a histogram."""
-
-    basic_tfs: int
-    ranges: dict[str, list[float]]  # lowest and highest value of each
-
-
-@dataclass(frozen=True)
-class ViewsResult(Result):
+class ViewsResult(Result, section="data"):
     """Views of a basic transfer function."""
 
     train: int  # views
@@ -67,7 +64,7 @@ class ViewsResult(Result):
 
 
 @dataclass(frozen=True)
-class SheetResult(Result):
+class SheetResult(Result, section="data"):
     """A contact sheet of views."""
 
     train: int  # views there are
@@ -77,7 +74,7 @@ class SheetResult(Result):
 
 
 @dataclass(frozen=True)
-class FitResult(Result):
+class FitResult(Result, section="fitting"):
     """A phase of a fit."""
 
     fit_seconds: float
@@ -98,15 +95,7 @@ class FitResult(Result):
 
 
 @dataclass(frozen=True)
-class FigureResult(Result):
-    """A figure of a fit."""
-
-    shown: list[str]  # views
-    primitives: int
-
-
-@dataclass(frozen=True)
-class ComparisonResult(Result):
+class ComparisonResult(Result, section="fitting"):
     """Fits side by side."""
 
     recipes: list[str]
@@ -132,7 +121,7 @@ class GalleryResult(Result):
 
 
 @dataclass(frozen=True)
-class MeshResult(Result):
+class MeshResult(Result, section="fitting"):
     """The surface of a fit against that of its volume; lengths in world units."""
 
     chamfer: float  # mean of the next two
@@ -148,7 +137,7 @@ class MeshResult(Result):
 
 
 @dataclass(frozen=True)
-class SceneResult(Result):
+class SceneResult(Result, section="pse"):
     """Fields as one scene."""
 
     models: int
@@ -165,7 +154,7 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class PseResult(Result):
+class PseResult(Result, section="pse"):
     """Edits by numbers, and a light that moves."""
 
     views: int
@@ -189,7 +178,7 @@ class TimingResult(Result):
 
 
 @dataclass(frozen=True)
-class PageResult(Result):
+class PageResult(Result, section="scenes"):
     """A scene as a page for a browser."""
 
     edit: str  # or "none"
@@ -199,7 +188,7 @@ class PageResult(Result):
 
 
 @dataclass(frozen=True)
-class EditResult(Result):
+class EditResult(Result, section="parts"):
     """A scene with a new look or a new part."""
 
     edit: str
@@ -226,23 +215,25 @@ class EditMeasures(Result):
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> EditMeasures:
-        """Return the measures that `plain` made these numbers of; whoever has the metrics checks `values`."""
+        """Return the measures that `plain` made these numbers of; who knows the metrics checks `values`."""
         own = {each.name for each in fields(cls)} - {"values"}
         known = {name: value for name, value in numbers.items() if name in own}
-        return typed(cls, {**known, "values": {k: v for k, v in numbers.items() if k not in own}})
+        values = {name: value for name, value in numbers.items() if name not in own}
+        return typed(cls, {**known, "values": values})
 
 
 def plain(result: Result) -> dict[str, Any]:
-    """Return what `metrics.json` holds of a result: all that was measured, values by name side by side."""
-    told = asdict(result)  # type: ignore[call-overload]
+    """Return a result for JSON, without what was not measured; values by name stand among the rest."""
+    told: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
     told |= told.pop("values", {})
     return {name: value for name, value in told.items() if value is not None}
 
 
-def result_of(kind: str, numbers: Mapping[str, Any]) -> Any:
-    """Return the result of one kind that `plain` made these numbers of.
+def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
+    """Return the result that `plain` made these numbers of.
 
     Raises:
         KeyError, OmegaConfBaseException: if they are those of no result.
     """
-    return {each.__name__: each for each in Result.__subclasses__()}[kind].of(numbers)
+    result: Result = Result.kinds[kind].of(numbers)
+    return result

@@ -15,16 +15,10 @@ from urllib.parse import quote
 
 from PIL import Image
 
+from texgs.edit.method import NO_METHOD
 from texgs.report.metrics_files import Record
 from texgs.report.published import in_order
-from texgs.report.results import (
-    NO_METHOD,
-    ComparisonResult,
-    EditResult,
-    FitResult,
-    GalleryResult,
-    PageResult,
-)
+from texgs.report.results import ComparisonResult, EditResult, GalleryResult, PageResult
 
 SECTIONS = {
     "data": "Data sets and views",
@@ -41,12 +35,6 @@ SECTIONS = {
     "study": "User study",
     "differences": "Where we differ from the paper",
     "more": "Further tables and figures",
-}
-OF_STAGES = {  # sections by the stage that made a figure; edits have theirs by what they follow
-    **dict.fromkeys(("volume", "transfer", "views", "sheet"), "data"),
-    **dict.fromkeys(("figure", "comparison", "mesh"), "fitting"),
-    **dict.fromkeys(("compose", "pse"), "pse"),
-    "page": "scenes",
 }
 OF_PICTURES = {"relight.png": "relight"}  # where a stage has pictures of several sections
 OF_EDITS = {"style": "image", "instruction": "text", "": "parts"}  # by what they follow
@@ -114,9 +102,7 @@ def section_of(record: Record[Any], picture: str) -> str:
         return "parts" if is_part else OF_EDITS[result.follows]
     if isinstance(result, GalleryResult):
         return result.section
-    if isinstance(result, FitResult):
-        return "fitting"
-    return OF_PICTURES.get(picture, OF_STAGES.get(record.stage, "more"))
+    return OF_PICTURES.get(picture, result.pictured_in)
 
 
 def label(record: Record[Any]) -> str:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
+from texgs.core.image_grid import DPI, content
 from texgs.core.plots import words
 from texgs.report.metrics_files import Record
-from texgs.report.strip import DPI, content
 from texgs.report.sweep_table import digits_of, measured, natural, number, sweep_runs, variants
 from texgs.report.table import SOURCES
 

@@ -25,7 +25,7 @@ class TableSpec:
     title: str
     caption: str
     section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
-    places: tuple[str, ...]  # of the jobs that it reads, keys of `texgs.workflow.places.PLACES`
+    places: tuple[str, ...]  # of the jobs that it reads, names of rules of the workflow
     make: Callable[[Sequence[Record[Any]]], Table] | None  # None: whoever writes the tables hands it in
     number: int | None = None  # among the paper's tables; none for ours
     paper: str = ""  # where the paper has it

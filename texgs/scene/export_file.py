@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, cast
+from typing import cast
 
 import torch
 
-from texgs.config.fields import Kind, kinds
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
@@ -19,6 +18,7 @@ from texgs.fields.field import Field, Look
 from texgs.fields.gaussians.composition import JoinedGaussians
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.gaussians.ply import write_ply as write_gaussians
+from texgs.fields.kinds import Kind, kinds
 from texgs.fields.surfels.compact import seen_surfels, write_compact
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -55,7 +55,7 @@ class Export:
         return [camera.to(self.device) for camera in placed]
 
 
-def require_export(field: Kind[Any], kind: str) -> None:
+def require_export(field: Kind, kind: str) -> None:
     """Require of a kind of field that it can be exported as something.
 
     Raises:

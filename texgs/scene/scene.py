@@ -9,11 +9,11 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from texgs.config.fields import kinds
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import Light
 from texgs.fields.field import Composed, Field
 from texgs.fields.files import open_field
+from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.segment import labels_of, with_variants

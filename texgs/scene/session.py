@@ -41,7 +41,7 @@ class Session:
     """
 
     def __init__(self, scene: Scene, device: torch.device | str = "cpu") -> None:
-        self._past, self._future = [scene], list[Scene]()
+        self._past, self._future = [(scene, "")], list[tuple[Scene, str]]()  # with titles of steps
         self._device = device
         self._opened = deque[tuple[list[object], Composed]](maxlen=KEPT)
 
@@ -56,8 +56,18 @@ class Session:
 
     @property
     def scene(self) -> Scene:
-        """As it is now."""
-        return self._past[-1]
+        """The scene as it is now."""
+        return self._past[-1][0]
+
+    @property
+    def past(self) -> list[str]:
+        """Titles of the steps that were made, the oldest first; see `name_step`."""
+        return [title for _, title in self._past[1:]]
+
+    @property
+    def future(self) -> list[str]:
+        """Titles of the steps that were taken back, the latest first."""
+        return [title for _, title in reversed(self._future)]
 
     # ---- Changes ------------------------------------------------------------
 
@@ -155,7 +165,7 @@ class Session:
                 one of the history's.
         """
         require_new(self.scene, part)
-        if file.resolve() in {each.resolve() for scene in self._past for each in files_of(scene) if each}:
+        if file.resolve() in {each.resolve() for scene, _ in self._past for each in files_of(scene) if each}:
             raise ArgumentError(f"{part}: expected a new file, got {file} of an earlier scene; name another")
         name, mask = split(self.scene, part)[0], mask.cpu()
         entry = self.scene.models[name]
@@ -199,6 +209,10 @@ class Session:
         names = {each: name if each == segment else each for each in entry.segments}
         renamed = replace(entry, segments={names[each]: value for each, value in entry.segments.items()})
         self._push(replaced(self.scene, model, renamed))
+
+    def name_step(self, title: str) -> None:
+        """Give the latest step a title."""
+        self._past[-1] = (self.scene, title)
 
     def undo(self) -> bool:
         """Take the latest change back; whether there was one."""
@@ -268,7 +282,7 @@ class Session:
         self._push(scene)
 
     def _push(self, scene: Scene) -> None:
-        self._past.append(scene)
+        self._past.append((scene, ""))
         self._future.clear()
 
 

@@ -10,12 +10,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from texgs.config.fields import Kind
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.gaussians.composition import JoinedGaussians
+from texgs.fields.kinds import Kind
 from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.raster.shading import MATERIAL
@@ -87,7 +87,7 @@ def describe_light(light: Light) -> dict[str, float] | None:
     return None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar}
 
 
-def modes_of(kind: Kind[Any]) -> list[str]:
+def modes_of(kind: Kind) -> list[str]:
     """What frames of a kind of field can show."""
     needs = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
     needs |= dict.fromkeys(MATERIAL, "relight")

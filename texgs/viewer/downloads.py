@@ -10,11 +10,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from texgs.config.fields import Kind
 from texgs.core.errors import ArgumentError
 from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.fields.files import kind_of
+from texgs.fields.kinds import Kind
 from texgs.scene import export_file
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
@@ -79,7 +79,7 @@ class Downloads:
             yield self._frames.pixels(replace(view, camera=place), scene)
 
 
-def exports_of(kind: Kind[object]) -> list[str]:
+def exports_of(kind: Kind) -> list[str]:
     """What scenes of a kind of field can be written as."""
     return [*FILMS, *(export for export in kind.exports if export not in export_file.OF_MODELS)]
 

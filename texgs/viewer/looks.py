@@ -16,12 +16,12 @@ from typing import Any
 import torch
 
 from texgs.config.edit import Edit
-from texgs.config.methods import method_of
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.core.names import part_file
 from texgs.core.typed import typed
+from texgs.edit.method import method_of
 from texgs.edit.task import EditedScene, Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texture_file import write_texture
@@ -74,7 +74,7 @@ class Looks:
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
         if asked.style:
             style = self._styles.source(asked.style)
-            recipes = ("preview",) if asked.is_preview else FULL
+            recipes = ("preview",) if asked.preview else FULL
             choices = [{"image": {"style": style, "recipe": recipe}} for recipe in recipes]
         else:
             said = asked.instruction

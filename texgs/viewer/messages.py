@@ -1,58 +1,77 @@
-"""What a page says to its server."""
+"""What a page says to its server: messages in JSON, checked before anything uses them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from dataclasses import field
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
 
 from texgs.core.camera import Camera, orbit
+from texgs.core.errors import ArgumentError
 from texgs.scene.frame import Mode
 
 OfViews = Literal["truth", "difference"]
 OF_VIEWS = get_args(OfViews)  # modes that show the training view nearest to the camera
 MODES = (*get_args(Mode), *OF_VIEWS)
 LARGEST = 1 << 16  # bytes of a message; a page's own have a few hundred
+MOST_POINTS = 100
+MOST_PARTS = 1000
+STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
+
+Number = Annotated[int, Field(ge=0, le=2**53)]  # that comes back with what was asked for
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Pixels = Annotated[int, Field(ge=1, le=4096)]
+Click = tuple[Annotated[float, Field(ge=-4096, le=8192)], Annotated[float, Field(ge=-4096, le=8192)], bool]
 
 
-@dataclass(frozen=True)
+def tag(name: str) -> Any:
+    """Return the field that says which message this is."""
+    return field(default=name, kw_only=True)
+
+
+@dataclass(frozen=True, config=STRICT)
 class Orbit:
     """A camera that looks at a target, as `texgs.core.camera.orbit` has it."""
 
-    target: tuple[float, float, float]  # world units
-    azimuth: float  # degrees
-    polar: float  # degrees above the horizon
-    distance: float  # world units
-    fov_y: float  # degrees
-    width: int  # pixels
-    height: int  # pixels
+    target: tuple[Coordinate, Coordinate, Coordinate]  # world units
+    azimuth: Coordinate  # degrees
+    polar: Annotated[float, Field(ge=-90, le=90)]  # degrees above the horizon
+    distance: Annotated[float, Field(ge=1e-6, le=1e6)]  # world units
+    fov_y: Annotated[float, Field(ge=1, le=150)]  # degrees
+    width: Pixels
+    height: Pixels
 
     def camera(self, scale: float = 1.0) -> Camera:
-        """The camera, with sides of this part of the pixels."""
+        """Return the camera, with sides of this part of the pixels."""
         width, height = (max(1, round(scale * side)) for side in (self.width, self.height))
         return orbit(self.azimuth, self.polar, self.distance, self.fov_y, width, height, self.target)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class View:
     """Show a frame."""
 
-    id: int  # comes back with the frame
     camera: Orbit
-    mode: Mode | OfViews
-    moving: bool  # another one follows at once: speed counts more than quality
-    before: bool  # the scene as it was opened
+    id: Number = 0  # comes back with the frame
+    mode: Mode | OfViews = "shaded"
+    moving: bool = False  # another one follows at once: speed counts more than quality
+    before: bool = False  # the scene as it was opened
     only: str = ""  # a model that is shown alone and unedited, to be clicked on
+    type: Literal["view"] = tag("view")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Edit:
     """Change one value of a part, or of the scene where the part is empty."""
 
     part: str  # MODEL or MODEL/SEGMENT
     key: str  # of a `PartEdit`; "light" or "background" of the scene
-    value: Any  # as in a scene file; None takes the edit back
-    step: int  # edits of one number in a row are one step of the history, such as those of a slider
+    value: Any = None  # as in a scene file; None takes the edit back
+    step: Number = 0  # edits of one number in a row are one step of the history, such as those of a slider
+    type: Literal["edit"] = tag("edit")
 
     @property
     def title(self) -> str:
@@ -60,93 +79,138 @@ class Edit:
         return f"{self.part} {self.key} {title_of_value(self.value)}".strip()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Undo:
     """Take the latest step back."""
 
+    type: Literal["undo"] = tag("undo")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, config=STRICT)
 class Redo:
     """Make the step again that was taken back last."""
 
+    type: Literal["redo"] = tag("redo")
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, config=STRICT)
 class Save:
     """Write the scene file."""
 
     name: str  # of the file, in the folder for saving
-    replace: bool  # a file that is there already
+    replace: bool = False  # a file that is there already
+    type: Literal["save"] = tag("save")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Clicked:
-    """Clicks on a view of a model alone."""
+    """Clicks on a view of a model alone: pixels to the right and down, and whether they are on the object."""
 
     camera: Orbit
-    points: tuple[
-        tuple[float, float, bool], ...
-    ]  # pixels to the right and down, and whether it is on the object
+    points: Annotated[tuple[Click, ...], Field(min_length=1, max_length=MOST_POINTS)]
 
 
-@dataclass(frozen=True)
-class Mask:
+@dataclass(frozen=True, config=STRICT)
+class Mask(Clicked):
     """Show what clicks select."""
 
-    id: int  # comes back with the mask
     model: str
-    clicked: Clicked
+    id: Number = 0  # comes back with the mask
+    type: Literal["mask"] = tag("mask")
 
 
-@dataclass(frozen=True)
-class Segment:
+@dataclass(frozen=True, config=STRICT)
+class Segment(Clicked):
     """Make a segment of what clicks select."""
 
     part: str  # MODEL/SEGMENT, a new name
-    clicked: Clicked
+    type: Literal["segment"] = tag("segment")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Look:
     """Give parts a new look, by a picture or by an instruction."""
 
-    parts: tuple[str, ...]  # none: all models
-    style: str  # name of a picture; "" with an instruction
-    instruction: str  # "" with a picture
-    is_preview: bool  # show what it would be like, and change nothing
+    parts: Annotated[tuple[str, ...], Field(max_length=MOST_PARTS)] = ()  # none: all models
+    style: str = ""  # name of a picture; "" with an instruction
+    instruction: str = ""  # "" with a picture
+    preview: bool = False  # show what it would be like, and change nothing
+    type: Literal["look"] = tag("look")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Export:
     """Write a file for the page to save."""
 
     kind: str  # mp4 or gif, a turntable; html; or as `texgs.scene.export_file.Export` has it
     view: View  # that a turntable begins with
+    type: Literal["export"] = tag("export")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Rename:
     """Give a segment another name."""
 
     part: str  # MODEL/SEGMENT
     name: str  # of the segment
+    type: Literal["rename"] = tag("rename")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Remove:
     """Give the surfels of a segment back to its model."""
 
     part: str  # MODEL/SEGMENT
+    type: Literal["remove"] = tag("remove")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, config=STRICT)
 class Cancel:
     """Stop the job that is at work, and show no preview any more."""
 
-    only_preview: bool = False  # the job goes on
+    preview: bool = False  # the preview alone; the job goes on
+    type: Literal["cancel"] = tag("cancel")
+
+
+Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Export | Rename | Remove | Cancel
+MESSAGES: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+VIEWS = TypeAdapter(View)
+
+
+def parse(text: str | bytes, adapter: TypeAdapter[Any] = MESSAGES) -> Any:
+    """Return the message that a text holds.
+
+    Raises:
+        ArgumentError: naming the first key that is not as it should be.
+    """
+    try:
+        return adapter.validate_json(text)
+    except ValidationError as error:
+        raise ArgumentError(sentence(error.errors(include_url=False)[0])) from error
+
+
+def sentence(fault: Mapping[str, Any]) -> str:
+    """Return what pydantic found wrong as key, what was expected and what there was."""
+    tags = [each.__name__.lower() for each in get_args(Message)]
+    keys = [str(key) for key in fault["loc"] if not str(key).startswith("literal[")]
+    name = ".".join(keys[1:] if keys[:1] and keys[0] in tags else keys)
+    match fault["type"]:
+        case "json_invalid" | "dataclass_type" | "dict_type" | "model_attributes_type":
+            return f"{name or 'message'}: expected keys with values in JSON, got {fault['input']!r:.100}"
+        case "union_tag_invalid" | "union_tag_not_found":
+            return f"type: expected one of {', '.join(tags)}, got {fault['input'].get('type')!r:.100}"
+        case "missing":
+            return f"{name}: expected a value, got none"
+        case "unexpected_keyword_argument":
+            return f"message: no such key {name!r:.100}"
+        case "too_long" | "too_short":
+            return f"{name}: {fault['msg']}"
+    expected = fault["msg"].removeprefix("Input should be ")
+    return f"{name}: expected {expected}, got {fault['input']!r:.100}"
 
 
 def title_of_value(value: Any) -> str:
-    """A value of an edit in few letters: #rrggbb, angles, a number."""
+    """Return a value of an edit in few letters: #rrggbb, angles, a number."""
     if value is None:
         return "reset"
     if isinstance(value, bool):
@@ -156,6 +220,3 @@ def title_of_value(value: Any) -> str:
     if isinstance(value, list):
         return "#" + "".join(f"{round(255 * x):02x}" for x in value)
     return value if isinstance(value, str) else f"{value:.4g}"
-
-
-Message = View | Edit | Undo | Redo | Save | Mask | Segment | Look | Export | Rename | Remove | Cancel

@@ -10,13 +10,10 @@ from aiohttp import web
 
 from texgs.core.errors import TexgsError
 from texgs.scene.scene import Scene
-from texgs.scene.scene_file import known
 from texgs.viewer.frames import Frames
-from texgs.viewer.messages import View
-from texgs.viewer.reading import view_of
+from texgs.viewer.messages import VIEWS, View, parse
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import thumbnail
-from texgs.viewer.values import parse_json
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
@@ -64,9 +61,7 @@ class Requests:
     async def still(self, request: web.Request) -> web.StreamResponse:
         """A PNG file of the view in the query on its page, as `texgs render` writes it."""
         try:
-            values = parse_json(request.query.get("view", ""))
-            known(values, None, "view")
-            view = view_of(values)
+            view = parse(request.query.get("view", ""), VIEWS)
             png = await self._frames.still(view, self._shown(view, request.query.get("page", "")))
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error

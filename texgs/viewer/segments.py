@@ -74,13 +74,13 @@ class Segmenter:
         """What a segment comes from, for its file."""
         name = "" if self._masks is None else self._masks.name
         points = {
-            key: [[x, y] for x, y, is_on in asked.clicked.points if is_on == sign]
+            key: [[x, y] for x, y, is_on in asked.points if is_on == sign]
             for key, sign in (("point", True), ("other", False))
         }
-        return {"camera": asdict(asked.clicked.camera), **points, "masks": name, "vote": "contribution"}
+        return {"camera": asdict(asked.camera), **points, "masks": name, "vote": "contribution"}
 
     def _mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
-        model, clicks = self._model(scene, asked.model), self._clicks(asked.clicked)
+        model, clicks = self._model(scene, asked.model), self._clicks(asked)
         prompts_at(model, clicks)
         mask = ViewMasks(model, scene.light, self._mask_model()).mask(clicks)
         return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
@@ -88,7 +88,7 @@ class Segmenter:
     def _lift(self, scene: Scene, asked: Segment) -> Lifted:
         model = self._model(scene, split(scene, asked.part)[0])
         cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, LENS)]
-        clicks, masks, title = self._clicks(asked.clicked), self._mask_model(), f"segment {asked.part}"
+        clicks, masks, title = self._clicks(asked), self._mask_model(), f"segment {asked.part}"
         return lift(model, clicks, cameras, masks, light=scene.light, title=title)
 
     def _clicks(self, clicked: Clicked) -> Clicks:

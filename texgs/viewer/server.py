@@ -35,11 +35,11 @@ from texgs.viewer.messages import (
     Segment,
     Undo,
     View,
+    parse,
 )
 from texgs.viewer.opening import Opened
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
-from texgs.viewer.reading import parse
 from texgs.viewer.requests import Requests
 from texgs.viewer.shared_edits import SharedEdits
 from texgs.viewer.styles import LARGEST as LARGEST_FILE
@@ -141,7 +141,7 @@ class Server:
         elif isinstance(message, Export):
             self.work.begin_export(message, page)
         elif isinstance(message, Cancel):
-            if not message.only_preview:
+            if not message.preview:
                 self.work.stop(page)
             page.try_on(None)
         else:

@@ -22,7 +22,7 @@ from texgs.viewer.segments import alone
 
 
 class SharedEdits:
-    """The history of a session, with a name for each step.
+    """The scene that all pages edit, and where it is saved.
 
     Args:
         session: that is edited.
@@ -35,7 +35,6 @@ class SharedEdits:
         files = [opened.file.resolve()] if opened.file else []
         self._own = {file: state_of(file) for file in files}  # replaced without a question, while they are so
         self.original = self._saved = session.scene
-        self._past, self._future = list[str](), list[str]()
         self._latest: tuple[object, ...] | None = None  # author and number of a step that may go on
 
     @property
@@ -69,8 +68,8 @@ class SharedEdits:
     def state(self) -> dict[str, Any]:
         """What pages show of the history, JSON."""
         return {
-            "past": list(self._past),
-            "future": list(reversed(self._future)),
+            "past": self._session.past,
+            "future": self._session.future,
             "saved": self.is_saved,
             "file": self.name,
             "folder": str(self._folder.resolve()),
@@ -91,8 +90,6 @@ class SharedEdits:
             if goes_on:
                 self._session.redo()
             raise
-        if goes_on:
-            self._past.pop()
         self._step(edit.title)
         self._latest = step
 
@@ -139,14 +136,12 @@ class SharedEdits:
     def undo(self) -> None:
         """Take the latest step back, if there is one."""
         self._latest = None
-        if self._session.undo():
-            self._future.append(self._past.pop())
+        self._session.undo()
 
     def redo(self) -> None:
         """Make again what was taken back last, if there is anything."""
         self._latest = None
-        if self._session.redo():
-            self._past.append(self._future.pop())
+        self._session.redo()
 
     def path_of(self, name: str) -> Path:
         """The scene file of a name in the folder for saving.
@@ -180,8 +175,7 @@ class SharedEdits:
         return path
 
     def _step(self, name: str) -> None:
-        self._past.append(name)
-        self._future.clear()
+        self._session.name_step(name)
         self._latest = None
 
     def new_folder(self, kind: str) -> Path:

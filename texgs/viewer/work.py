@@ -142,7 +142,7 @@ class Work:
         if not parts:
             parts = tuple(await asyncio.to_thread(parts_with_surfels, scene))
             edit = replace(edit, parts=list(parts))
-        if asked.is_preview:
+        if asked.preview:
             output = self._looks.preview_folder(page.number, parts)
         else:
             output = self._edits.new_folder(edit.name)
@@ -154,7 +154,7 @@ class Work:
         try:
             edited = await self._looks.make(scene, edit, output, watch, show)
             textures = textures_of(edited.scene, parts)
-            if asked.is_preview:
+            if asked.preview:
                 page.try_on(textures)
                 return
             async with self._changing:
@@ -163,7 +163,7 @@ class Work:
             rmtree(output, ignore_errors=True)
             raise
         finally:
-            if not asked.is_preview:
+            if not asked.preview:
                 page.try_on(None)
         how = f"{name}: {edited.how}, {monotonic() - start:.0f} s."
         page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")

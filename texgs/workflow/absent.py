@@ -51,7 +51,7 @@ def left_out(entries: Mapping[LeftOut, Iterable[str]], results: str) -> str:
 
 def missing_weights(configs: Iterable[DictConfig]) -> list[str]:
     """What edits need and this machine has not; mistakes in edits are told first."""
-    from texgs.config.methods import NO_METHOD
+    from texgs.edit.method import NO_METHOD
 
     edited = [config for config in configs if config.edit.method != NO_METHOD]
     if not edited:

@@ -1,20 +1,23 @@
 """Digest of the code a stage runs: its module and all modules of texgs that it imports, however deep.
 
-Read from the source without importing it, see sources.py. Code that calls the native library has the digest
-of the C++ and CUDA sources in it; a module that reads texts of its package has these in it.
+Read from the source without importing it, see sources.py. The rest of texgs/workflow does not count. Code
+that calls the native library has the digest of the C++ and CUDA sources in it; a module that reads files of
+its package has these in it.
 """
 
 from functools import cache
 from pathlib import Path
 
-from texgs.core.checksum import digest
+from texgs.core.checksum import digest, sha256
 from texgs.core.native_sources import library_sources
 from texgs.workflow.sources import Sources
 
 ROOT = Path(__file__).parents[2]
+STAGES = "texgs.workflow.stages."
+PLANNING = "texgs.workflow."  # what else is there decides settings and inputs, which jobs are known by anyway
 NATIVE = "texgs.raster.native"  # the module that calls the native library
-READS_TEXTS = b"importlib.resources"  # in modules that do
-TEXTS = (".css", ".csv", ".html", ".j2", ".js", ".yaml")
+READS_DATA = b"importlib.resources"  # in modules that do
+DATA = (".css", ".csv", ".html", ".j2", ".js", ".png", ".yaml")
 SOURCES = Sources()
 
 
@@ -25,7 +28,8 @@ def code_digest(module: str) -> str:
     waiting = [module]
     while waiting:
         name = waiting.pop()
-        if name in seen or (read := essence(name)) is None:
+        is_planning = name.startswith(PLANNING) and not name.startswith(STAGES)
+        if name in seen or is_planning or (read := essence(name)) is None:
             continue
         seen[name], imported = read
         waiting += imported
@@ -42,13 +46,13 @@ def essence(module: str) -> tuple[str, tuple[str, ...]] | None:
         return None
     text = path.read_bytes()
     what, *imported = SOURCES.of(text)
-    return digest(what + texts_beside(path)) if READS_TEXTS in text else what, tuple(imported)
+    return digest(what + data_beside(path)) if READS_DATA in text else what, tuple(imported)
 
 
-def texts_beside(path: Path) -> str:
-    """The texts that are no modules in the folder of a module and below: templates, published numbers."""
-    files = sorted(each for each in path.parent.rglob("*") if each.suffix in TEXTS)
-    return "".join(f"{each.name}\n{each.read_text(encoding='utf-8')}" for each in files)
+def data_beside(path: Path) -> str:
+    """Name the files beside a module and below that are no modules, with their checksums."""
+    files = sorted(each for each in path.parent.rglob("*") if each.suffix in DATA)
+    return "".join(f"{each.name}\n{sha256(each)}\n" for each in files)
 
 
 def source(module: str) -> Path | None:

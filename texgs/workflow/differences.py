@@ -12,10 +12,10 @@ from typing import Any
 from omegaconf import OmegaConf
 
 from texgs.config.compose import compose
-from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.typed import typed
+from texgs.edit.method import NO_METHOD, method_of
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SheetResult
 from texgs.report.table import Column, Table

@@ -3,10 +3,10 @@
 from omegaconf import DictConfig
 
 from texgs.config.compose import compose
-from texgs.config.fields import require
-from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.core.errors import MissingDataError
+from texgs.edit.method import NO_METHOD, method_of
+from texgs.fields.kinds import require
 from texgs.workflow.edits import lineage
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.looks import looks_of

@@ -2,10 +2,10 @@
 
 from texgs.config.check import is_scene_file
 from texgs.config.compose import compose
-from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.names import close
+from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.locate import tf_names
 

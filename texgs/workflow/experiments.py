@@ -11,11 +11,11 @@ from omegaconf import DictConfig
 
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
-from texgs.config.methods import method_of
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.names import close
+from texgs.edit.method import method_of
 from texgs.workflow.edits import edits
 from texgs.workflow.places import edit_folder
 from texgs.workflow.stage_table import STAGES

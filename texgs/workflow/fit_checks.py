@@ -2,11 +2,11 @@
 
 from omegaconf import DictConfig
 
-from texgs.config.fields import kinds
-from texgs.config.phase import require_material
 from texgs.core.errors import ConfigError
 from texgs.core.typed import typed
-from texgs.workflow.places import PLACES
+from texgs.fields.kinds import kinds
+from texgs.fields.surfels.material import require_material
+from texgs.fit.kinds import fit_specs
 from texgs.workflow.stage import Stage
 
 
@@ -17,7 +17,7 @@ def check_fit(config: DictConfig) -> None:
         ConfigError: if it is fitted on others.
         ArgumentError: naming the key that is not as it should be.
     """
-    fit, kind = config.fit, kinds()[config.fit.field]
+    fit, kind = config.fit, fit_specs()[config.fit.field]
     if config.device.name not in kind.devices:
         raise ConfigError(
             f"device: expected {' or '.join(sorted(kind.devices))} for fit={fit.name}, "
@@ -36,16 +36,16 @@ def require_fit(stage: Stage, config: DictConfig) -> None:
         ConfigError: if its field goes through other phases, has no surface, or is not fitted on the device.
         ArgumentError: if settings of the fit do not fit each other.
     """
-    if "{fit}" not in PLACES[stage.place].folder:
+    if "{fit}" not in stage.rule.folder:
         return
-    fit, kind = config.fit, kinds()[config.fit.field]
+    fit, kind = config.fit, fit_specs()[config.fit.field]
     if stage.place == "phase" and stage.name not in kind.phases:
-        owner = next(other.name for other in kinds().values() if stage.name in other.phases)
+        owner = next(other.name for other in fit_specs().values() if stage.name in other.phases)
         raise ConfigError(
             f"fit.field: texgs {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
             f"run texgs {kind.phases[-1]} or choose another fit"
         )
-    if stage.place == "mesh" and not kind.depth:
+    if stage.place == "mesh" and not kind.field.depth:
         able = " or ".join(other.name for other in kinds().values() if other.depth)
         raise ConfigError(
             f"fit.field: texgs mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "

@@ -11,9 +11,9 @@ from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.compose import Same, compose
 from texgs.config.gallery import AS_FITTED, GalleryKeys, GridKeys, ShotKeys
-from texgs.config.methods import method_of
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
+from texgs.edit.method import method_of
 from texgs.workflow.gallery_scenes import check_changes, fit_of, takers
 from texgs.workflow.inputs import prepared_volume, scene_settings, sibling
 from texgs.workflow.places import edit_folder, fit_folder, made

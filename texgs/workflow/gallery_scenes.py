@@ -5,10 +5,10 @@ from omegaconf import DictConfig
 from texgs.config.check import is_scene_file
 from texgs.config.compose import changed, compose
 from texgs.config.gallery import AS_FITTED, ShotKeys
-from texgs.config.methods import method_of
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.core.names import close
+from texgs.edit.method import method_of
 from texgs.workflow.inputs import with_recipe
 from texgs.workflow.locate import tf_names
 from texgs.workflow.variants import changes as swept

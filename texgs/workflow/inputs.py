@@ -1,58 +1,71 @@
-"""Which files and settings the stages of the workflow read."""
+"""What several stages read, files and settings, and which configurations go through them."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from omegaconf import DictConfig
-from yaml import YAMLError
 
-from texgs.config.check import is_scene_file
-from texgs.config.compose import Same, changed, compose
-from texgs.config.edit import EditKeys
-from texgs.config.fields import kinds
-from texgs.config.methods import NO_METHOD, method_of
 from texgs.config.project import members
-from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
-from texgs.core.plain_yaml import parse_yaml
-from texgs.workflow.locate import source_file, tf_names, views_folder
-from texgs.workflow.looks import captions, looks_of
+from texgs.core.errors import ConfigError, MissingDataError
+from texgs.edit.method import NO_METHOD
+from texgs.fit.kinds import fit_specs
+from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.places import edit_folder, folder_of, made
-from texgs.workflow.variants import NO_SWEEP, fit_variant
+from texgs.workflow.stage import plain
 
 
-def volume_inputs(config: DictConfig) -> dict[str, Path]:
-    """The volume's file, where there is one."""
-    path = source_file(config)
-    return {} if path is None else {"source": path}
+def is_fit(config: DictConfig) -> bool:
+    """Return whether a configuration is of views and fits, not of an edit."""
+    return bool(config.edit.method == NO_METHOD)
+
+
+def is_fit_of(kind: str) -> Callable[[DictConfig], bool]:
+    """Return whether a configuration is of fits of a kind of field, as a function."""
+    return lambda config: is_fit(config) and config.fit.field == kind
+
+
+def has_volume(config: DictConfig) -> bool:
+    """Return whether the data set starts from a volume, not from views."""
+    return is_fit(config) and config.dataset.views_folder is None
+
+
+def has_scene(config: DictConfig) -> bool:
+    """Return whether the configuration is of all basic TFs."""
+    return is_fit(config) and config.tf is None
+
+
+def is_swept(config: DictConfig) -> bool:
+    """Return whether the configuration is of a sweep."""
+    from texgs.workflow.variants import changes  # not at the top: it loads Hydra
+
+    return bool(changes(config))
+
+
+def is_first_recipe(config: DictConfig) -> bool:
+    """Return whether the fit is the first one of the experiment's, whose configuration stands for all."""
+    return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
 
 def prepared_volume(config: DictConfig) -> dict[str, Path]:
-    """What stage `volume` writes."""
+    """Return what stage `volume` writes."""
     return {"volume": made("volume", config)}
 
 
 def view_set(config: DictConfig, tf: str | None = None) -> dict[str, Path]:
-    """The views: those that stage `views` renders, or those that the data set consists of."""
+    """Return the views: those that stage `views` renders, or those that the data set consists of."""
     given = views_folder(config, tf)
     return {"views": made("views", config, tf=tf) if given is None else given / "transforms_train.json"}
 
 
-def seeded(config: DictConfig) -> dict[str, Path]:
-    """The views, and the volume where surfels start in its voxels."""
-    from_voxels = config.fit.seeds.kind == "voxels" and config.dataset.views_folder is None
-    return {**view_set(config), **(prepared_volume(config) if from_voxels else {})}
-
-
 def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
-    """The model that a stage of the fit writes, and the views."""
+    """Return the model that a stage of the fit writes, and the views, as a function."""
     return lambda config: {"model": made("phase", config, stage), **view_set(config)}
 
 
 def all_models(config: DictConfig) -> dict[str, Path]:
-    """The models of all basic TFs after the last phase, by name.
+    """Return the models of all basic TFs after the last phase, by name.
 
     Raises:
         ConfigError: if one basic TF is chosen.
@@ -63,29 +76,23 @@ def all_models(config: DictConfig) -> dict[str, Path]:
 
 
 def last_phase(config: DictConfig) -> str:
-    """The phase of a fit that makes what scenes are composed of."""
-    return str(kinds()[config.fit.field].phases[-1])
+    """Return the phase of a fit that makes what scenes are composed of."""
+    return str(fit_specs()[config.fit.field].phases[-1])
 
 
 def scene_and_volume(config: DictConfig) -> dict[str, Path]:
-    """The scene with its models, and the prepared volume where there is one."""
+    """Return the scene with its models, and the prepared volume where there is one."""
     scene = {"scene": made("compose", config), **models_of_scene(config)}
     return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
 
 
 def models_of_scene(config: DictConfig) -> dict[str, Path]:
-    """The models that a scene names, as inputs beside it."""
+    """Return the models that a scene names, as inputs beside it."""
     return {f"model.{name}": path for name, path in all_models(config).items()}
 
 
-def shown_scene(config: DictConfig) -> dict[str, Path]:
-    """The scene of an edit, or the one as fitted, with its models."""
-    place = "compose" if config.edit.method == NO_METHOD else "edit"
-    return {"scene": made(place, config), **models_of_scene(config)}
-
-
 def scene_settings(config: DictConfig) -> dict[str, Any]:
-    """What stages read that compare a scene with its volume."""
+    """Return what stages read that compare a scene with its volume."""
     basic = {} if config.dataset.views_folder is not None else config.dataset.basic_tfs
     return {
         "tf_values": config.dataset.tf_values,
@@ -96,17 +103,20 @@ def scene_settings(config: DictConfig) -> dict[str, Any]:
 
 
 def lens(config: DictConfig) -> dict[str, float]:
-    """Distance and field of view of the views, which pictures of scenes share."""
+    """Return distance and field of view of the views, which pictures of scenes share."""
     return {"radius": config.views.radius, "fov_y": config.views.fov_y}
 
 
 def fit_label(config: DictConfig, later: Sequence[str] = ()) -> dict[str, Any]:
-    """Which fit this is, and what it runs on. One that variants of a sweep share is of none of them.
+    """Return which fit this is, and what it runs on. One that variants of a sweep share is of none of them.
 
     Args:
         config: of a job.
         later: keys of the recipe that only later jobs read.
     """
+    from texgs.config.schema import NO_SWEEP
+    from texgs.workflow.variants import fit_variant
+
     variant = fit_variant(config)
     return {
         "fit": {
@@ -121,8 +131,25 @@ def fit_label(config: DictConfig, later: Sequence[str] = ()) -> dict[str, Any]:
     }
 
 
+def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[DictConfig], dict[str, Any]]:
+    """Return what a stage of the fit reads, as a function: what holds for all, and its own parts.
+
+    Args:
+        parts: keys of the recipe.
+        later: those of later stages.
+    """
+    return lambda config: {
+        "fit": {
+            **fit_label(config, later)["fit"],
+            **{part: getattr(config.fit, part) for part in ("reduce", *parts)},
+        }
+    }
+
+
 def is_changed(fit: DictConfig, later: Sequence[str] = ()) -> bool:
-    """Whether a recipe is not that of the file with its name, but for its seed and for some keys."""
+    """Return whether a recipe is not that of the file with its name, but for its seed and for some keys."""
+    from texgs.config.compose import compose
+
     if fit.name not in members("fit"):
         return True
     file = compose((f"fit={fit.name}",)).fit
@@ -132,91 +159,33 @@ def is_changed(fit: DictConfig, later: Sequence[str] = ()) -> bool:
 
 
 def view_settings(config: DictConfig) -> dict[str, Any]:
-    """How views are rendered, without the name of their folder."""
-    return {name: value for name, value in config.views.items() if name != "name"}
-
-
-def models(config: DictConfig) -> dict[str, Path]:
-    """The models that the phases of the fit write, and the views."""
-    phases = kinds()[config.fit.field].phases
-    return {
-        **{name: made("phase", config, name) for name in phases},
-        **view_set(config),
-    }
-
-
-def compared_models(config: DictConfig) -> dict[str, Path]:
-    """The models of all recipes of the experiment after their last phases, by recipe, and the views."""
-    fits = [with_recipe(config, name) for name in config.fits]
-    return {
-        **{each.fit.name: made("phase", each, last_phase(each)) for each in fits},
-        **view_set(config),
-    }
+    """Return how views are rendered, without the name of their folder."""
+    return {name: value for name, value in plain(config.views).items() if name != "name"}
 
 
 def with_recipe(config: DictConfig, name: str) -> DictConfig:
-    """The same configuration with the name and field of another recipe: what decides where its models are."""
+    """Return the configuration with another recipe's name and field: what decides where its models are."""
+    from texgs.config.compose import Same
+
     return _with_recipe(Same(config), name)
 
 
 @lru_cache(maxsize=1024)
-def _with_recipe(same: Same, name: str) -> DictConfig:
+def _with_recipe(same: Any, name: str) -> DictConfig:
+    from texgs.config.compose import changed, compose
+
     recipe = compose((f"fit={name}",)).fit
     return changed(same.config, fit=changed(same.config.fit, name=recipe.name, field=recipe.field))
 
 
-def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[DictConfig], dict[str, Any]]:
-    """What a stage of the fit reads: what holds for all, and its own parts; `later`: parts of later ones."""
-    return lambda config: {
-        "fit": {**fit_label(config, later)["fit"], **{part: config.fit[part] for part in ("reduce", *parts)}}
-    }
-
-
-def edited_scene(config: DictConfig) -> dict[str, Path]:
-    """The scene that an edit starts from with its models, their training views, and a style picture's file.
-
-    Raises:
-        ConfigError: if one basic TF is chosen, or the edit starts from itself.
-    """
-    if config.edit.base == config.edit.name:
-        raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
-    if config.tf is not None:
-        raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
-    views = {f"views.{name}": view_set(config, name)["views"] for name in tf_names(config)}
-    method = method_of(config.edit)
-    scene = scene_before(config)
-    models = files_of_scene(scene) if is_scene_file(config.edit.base or "") else models_of_scene(config)
-    looks: dict[str, str | None] = {**looks_of(config)} or {"": None}
-    files = {
-        f"{key}.{name}" if name else key: path
-        for name, look in looks.items()
-        for key, path in method.files(method.of(config.edit, look)).items()
-    }
-    return {"scene": scene, **models, **views, **files}
-
-
-def files_of_scene(scene: Path) -> dict[str, Path]:
-    """The files that the file of a scene names, as far as they are there: what else decides what it shows."""
-    try:
-        named: list[object] = [parse_yaml(scene.read_text(encoding="utf-8"))]
-    except (OSError, ValueError, YAMLError, ArgumentError):
-        return {}  # the job tells what is wrong with it
-    files: dict[str, Path] = {}
-    while named:
-        table = named.pop()
-        for key, value in table.items() if isinstance(table, dict) else ():
-            if key in ("file", "texture") and (path := scene.parent / str(value)).is_file():
-                files[f"of_scene.{len(files)}"] = path
-            named.append(value)
-    return files
-
-
 def scene_before(config: DictConfig) -> Path:
-    """The scene.yaml that an edit starts from.
+    """Return the scene.yaml that an edit starts from.
 
     Raises:
         MissingDataError: if it is a file that is not there.
     """
+    from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
+
     base = config.edit.base
     if base is None:
         return made("compose", config)
@@ -228,25 +197,5 @@ def scene_before(config: DictConfig) -> Path:
 
 
 def sibling(config: DictConfig, name: str) -> Path:
-    """The scene.yaml that another edit of the same fit writes."""
+    """Return the scene.yaml that another edit of the same fit writes."""
     return folder_of("edit", config).with_name(edit_folder(config, name)) / made("edit", config).name
-
-
-def scenes_before_and_after(config: DictConfig) -> dict[str, Path]:
-    """The scene as edited and as fitted, what says where its surfaces are, and the views of all basic TFs.
-
-    Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
-    """
-    first = with_recipe(config, config.fits[0]) if config.fits else config
-    scenes = {"scene": made("edit", config), "before": made("compose", config)}
-    return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
-
-
-def edit_settings(config: DictConfig) -> dict[str, Any]:
-    """What jobs of edits read: what all edits have, and the keys of this one's method."""
-    keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
-    edit = {name: config.edit[name] for name in keys} | captions(config)
-    given = {"reduce": config.fit.reduce, "lens": lens(config)}
-    given["followed"] = looks_of(config)
-    label = fit_label(config)["fit"] | {"sweep": config.sweep.name, "variant": config.variant}
-    return {"edit": edit, "fit": label, **given}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -14,6 +13,7 @@ from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.slips import sentence
 from texgs.core.checksum import Checksums
+from texgs.core.curves import heard
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.core.typed import typed
@@ -21,8 +21,7 @@ from texgs.report.results import plain
 from texgs.workflow import result, tracked
 from texgs.workflow import tracking as track
 from texgs.workflow.provenance import record
-from texgs.workflow.stage import Stage, settings_digest
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stage import Outcome, Stage, settings_digest
 from texgs.workflow.tracked import Tracking
 from texgs.workflow.variants import swept
 from texgs.workflow.weights import require_same, weights_of
@@ -110,8 +109,7 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
             )
         result.require_intact(path)
     require_same(job.settings.get("weights", {}))
-    module = importlib.import_module(job.stage.module)
-    settings = _typed(module.Settings, job)
+    settings = _typed(job.stage.schema, job)
     identity = job.identity()
     work = result.claim(job.output, identity, is_fresh=is_fresh)
     with track.run(
@@ -122,7 +120,8 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
         params={**job.swept, **job.settings},
     ) as run:
         start = time.perf_counter()
-        outcome: Outcome = module.work(settings, dict(job.inputs), work)
+        with heard(run.log if run.id else None):
+            outcome: Outcome = job.stage.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         metrics = {
             **record(job.settings, identity, job.made_from(), seconds),

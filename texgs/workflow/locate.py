@@ -4,7 +4,6 @@ from pathlib import Path
 
 from omegaconf import DictConfig
 
-from texgs.config.check import check_name
 from texgs.config.dataset import Volume
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder
@@ -99,6 +98,8 @@ def tf_names(config: DictConfig) -> list[str]:
         ConfigError: if there are none, or not the one chosen.
         MissingDataError: if there is no folder of views.
     """
+    from texgs.config.check import check_name  # not at the top: it loads Hydra
+
     if config.tf is not None:
         if config.dataset.views_folder is None:
             basic_tf(config)

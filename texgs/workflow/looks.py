@@ -2,8 +2,8 @@
 
 from omegaconf import DictConfig
 
-from texgs.config.methods import method_of
 from texgs.core.errors import ConfigError
+from texgs.edit.method import method_of
 from texgs.workflow.locate import tf_names
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows

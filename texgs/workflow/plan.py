@@ -14,20 +14,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.project import folders
-from texgs.core.checksum import digest
+from texgs.core.checksum import digest, sha256
 from texgs.core.errors import ConfigError, MissingDataError
-from texgs.workflow.code import ROOT, code_digest
-from texgs.workflow.kept import fingerprint, keep, recall
+from texgs.core.io import write_atomic
+from texgs.core.kept import fingerprint, keep, recall
+from texgs.workflow.code import ROOT
+from texgs.workflow.stage import LONG_AGO
+from texgs.workflow.stage_table import RULES, STAGES
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
 
     from texgs.core.checksum import Checksums
     from texgs.workflow.job import Job
+    from texgs.workflow.stage import Rule
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
 SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places that are shown of a sweep
-OTHER_CODE = ("texgs.cli.tables", "texgs.cli.report")  # of rules that are no stages
 
 
 @dataclass(frozen=True)
@@ -37,16 +40,15 @@ class Plan:
     results: str
     tracking: str | None  # URI of the store
     experiment: str  # of the store
-    mapper_gpu: int  # GPUs that a job of views takes
-    fit_gpu: int  # and a job of the fits and edits
+    gpu: list[str]  # what GPUs are for: "views", "fit" or both
     jobs: dict[str, dict[str, Any]]  # stage, place, settings file, code, inputs and swept values, by folder
     sweeps: dict[str, list[str]]  # folders of the jobs of each sweep, "" for those of none
     downloads: dict[str, tuple[str, str]]  # address and checksum of volumes, by the files they go to
     wildcards: dict[str, list[str]]  # values of `dataset`, `views`, `fit`, `phase` and `edit`
-    code: dict[str, str]  # digests of modules that are no stages
     left_out: str  # file that tells what the run goes on without
     earlier: dict[str, str]  # metrics files of other runs with the same results, and their digests
     replaced: list[str]  # folders with results of other settings, in whose place the run puts its own
+    notes: dict[str, str]  # files that tables and the report read: whether somebody else has changed them
 
     def warning(self) -> str:
         """What a user should know before the run begins; empty where there is nothing."""
@@ -58,6 +60,25 @@ class Plan:
             f"{self.replaced[0]} {verb} results of other settings, which this run replaces; "
             "results=FOLDER keeps both"
         )
+
+    def target(self, name: str) -> list[str]:
+        """Return the metrics files of all jobs of a target; of galleries also those of sweeps."""
+        places = [rule.name for rule in RULES.values() if rule.target == name]
+        sweeps = self.sweeps if "gallery" in places else [""]
+        return [file for sweep in sweeps for file in self.done(*places, sweep=sweep)]
+
+    def swept(self) -> list[str]:
+        """Return the sweeps that have fits, by name."""
+        return sorted(name for name in self.sweeps if name and self.done("phase", sweep=name))
+
+    def told(self, *places: str) -> list[str]:
+        """Return the metrics files that tables read, of some places, and all that is shown of sweeps."""
+        of_sweeps = [file for name in self.swept() for file in self.done(*SWEPT, sweep=name)]
+        return sorted({*self.done(*places), *of_sweeps})
+
+    def gpus(self, rule: Rule) -> int:
+        """Return how many GPUs a job of a rule takes."""
+        return int(any(use in self.gpu for use in rule.gpu))
 
     def done(self, *places: str, sweep: str = "") -> list[str]:
         """The metrics files of all jobs that have one of some places, of a sweep or of none."""
@@ -134,25 +155,30 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
         results,
         config.tracking.uri,
         config.tracking.experiment,
-        int(any(each.views.mapper == "gpu" for each in configs)),
-        int(any(each.device.name == "cuda" for each in configs)),
+        gpu_uses(configs),
         plain_jobs,
         sweeps,
         downloads(configs),
         wildcards(configs),
-        {module: code_digest(module) for module in OTHER_CODE},
         left_out({**selection.left_out, **outdated}, results),
         others,
         of_other_settings(run.values()),
+        notes(results, checksums),
     )
     checksums.save()
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
 
 
+def gpu_uses(configs: Iterable[DictConfig]) -> list[str]:
+    """Return what GPUs are for in some configurations: views, fits or both."""
+    uses = {"views" if each.views.mapper == "gpu" else "" for each in configs}
+    uses |= {"fit" if each.device.name == "cuda" else "" for each in configs}
+    return sorted(filter(None, uses))
+
+
 def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
     """What the wildcards of rules stand for in these configurations."""
     from texgs.workflow.places import edit_folder, fit_folder
-    from texgs.workflow.stage_table import STAGES
 
     values = {
         "dataset": {each.dataset.name for each in configs},
@@ -228,6 +254,39 @@ def plain(job: Job, results: str) -> dict[str, Any]:
         "inputs": inputs,
         "swept": dict(job.swept),
     }
+
+
+def notes(results: str, checksums: Checksums) -> dict[str, str]:
+    """Note in files for tables and the report what of them has been changed since they were made.
+
+    Returns:
+        These files by the names of the rules.
+    """
+    from texgs.workflow.stage import note_result
+
+    made = recall(written_file(results), "") or {}
+    changed = sorted(path for path, sha in made.items() if Path(path).exists() and checksums.of(path) != sha)
+    files = {}
+    for name, place in {"tables": f"{results}/tables", "report": f"{results}/report.html"}.items():
+        files[name] = f"{results}/.conf/{name}.txt"
+        if not Path(files[name]).exists():
+            write_atomic(Path(files[name]), lambda file: file.write(b"whole\n"))
+            os.utime(files[name], (LONG_AGO, LONG_AGO))
+        own = [path for path in changed if path.startswith(place)]
+        note_result(files[name], f"{', '.join(own)}: changed since they were made" if own else None)
+    return files
+
+
+def note_written(results: str, made: Iterable[str]) -> None:
+    """Note the checksums of tables and the report, which a run has made, for the next one to compare."""
+    known = recall(written_file(results), "") or {}
+    of_tables = {path for path in made if path.startswith((f"{results}/tables/", f"{results}/report.html"))}
+    keep(written_file(results), "", {**known, **{path: sha256(Path(path)) for path in sorted(of_tables)}})
+
+
+def written_file(results: str) -> Path:
+    """Return the file that holds the checksums of tables and the report."""
+    return Path(results, ".conf", "written.json")
 
 
 def note_results(jobs: Iterable[Job], settings: Iterable[str]) -> None:

@@ -8,13 +8,14 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from texgs import __version__
-from texgs.config.methods import NO_METHOD
 from texgs.core.memory import MIB, peak_memory
+from texgs.edit.method import NO_METHOD
 
 PACKAGES = (  # whose code decides results
     *("torch", "numpy", "scipy", "kornia", "opencv-python-headless", "pillow", "matplotlib", "av"),
@@ -129,8 +130,9 @@ def user() -> str:
         return str(os.getuid())
 
 
+@cache
 def git_revision() -> str:
-    """Commit of the source tree, with "+" where files differ from it; "unknown" outside a clone."""
+    """Return the commit of the source tree, "+" after it where files differ; "unknown" outside a clone."""
     folder = Path(__file__).parents[2]
     if not (folder / ".git").exists():  # a wheel may be installed inside of the clone of something else
         return "unknown"

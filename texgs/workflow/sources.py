@@ -77,7 +77,7 @@ def imports(tree: ast.AST) -> Iterator[str]:
 
 
 class WithoutWords(ast.NodeTransformer):
-    """Takes out docstrings and help texts: the words of `key(...)`, `help=...` and `{"help": ...}`."""
+    """Takes out docstrings, `STAGE = ...` and help: the words of `key(...)`, `help=...`, `{"help": ...}`."""
 
     def visit(self, node: ast.AST) -> ast.AST:
         """The node without them."""
@@ -85,6 +85,8 @@ class WithoutWords(ast.NodeTransformer):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if is_text(node.body[0] if node.body else None):
                 node.body = node.body[1:] or [ast.Pass()]
+        elif isinstance(node, ast.Assign) and is_stage(node):
+            return ast.Pass()
         elif isinstance(node, ast.Call):
             node.keywords = [word for word in node.keywords if word.arg not in ("help", "description")]
             if isinstance(node.func, ast.Name) and node.func.id == "key":
@@ -94,6 +96,11 @@ class WithoutWords(ast.NodeTransformer):
             kept = [(k, v) for k, v in items if not (isinstance(k, ast.Constant) and k.value == "help")]
             node.keys, node.values = [k for k, _ in kept], [v for _, v in kept]
         return node
+
+
+def is_stage(node: ast.Assign) -> bool:
+    """Return whether a statement says what a stage is to the workflow: its job runs something else."""
+    return any(isinstance(name, ast.Name) and name.id in ("STAGE", "STAGES") for name in node.targets)
 
 
 def is_text(node: ast.stmt | None) -> bool:

@@ -1,49 +1,92 @@
 """What a stage of the workflow is: the configuration it reads, the code it runs, the place of its files.
 
-A job's settings are written once to a file named after their contents. That file is an input of the job and
-the digest of the code a parameter, so a changed value or line of code reruns what depends on it.
+A stage is one module of texgs/workflow/stages, see `stage_table`. A job's settings are written once to a file
+named after their contents. That file is an input of the job and the digest of the code a parameter, so a
+changed value or line of code reruns what depends on it.
 """
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 from omegaconf import DictConfig, OmegaConf
 
-from texgs.config.compose import changed
-from texgs.config.fields import kinds
-from texgs.config.methods import methods
 from texgs.core.checksum import digest
 from texgs.core.io import write_atomic
+from texgs.edit.method import methods
+from texgs.fields.kinds import kinds
+from texgs.metrics.metric import metrics
+from texgs.report.results import Result
 from texgs.workflow.code import code_digest
-from texgs.workflow.places import PLACES, folder_of
 
 LONG_AGO = 946684800  # the year 2000, in seconds
+EVERY = 1024  # threads, of which a job gets as many as there are
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule of the workflow, of one stage or of several alike: where its jobs write, and what they take."""
+
+    name: str
+    folder: str  # of wildcards dataset, tf, views, fit, phase, edit and gallery
+    files: tuple[str, ...] = ()  # the first is the one that other jobs ask for; metrics.json comes with all
+    target: str = ""  # what `texgs run` calls all its jobs, together with those of some other rules
+    threads: int = 4
+    gpu: tuple[Literal["views", "fit"], ...] = ()  # what a GPU is for, where the configuration asks for one
+    shown: Mapping[str, str] = field(default_factory=dict)  # captions of files in the report of Snakemake
+
+    @property
+    def is_per_tf(self) -> bool:
+        """Whether there is a job for each basic TF, not for the whole data set."""
+        return "{tf}" in self.folder
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A result for metrics.json, and pictures for the report and the tracked run."""
+
+    result: Result
+    pictures: Mapping[str, str] = field(default_factory=dict)  # what files of the output show, by their names
 
 
 @dataclass(frozen=True)
 class Stage:
-    """One arrow of the data flow: a verb of the command line, and a job of the workflow."""
+    """One arrow of the data flow: a verb of the command line, and a job of the workflow.
+
+    Its module imports nothing heavy before `work` is called.
+    """
 
     name: str
-    module: str  # what the job runs
-    select: Callable[[DictConfig], dict[str, Any]]  # the part of the configuration that the job reads
-    inputs: Callable[[DictConfig], dict[str, Path]]  # the files it reads
-    place: str  # of its files, a key of PLACES, and its rule in the workflow
-    needs: tuple[str, ...] = ()  # stages that make these files
+    order: int  # among the stages: behind those whose files it reads
+    help: str  # what it does, in `texgs --help`
+    rule: Rule
+    schema: type[Any]  # dataclass of its settings
+    select: Callable[[DictConfig], dict[str, Any]]  # the part of the configuration that is its settings
+    inputs: Callable[[DictConfig], dict[str, Path]]  # the files it reads, by name
+    work: Callable[[Any, dict[str, Path], Path], Outcome]  # its job: from settings and inputs to a folder
     applies: Callable[[DictConfig], bool] = lambda config: True  # whether a data set or edit goes through it
     fits: str = ""  # module of the kind of field that it fits
 
     @property
+    def module(self) -> str:
+        """What the job runs."""
+        return self.work.__module__
+
+    @property
+    def place(self) -> str:
+        """Name of its rule."""
+        return self.rule.name
+
+    @property
     def per_tf(self) -> bool:
         """Whether there is a job for each basic TF, not for the whole data set."""
-        return PLACES[self.place].is_per_tf
+        return self.rule.is_per_tf
 
     def settings(self, config: DictConfig) -> dict[str, Any]:
-        """What a job reads, as plain lists and dicts.
+        """Return what a job reads, as plain lists and dicts.
 
         Raises:
             ConfigError: if the stage works on one basic TF, and `config.tf` is none of the data set's.
@@ -55,19 +98,23 @@ class Stage:
         return cast(dict[str, Any], plain(selected))
 
     def output(self, config: DictConfig) -> Path:
-        """Folder of the job's files."""
-        return folder_of(self.place, config, phase=self.name)
+        """Return the folder of the job's files."""
+        from texgs.workflow.places import folder_of  # not at the top: it asks for the rules of all stages
+
+        return folder_of(self.rule.name, config, phase=self.name)
 
     def code(self, settings: Mapping[str, Any]) -> str:
-        """Digest of the code that a job runs: that of its stage, its kind of field and its method of editing.
+        """Return the digest of the code that a job runs: of its stage, kind of field, method and metrics.
 
-        The last two are imported by the names in its settings, so the sources of the stage do not tell.
+        All but the first are found by their names, so the sources of the stage do not tell.
         """
         modules = [self.module, self.fits] if self.fits else [self.module]
         if self.place != "phase" and "fit" in settings:
             modules.append(kinds()[settings["fit"]["field"]].module)
         if "edit" in settings:
             modules.append(methods()[settings["edit"]["method"]].module)
+        if self.name == "edit_metrics":
+            modules += [metric.run.__module__ for metric in metrics().values()]
         return digest(" ".join(map(code_digest, modules)))
 
 
@@ -97,12 +144,12 @@ def note_result(settings: str, note: str | None) -> None:
 
 
 def settings_digest(settings: dict[str, Any]) -> str:
-    """Digest of a job's settings: the one in the name of its file."""
+    """Return the digest of a job's settings: the one in the name of its file."""
     return digest(_yaml(settings))
 
 
 def plain(value: Any) -> Any:
-    """A value of a configuration, or tables and lists of them, as plain dicts and lists."""
+    """Return a value of a configuration, or tables and lists of them, as plain dicts and lists."""
     if OmegaConf.is_config(value):
         return OmegaConf.to_container(value, resolve=True)
     if isinstance(value, Mapping):
@@ -115,5 +162,7 @@ def _yaml(settings: dict[str, Any]) -> str:
 
 
 def for_tf(config: DictConfig, name: str) -> DictConfig:
-    """The same configuration for one basic TF."""
+    """Return the same configuration for one basic TF."""
+    from texgs.config.compose import changed  # not at the top: it loads Hydra
+
     return changed(config, tf=name)

@@ -7,9 +7,9 @@ from itertools import product
 from omegaconf import DictConfig, OmegaConf
 
 from texgs.config.compose import compose
-from texgs.config.edit import EditKeys
-from texgs.config.methods import NO_METHOD
 from texgs.core.errors import ConfigError
+from texgs.edit.keys import EditKeys
+from texgs.edit.method import NO_METHOD
 from texgs.workflow.product import SEEDS, key_of
 from texgs.workflow.variants import OF_EDITS, OF_FITS, changes, changes_edits, group_of, is_of_edits, own_name
 

@@ -10,12 +10,11 @@ from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
+from texgs.config.schema import NO_SWEEP
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow import tracking as track
-from texgs.workflow.places import PLACES
 from texgs.workflow.provenance import edit, git_revision, recipe, seed, user
-from texgs.workflow.variants import NO_SWEEP
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job
@@ -82,23 +81,25 @@ def tell(run: track.Run, job: Job, metrics: Mapping[str, Any]) -> None:
     for step, values in curves(metrics["numbers"]):
         run.log(values, step)
     checksums = result.recorded(job.output)
-    for file in PLACES[job.stage.place].files[:1]:
+    for file in job.stage.rule.files[:1]:
         run.tag({"file": (job.output / file).as_posix(), "file.sha256": checksums[file]})
     for picture in (*metrics["pictures"], result.METRICS):
         run.artifact(job.output / picture)
 
 
 def curves(numbers: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, float]]]:
-    """Steps and values of what has several: times of frames, and losses over iterations."""
+    """Yield steps and values of what has several: times of frames, and losses of edits over iterations.
+
+    Losses of fits are told while they run.
+    """
     for key, listed in numbers.items():
         if isinstance(listed, list) and key.endswith("_ms"):
             yield from ((step, {key: float(value)}) for step, value in enumerate(listed))
-    losses = numbers.get("losses", [])
-    by_name = {f"loss/{name}": each for name, each in losses.items()} if isinstance(losses, dict) else {}
-    for name, listed in (by_name or {"loss": losses}).items():
+    losses = numbers.get("losses")
+    for name, listed in losses.items() if isinstance(losses, dict) else ():
         total = numbers.get("iterations") or len(listed)
-        for index, loss in enumerate(listed):
-            yield round(total * (index + 1) / len(listed)), {name: float(loss)}
+        for index, loss in enumerate(listed, 1):
+            yield round(total * index / len(listed)), {f"loss/{name}": float(loss)}
 
 
 def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:

@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 
 from omegaconf import DictConfig, OmegaConf
 
+from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ConfigError
-from texgs.report.results import NO_SWEEP
 from texgs.workflow.product import ONLY_SEEDS, SEEDS, combinations, key_of, label
 
 OF_FITS = ("views", "fit", "device")  # groups of keys that change fits

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from texgs.config.methods import NO_METHOD, method_of
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
+from texgs.edit.method import NO_METHOD, method_of
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig

@@ -6,13 +6,17 @@ import shlex
 import sys
 from pathlib import Path
 
-from texgs.workflow import fork_client, last_words, parents
-from texgs.workflow.plan import planned, words_of
-from texgs.workflow.places import PLACES
+from texgs.cli import fork_client
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
 from texgs.core.memory import collect_rarely
 from texgs.core.waiting import waiting
+from texgs.report.table import DOCUMENT, FORMATS
+from texgs.report.tables import specs
+from texgs.workflow import last_words, parents
+from texgs.workflow.code import code_digest
+from texgs.workflow.plan import note_written, planned, words_of
+from texgs.workflow.stage_table import RULES
 
 collect_rarely()
 
@@ -36,36 +40,52 @@ if workflow.is_main_process and (warning := PLAN.warning()):
 
 PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
-MAPPER_GPU, FIT_GPU = PLAN.mapper_gpu, PLAN.fit_gpu
-EVERY = 1024  # threads, of which a job gets as many as there are
+TARGETS = dict.fromkeys(rule.target for rule in RULES.values() if rule.target)
+TABLES = specs(PLAN.swept())
+STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
+BESIDE = {  # what tables and the report show beside the jobs of this run
+    "earlier": list(PLAN.earlier),
+    "of_earlier": list(PLAN.earlier.values()),
+    "left_out": PLAN.left_out,
+    "study": f"{STUDY}/key.json",
+    "ballots": sorted(map(str, STUDY.glob("votes/*.csv"))),
+}
+config["captions"] = {rule.name: rule.shown for rule in RULES.values()}  # what workflow/report/figure.rst shows
 
 
-def job(place, wildcards):
+def job(rule, wildcards):
     """Folder of the job that wildcards describe, and what the plan says of it."""
-    folder = Path(RESULTS, PLACES[place].folder.format(**dict(wildcards.items()))).as_posix()
+    folder = Path(RESULTS, rule.folder.format(**dict(wildcards.items()))).as_posix()
     return folder, PLAN.jobs[folder]
 
 
-def reads(place):
+def reads(rule):
     """The files a job reads, first its settings, as a function of wildcards."""
 
     def of(wildcards):
-        _, planned = job(place, wildcards)
+        _, planned = job(rule, wildcards)
         return [planned["settings"], *planned["inputs"].values()]
 
     return of
 
 
-def writes(place):
-    """The files a job writes that others read."""
-    return [f"<results>/{PLACES[place].folder}/{file}" for file in (*PLACES[place].files, "metrics.json")]
+def writes(rule):
+    """The files a job writes that others read; pictures go into the report of Snakemake, too."""
+
+    def of(file):
+        path = f"<results>/{rule.folder}/{file}"
+        if file not in rule.shown:
+            return path
+        return report(path, caption="../report/figure.rst", category=rule.target, subcategory=rule.name)
+
+    return [of(file) for file in (*rule.files, "metrics.json")]
 
 
-def words(place):
+def words(rule):
     """The words of a job's command, first its stage, as a function of wildcards."""
 
     def of(wildcards):
-        folder, planned = job(place, wildcards)
+        folder, planned = job(rule, wildcards)
         inputs = [f"{name}={path}" for name, path in planned["inputs"].items()]
         files = ["--input", *inputs] if inputs else []
         return [planned["stage"], "--settings", planned["settings"], *files, "--output", folder]
@@ -73,14 +93,14 @@ def words(place):
     return of
 
 
-def code(place):
+def code(rule):
     """The digest of the code that a job runs, as a function of wildcards."""
-    return lambda wildcards: job(place, wildcards)[1]["code"]
+    return lambda wildcards: job(rule, wildcards)[1]["code"]
 
 
-def log_of(place):
+def log_of(rule):
     """The log of a job."""
-    return f"<logs>/{PLACES[place].folder}.log"
+    return f"<logs>/{rule.folder}.log"
 
 
 def any_of(names, otherwise="none"):
@@ -91,7 +111,7 @@ def any_of(names, otherwise="none"):
 def begin():
     """Hold the results, begin the tracked runs that hold those of jobs, and start what forks the jobs."""
     global RUN_LOCK, FORK_SERVER, PARENTS
-    from texgs.workflow import fork_server
+    from texgs.cli import fork_server
     from texgs.workflow.result import run_alone
 
     try:
@@ -100,7 +120,7 @@ def begin():
             # A limit of jobs a second makes Snakemake look at all jobs once more after each look, so that a long
             # run looks at them all the time, with half of a core: github.com/snakemake/snakemake/issues/2967.
             workflow.scheduler.job_rate_limiter = None
-        jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in PLACES]
+        jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in RULES]
         if workflow.local_exec and len(jobs) > 1:
             FORK_SERVER = fork_server.start(ENVIRONMENT)
         PARENTS = parents.begin(PLAN, WORDS)
@@ -112,6 +132,8 @@ def begin():
 def finish(status):
     """End the tracked runs that hold those of jobs; returns all files that the workflow makes."""
     made = {str(file) for each in workflow.dag.jobs for file in each.output}
+    if status == "FINISHED":
+        note_written(RESULTS, made)
     parents.end(PARENTS, status, PLAN, made)
     return made
 

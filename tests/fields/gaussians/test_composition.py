@@ -3,11 +3,11 @@ import torch
 from torch.testing import assert_close
 
 from tests.fields.gaussians.samples import sample
-from texgs.config.fields import kinds
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.fields.gaussians.composition import JoinedGaussians
 from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 
 CAMERA = orbit(30, 20, 3, 40, 48, 40)
@@ -74,7 +74,7 @@ def test_other_edits_are_refused(edit, name):
 
 
 def test_looks_without_light_are_refused():
-    with pytest.raises(ArgumentError, match="look: 3D Gaussians have light in their colours, so no diffuse"):
+    with pytest.raises(ArgumentError, match="look: expected shaded, got diffuse; gaussians have light"):
         JoinedGaussians([sample()]).render(CAMERA, look="diffuse")
 
 
@@ -83,14 +83,14 @@ def test_what_is_no_scene_is_refused():
         JoinedGaussians([])
     with pytest.raises(ArgumentError, match="expected all with the antialiased filter or none, got both"):
         JoinedGaussians([sample(), sample(antialiased=True)])
-    with pytest.raises(ArgumentError, match="segments: 3D Gaussians have none"):
+    with pytest.raises(ArgumentError, match="segments: expected none of gaussians"):
         JoinedGaussians([sample()], [[torch.ones(7, dtype=torch.bool)]])
     with pytest.raises(ArgumentError, match="edits: expected one for each of 1 models, got 2"):
         JoinedGaussians([sample()]).render(CAMERA, edits=[PartEdit(), PartEdit()])
 
 
 def test_the_kind_composes_and_says_what_it_cannot_do():
-    from texgs.config.fields import require
+    from texgs.fields.kinds import require
 
     kind = kinds()["gaussians"]
     assert isinstance(kind.compose([sample()], [()]), JoinedGaussians)

@@ -184,7 +184,7 @@ def test_clusters_are_of_hues_and_the_largest_comes_first():
             lambda s: s.render(CAMERA, edits=[PartEdit(diffuse=2)]),
             "diffuse: .* got one of palette; fit surfels for this",
         ),
-        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded of palette fields, got ambient"),
+        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded, got ambient"),
         (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of palette fields, got"),
         (lambda s: PaletteScene([]), "models: expected at least one"),
         (lambda s: s.fields[0].to("cuda"), "device: expected cpu, got cuda; palette fields are rendered on"),

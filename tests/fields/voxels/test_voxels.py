@@ -175,7 +175,7 @@ def test_edits_of_opacity_and_visibility():
             lambda s: s.render(CAMERA, edits=[PartEdit(diffuse=2)]),
             "diffuse: .* got one of voxels; fit surfels for this",
         ),
-        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded of voxels, got ambient"),
+        (lambda s: s.render(CAMERA, look="ambient"), "look: expected shaded, got ambient"),
         (lambda s: s.render(CAMERA, outputs=("normal",)), "outputs: expected depth of voxels, got normal"),
         (lambda s: VoxelScene([]), "models: expected at least one"),
     ],

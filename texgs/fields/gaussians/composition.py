@@ -11,86 +11,40 @@ from torch.nn.functional import pad
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Look
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, opacity_factors
+from texgs.fields.unlit import UnlitScene
 from texgs.raster import Render
 
 
-class JoinedGaussians:
-    """Models as one scene on one device.
-
-    Args:
-        models: with one filter; their harmonics may have different degrees.
-        segments: of each model; there may be none.
+class JoinedGaussians(UnlitScene[Gaussians]):
+    """Models as one scene on one device, see `UnlitScene`.
 
     Raises:
         ArgumentError: if there is no model, their filters differ, or there is a segment.
     """
 
     def __init__(self, models: Sequence[Gaussians], segments: Sequence[Sequence[Tensor]] = ()) -> None:
-        if not models:
-            raise ArgumentError("models: expected at least one, got none")
+        super().__init__(models, segments)
         if len({model.shading for model in models}) > 1:
             raise ArgumentError(
                 "models: expected all with the antialiased filter or none, got both; fit them by one recipe"
             )
-        if any(segments):
-            raise ArgumentError("segments: 3D Gaussians have none; remove them, or fit surfels")
-        self.counts = [len(model) for model in models]
         self.whole = joined(models)
 
-    def __len__(self) -> int:
-        return len(self.whole)
-
-    @property
-    def device(self) -> torch.device:
-        """Where the Gaussians are."""
-        return self.whole.device
-
-    @property
-    def palettes(self) -> list[tuple[float, ...]]:
-        """Black for each model: none has a palette."""
-        return [(0.0, 0.0, 0.0)] * len(self.counts)
-
-    @torch.no_grad()
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        edits: Sequence[PartEdit] | None = None,
-        *,
-        look: Look = "shaded",
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
+    def _blend(
+        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
     ) -> Render:
-        """Render all visible models.
-
-        Args:
-            camera: on the models' device.
-            light: changes nothing: the colours are those of the views.
-            edits: one for each model, of opacity and visibility; by default nothing is changed.
-            look: only "shaded".
-            background: [3]; white by default.
-            outputs: of the rasterizer, without "normal".
-
-        Raises:
-            ArgumentError: if there are not as many edits as models, or 3D Gaussians cannot show what is
-                asked for.
-        """
-        if look != "shaded":
-            raise ArgumentError(f"look: 3D Gaussians have light in their colours, so no {look}; fit surfels")
-        opacity = 1.0 if edits is None else self._opacity(edits)
-        return self.whole.render(camera, light, background=background, outputs=outputs, opacity=opacity)
+        opacity = self._per_gaussian(factors)
+        return self.whole.render(camera, background=background, outputs=outputs, opacity=opacity)
 
     def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
-        """What is visible as one model, opacities as edited.
+        """Return what is visible as one model, opacities as edited.
 
         Raises:
             ArgumentError: as `render`; or if nothing is visible.
         """
-        factors = self._opacity(edits)
+        factors = self._per_gaussian(opacity_factors(edits, len(self.counts), self.kind))
         shown = factors > 0
         if not bool(shown.any()):
             raise ArgumentError("models: expected at least one visible Gaussian, got none; show a model")
@@ -100,9 +54,8 @@ class JoinedGaussians:
         parameters["opacities"] = torch.where(factor == 1, raw, changed)
         return replace(self.whole, parameters=parameters)
 
-    def _opacity(self, edits: Sequence[PartEdit]) -> Tensor:
-        """Factors [N] on opacities; 0 for what is hidden, so that nothing of it is drawn."""
-        factors = opacity_factors(edits, len(self.counts), self.whole.kind)
+    def _per_gaussian(self, factors: Sequence[float]) -> Tensor:
+        """Return the factor [N] of each Gaussian's opacity; 0 for what is hidden, which is not drawn."""
         pairs = zip(factors, self.counts, strict=True)
         return torch.cat([torch.full((n,), factor, device=self.device) for factor, n in pairs])
 

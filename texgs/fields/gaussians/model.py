@@ -13,10 +13,10 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.core.memory import MIB
 from texgs.fields.field import Role
 from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import geometry
+from texgs.fields.unlit import sizes_in_mib
 from texgs.raster import Options, Render, rasterize
 from texgs.raster.spherical_harmonics import DEGREES, spherical_harmonics
 
@@ -85,11 +85,14 @@ class Gaussians:
         return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
 
     def sizes(self) -> dict[str, float]:
-        """Sizes in MiB: as the paper counts, PLY files of 3DGS; with `stored_` before, of the tensors."""
-        stored = {role: sum(x.nbytes for x in self.tensors(role).values()) for role in ROLES}
-        counted = _mebibytes(PLY_GEOMETRY * len(self), PLY_SHADING * len(self))
-        kept = _mebibytes(stored["geometry"], stored["appearance"])
-        return counted | {f"stored_{name}": value for name, value in kept.items()}
+        """Return sizes in MiB: as the paper counts, PLY files of 3DGS; `stored_` are those of the tensors."""
+        n_geometry, n_shading = (
+            sum(x.nbytes for x in self.tensors(role).values()) for role in ("geometry", "appearance")
+        )
+        return sizes_in_mib(
+            {"geometry": PLY_GEOMETRY * len(self), "shading": PLY_SHADING * len(self), "texture": 0},
+            {"geometry": n_geometry, "shading": n_shading, "texture": 0},
+        )
 
     def render(
         self,
@@ -127,11 +130,3 @@ class Gaussians:
             outputs=outputs,
             options=self.shading.options,
         )
-
-
-ROLES: tuple[Role, Role] = ("geometry", "appearance")
-
-
-def _mebibytes(geometry: int, shading: int) -> dict[str, float]:
-    sizes = {"geometry_mib": geometry / MIB, "shading_mib": shading / MIB, "texture_mib": 0.0}
-    return {**sizes, "total_mib": (geometry + shading) / MIB, "files_mib": (geometry + shading) / MIB}

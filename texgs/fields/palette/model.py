@@ -16,10 +16,10 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, DeviceError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.core.memory import MIB
 from texgs.fields.field import Role
 from texgs.fields.palette.networks import Parameters, free_color, light, palette_color
 from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
+from texgs.fields.unlit import sizes_in_mib
 from texgs.raster import Render
 from texgs.raster.voxels import camera_rays
 
@@ -104,7 +104,7 @@ class PaletteField:
         return render_fields([self], [1.0], camera, background, outputs)
 
     def sizes(self) -> dict[str, float]:
-        """MiB.
+        """Return sizes in MiB.
 
         The paper counts the hash grids and two lattices of 32 bits for what is occupied; the file has all
         networks, and a mask for each block of voxels and a number for each voxel.
@@ -116,8 +116,7 @@ class PaletteField:
             group = groups.get(name.split(".")[0], "shading")
             counted[group] += 4 * x.numel() if name.endswith(".table") else 0
             stored[group] += 4 * x.numel()
-        sizes = _mebibytes("", counted)
-        return {**sizes, "files_mib": sizes["total_mib"], **_mebibytes("stored_", stored)}
+        return sizes_in_mib(counted, stored)
 
 
 @torch.no_grad()
@@ -161,8 +160,3 @@ def _blended(fields: Sequence[PaletteField], factors: Sequence[float], rays: Ten
         own_points = shows.points.take(own)
         values[own, :3] = each.color(own_points, harmonics[own_points.ray])
     return shows.blend(values, len(rays))
-
-
-def _mebibytes(prefix: str, groups: Mapping[str, int]) -> dict[str, float]:
-    sizes = {**groups, "total": sum(groups.values())}
-    return {f"{prefix}{group}_mib": count / MIB for group, count in sizes.items()}

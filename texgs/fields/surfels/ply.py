@@ -10,7 +10,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from texgs.config.phase import RANGES
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.ply_file import read_vertices
@@ -23,6 +22,7 @@ from texgs.fields.ply_columns import (
     take_harmonics,
     write_columns,
 )
+from texgs.fields.surfels.material import RANGES
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.release_texture import read_texture
 from texgs.fields.surfels.shading import ShadingModel, material

@@ -9,9 +9,9 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from texgs.config.phase import RANGES, require_material
 from texgs.core.camera import Camera
 from texgs.core.light import Light
+from texgs.fields.surfels.material import RANGES, require_material
 from texgs.raster import Options, Texture
 from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture
 from texgs.raster.spherical_harmonics import spherical_harmonics
@@ -49,7 +49,7 @@ class ShadingModel:
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
     """Factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
 
-    Those that have a range, see `texgs.config.phase.RANGES`, go through a sigmoid; others are as they are.
+    Those that have a range, see `RANGES`, go through a sigmoid; others are as they are.
     """
     ranges = RANGES[kind]
     return {

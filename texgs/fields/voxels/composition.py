@@ -10,10 +10,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
-from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Look
-from texgs.fields.part_edit import PartEdit, opacity_factors
+from texgs.fields.unlit import UnlitScene
 from texgs.fields.voxels.model import Voxels
 from texgs.raster import Render
 from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, unpack_rows, voxel_grid
@@ -22,65 +19,24 @@ PIECE = 1 << 18  # voxels at a time
 SIDE = 8  # voxels that sides of a lattice are multiples of
 
 
-class VoxelScene:
-    """Grids that are drawn together; edits of opacity and visibility make another merged grid.
+class VoxelScene(UnlitScene[Voxels]):
+    """Grids that are drawn together, see `UnlitScene`; edits make another merged grid.
 
-    Args:
-        fields: at least one, all on one device.
-
-    Raises:
-        ArgumentError: if there is none.
+    Opacity is a factor on densities.
     """
 
-    def __init__(self, fields: Sequence[Voxels]) -> None:
-        if not fields:
-            raise ArgumentError("models: expected at least one, got none")
+    def __init__(self, fields: Sequence[Voxels], segments: Sequence[Sequence[Tensor]] = ()) -> None:
+        super().__init__(fields, segments)
         self.fields = list(fields)
         self._merged: tuple[tuple[float, ...], Voxels] | None = None
 
-    def __len__(self) -> int:
-        return sum(map(len, self.fields))
-
-    @property
-    def device(self) -> torch.device:
-        """Where the rows are."""
-        return self.fields[0].device
-
-    @property
-    def palettes(self) -> list[tuple[float, ...]]:
-        """Grids have none."""
-        return [(0.0, 0.0, 0.0)] * len(self.fields)
-
-    @torch.no_grad()
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        edits: Sequence[PartEdit] | None = None,
-        *,
-        look: Look = "shaded",
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
+    def _blend(
+        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
     ) -> Render:
-        """Render all visible grids.
-
-        Args:
-            camera: from where.
-            light: changes nothing.
-            edits: one for each grid; opacity is a factor on densities.
-            look: "shaded", as fitted.
-            background: [3]; white by default.
-            outputs: "depth".
-
-        Raises:
-            ArgumentError: if there are not as many edits as grids, or one cannot be shown.
-        """
-        if look != "shaded":
-            raise ArgumentError(f"look: expected shaded of voxels, got {look}")
-        factors = tuple(opacity_factors(edits, len(self.fields), Voxels.kind))
-        if self._merged is None or self._merged[0] != factors:
-            self._merged = (factors, self._merge(factors))
-        return self._merged[1].render(camera, light, background=background, outputs=outputs)
+        key = tuple(factors)
+        if self._merged is None or self._merged[0] != key:
+            self._merged = (key, self._merge(key))
+        return self._merged[1].render(camera, background=background, outputs=outputs)
 
     def _merge(self, factors: tuple[float, ...]) -> Voxels:
         first, grids = self.fields[0], []

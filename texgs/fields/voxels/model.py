@@ -12,8 +12,8 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.core.memory import MIB
 from texgs.fields.field import Role
+from texgs.fields.unlit import sizes_in_mib
 from texgs.raster import Render
 from texgs.raster.voxel_grid import VoxelGrid, unpack_rows
 from texgs.raster.voxels import March, render_view
@@ -74,19 +74,18 @@ class Voxels:
         return Render(view.color, view.alpha, depth=view.depth if outputs else None)
 
     def sizes(self) -> dict[str, float]:
-        """MiB.
+        """Return sizes in MiB.
 
         The paper counts an index of 32 bits for each point of the lattice, densities of 32 bits and
         coefficients of 16; the file has a mask and a number for each block of 64 points, and 32 bits a value.
         """
         grid, values = self.grid, 3 * (self.grid.degree + 1) ** 2
         x, y, z = grid.size
-        counted = {"geometry": 4 * x * y * z + 4 * len(grid), "shading": 2 * values * len(grid)}
-        stored = {"geometry": 8 * grid.masks.numel() + 4 * len(grid), "shading": 4 * values * len(grid)}
-        sizes = _mebibytes("", counted)
-        return {**sizes, "files_mib": sizes["total_mib"], **_mebibytes("stored_", stored)}
-
-
-def _mebibytes(prefix: str, groups: Mapping[str, int]) -> dict[str, float]:
-    sizes = {**groups, "texture": 0, "total": sum(groups.values())}
-    return {f"{prefix}{group}_mib": count / MIB for group, count in sizes.items()}
+        return sizes_in_mib(
+            {"geometry": 4 * x * y * z + 4 * len(grid), "shading": 2 * values * len(grid), "texture": 0},
+            {
+                "geometry": 8 * grid.masks.numel() + 4 * len(grid),
+                "shading": 4 * values * len(grid),
+                "texture": 0,
+            },
+        )

@@ -19,7 +19,7 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     """
     import torch
 
-    from texgs.config.fields import kinds
+    from texgs.fields.kinds import kinds
     from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
     from texgs.models.lpips import Lpips
 

@@ -1,15 +1,20 @@
 """Stage `comparison`: show the fits of several recipes side by side."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from texgs.fields.files import open_field
-from texgs.report.comparison import write_comparison
 from texgs.report.results import ComparisonResult
-from texgs.volume.view_set import read_views
+from texgs.workflow.inputs import is_first_recipe, is_fit, is_swept, last_phase, view_set, with_recipe
+from texgs.workflow.places import made
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.figure import shown_views
-from texgs.workflow.stages.outcome import Outcome
 from texgs.workflow.stages.settings import OfTF
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 SHOWN = "Test views, the fit of each recipe with its PSNR, and below it its error."
 
@@ -30,6 +35,10 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             transforms_train.json; without test views training views are shown.
         output: folder.
     """
+    from texgs.fields.files import open_field
+    from texgs.report.comparison import write_comparison
+    from texgs.volume.view_set import read_views
+
     shown = shown_views(read_views(inputs["views"].parent))
     models = {recipe: open_field(path) for recipe, path in inputs.items() if recipe != "views"}
     write_comparison(
@@ -40,3 +49,34 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         f"{settings.dataset}/{settings.tf}, {len(models)} recipes",
     )
     return Outcome(ComparisonResult(list(models), list(shown)), {"comparison.png": SHOWN})
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the last models of all recipes of the experiment, by recipe, and the views."""
+    fits = [with_recipe(config, name) for name in config.fits]
+    models = {each.fit.name: made("phase", each, last_phase(each)) for each in fits}
+    return {**models, **view_set(config)}
+
+
+def applies(config: DictConfig) -> bool:
+    """Return whether this is the first of several recipes: its configuration stands for all of them."""
+    return is_fit(config) and len(config.fits) > 1 and not is_swept(config) and is_first_recipe(config)
+
+
+STAGE = Stage(
+    "comparison",
+    order=100,
+    help="show the fits of several recipes side by side in test views",
+    rule=Rule(
+        "comparison",
+        "{dataset}/{tf}/comparison/{gallery}",
+        ("comparison.png",),
+        target="comparisons",
+        shown={"comparison.png": SHOWN},
+    ),
+    schema=Settings,
+    select=lambda config: {"reduce": config.fit.reduce},
+    inputs=inputs,
+    work=work,
+    applies=applies,
+)

@@ -1,16 +1,13 @@
 """Stage `compose`: the basic models of a data set as one scene."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 
-from texgs.core.camera import orbit
-from texgs.core.device import torch_device
-from texgs.core.movie import write_frames
 from texgs.report.results import SceneResult
-from texgs.scene.frame import frame
-from texgs.scene.scene import Scene, SceneModel
-from texgs.scene.scene_file import write_scene
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.inputs import all_models, fit_label, has_scene, lens
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
 
 SHOWN = "The basic models as one scene, rendered from their primitives."
@@ -34,6 +31,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: model.safetensors of each basic TF, by its name.
         output: folder.
     """
+    from texgs.core.camera import orbit
+    from texgs.core.device import torch_device
+    from texgs.core.movie import write_frames
+    from texgs.scene.frame import frame
+    from texgs.scene.scene import Scene, SceneModel
+    from texgs.scene.scene_file import write_scene
+
     scene = Scene({name: SceneModel(path) for name, path in inputs.items()})
     write_scene(output / "scene.yaml", scene)
     composition = scene.open(torch_device(settings.fit.device))
@@ -41,3 +45,23 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
     return Outcome(SceneResult(len(scene.models), len(composition)), {"scene.png": SHOWN})
+
+
+STAGE = Stage(
+    "compose",
+    order=120,
+    help="make one scene of the basic models of a data set",
+    rule=Rule(
+        "compose",
+        "{dataset}/scene/{fit}/compose",
+        ("scene.yaml", "scene.png"),
+        target="scenes",
+        gpu=("fit",),
+        shown={"scene.png": SHOWN},
+    ),
+    schema=Settings,
+    select=lambda config: {"image": config.dataset.image, "lens": lens(config), **fit_label(config)},
+    inputs=all_models,
+    work=work,
+    applies=has_scene,
+)

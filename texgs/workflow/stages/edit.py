@@ -1,25 +1,32 @@
 """Stages `edit_METHOD`: a method of editing gives a scene a new look, or a new part."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
+from yaml import YAMLError
 
 from texgs.config.edit import Edit
-from texgs.config.fields import kinds
-from texgs.config.methods import method_of
-from texgs.core.device import torch_device
-from texgs.edit.parts import parts_of
-from texgs.edit.task import Task
-from texgs.report.before_after import write_before_and_after
-from texgs.report.convergence import write_convergence
+from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.plain_yaml import parse_yaml
+from texgs.edit.keys import EditKeys
+from texgs.edit.method import Method, method_of, methods
+from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
-from texgs.scene.scene_file import read_scene, write_scene
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.inputs import fit_label, lens, models_of_scene, scene_before, view_set
+from texgs.workflow.locate import tf_names
+from texgs.workflow.looks import captions, looks_of
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.edit.task import Task
 
 FALLEN = "How the loss of the edit fell, term by term."
 POINTS = 100  # of a curve of losses at most
@@ -47,6 +54,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.edit.task import Task
+    from texgs.report.before_after import write_before_and_after
+    from texgs.report.convergence import write_convergence
+    from texgs.scene.scene_file import read_scene, write_scene
+
     method, title = method_of(settings.edit), f"{settings.dataset}: edit"
     device, before = torch_device(settings.fit.device), read_scene(inputs["scene"])
     task = Task(
@@ -81,7 +94,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, dict[str, list[float]]]:
-    """The number of iterations, and the means of losses over equal shares of them, by part and term."""
+    """Return how many iterations there were, and mean losses over equal shares of them, by part and term."""
+    import numpy as np
+
     curves = {f"{part}/{term}": values for part, terms in losses.items() for term, values in terms.items()}
     iterations = max(map(len, curves.values()), default=0)
     shares = max(1, min(POINTS, iterations))
@@ -93,9 +108,89 @@ def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, di
 
 
 def followed(task: Task[Any]) -> dict[str, str]:
-    """The picture or the words that each part follows; none where the method follows neither."""
+    """Return the picture or the words that each part follows; none where the method follows neither."""
+    from texgs.edit.parts import parts_of
+
     method = method_of(task.edit)
     if not method.follows:
         return {}
     parts = [part.name for part in parts_of(task.scene, task.edit.parts)]
     return {name: method.followed(task.settings_for(name.split("/")[0])) for name in parts}
+
+
+def edit_settings(config: DictConfig) -> dict[str, Any]:
+    """Return what jobs of edits read: what all edits have, and the keys of this one's method."""
+    keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
+    edit = {name: getattr(config.edit, name) for name in keys} | captions(config)
+    given = {"reduce": config.fit.reduce, "lens": lens(config), "followed": looks_of(config)}
+    label = fit_label(config)["fit"] | {"sweep": config.sweep.name, "variant": config.variant}
+    return {"edit": edit, "fit": label, **given}
+
+
+def edited_scene(config: DictConfig) -> dict[str, Path]:
+    """Return the scene that an edit starts from with its models, their training views, and files of styles.
+
+    Raises:
+        ConfigError: if one basic TF is chosen, or the edit starts from itself.
+    """
+    from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
+
+    if config.edit.base == config.edit.name:
+        raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
+    if config.tf is not None:
+        raise ConfigError(f"tf: an edit is of a scene, with all basic TFs; leave out tf={config.tf}")
+    views = {f"{VIEWS}{name}": view_set(config, name)["views"] for name in tf_names(config)}
+    method = method_of(config.edit)
+    scene = scene_before(config)
+    models = files_of_scene(scene) if is_scene_file(config.edit.base or "") else models_of_scene(config)
+    looks: dict[str, str | None] = {**looks_of(config)} or {"": None}
+    files = {
+        f"{key}.{name}" if name else key: path
+        for name, look in looks.items()
+        for key, path in method.files(method.of(config.edit, look)).items()
+    }
+    return {"scene": scene, **models, **views, **files}
+
+
+def files_of_scene(scene: Path) -> dict[str, Path]:
+    """Return the files that a scene's file names, where they are there: they decide what it shows, too."""
+    try:
+        named: list[object] = [parse_yaml(scene.read_text(encoding="utf-8"))]
+    except (OSError, ValueError, YAMLError, ArgumentError):
+        return {}  # the job tells what is wrong with it
+    files: dict[str, Path] = {}
+    while named:
+        table = named.pop()
+        for key, value in table.items() if isinstance(table, dict) else ():
+            if key in ("file", "texture") and (path := scene.parent / str(value)).is_file():
+                files[f"of_scene.{len(files)}"] = path
+            named.append(value)
+    return files
+
+
+RULE = Rule(
+    "edit",
+    "{dataset}/scene/{fit}/edits/{edit}",
+    ("scene.yaml", "edit.png"),
+    target="edits",
+    gpu=("fit",),
+    shown={"edit.png": SHOWN},
+)
+
+
+def stage_of(method: Method[Any]) -> Stage:
+    """Return the stage of a method of editing."""
+    return Stage(
+        method.stage,
+        order=150,
+        help=method.summary,
+        rule=RULE,
+        schema=Settings,
+        select=edit_settings,
+        inputs=edited_scene,
+        work=work,
+        applies=lambda config: config.tf is None and config.edit.method == method.name,
+    )
+
+
+STAGES = [stage_of(method) for method in methods().values()]

@@ -1,20 +1,26 @@
-"""Stage `edit_metrics`: all that can be measured of an edited scene, and why the rest was not."""
+"""Stage `edit_metrics`: what can be measured of an edited scene, and why the rest was not."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from texgs.config.fields import kinds
-from texgs.config.methods import method_of
 from texgs.config.views import ViewKeys
-from texgs.core.device import torch_device
-from texgs.edit.parts import parts_of
-from texgs.metrics.metric import MeasuredScene, StyledModel, values_of
+from texgs.edit.method import method_of, methods
+from texgs.fields.kinds import kinds
 from texgs.report.results import EditMeasures
-from texgs.scene.scene import Scene
-from texgs.scene.scene_file import read_scene
-from texgs.volume.cameras import spiral, spread
+from texgs.workflow.inputs import view_settings, with_recipe
+from texgs.workflow.places import made
+from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
 from texgs.workflow.stages.edit import Settings as EditSettings
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stages.edit import edit_settings, edited_scene
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.metrics.metric import StyledModel
+    from texgs.scene.scene import Scene
 
 
 @dataclass
@@ -34,6 +40,11 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.metrics.metric import MeasuredScene, values_of
+    from texgs.scene.scene_file import read_scene
+    from texgs.volume.cameras import spiral, spread
+
     edit, views, device = settings.edit, settings.views, torch_device(settings.fit.device)
     before, after = read_scene(inputs["before"]), read_scene(inputs["scene"])
     cameras = [camera.to(device) for camera in spiral(max(2, views.test.count), *views.lens)]
@@ -50,12 +61,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         styles=styles_of(settings, after, max(cameras[0].width, cameras[0].height)),
         has_normals="normals" in kinds()[settings.fit.field].can,
     )
-    values = values_of(measured)
-    return Outcome(EditMeasures(edit.name, edit.method, views.width, views.height, values))
+    return Outcome(EditMeasures(edit.name, edit.method, views.width, views.height, values_of(measured)))
 
 
 def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledModel]:
     """Return the styles of models, `longest` pixels large; none of segments, words or several pictures."""
+    from texgs.edit.parts import parts_of
+    from texgs.metrics.metric import StyledModel
+
     edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
     if method.style is None or any(part.segment for part in parts):
@@ -68,3 +81,44 @@ def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledMode
         style = picture.scaled(longest)
         styles.append(StyledModel(part.model, part.name, style.image, style.region))
     return styles
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    measures = {"compared": config.metric.views, "clip": config.metric.clip}
+    return {**edit_settings(config), **measures, "views": view_settings(config)}
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the scene as edited and as fitted, what says where its surfaces are, and the views of all TFs.
+
+    Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
+    """
+    first = with_recipe(config, config.fits[0]) if config.fits else config
+    scenes = {"scene": made("edit", config), "before": made("compose", config)}
+    return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
+
+
+def applies(config: DictConfig) -> bool:
+    """Return whether the configuration is of an edit that makes the scene look different."""
+    method = methods().get(config.edit.method)
+    return config.tf is None and method is not None and method.is_look
+
+
+STAGE = Stage(
+    "edit_metrics",
+    order=180,
+    help="measure an edited scene: CLIP, style, consistency, time, size",
+    rule=Rule(
+        "edit_metrics",
+        "{dataset}/scene/{fit}/edit_metrics/{edit}",
+        target="edits",
+        threads=EVERY,  # it measures frames, too
+        gpu=("fit",),
+    ),
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=applies,
+)

@@ -1,17 +1,32 @@
 """Stage `figure`: show what a fit is worth, its phases beside views it has not seen."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from texgs.fields.files import open_field
-from texgs.fields.surfels.model import Surfels
-from texgs.report.fit_figure import write_fit_figure
-from texgs.report.results import FigureResult
-from texgs.volume.view_set import View, ViewSet, read_views
-from texgs.workflow.stages.outcome import Outcome
+from texgs.fit.kinds import fit_specs
+from texgs.report.results import Result
+from texgs.workflow.inputs import fit_label, is_fit, view_set
+from texgs.workflow.places import made
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfTF, Recipe
 
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.volume.view_set import View, ViewSet
+
 SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
+
+
+@dataclass(frozen=True)
+class FigureResult(Result, section="fitting"):
+    """A figure of a fit."""
+
+    shown: list[str]  # views
+    primitives: int
 
 
 @dataclass
@@ -37,6 +52,11 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             views training views are shown.
         output: folder.
     """
+    from texgs.fields.files import open_field
+    from texgs.fields.surfels.model import Surfels
+    from texgs.report.fit_figure import write_fit_figure
+    from texgs.volume.view_set import read_views
+
     fit, shown = settings.fit, shown_views(read_views(inputs["views"].parent))
     models = {phase: open_field(path) for phase, path in inputs.items() if phase != "views"}
     last = next(reversed(models.values()))
@@ -56,11 +76,38 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def shown_views(views: ViewSet) -> dict[str, View]:
-    """Two test views by the names that stand beside them; training views where there are none."""
+    """Return two test views by the names that stand beside them; training views where there are none."""
     split, candidates = ("test", views.test) if views.test else ("training", views.train)
     return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
 
 
 def is_fitted(phase: str, fit: ShownFit) -> bool:
-    """Whether a phase does more than seed."""
+    """Return whether a phase does more than seed."""
     return phase != "surfels" or fit.surfels_iterations > 0
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    shown = {"reduce": config.fit.reduce, "surfels_iterations": config.fit.surfels.iterations}
+    return {"fit": {**fit_label(config)["fit"], **shown}}
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the models that the phases of the fit write, and the views."""
+    phases = fit_specs()[config.fit.field].phases
+    return {**{name: made("phase", config, name) for name in phases}, **view_set(config)}
+
+
+STAGE = Stage(
+    "figure",
+    order=90,
+    help="show a fit beside test views, with its maps",
+    rule=Rule(
+        "figure", "{dataset}/{tf}/{fit}/figure", ("figure.png",), "figures", shown={"figure.png": SHOWN}
+    ),
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=is_fit,
+)

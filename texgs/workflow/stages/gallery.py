@@ -1,15 +1,21 @@
 """Stage `gallery`: show scenes of a data set and its volume in rows and columns, as an experiment says."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from texgs.core.progress import progress
 from texgs.report.results import GalleryResult, Shown
-from texgs.report.strip import write_strip
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.inputs import has_scene, is_first_recipe
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
 from texgs.workflow.stages.shots import Shot, Studio, Taken
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 ERRORS = (
     "Errors are those of the worst channel, four times enlarged, red where the scene is too bright and blue "
@@ -53,6 +59,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: scenes by the names that pictures have for them, and `volume` where one shows it.
         output: folder.
     """
+    from texgs.core.image_grid import write_strip
+
     studio, shown, captions = Studio(settings, inputs, settings.size), [], {}
     for grid in settings.grids:
         taken = pictures(grid, studio, f"{settings.dataset}: {grid.name}")
@@ -70,7 +78,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def pictures(grid: Grid, studio: Studio, title: str) -> dict[str, list[Taken]]:
-    """The pictures of each row by its title; those of one scene are taken together."""
+    """Return the pictures of each row by its title; those of one scene are taken together."""
     places = [(row.title, column, shot) for row in grid.rows for column, shot in enumerate(row.pictures)]
     places.sort(key=lambda place: place[2].scene)
     taken = {
@@ -81,10 +89,51 @@ def pictures(grid: Grid, studio: Studio, title: str) -> dict[str, list[Taken]]:
 
 
 def entries(grid: Grid, taken: Mapping[str, list[Taken]]) -> list[Shown]:
-    """What is shown, in words and numbers."""
+    """Return what is shown, in words and numbers."""
     return [
         Shown(grid.name, row, column, each.psnr)
         for row, line in taken.items()
         for column, each in zip(grid.columns, line, strict=True)
         if each.pixels is not None
     ]
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads: the pictures of all places, and what it takes to show the volume."""
+    from texgs.workflow.galleries import gallery_settings  # not at the top: it loads Hydra
+
+    return gallery_settings(config)
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the scenes of all places, and the volume where one is shown."""
+    from texgs.workflow.galleries import gallery_inputs
+
+    return gallery_inputs(config)
+
+
+def applies(config: DictConfig) -> bool:
+    """Return whether this is the first of the recipes and variants of an experiment with scenes to show."""
+    from texgs.workflow.variants import changes
+
+    variants = list(changes(config))
+    shows_all = len(config.edits) > 1 and not variants
+    if not has_scene(config) or not (config.gallery.grids or shows_all):
+        return False
+    first = variants[:1], config.sweep.seeds[:1], config.sweep.edit_seeds[:1]
+    if variants and ([config.variant], [config.fit.seed], [config.edit.seed]) != first:
+        return False
+    return is_first_recipe(config)
+
+
+STAGE = Stage(
+    "gallery",
+    order=170,
+    help="show all looks of a data set side by side",
+    rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("views", "fit")),
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=applies,
+)

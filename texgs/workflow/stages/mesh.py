@@ -1,33 +1,32 @@
 """Stage `mesh`: the surface of a fit beside that of its volume, as the paper compares 3DGS and 2DGS."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-
-import torch
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import BasicTF
-from texgs.config.fields import kinds
 from texgs.config.mesh import MeshKeys
-from texgs.core.camera import Camera
-from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.fields.field import Field
-from texgs.fields.files import open_field
-from texgs.metrics.surface import compare, sample, seen
-from texgs.raster import Render
-from texgs.report.mesh_figure import write_mesh_figure
+from texgs.fields.kinds import kinds
 from texgs.report.results import MeshResult
-from texgs.scene.mesh import fuse, write_mesh
-from texgs.volume.isosurface import Mesh, surface_of
-from texgs.volume.nrrd_file import open_grid
-from texgs.volume.reduced import smaller
-from texgs.volume.view_set import read_views
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.inputs import has_volume, last_phase, lens, model_of, prepared_volume, recipe
+from texgs.workflow.locate import basic_tf
+from texgs.workflow.stage import Outcome, Rule, Stage, plain
 from texgs.workflow.stages.settings import Distance, OfTF, Recipe
 from texgs.workflow.stages.tf import in_data_values
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.core.camera import Camera
+    from texgs.fields.field import Field
+    from texgs.raster import Render
+    from texgs.volume.isosurface import Mesh
 
 SHOWN = "The isosurface of the volume, the mesh of the fit, and its distance from it."
 MEASURED = 200_000  # points on each surface
@@ -53,6 +52,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `model`, of the last phase of a fit; `views`, the transforms_train.json; `volume`.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.fields.files import open_field
+    from texgs.metrics.surface import compare, sample, seen
+    from texgs.report.mesh_figure import write_mesh_figure
+    from texgs.scene.mesh import fuse, write_mesh
+    from texgs.volume.reduced import smaller
+    from texgs.volume.view_set import read_views
+
     keys, views = settings.mesh, read_views(inputs["views"].parent)
     cameras = [smaller(view.camera, settings.fit.reduce) for view in views.train]
     reference = reference_of(settings, inputs["volume"])
@@ -84,7 +91,10 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def reference_of(settings: Settings, volume: Path) -> Mesh:
-    """The surface that the basic TF makes of the volume."""
+    """Return the surface that the basic TF makes of the volume."""
+    from texgs.volume.isosurface import surface_of
+    from texgs.volume.nrrd_file import open_grid
+
     grid, summary = open_grid(volume), read_json(volume.with_name("volume.json"))
     tf = in_data_values(
         settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
@@ -93,14 +103,52 @@ def reference_of(settings: Settings, volume: Path) -> Mesh:
 
 
 def shown_by(field: Field) -> Callable[[Camera], Render]:
-    """What renders a field with the depth that its meshes are made of.
+    """Return what renders a field with the depth that its meshes are made of.
 
     Raises:
         ArgumentError: for a field without depth.
     """
+    import torch
+
     output = kinds()[field.kind].depth
     if not output:
         able = " or ".join(name for name, kind in kinds().items() if kind.depth)
         raise ArgumentError(f"mesh: expected a fit of {able}, got one of {field.kind}, which has no depth")
     black = torch.zeros(3, device=field.device)
     return lambda camera: field.render(camera, background=black, outputs=(output,))
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    return {
+        **recipe()(config),
+        "tf_values": config.dataset.tf_values,
+        "points": basic_tf(config),
+        "mesh": {name: value for name, value in plain(config.mesh).items() if name != "tfs"},
+        "lens": lens(config),
+    }
+
+
+def applies(config: DictConfig) -> bool:
+    """Return whether a mesh is made of the fit of a basic TF."""
+    return has_volume(config) and config.tf in config.mesh.tfs and bool(kinds()[config.fit.field].depth)
+
+
+STAGE = Stage(
+    "mesh",
+    order=110,
+    help="make a mesh of a fit, and compare it with the isosurface of its volume",
+    rule=Rule(
+        "mesh",
+        "{dataset}/{tf}/{fit}/mesh",
+        ("mesh.ply", "reference.ply", "mesh.png"),
+        target="meshes",
+        gpu=("fit",),
+        shown={"mesh.png": SHOWN},
+    ),
+    schema=Settings,
+    select=select,
+    inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
+    work=work,
+    applies=applies,
+)

@@ -1,15 +1,23 @@
 """Stage `page`: a scene as one HTML file that shows and edits it in a browser, without a server."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from texgs.core.io import write_bytes
 from texgs.core.memory import MIB
+from texgs.edit.method import methods
+from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
-from texgs.scene.scene_file import read_scene
-from texgs.viewer.standalone import write_page
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.inputs import fit_label, is_fit, is_swept, models_of_scene
+from texgs.workflow.places import made
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import FitLabel, OfDataset
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 SHOWN = "The scene: open it to turn it, to move its light, and to change colours and opacities."
 
@@ -32,6 +40,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `scene`, the scene.yaml.
         output: folder.
     """
+    from texgs.scene.scene_file import read_scene
+    from texgs.viewer.standalone import write_page
+
     scene = read_scene(inputs["scene"])
     parts = [settings.dataset, settings.fit.name, *([settings.look] if settings.look != "none" else [])]
     page = write_page(output / "scene.html", scene, " ".join(parts))
@@ -39,3 +50,41 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     mib = page.path.stat().st_size / MIB
     result = PageResult(settings.look, page.surfels, mib, mib <= settings.embedded)
     return Outcome(result, {"poster.jpg": SHOWN})
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    look = {"look": config.edit.name, "look_seed": config.edit.seed}
+    return {**look, "embedded": config.page.embedded, **fit_label(config)}
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the scene of an edit, or the one as fitted, with its models."""
+    return {"scene": made("compose" if is_fit(config) else "edit", config), **models_of_scene(config)}
+
+
+def applies(config: DictConfig) -> bool:
+    """Return whether the scene or its new look becomes a page: of sweeps only the numbers are of interest."""
+    is_shown = is_fit(config) or methods()[config.edit.method].is_look
+    able = "html" in kinds()[config.fit.field].exports
+    return bool(config.page.made and config.tf is None and able and is_shown and not is_swept(config))
+
+
+STAGE = Stage(
+    "page",
+    order=160,
+    help="make a page of a scene that shows and edits it in a browser",
+    rule=Rule(
+        "page",
+        "{dataset}/scene/{fit}/pages/{edit}",
+        ("scene.html", "poster.jpg"),
+        target="scenes",
+        threads=2,
+        shown={"scene.html": SHOWN},
+    ),
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=applies,
+)

@@ -1,31 +1,27 @@
 """Stage `pse`: the photorealistic edits of the paper's figure, beside the same edits of the volume."""
 
+from __future__ import annotations
+
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import fmean
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import torch
-
-from texgs.config.fields import kinds
-from texgs.core.camera import Camera
-from texgs.core.device import torch_device
-from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.fields.field import Composed
-from texgs.metrics.image import psnr, ssim
-from texgs.report.error_map import ERROR, signed_error
+from texgs.fields.kinds import kinds
 from texgs.report.results import Comparison, PseResult
-from texgs.report.strip import write_strip
-from texgs.scene.scene import Scene
-from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.session import Session
-from texgs.volume.cameras import orbit_path
-from texgs.workflow.stages.outcome import Outcome
-from texgs.workflow.stages.settings import OfScene as Settings
-from texgs.workflow.stages.volume_scene import VolumeScene
+from texgs.workflow.inputs import has_scene, scene_and_volume, scene_settings
+from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stages.settings import OfScene
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from texgs.core.camera import Camera
+    from texgs.fields.field import Composed
+    from texgs.scene.scene import Scene
+    from texgs.workflow.stages.volume_scene import VolumeScene
 
 PICTURES = {
     "pse.png": "Edits of opacity, colour and light, each on top of those before it",
@@ -34,7 +30,7 @@ PICTURES = {
 BELOW = "; below each the volume with the same edit, and the error of the worst channel, four times enlarged."
 COMPARED = 6  # views around the object, one of which is shown
 POLAR = 20.0  # of these views, degrees
-LEFT = Light("directional", -150.0, 20.0)
+LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
 SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
 
 
@@ -46,7 +42,7 @@ class Step:
     scene: Scene
 
 
-def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write a scene file for each edit, pse.png and relight.png.
 
     Args:
@@ -54,6 +50,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.core.image_grid import write_strip
+    from texgs.scene.scene_file import read_scene, write_scene
+    from texgs.volume.cameras import orbit_path
+    from texgs.workflow.stages.volume_scene import VolumeScene
+
     scene = read_scene(inputs["scene"])
     composition = scene.open(torch_device(settings.fit.device))
     volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
@@ -80,11 +82,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:
-    """The edits of the paper's figure in its order: opacity, colour, magnitude and direction of the light.
+    """Return the edits of the paper's figure in order: opacity, colour, magnitude and direction of the light.
 
     Each is on top of those before it. What fields of a kind cannot do is left out, but for the direction of
     the light: without shading it changes nothing.
     """
+    from texgs.core.light import Light
+
     names, steps = list(scene.models), [Step("as fitted", scene)]
     changes: list[tuple[str, Mapping[str, Mapping[str, Any]]]] = [
         (f"+ opacity of {names[0]} x 0.4", {names[0]: {"opacity": 0.4}})
@@ -97,17 +101,24 @@ def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str
         changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
     for title, change in changes:
         steps.append(Step(title, edited(steps[-1].scene, change)))
-    return [*steps, Step("+ light from the left", replace(steps[-1].scene, light=LEFT))]
+    return [
+        *steps,
+        Step("+ light from the left", replace(steps[-1].scene, light=Light("directional", *LEFT))),
+    ]
 
 
 def light_sweep(scene: Scene) -> list[Step]:
-    """A light that moves from below the object to above it."""
+    """Return the steps of a light that moves from below the object to above it."""
+    from texgs.core.light import Light
+
     lights = {f"light at (-90°, {polar:g}°)": Light("directional", -90.0, polar) for polar in SWEEP}
     return [Step(title, replace(scene, light=light)) for title, light in lights.items()]
 
 
 def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
-    """The scene with edits of some models changed."""
+    """Return the scene with edits of some models changed."""
+    from texgs.scene.session import Session
+
     session = Session(scene)
     for part, values in changes.items():
         for key, value in values.items():
@@ -118,7 +129,12 @@ def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
 def compared(
     step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
-    """PSNR and SSIM against the volume over some views, and of the first view all pictures [H, W, 3]."""
+    """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
+    import torch
+
+    from texgs.metrics.image import psnr, ssim
+    from texgs.report.error_map import ERROR, signed_error
+
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
     background = torch.tensor(step.scene.background, device=composition.device)
@@ -140,6 +156,26 @@ def compared(
 
 
 def caption(entry: Comparison) -> str:
-    """Title of a picture, with the mean PSNR of all views where it was measured."""
+    """Return the title of a picture, with the mean PSNR of all views where it was measured."""
     measured = "" if entry.psnr is None else f"\nmean of {COMPARED} views: {entry.psnr:.1f} dB"
     return entry.title + measured
+
+
+STAGE = Stage(
+    "pse",
+    order=130,
+    help="edit colours, opacities and lights of a scene beside those of its volume",
+    rule=Rule(
+        "pse",
+        "{dataset}/scene/{fit}/pse",
+        ("pse.png", "relight.png"),
+        target="scenes",
+        gpu=("views", "fit"),
+        shown={name: f"{words}." for name, words in PICTURES.items()},
+    ),
+    schema=OfScene,
+    select=scene_settings,
+    inputs=scene_and_volume,
+    work=work,
+    applies=has_scene,
+)

@@ -1,7 +1,7 @@
 """What jobs read of the configuration: what all of them have, and what several share.
 
-The module of a stage adds its own in a dataclass `Settings`; its row in texgs/config/stages.py selects the
-values. No field has a default, so a value that is not selected is an error.
+The module of a stage adds its own in a dataclass `Settings`; its function `select` takes the values from the
+configuration. No field has a default, so a value that is not selected is an error.
 """
 
 from dataclasses import dataclass

@@ -1,23 +1,23 @@
 """Stage `shading`: from surfels to relightable ones, with Blinn-Phong shading fitted to the views."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from texgs.config.phase import Material, Phase
-from texgs.core.device import torch_device
-from texgs.fields.harmonics import base_color
-from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.model_file import read_model, write_model
-from texgs.fields.surfels.shading import material, raw_material
-from texgs.fit import checkpoint
+from texgs.fit.settings import Material, Phase
 from texgs.report.results import FitResult
-from texgs.volume.images import load
-from texgs.volume.view_set import read_views
-from texgs.workflow.stages.outcome import Outcome
-from texgs.workflow.stages.phase import gpu_memory, quality, run_phase
+from texgs.workflow.inputs import is_fit_of, model_of, recipe
+from texgs.workflow.stage import Outcome, Stage
+from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, run_phase
 from texgs.workflow.stages.settings import OfTF, Recipe
 
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
 HARMONICS = ("sh", "sh_rest")
+LATER = ("texture",)  # keys of a recipe that later stages read
 
 
 @dataclass
@@ -45,6 +45,15 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `model`, of the stage before, and `views`, the transforms_train.json.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.fields.harmonics import base_color
+    from texgs.fields.surfels.model import Surfels
+    from texgs.fields.surfels.model_file import read_model, write_model
+    from texgs.fields.surfels.shading import material, raw_material
+    from texgs.fit import checkpoint
+    from texgs.volume.images import load
+    from texgs.volume.view_set import read_views
+
     fit, phase = settings.fit, settings.phase
     title = f"{settings.dataset}/{settings.tf}: shading"
     device = torch_device(fit.device)
@@ -70,3 +79,22 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     )
     checkpoint.discard(output / checkpoint.FOLDER)
     return Outcome(result)
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    shared = recipe("material_range", "materials", "first_material", later=LATER)(config)
+    return {**shared, "phase": config.fit.shading}
+
+
+STAGE = Stage(
+    "shading",
+    order=60,
+    help="fit relightable surfels with Blinn-Phong shading",
+    rule=PHASE,
+    schema=Settings,
+    select=select,
+    inputs=model_of("surfels"),
+    work=work,
+    applies=is_fit_of("surfels"),
+)

@@ -1,20 +1,23 @@
 """Stage `sheet`: read a folder of views, rendered here or elsewhere, and show them on one contact sheet."""
 
-from pathlib import Path
+from __future__ import annotations
 
-from PIL import Image
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from texgs.report.results import SheetResult
-from texgs.volume.sheet import write_sheet
-from texgs.volume.view_set import read_views
-from texgs.workflow.stages.outcome import Outcome
-from texgs.workflow.stages.settings import OfTF as Settings
+from texgs.workflow.inputs import is_fit, view_set
+from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stages.settings import OfTF
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
 
 SHOWN = 12  # views
 CAPTION = "Views that the model was fitted to, and test views."
 
 
-def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: OfTF, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write sheet.png from up to twelve training views.
 
     Args:
@@ -22,20 +25,45 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `views`, the transforms_train.json of the folder of views.
         output: folder.
     """
+    from PIL.Image import fromarray
+
+    from texgs.volume.sheet import write_sheet
+    from texgs.volume.view_set import read_views
+
     views = read_views(inputs["views"].parent)
     n_shown = min(SHOWN, len(views.train))
     shown = [views.train[index * len(views.train) // n_shown] for index in range(n_shown)]
-    pictures = [Image.fromarray(view.load().numpy()) for view in shown]
+    pictures = [fromarray(view.load().numpy()) for view in shown]
     write_sheet(output / "sheet.png", [picture.crop(common_box(pictures)) for picture in pictures])
     camera = views.train[0].camera
     result = SheetResult(len(views.train), len(views.test), camera.width, camera.height)
     return Outcome(result, {"sheet.png": CAPTION})
 
 
-def common_box(pictures: list[Image.Image]) -> tuple[int, int, int, int]:
-    """Left, top, right and bottom of what shows in any of the pictures; the whole where nothing does."""
+def common_box(pictures: list[Image]) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of what shows in any picture; the whole where nothing does."""
     boxes = [box for picture in pictures if (box := picture.getchannel("A").getbbox())]
     if not boxes:
         return 0, 0, *pictures[0].size
     lefts, tops, rights, bottoms = zip(*boxes, strict=True)
     return min(lefts), min(tops), max(rights), max(bottoms)
+
+
+STAGE = Stage(
+    "sheet",
+    order=40,
+    help="show views on one contact sheet",
+    rule=Rule(
+        "sheet",
+        "{dataset}/{tf}/sheet",
+        ("sheet.png",),
+        target="sheets",
+        threads=1,
+        shown={"sheet.png": CAPTION},
+    ),
+    schema=OfTF,
+    select=lambda config: {},
+    inputs=view_set,
+    work=work,
+    applies=lambda config: is_fit(config) and config.views.name == "views",  # of those of a sweep none
+)

@@ -1,22 +1,19 @@
 """Pictures of a scene or of its volume: from where, under which light, with which changes, and which part."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-import torch
-
-from texgs.cli.edit import apply_all
-from texgs.core.camera import Camera, orbit
-from texgs.core.device import torch_device
-from texgs.core.light import Light
-from texgs.metrics.image import psnr
-from texgs.report.error_map import ERROR, signed_error
-from texgs.scene.scene_file import read_scene
-from texgs.scene.session import Session
 from texgs.workflow.stages.settings import OfScene
-from texgs.workflow.stages.volume_scene import VolumeScene
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from texgs.core.camera import Camera
+    from texgs.scene.session import Session
 
 
 @dataclass
@@ -51,17 +48,27 @@ class Studio:
     """
 
     def __init__(self, settings: OfScene, inputs: Mapping[str, Path], size: int) -> None:
+        from texgs.core.device import torch_device
+        from texgs.workflow.stages.volume_scene import VolumeScene
+
         self._device, self._lens = torch_device(settings.fit.device), settings.views.lens
         self._inputs, self._size = inputs, size
         self._volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
         self._open: tuple[str, Session] | None = None
 
     def take(self, shot: Shot) -> Taken:
-        """One picture.
+        """Return one picture.
 
         Raises:
             TexgsError: for a change that the scene cannot show, or a file that is not as it should be.
         """
+        import torch
+
+        from texgs.core.light import Light
+        from texgs.metrics.image import psnr
+        from texgs.report.error_map import ERROR, signed_error
+        from texgs.scene.changes import apply_all
+
         if not shot.show:
             return Taken()
         session = self._session(shot.scene)
@@ -80,28 +87,37 @@ class Studio:
         return Taken(ERROR(signed_error(image, truth)).numpy(), psnr(image, truth))
 
     def _session(self, name: str) -> Session:
+        from texgs.scene.scene_file import read_scene
+        from texgs.scene.session import Session
+
         if self._open is None or self._open[0] != name:
             self._open = (name, Session(read_scene(self._inputs[name]), self._device))
         return self._open[1]
 
     def _frame(self, session: Session, shot: Shot) -> np.ndarray:
-        return self._cut(session.frame(self._camera(shot)), shot).astype(np.float32) / 255
+        return self._cut(session.frame(self._camera(shot)), shot).astype("float32") / 255
 
     def _volume_frame(self, session: Session, shot: Shot) -> np.ndarray:
+        import numpy as np
+
         assert self._volume is not None, "an input where a place shows it"
         scene = session.scene
         rgba = self._volume.render(self._camera(shot), scene, session.composition.palettes)
-        color = rgba[..., :3] + (1 - rgba[..., 3:]) * np.asarray(scene.background, dtype=np.float32)
+        color = rgba[..., :3] + (1 - rgba[..., 3:]) * np.asarray(scene.background, dtype="float32")
         return self._cut(color.clip(0, 1), shot)
 
     def _camera(self, shot: Shot) -> Camera:
-        """Of the whole view."""
+        """Return the camera of the whole view."""
+        from texgs.core.camera import orbit
+
         size = shot.pixels or round(self._size / (shot.box[2] if shot.box else 1))
         azimuth, polar = shot.view
         return orbit(azimuth, polar, self._lens.radius, shot.fov_y or self._lens.fov_y, size, size)
 
     def _cut(self, image: np.ndarray, shot: Shot) -> np.ndarray:
-        """The part of a view that is shown, as large as a picture, each pixel with that of its place."""
+        """Return the part of a view that is shown, as large as a picture, each pixel that of its place."""
+        import numpy as np
+
         left, top, side = shot.box or (0, 0, 1)
         across = (np.arange(self._size) + 0.5) / self._size * side * len(image)
         rows, columns = ((across + start * len(image)).astype(int) for start in (top, left))

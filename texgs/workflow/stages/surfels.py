@@ -1,25 +1,22 @@
 """Stage `surfels`: seed surfels in the views, and fit them with spherical harmonics."""
 
+from __future__ import annotations
+
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import torch
-
-from texgs.config.phase import Phase, Seeds
-from texgs.core.device import torch_device
-from texgs.fields.harmonics import join, split, zeroth
-from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.shading import ShadingModel
-from texgs.fit import checkpoint
-from texgs.fit.seeds import seed_surfels
+from texgs.fit.settings import Phase, Seeds
 from texgs.report.results import FitResult
-from texgs.volume.images import load
-from texgs.volume.nrrd_file import open_grid
-from texgs.volume.view_set import read_views
-from texgs.workflow.stages.outcome import Outcome
-from texgs.workflow.stages.phase import gpu_memory, quality, run_phase
+from texgs.workflow.inputs import is_fit_of, prepared_volume, recipe, view_set
+from texgs.workflow.stage import Outcome, Stage
+from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, run_phase
 from texgs.workflow.stages.settings import OfTF, Recipe
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+LATER = ("materials", "first_material", "shading", "texture")  # keys of a recipe that later stages read
 
 
 @dataclass
@@ -48,6 +45,19 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `views`, the transforms_train.json; for seeds in voxels also `volume`, the volume.nrrd.
         output: folder.
     """
+    import torch
+
+    from texgs.core.device import torch_device
+    from texgs.fields.harmonics import join, split, zeroth
+    from texgs.fields.surfels.model import Surfels
+    from texgs.fields.surfels.model_file import write_model
+    from texgs.fields.surfels.shading import ShadingModel
+    from texgs.fit import checkpoint
+    from texgs.fit.seeds import seed_surfels
+    from texgs.volume.images import load
+    from texgs.volume.nrrd_file import open_grid
+    from texgs.volume.view_set import read_views
+
     fit, phase = settings.fit, settings.phase
     title = f"{settings.dataset}/{settings.tf}: surfels"
     views = read_views(inputs["views"].parent)
@@ -72,3 +82,28 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             seconds, len(model), phase.iterations, losses, peak_gpu_memory_mib=gpu_memory(device), **measured
         )
     )
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    shared = recipe("low_pass", "facing", "material_range", "seeds", later=LATER)(config)
+    return {**shared, "phase": config.fit.surfels}
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the views, and the volume where surfels start in its voxels."""
+    from_voxels = config.fit.seeds.kind == "voxels" and config.dataset.views_folder is None
+    return {**view_set(config), **(prepared_volume(config) if from_voxels else {})}
+
+
+STAGE = Stage(
+    "surfels",
+    order=50,
+    help="seed surfels and fit them with spherical harmonics",
+    rule=PHASE,
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=is_fit_of("surfels"),
+)

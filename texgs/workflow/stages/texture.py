@@ -1,18 +1,16 @@
 """Stage `texture`: give the surfels of a relightable model textures; geometry and material stay."""
 
+from __future__ import annotations
+
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from texgs.config.phase import TextureKeys
-from texgs.core.device import torch_device
-from texgs.fields.surfels.model_file import read_model, write_model
-from texgs.fit.texels import texturize
+from texgs.fit.settings import TextureKeys
 from texgs.report.results import FitResult
-from texgs.volume.images import load
-from texgs.volume.view_set import read_views
-from texgs.workflow.stages.outcome import Outcome
-from texgs.workflow.stages.phase import gpu_memory, quality, training_quality
+from texgs.workflow.inputs import is_fit_of, model_of, recipe
+from texgs.workflow.stage import Outcome, Stage
+from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, training_quality
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 
@@ -32,6 +30,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `model`, of the stage before, and `views`, the transforms_train.json.
         output: folder.
     """
+    from texgs.core.device import torch_device
+    from texgs.fields.surfels.model_file import read_model, write_model
+    from texgs.fit.texels import texturize
+    from texgs.volume.images import load
+    from texgs.volume.view_set import read_views
+
     fit, title = settings.fit, f"{settings.dataset}/{settings.tf}: texture"
     device = torch_device(fit.device)
     views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
@@ -50,3 +54,16 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         peak_gpu_memory_mib=gpu_memory(device),
     )
     return Outcome(result)
+
+
+STAGE = Stage(
+    "texture",
+    order=70,
+    help="give relightable surfels textures",
+    rule=PHASE,
+    schema=Settings,
+    select=lambda config: {**recipe()(config), "texture": config.fit.texture},
+    inputs=model_of("shading"),
+    work=work,
+    applies=is_fit_of("surfels"),
+)

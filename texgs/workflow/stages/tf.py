@@ -1,15 +1,18 @@
 """The basic TFs of a configuration as functions of data values."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import BasicTF
 from texgs.core.errors import ArgumentError
-from texgs.volume.basic_tfs import check_disjoint
-from texgs.volume.transfer import TransferFunction
+
+if TYPE_CHECKING:
+    from texgs.volume.transfer import TransferFunction
 
 
 def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high: float) -> TransferFunction:
-    """A basic TF in the units of the data.
+    """Return a basic TF in the units of the data.
 
     Args:
         name: of the TF, for messages.
@@ -21,6 +24,8 @@ def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high:
     Raises:
         ArgumentError: if a point is wrong, or none of the data would be visible.
     """
+    from texgs.volume.transfer import TransferFunction
+
     try:
         tf = TransferFunction(tuple(points.opacity), tuple(points.color))
         tf = tf.scaled(low, high) if tf_values == "fraction" else tf
@@ -44,6 +49,9 @@ def check_basic_tfs(dataset: Any) -> None:
     Raises:
         ArgumentError: naming the basic TF, or the two that overlap.
     """
+    from texgs.volume.basic_tfs import check_disjoint
+    from texgs.volume.transfer import TransferFunction
+
     basic = {}
     for name, points in dataset.basic_tfs.items():
         try:

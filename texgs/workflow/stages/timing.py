@@ -1,24 +1,20 @@
 """Stage `timing`: how long a frame of the scene takes, beside one of the volume in the same minute."""
 
+from __future__ import annotations
+
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean, median
 
-import torch
-
-from texgs.core.device import torch_device
-from texgs.metrics.timing import FRAMES, milliseconds
 from texgs.report.results import TimingResult
-from texgs.scene.scene_file import read_scene
-from texgs.volume.cameras import spiral, spread
-from texgs.workflow.stages.outcome import Outcome
-from texgs.workflow.stages.settings import OfScene as Settings
-from texgs.workflow.stages.volume_scene import VolumeScene
+from texgs.workflow.inputs import has_scene, scene_and_volume, scene_settings
+from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
+from texgs.workflow.stages.settings import OfScene
 
 VOLUME_FRAMES = 12  # spread over the path: they take long
 
 
-def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
+def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
     Args:
@@ -26,6 +22,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
         output: folder.
     """
+    import torch
+
+    from texgs.core.device import torch_device
+    from texgs.metrics.timing import FRAMES, milliseconds
+    from texgs.scene.scene_file import read_scene
+    from texgs.volume.cameras import spiral, spread
+    from texgs.workflow.stages.volume_scene import VolumeScene
+
     scene, views = read_scene(inputs["scene"]), settings.views
     path = spiral(max(2, views.test.count), *views.lens)
     composition = scene.open(torch_device(settings.fit.device))
@@ -54,3 +58,22 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         )
         result = replace(result, volume_mean_ms=fmean(of_volume), volume_max_ms=max(of_volume))
     return Outcome(result)
+
+
+STAGE = Stage(
+    "timing",
+    order=140,
+    help="measure how long frames of a scene and of its volume take",
+    rule=Rule(
+        "timing",
+        "{dataset}/scene/{fit}/timing",
+        target="scenes",
+        threads=EVERY,  # other jobs would be measured with it
+        gpu=("views", "fit"),
+    ),
+    schema=OfScene,
+    select=scene_settings,
+    inputs=scene_and_volume,
+    work=work,
+    applies=has_scene,
+)

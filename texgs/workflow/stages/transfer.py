@@ -1,21 +1,26 @@
 """Stage `transfer`: compare a data set's basic TFs with its values, plot them, and export them."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from texgs.config.dataset import BasicTF
 from texgs.core.io import read_json
-from texgs.report.results import TransferResult
-from texgs.volume.basic_tfs import check_disjoint
-from texgs.volume.tf_files import write_paraview
-from texgs.volume.tf_plot import plot
-from texgs.workflow.stages.outcome import Outcome
+from texgs.report.results import Result
+from texgs.workflow.inputs import has_volume, prepared_volume
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfDataset
-from texgs.workflow.stages.tf import in_data_values
 
 SHOWN = "Histogram of the volume with the basic transfer functions."
+
+
+@dataclass(frozen=True)
+class TransferResult(Result, section="data"):
+    """Basic transfer functions over a histogram."""
+
+    basic_tfs: int
+    ranges: dict[str, list[float]]  # lowest and highest value of each
 
 
 @dataclass
@@ -35,6 +40,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `volume`, the volume.nrrd; volume.json is beside it.
         output: folder.
     """
+    import numpy as np
+
+    from texgs.volume.basic_tfs import check_disjoint
+    from texgs.volume.tf_files import write_paraview
+    from texgs.volume.tf_plot import plot
+    from texgs.workflow.stages.tf import in_data_values
+
     summary = read_json(inputs["volume"].with_name("volume.json"))
     low, high = summary["minimum"], summary["maximum"]
     basic = {
@@ -47,3 +59,23 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
     ranges = {name: list(tf.support) for name, tf in basic.items()}
     return Outcome(TransferResult(len(basic), ranges), {"transfer.png": SHOWN})
+
+
+STAGE = Stage(
+    "transfer",
+    order=20,
+    help="plot the histogram with the basic transfer functions, and export these",
+    rule=Rule(
+        "transfer",
+        "{dataset}/transfer",
+        ("transfer.png",),
+        target="volumes",
+        threads=1,
+        shown={"transfer.png": SHOWN},
+    ),
+    schema=Settings,
+    select=lambda config: {key: getattr(config.dataset, key) for key in ("title", "tf_values", "basic_tfs")},
+    inputs=prepared_volume,
+    work=work,
+    applies=has_volume,
+)

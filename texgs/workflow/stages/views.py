@@ -1,38 +1,38 @@
 """Stage `views`: render the training and test views of one basic TF, and a turntable."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from statistics import mean, median
-from typing import Any, Literal
-
-import numpy as np
-from PIL import Image
+from typing import TYPE_CHECKING, Any, Literal
 
 from texgs.config.dataset import BasicTF
 from texgs.config.views import CameraPath, ViewKeys
-from texgs.core.camera import Camera
-from texgs.core.device import torch_device
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_atomic
 from texgs.core.lens import Lens
-from texgs.core.light import Light
 from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
-from texgs.volume.appearance import Appearance
-from texgs.volume.cameras import icosphere, orbit_path, spiral
-from texgs.volume.caster import Caster
-from texgs.volume.grid import Grid
-from texgs.volume.nrrd_file import open_grid
-from texgs.volume.render import Mapper, Times, render_views
-from texgs.volume.sheet import write_animation
-from texgs.volume.transfer import TransferFunction
-from texgs.volume.view_set import View, write_transforms
+from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
+from texgs.workflow.locate import basic_tf
 from texgs.workflow.result import TIMES
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfTF
 from texgs.workflow.stages.tf import in_data_values
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.core.camera import Camera
+    from texgs.volume.appearance import Appearance
+    from texgs.volume.caster import Caster
+    from texgs.volume.grid import Grid
+    from texgs.volume.render import Mapper, Times
+    from texgs.volume.transfer import TransferFunction
+    from texgs.volume.view_set import View
 
 SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
 TURNTABLE = 320  # pixels of its longer side
@@ -58,6 +58,11 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `volume`, the volume.nrrd; volume.json is beside it.
         output: folder.
     """
+    from texgs.volume.caster import Caster
+    from texgs.volume.nrrd_file import open_grid
+    from texgs.volume.render import Times, render_views
+    from texgs.volume.view_set import write_transforms
+
     views, title = settings.views, f"{settings.dataset}/{settings.tf}"
     grid, summary = open_grid(inputs["volume"]), read_json(inputs["volume"].with_name("volume.json"))
     tf = in_data_values(
@@ -84,21 +89,28 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def appearance_of(views: ViewKeys) -> Appearance:
-    """How the volume looks in views."""
+    """Return how the volume looks in views."""
+    from texgs.volume.appearance import Appearance
+
     return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
 
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
-    """The caster on the CPU or a GPU, or VTK."""
+    """Return the caster on the CPU or a GPU, or VTK."""
+    from texgs.core.device import torch_device
+    from texgs.volume.caster import Caster
+
     if kind == "vtk":
-        from texgs.volume.vtk_mapper import VtkMapper  # takes a second
+        from texgs.volume.vtk_mapper import VtkMapper
 
         return VtkMapper(grid, appearance)
     return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
 
 
 def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
-    """The cameras of one arrangement."""
+    """Return the cameras of one arrangement."""
+    from texgs.volume.cameras import icosphere, orbit_path, spiral
+
     if path.kind == "icosphere":
         return icosphere(path.frequency, *lens)
     if path.kind == "spiral":
@@ -107,7 +119,10 @@ def cameras(path: CameraPath, lens: Lens) -> list[Camera]:
 
 
 def views_of(views: ViewKeys, split: Literal["train", "test"], output: Path) -> list[View]:
-    """Cameras, lights and files of the training or the test views."""
+    """Return cameras, lights and files of the training or the test views."""
+    from texgs.core.light import Light
+    from texgs.volume.view_set import View
+
     path, chosen = views.train, views.lights
     if split == "test":
         path, chosen = views.test, views.test_lights or views.lights
@@ -122,6 +137,14 @@ def views_of(views: ViewKeys, split: Literal["train", "test"], output: Path) -> 
 
 def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Path, title: str) -> None:
     """Write turntable.png, an animation of one turn under a headlight."""
+    from PIL.Image import fromarray
+
+    from texgs.core.light import Light
+    from texgs.volume.cameras import orbit_path
+    from texgs.volume.render import render_views
+    from texgs.volume.sheet import write_animation
+    from texgs.volume.view_set import View
+
     scale = min(1.0, TURNTABLE / max(views.width, views.height))
     small = [max(1, round(scale * size)) for size in (views.width, views.height)]
     around = orbit_path(views.turntable, 15.0, views.radius, views.fov_y, *small)
@@ -130,11 +153,13 @@ def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Pat
         for index, camera in enumerate(around)
     ]
     render_views(mapper, tf, shot, f"{title}: turntable")
-    write_animation(output / "turntable.png", [Image.fromarray(view.load().numpy()) for view in shot])
+    write_animation(output / "turntable.png", [fromarray(view.load().numpy()) for view in shot])
 
 
 def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folder: Path, title: str) -> None:
     """Write depth and normals of views as .npz, the arrays `depth` [H, W] and `normal` [H, W, 3]."""
+    import numpy as np
+
     for view in progress(shot, title=f"{title}: depth and normals", unit="view"):
         path = folder / f"{view.path.stem}.npz"
         if path.exists():
@@ -149,7 +174,7 @@ def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folde
 
 
 def describe(settings: Settings, tf: TransferFunction, grid: Grid, mapper: Mapper) -> dict[str, Any]:
-    """What transforms_*.json says about the images beside cameras and lights."""
+    """Return what transforms_*.json says about the images beside cameras and lights."""
     views = settings.views
     return {
         "volume": settings.dataset,
@@ -163,12 +188,12 @@ def describe(settings: Settings, tf: TransferFunction, grid: Grid, mapper: Mappe
 
 
 def coverage(view: View) -> float:
-    """Share of pixels that show something."""
+    """Return the share of pixels that show something."""
     return float((view.load()[..., 3] > 0).float().mean())
 
 
 def result_of(shots: Mapping[Any, list[View]], times: Times, coverages: list[float]) -> ViewsResult:
-    """Counts, sizes, mean coverage, and the time per view over all runs that this job took."""
+    """Return counts, sizes, mean coverage, and the time per view over all runs that this job took."""
     camera = shots["train"][0].camera
     result = ViewsResult(
         len(shots["train"]), len(shots["test"]), camera.width, camera.height, mean(coverages)
@@ -182,3 +207,27 @@ def result_of(shots: Mapping[Any, list[View]], times: Times, coverages: list[flo
         first_frame_ms=times.first[0],
         frames_ms=times.others,
     )
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return what the stage reads."""
+    points = {"tf_values": config.dataset.tf_values, "points": basic_tf(config)}
+    return {**points, "views": view_settings(config)}
+
+
+STAGE = Stage(
+    "views",
+    order=30,
+    help="render the training and test views of basic transfer functions",
+    rule=Rule(
+        "views",
+        "{dataset}/{tf}/{views}",
+        ("transforms_train.json", "transforms_test.json", "turntable.png"),
+        gpu=("views",),
+    ),
+    schema=Settings,
+    select=select,
+    inputs=prepared_volume,
+    work=work,
+    applies=has_volume,
+)

@@ -1,23 +1,26 @@
 """Stage `volume`: make or read a scalar field, check it, and write the one file that later stages read."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.dataset import Volume
 from texgs.core.io import write_json
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
-from texgs.volume.download import require_whole
-from texgs.volume.generate import GENERATORS, RANDOM
-from texgs.volume.prepare import prepare
-from texgs.volume.slabs import ArraySource, Source
-from texgs.volume.sources import open_source
-from texgs.workflow.locate import cached_volume
-from texgs.workflow.stages.outcome import Outcome
+from texgs.workflow.inputs import has_volume
+from texgs.workflow.locate import cached_volume, source_file
+from texgs.workflow.stage import Outcome, Rule, Stage, plain
 from texgs.workflow.stages.settings import OfDataset
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+    from texgs.volume.slabs import Source
 
 
 @dataclass
@@ -35,6 +38,8 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: `source`, the volume's file, where it is not generated.
         output: folder.
     """
+    from texgs.volume.prepare import prepare
+
     volume = settings.volume
 
     def slabs(steps: Iterable[tuple[int, int]], total: int) -> Iterable[tuple[int, int]]:
@@ -66,15 +71,45 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 
 def generated(volume: Volume, generator: str) -> Source:
-    """The field of a generator."""
+    """Return the field of a generator."""
+    from texgs.volume.generate import GENERATORS, RANDOM
+    from texgs.volume.slabs import ArraySource
+
     options = {"seed": volume.seed} if generator in RANDOM else {}
     return ArraySource(GENERATORS[generator](volume.size, **options), generator)
 
 
 def source(volume: Volume, path: Path) -> Source:
-    """The field of a file; one that was downloaded is compared with its checksum."""
+    """Return the field of a file; one that was downloaded is compared with its checksum."""
+    from texgs.volume.download import require_whole
+    from texgs.volume.sources import open_source
+
     if volume.url and path == cached_volume(volume):
         require_whole(path, volume.sha256 or "")
     given = {"dims": volume.dims, "spacing": volume.spacing, "origin": volume.origin}
     triples: dict[str, Any] = {name: values and tuple(values) for name, values in given.items()}
     return open_source(path, dtype=volume.dtype, endian=volume.endian, skip=volume.skip, **triples)
+
+
+def select(config: DictConfig) -> dict[str, Any]:
+    """Return the volume's keys, but for how to obtain its file."""
+    return {"volume": {key: x for key, x in plain(config.dataset.volume).items() if key != "obtain"}}
+
+
+def inputs(config: DictConfig) -> dict[str, Path]:
+    """Return the volume's file, where there is one."""
+    path = source_file(config)
+    return {} if path is None else {"source": path}
+
+
+STAGE = Stage(
+    "volume",
+    order=10,
+    help="make or read the volume of a data set, and check it",
+    rule=Rule("volume", "{dataset}/volume", ("volume.nrrd", "volume.json"), threads=1),
+    schema=Settings,
+    select=select,
+    inputs=inputs,
+    work=work,
+    applies=has_volume,
+)

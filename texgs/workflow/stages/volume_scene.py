@@ -1,24 +1,25 @@
 """The volume with all basic TFs, edited as a scene is: what its pictures are compared with."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from texgs.core.camera import Camera
 from texgs.core.io import read_json
-from texgs.fields.part_edit import PartEdit
-from texgs.raster.shading import MATERIAL
-from texgs.scene.scene import Scene
-from texgs.volume.basic_tfs import combine
-from texgs.volume.nrrd_file import open_grid
-from texgs.volume.transfer import TransferFunction
 from texgs.workflow.stages.settings import OfScene
 from texgs.workflow.stages.tf import in_data_values
 from texgs.workflow.stages.views import appearance_of, mapper_for
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from texgs.core.camera import Camera
+    from texgs.fields.part_edit import PartEdit
+    from texgs.scene.scene import Scene
+    from texgs.volume.transfer import TransferFunction
 
 
 class VolumeScene:
@@ -30,6 +31,8 @@ class VolumeScene:
     """
 
     def __init__(self, settings: OfScene, volume: Path) -> None:
+        from texgs.volume.nrrd_file import open_grid
+
         summary = read_json(volume.with_name("volume.json"))
         bounds = (settings.tf_values, summary["minimum"], summary["maximum"])
         self.tfs = {
@@ -40,7 +43,7 @@ class VolumeScene:
         self._mapper = mapper_for(settings.views.mapper, self.grid, self.look)
 
     def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> np.ndarray:
-        """Premultiplied RGBA [H, W, 4] of the basic TFs of a scene's visible models, with their edits.
+        """Return premultiplied RGBA [H, W, 4] of the basic TFs of a scene's visible models, with their edits.
 
         A palette moves all colours of a basic TF by the same difference, as it does those of a model; factors
         of light hold for the whole volume: those of the first visible model.
@@ -50,6 +53,11 @@ class VolumeScene:
             scene: whose models have the names of basic TFs; its light shines.
             palettes: of its models, as fitted.
         """
+        import numpy as np
+
+        from texgs.raster.shading import MATERIAL
+        from texgs.volume.basic_tfs import combine
+
         edits = [(name, model.edit) for name, model in scene.models.items()]
         shown, factors = {}, list[dict[str, float]]()
         for (name, edit), palette in zip(edits, palettes, strict=True):
@@ -63,7 +71,11 @@ class VolumeScene:
 
 
 def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
-    """A basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
+    """Return a basic TF with an edit's colour and opacity, cut off at 0 and 1 at every value."""
+    import numpy as np
+
+    from texgs.volume.transfer import TransferFunction
+
     opacity = clipped([(value, alpha * edit.opacity) for value, alpha in tf.opacity])
     if edit.palette is None:
         return TransferFunction(opacity, tf.color)
@@ -72,7 +84,9 @@ def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> Tr
 
 
 def clipped(points: Sequence[tuple[float, ...]]) -> Any:
-    """Points of a piecewise linear function that is cut off at 0 and 1, with those where that begins."""
+    """Return the points of a piecewise linear function cut off at 0 and 1, with those where that begins."""
+    import numpy as np
+
     made = [points[0]]
     for before, after in pairwise(points):
         places = {

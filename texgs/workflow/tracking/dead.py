@@ -1,5 +1,7 @@
 """Runs of processes that were killed: MLflow leaves them RUNNING for ever, the next process closes them."""
 
+from __future__ import annotations
+
 import json
 import os
 import platform
@@ -16,24 +18,27 @@ HOST, PROCESS, METRICS = "texgs.host", "texgs.process", "texgs.metrics"  # tags
 
 
 def process_tags(metrics: Path | None = None) -> dict[str, str]:
-    """Tags that say which process a run is of, and where the metrics of its job will be, if it is one."""
+    """Return tags that say which process a run is of, and where the metrics of its job will be."""
     own = {HOST: platform.node(), PROCESS: f"{os.getpid()} {psutil.Process().create_time()}"}
     return own if metrics is None else {**own, METRICS: str(metrics.absolute())}
 
 
-def close_dead(client: "MlflowClient", experiment_id: str) -> None:
+def close_dead(client: MlflowClient) -> None:
     """End the runs of this machine whose process is gone.
 
     A run whose metrics are in place is FINISHED: its process was killed after its work. Others are KILLED.
     """
     words = f"attributes.status = 'RUNNING' AND tags.`{HOST}` = '{platform.node()}'"
-    for run in client.search_runs([experiment_id], words):
-        if not is_alive(run.data.tags.get(PROCESS, "")):
+    experiments = [experiment.experiment_id for experiment in client.search_experiments()]
+    for run in client.search_runs(experiments, words):
+        if is_alive(run.data.tags.get(PROCESS, "")):
+            continue
+        if client.get_run(run.info.run_id).info.status == "RUNNING":  # else it has ended since the search
             client.set_terminated(run.info.run_id, "FINISHED" if is_recorded(run) else "KILLED")
 
 
 def is_alive(process: str) -> bool:
-    """Whether the process of a tag still runs, and is not another one with its number."""
+    """Return whether the process of a tag still runs, and is not another one with its number."""
     number, _, started = process.partition(" ")
     try:
         return str(psutil.Process(int(number)).create_time()) == started
@@ -41,8 +46,8 @@ def is_alive(process: str) -> bool:
         return False
 
 
-def is_recorded(run: "Run") -> bool:
-    """Whether the metrics of a run's job are in place and name this run."""
+def is_recorded(run: Run) -> bool:
+    """Return whether the metrics of a run's job are in place and name this run."""
     try:
         metrics = json.loads(Path(run.data.tags.get(METRICS, "")).read_text())
     except (OSError, ValueError):

@@ -1,59 +1,42 @@
-"""Connections to a tracking store, made so that MLflow neither chatters nor waits for minutes."""
+"""Connections to a tracking store: one SQLite file, made once however many jobs open it, or a server."""
+
+from __future__ import annotations
 
 import logging
 import os
+import re
+import sqlite3
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.core.errors import ArgumentError
-from texgs.workflow.tracking import sqlite
-from texgs.workflow.tracking.errors import TrackingError, public
+from texgs.core.errors import ArgumentError, TexgsError
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
 
-# What MLflow is told where the user has not decided otherwise. Its own defaults retry for minutes, which
-# would stop a job whose server is gone; a run itself sends again what was left over.
-DEFAULTS = {
+# What MLflow is told where the user has not decided otherwise: by default it tries again for minutes.
+SETTINGS = {
+    "MLFLOW_ASYNC_LOGGING_BUFFERING_SECONDS": "5",
+    "MLFLOW_ASYNC_LOGGING_THREADPOOL_SIZE": "4",
     "MLFLOW_DISABLE_TELEMETRY": "true",
     "MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR": "false",
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
-    "MLFLOW_HTTP_REQUEST_TIMEOUT": "20",
+    "MLFLOW_HTTP_REQUEST_TIMEOUT": "10",
     "MLFLOW_SUPPRESS_PRINTING_URL_TO_STDOUT": "true",
 }
-SECONDS_TO_CONNECT = 5
 CHATTERING = ("alembic", "mlflow", "urllib3.connectionpool")
+ARTIFACTS = "mlartifacts"  # folder beside the file
+LONGEST_REASON = 200
 
 
-@contextmanager
-def calm(**settings: str) -> Iterator[None]:
-    """Let MLflow work without telemetry, long waits and messages of its own; put everything back after.
-
-    Args:
-        settings: environment variables of MLflow that replace the defaults; the user's own win over both.
-    """
-    ours = {key: value for key, value in (DEFAULTS | settings).items() if key not in os.environ}
-    os.environ.update(ours)
-    try:
-        # Its import sets the levels of its loggers, so that it comes before they are changed.
-        import mlflow  # noqa: F401
-
-        loggers = [logging.getLogger(name) for name in CHATTERING]
-        levels = [logger.level for logger in loggers]
-        for logger in loggers:
-            logger.setLevel(logging.CRITICAL)
-        try:
-            yield
-        finally:
-            for logger, level in zip(loggers, levels, strict=True):
-                logger.setLevel(level)
-    finally:
-        for key in ours:
-            os.environ.pop(key, None)
+class TrackingError(TexgsError, RuntimeError):
+    """The tracking store cannot be used."""
 
 
-def connect(uri: str, experiment: str) -> tuple["MlflowClient", str]:
+def connect(uri: str, experiment: str) -> tuple[MlflowClient, str]:
     """Open a store, and make the experiment where there is none of this name.
 
     Args:
@@ -65,38 +48,165 @@ def connect(uri: str, experiment: str) -> tuple["MlflowClient", str]:
 
     Raises:
         ArgumentError: if it is an address of another kind.
-        TrackingError: if a local store cannot be made or upgraded, or the experiment was deleted.
-        Exception: whatever MLflow raises where the store cannot be reached.
+        TrackingError: if the store cannot be used.
     """
-    from mlflow import MlflowClient
+    os.environ.update({key: value for key, value in SETTINGS.items() if key not in os.environ})
+    import mlflow  # sets the levels of its loggers, so that it comes before they are changed
 
-    location = None
-    if uri.startswith("sqlite:"):
-        database = sqlite.path_of(uri)
-        location = sqlite.prepare(database).as_uri()
-        uri = f"sqlite:///{database}"
-    elif not uri.startswith(("http://", "https://")):
+    for name in CHATTERING:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    if uri.startswith(("http://", "https://")):
+        with translated(uri):
+            client = mlflow.MlflowClient(tracking_uri=uri)
+            return client, _experiment_id(client, experiment, None)
+    from filelock import FileLock
+
+    database = path_of(uri)
+    with translated(uri):
+        database.parent.mkdir(parents=True, exist_ok=True)
+        # MLflow makes tables in each process that finds none; processes that do so at once break the file.
+        with FileLock(database.with_name(f".{database.name}.lock")):
+            _prepare(database)
+            client = mlflow.MlflowClient(tracking_uri=_address(database))
+            return client, _experiment_id(client, experiment, _artifacts(database))
+
+
+def path_of(uri: str) -> Path:
+    """Return the absolute path of the file that an address such as `sqlite:///results/mlflow.db` names.
+
+    Raises:
+        ArgumentError: if it names none.
+    """
+    path = uri.removeprefix("sqlite:///")
+    if path in (uri, "", ":memory:") or "?" in path:
         raise ArgumentError(
-            f"tracking: expected sqlite:///PATH or the http address of an MLflow server, got {public(uri)!r}"
+            "tracking: expected sqlite:///PATH or the http address of an MLflow server, "
+            f"got {public(uri)[:LONGEST_REASON]!r}"
         )
-    client = MlflowClient(tracking_uri=uri)
-    return client, _experiment_id(client, experiment, location)
+    return Path(path).expanduser().resolve()
 
 
-def _experiment_id(client: "MlflowClient", name: str, location: str | None) -> str:
+def _address(database: Path) -> str:
+    """Return the address of a file for MLflow, which takes what follows a "?" for options."""
+    path = str(database)
+    return f"sqlite:///{os.path.relpath(path) if '?' in path else path}"
+
+
+def _artifacts(database: Path) -> str:
+    """Return the address of the folder for files of runs; the quotes of a path are escaped in it."""
+    return database.with_name(ARTIFACTS).as_uri()
+
+
+def _prepare(database: Path) -> None:
+    """Make a store, or bring an older one to the schema of this MLflow; a copy of that is kept beside it."""
+    import mlflow
+    import sqlalchemy
+    from alembic.migration import MigrationContext
+    from alembic.script import ScriptDirectory
+
+    if not database.exists() or not database.stat().st_size:
+        _make(database)
+        return
+    engine = sqlalchemy.create_engine(_address(database))
+    with closing(engine.connect()) as connection:
+        revision = MigrationContext.configure(connection).get_current_revision()
+    engine.dispose()
+    if revision is None:
+        raise TrackingError(
+            f"{database}: expected a store of MLflow, got another database or half of one; "
+            "choose another file"
+        )
+    migrations = Path(mlflow.__file__).parent / "store" / "db_migrations"
+    if revision != ScriptDirectory(str(migrations)).get_current_head():
+        _upgrade(database, revision)
+
+
+def _make(database: Path) -> None:
+    """Let MLflow make its tables, in a file beside the place: a killed process leaves no half of a store."""
+    from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
+
+    fresh = database.with_name(f".{database.name}.new")
+    for left in database.parent.glob(f"{fresh.name}*"):
+        left.unlink()
+    # Not by a client: that puts the working directory into its SQL, which breaks at quotes.
+    SqlAlchemyStore(_address(fresh), _artifacts(database)).engine.dispose()
+    fresh.replace(database)
+
+
+def _upgrade(database: Path, revision: str) -> None:
+    """Run `mlflow db upgrade` on a store of another MLflow."""
+    from alembic.util import CommandError
+    from mlflow.db import upgrade
+
+    copy = database.with_name(f"{database.name}.{revision}")
+    with closing(sqlite3.connect(database)) as old, closing(sqlite3.connect(copy)) as new:
+        old.backup(new)
+    try:
+        upgrade.main([_address(database)], standalone_mode=False)
+    except CommandError as error:
+        raise TrackingError(
+            f"{database}: MLflow cannot upgrade this store ({reason(error)}); "
+            "install the MLflow that wrote it, or choose another file"
+        ) from error
+
+
+def _experiment_id(client: MlflowClient, name: str, location: str | None) -> str:
+    """Return the experiment of a name, made where there is none that keeps its files in this place."""
     from mlflow.exceptions import MlflowException
 
     experiment = client.get_experiment_by_name(name)
+    if experiment is not None and experiment.lifecycle_stage == "deleted":
+        raise TrackingError(
+            f"experiment {name!r} was deleted from the tracking store; bring it back with "
+            f"`mlflow experiments restore --experiment-id {experiment.experiment_id}`, or choose another name"
+        )
+    if experiment is not None and location and experiment.artifact_location != location:
+        # The store was moved: MLflow keeps absolute addresses, and would go on to write to the old place.
+        client.rename_experiment(
+            experiment.experiment_id, f"{name} {experiment.experiment_id}, before it was moved"
+        )
+        experiment = None
     if experiment is None:
         try:
             return str(client.create_experiment(name, artifact_location=location))
         except MlflowException:
             experiment = client.get_experiment_by_name(name)
-            if experiment is None:  # else another process was faster
+            if experiment is None:  # else another process was faster, on a server
                 raise
-    if experiment.lifecycle_stage == "deleted":
-        raise TrackingError(
-            f"experiment {name!r} was deleted from the tracking store; bring it back with "
-            f"`mlflow experiments restore --experiment-id {experiment.experiment_id}`, or choose another name"
-        )
     return str(experiment.experiment_id)
+
+
+@contextmanager
+def translated(uri: str) -> Iterator[None]:
+    """Turn whatever MLflow raises into one TrackingError that names the store."""
+    outer = sys.exception()
+    try:
+        yield
+    except TexgsError:
+        raise
+    except Exception as error:  # the client passes on what any of the libraries below it raises
+        raise TrackingError(
+            f"{public(uri)}: the tracking store cannot be used ({cause(error, outer)}); "
+            "check it, choose another one, or switch tracking off"
+        ) from error
+
+
+def cause(error: BaseException, outer: BaseException | None) -> str:
+    """Return what lies at the bottom of an error of MLflow, such as "Connection refused".
+
+    `outer` is what was being handled when MLflow was called: the job's own error is no cause.
+    """
+    while (deeper := error.__cause__ or error.__context__) and deeper is not outer:
+        error = deeper
+    return reason(error)
+
+
+def reason(error: BaseException) -> str:
+    """Return the first line of an error's message, shortened, or its type where there is none."""
+    line = next(iter(str(error).splitlines()), "").strip()
+    return public(line)[:LONGEST_REASON] or type(error).__name__
+
+
+def public(text: str) -> str:
+    """Return the text without the user name and password of an address in it."""
+    return re.sub(r"//[^/@\s]*@", "//", text)

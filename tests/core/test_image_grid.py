@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+from PIL import Image
+
+from texgs.core.errors import ArgumentError
+from texgs.core.image_grid import DPI, INCHES, NOTE, content, write_strip
+
+
+def picture(rows, columns, size=(60, 80), value=0.2):
+    """White with a grey block."""
+    pixels = np.ones((*size, 3))
+    pixels[rows, columns] = value
+    return pixels
+
+
+def test_a_row_for_each_name_and_a_column_for_each_title(tmp_path):
+    rows = {
+        "scene": [picture(slice(20, 30), slice(30, 40))] * 3,
+        "volume": [picture(slice(20, 30), slice(30, 40))] * 3,
+    }
+    path = write_strip(tmp_path / "a.png", rows, ["one", "two", "three"])
+    width, height = Image.open(path).size
+    assert width == round(3 * INCHES * DPI)
+    assert height == round((2 * INCHES + 0.3) * DPI)
+    again = write_strip(tmp_path / "b.png", rows, ["one", "two", "three"])
+    assert path.read_bytes() == again.read_bytes()
+
+
+def test_all_show_the_square_around_what_any_shows():
+    pictures = [picture(slice(20, 24), slice(30, 34)), picture(slice(26, 30), slice(50, 54))]
+    rows, columns = content(pictures)
+    assert rows.stop - rows.start == columns.stop - columns.start == 24 + 8
+    assert rows.start < 20 < 30 < rows.stop
+    assert columns.start <= 30 < 54 <= columns.stop
+    assert content([np.ones((4, 4, 3))]) == (slice(None), slice(None))
+
+
+def test_rows_of_another_length_are_named(tmp_path):
+    with pytest.raises(ArgumentError, match="scene: expected 2 pictures, got 1"):
+        write_strip(tmp_path / "a.png", {"scene": [picture(0, 0)]}, ["one", "two"])
+
+
+def test_places_may_be_empty_and_pictures_have_words_below(tmp_path):
+    block = picture(slice(20, 30), slice(30, 40))
+    rows, titles = {"a": [block, None], "b": [None, block]}, ["one", "two"]
+    plain = write_strip(tmp_path / "plain.png", rows, titles)
+    noted = write_strip(tmp_path / "noted.png", rows, titles, {"a": ["", ""], "b": ["", "31.2 dB"]})
+    (width, height), (_, higher) = Image.open(plain).size, Image.open(noted).size
+    assert higher == round((2 * INCHES + 0.3 + NOTE) * DPI)
+    pixels = np.asarray(Image.open(plain).convert("L"))
+    right = pixels[40 : height // 2 - 20, width // 2 + 20 :]
+    assert right.min() == 255, "nothing is drawn in the empty place"
+    assert pixels[40 : height // 2 - 20, 20 : width // 2 - 20].min() < 100

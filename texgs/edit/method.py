@@ -1,0 +1,97 @@
+"""What a method of editing is, and the methods that there are: the modules of texgs/edit/methods.
+
+All that has to know of methods reads their specifications: the schema, the command line, the plan of the
+workflow, the check of weights, the tables. A method is one file there, and a file of conf/edit for each set
+of its values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from texgs.core.specifications import specifications
+from texgs.core.typed import typed
+from texgs.fields.kinds import kinds
+
+PACKAGE = "texgs.edit.methods"
+NO_METHOD = "none"  # of scenes as they are fitted
+Settings = TypeVar("Settings")
+
+
+@dataclass(frozen=True)
+class Method(Generic[Settings]):
+    """One way to edit a scene. Its module imports nothing heavy before one of these functions is called."""
+
+    name: str
+    summary: str
+    """What it does, in `texgs --help`."""
+    settings: type[Settings]
+    """Dataclass of its keys, `edit.NAME` in the configuration."""
+    run: Callable[[Any], Any]
+    """Edits a scene: from a `Task[Settings]` of texgs/edit/task.py to an `EditedScene`."""
+    check: Callable[[Settings], None]
+    """Raises an ArgumentError for what is wrong with its settings, without scene and weights."""
+    weights: Callable[[Settings], Mapping[str, str]]
+    """Names of the weights that it needs, each with the word of its settings that does without; or ""."""
+    needs: frozenset[str] = frozenset()
+    """What fields have to be capable of, of `texgs.fields.kinds.Capability`."""
+    fields: frozenset[str] = frozenset()
+    """Kinds of field that it is made for; empty: all that can what it needs."""
+    check_fit: Callable[[Settings, Any], None] = lambda settings, fit: None
+    """Raises an ArgumentError where its settings do not go with those of the fit, the node `fit`."""
+    files: Callable[[Settings], Mapping[str, Path]] = lambda settings: {}
+    """Files that it reads besides the scene and its views."""
+    adds: Callable[[Settings, Sequence[str]], Sequence[str]] = lambda settings, models: ()
+    """Parts that the scene has afterwards in addition, from the names of its models."""
+    style: Callable[[Settings], Any] | None = None
+    """The `StylePicture` that it follows, which the result is compared with; None where there are several."""
+    follows: str = ""
+    """Which of its keys, "style" or "instruction", looks of a data set have an own value of."""
+    followed: Callable[[Settings], str] = lambda settings: ""
+    """What it follows, in tables: the name of a picture, or words."""
+    numbers: Callable[[Settings], Mapping[str, Any]] = lambda settings: {}
+    """Numbers of the recipe that its settings name, with what they change about it."""
+    is_look: bool = True
+    """Whether the scene looks different afterwards."""
+
+    @property
+    def stage(self) -> str:
+        """Its verb, and its stage in the workflow."""
+        return f"edit_{self.name}"
+
+    @property
+    def module(self) -> str:
+        """Where it is."""
+        return self.run.__module__
+
+    def takes(self, kind: str) -> bool:
+        """Whether it can edit a kind of field."""
+        return (not self.fields or kind in self.fields) and self.needs <= kinds()[kind].can
+
+    def of(self, edit: Any, look: str | None = None) -> Settings:
+        """Its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
+
+        Args:
+            edit: to do.
+            look: what it follows, where that is not what its settings say.
+        """
+        values = getattr(edit, self.name)
+        settings: Any = values if isinstance(values, self.settings) else typed(self.settings, values)
+        return settings if look is None else replace(settings, **{self.follows: look})
+
+
+def methods() -> dict[str, Method[Any]]:
+    """All methods by name."""
+    return specifications(PACKAGE, "METHOD")
+
+
+def method_of(edit: Any) -> Method[Any]:
+    """The method of an edit.
+
+    Raises:
+        KeyError: for the edit `none`, which has no method.
+    """
+    return methods()[edit.method]

@@ -1,0 +1,66 @@
+"""Instruct-GS2GS (Vachha and Haque 2024), one of the paper's baselines, on 3D Gaussians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from texgs.core.keys import key
+from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
+from texgs.fit.settings import CommonRates
+
+if TYPE_CHECKING:
+    from texgs.edit.closeness import Closeness
+    from texgs.edit.gaussian_learner import GaussianLearner
+    from texgs.edit.task import EditedScene, Task
+    from texgs.edit.turns import Schedule
+    from texgs.fields.gaussians.model import Gaussians
+    from texgs.volume.images import Images
+
+
+def rates(zeroth: float, means_final: float) -> CommonRates:
+    """Rates of 3DGS, which go on where its fits end, but for two."""
+    return CommonRates(1.6e-4, 0.001, 0.005, 0.05, zeroth, zeroth / 20, means_final, 1.0)
+
+
+@dataclass
+class Igs2gsKeys(UpdateKeys):
+    """How Gaussians follow: all views are edited one after the other, then learned from for a while."""
+
+    passes: int = key(3, "times that each view is edited", least=1)
+    every: int = key(2500, "iterations from pass to pass", least=1)
+    noise: list[float] = key([0.7, 0.98], "level of an edit, from and to, as a share")
+    rates: CommonRates = field(
+        default_factory=lambda: rates(0.0025, 0.01), metadata={"help": "learning rates"}
+    )
+
+
+def run(task: Task[Igs2gsKeys]) -> EditedScene:
+    """Give the models the look; write views.png and convergence.png."""
+    return edit_by_updates(task, schedule, learner)
+
+
+def schedule(keys: Igs2gsKeys, views: int) -> Schedule:
+    """Passes through all views, each learned from when it is edited."""
+    from texgs.edit.turns import Schedule
+
+    levels = noise_range("edit.igs2gs.noise", keys.noise)
+    return Schedule(keys.passes, keys.every, learned="newest", levels=levels)
+
+
+def learner(keys: Igs2gsKeys, model: Gaussians, images: Images, closeness: Closeness) -> GaussianLearner:
+    """The Gaussians, by whole views."""
+    from texgs.edit.gaussian_learner import GaussianLearner
+
+    iterations = schedule(keys, len(images)).iterations
+    return GaussianLearner(model, images, keys.rates, closeness, iterations, is_frozen=keys.frozen)
+
+
+METHOD = update_method(
+    "igs2gs",
+    "edit all views of a scene of 3D Gaussians in turn by an instruction, as Instruct-GS2GS does",
+    Igs2gsKeys,
+    run,
+    schedule,
+    "gaussians",
+)

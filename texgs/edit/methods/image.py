@@ -1,0 +1,184 @@
+"""Image-driven editing of textures (the paper's section Image-Driven NPSE): the style of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.keys import key
+from texgs.edit.method import Method
+from texgs.edit.methods import style
+from texgs.edit.methods.style import StyleKeys
+from texgs.models.catalogue import CLIP_BACKBONES
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    from texgs.edit.recipe import Recipe
+    from texgs.edit.style_picture import StylePicture
+    from texgs.edit.task import EditedScene, Task
+    from texgs.fields.surfels.model import Surfels
+    from texgs.volume.view_set import View
+
+KEYS = "edit.image"  # where its keys stand
+
+
+@dataclass
+class ImageKeys(StyleKeys):
+    """How texels take on a style."""
+
+    recipe: str = key(
+        "default",
+        "default; patches, which needs no weights; preview, the picture laid onto the surface; paper",
+        choices=("default", "patches", "preview", "paper"),
+    )
+    iterations: int | None = key(None, "views, one each; default the recipe's", least=0)
+    lambda_s: float | None = key(
+        None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
+    )
+    clip: str = key(
+        CLIP_BACKBONES[0],
+        "backbone of the CLIP term, where lambda_s is below 1; metrics have their own",
+        choices=CLIP_BACKBONES,
+    )
+    pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
+    start: str | None = key(
+        None,
+        "colours at the start: the picture laid onto the surface, its mean, random pixels of it, or the "
+        "model's own moved to its colours; default the recipe's",
+        choices=("projected", "mean", "random", "transfer"),
+    )
+    textured: bool = key(True, "each texel learns, or each surfel one colour: the paper's ablation")
+
+
+def run(task: Task[ImageKeys]) -> EditedScene:
+    """Give the parts the style; write style.png."""
+    from texgs.edit.task import EditedScene
+
+    recipe = recipe_of(task.settings, task.edit.seed)
+    pictures: dict[str, StylePicture] = {}
+    losses: dict[str, dict[str, list[float]]] = {}
+    seconds: dict[str, dict[str, float]] = {}
+    adapted: dict[str, Recipe] = {}
+    scene = task.each_part(stylist(task, recipe, pictures, losses, seconds, adapted))
+    return EditedScene(
+        scene,
+        how(list(adapted.values()), task.settings.clip),
+        style.write_styles(task.output, pictures),
+        recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
+        {"seconds": seconds},
+        losses,
+    )
+
+
+def stylist(
+    task: Task[ImageKeys],
+    recipe: Recipe,
+    pictures: dict[str, StylePicture],
+    losses: dict[str, dict[str, list[float]]],
+    seconds: dict[str, dict[str, float]],
+    adapted: dict[str, Recipe],
+) -> Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]:
+    """What gives one part the style, for `Task.each_part`; it notes what there is to tell by name."""
+    from texgs.edit.clip_loss import ClipLoss
+    from texgs.edit.stylize import stylize
+    from texgs.models.clip import Clip
+    from texgs.models.vgg import Vgg
+    from texgs.volume.reduced import smaller
+
+    vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
+    network = Clip.load(task.settings.clip, task.device) if recipe.needs_clip else None
+
+    def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
+        picture = pictures[name] = style_of(task.settings_for(name.split("/")[0]))
+        pixels = picture.image.permute(1, 2, 0).to(task.device)
+        clip = ClipLoss(network, pixels) if network else None
+        result = stylize(
+            model,
+            [smaller(view.camera, task.reduce) for view in views],
+            [view.light for view in views],
+            picture,
+            recipe,
+            vgg=vgg,
+            clip=clip,
+            surfels=surfels,
+            title=f"{task.title} {task.edit.name}, {name}",
+            show=partial(task.show, name),
+        )
+        losses[name] = result.history.losses
+        seconds[name], adapted[name] = result.history.seconds, result.recipe
+        return result.model
+
+    return one
+
+
+def style_of(settings: ImageKeys) -> StylePicture:
+    """The picture, of it the object that was clicked on."""
+    return style.style_of(settings, KEYS)
+
+
+def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
+    """The recipe of an edit, with what the configuration changes about it.
+
+    Raises:
+        ArgumentError: naming the value that is out of range.
+    """
+    from texgs.edit.recipe import preset
+
+    changes: dict[str, Any] = {
+        name: value
+        for name in ("iterations", "lambda_s", "start")
+        if (value := getattr(settings, name)) is not None
+    }
+    return preset(
+        settings.recipe, pattern=settings.pattern, is_textured=settings.textured, seed=seed, **changes
+    )
+
+
+def how(recipes: Sequence[Recipe], clip: str) -> str:
+    """What the edit of some parts works with, for tables; `clip` is the backbone of a CLIP term."""
+    names = {
+        "VGG-16": any(recipe.needs_vgg for recipe in recipes),
+        clip: any(recipe.needs_clip for recipe in recipes),
+        "patches": any(recipe.patches > 0 and recipe.iterations > 0 for recipe in recipes),
+    }
+    used = [name for name, is_used in names.items() if is_used] or ["projection"]
+    words = " + ".join(used) + ("" if {"VGG-16", clip} & {*used} else " (no weights)")
+    return words if recipes[0].is_textured else f"{words}, without texture"
+
+
+def check(settings: ImageKeys) -> None:
+    """Require numbers that a recipe can have, and a picture.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    recipe_of(settings)
+    style.check(settings, KEYS)
+
+
+def weights(settings: ImageKeys) -> Mapping[str, str]:
+    """Those of the recipe, and what finds an object in the picture."""
+    recipe = recipe_of(settings)
+    vgg = {"vgg16": "recipe=patches"} if recipe.needs_vgg else {}
+    clip = {settings.clip: "lambda_s=1"} if recipe.needs_clip else {}
+    return {**vgg, **style.weights(settings), **clip}
+
+
+METHOD = Method(
+    "image",
+    "give a scene the style of a picture",
+    ImageKeys,
+    run,
+    check,
+    weights,
+    needs=frozenset({"texture", "relight"}),
+    files=style.files,
+    style=style_of,
+    follows="style",
+    followed=lambda settings: Path(settings.style).name,
+    numbers=lambda settings: vars(recipe_of(settings)),
+)

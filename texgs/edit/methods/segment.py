@@ -1,0 +1,197 @@
+"""2D-lift-3D segmentation (the paper's section Partial editing): clicks on a view make a part of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.keys import key
+from texgs.core.lens import Lens
+from texgs.core.names import require_name
+from texgs.edit.method import Method
+from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, shares
+
+if TYPE_CHECKING:
+    import torch
+
+    from texgs.core.camera import Camera
+    from texgs.edit.clicks import Clicks
+    from texgs.edit.new_segment import Segmented
+    from texgs.edit.task import EditedScene, Task
+    from texgs.fields.surfels.model import Surfels
+
+SHOWN = 3  # views of the segment around the object
+POLAR = 20.0  # of these views, degrees
+DIMMED = 0.15  # opacity of what is not in the segment, in its picture
+
+
+@dataclass
+class SegmentKeys:
+    """Where is clicked, and how masks become surfels."""
+
+    model: str = key("", "whose part it is; may be left out where there is one")
+    name: str = key("part", "of the segment")
+    view: list[float] = key([30.0, 20.0], "azimuth and polar angle of the view clicked on", "degrees")
+    # OmegaConf takes no integers for list[list[float]].
+    points: list[Any] = key([], "clicks on the part: right and down, as shares of the view's sides")
+    others: list[Any] = key([], "clicks on what does not belong to it")
+    masks: str = key("mobile_sam", "what finds the part in a view; grabcut needs no weights", choices=MASKS)
+    vote: str = key(
+        "contribution",
+        "how masks become surfels; centre: as in the paper",
+        choices=("contribution", "centre"),
+    )
+    connected: bool = key(False, "only the connected pieces that hold a click are kept")
+    voters: str = key(
+        "icosphere",
+        "views that vote: some around the object, or those of training, as in the paper",
+        choices=("icosphere", "training"),
+    )
+    views: int = key(42, "of the icosphere, 10 f^2 + 2", least=12)
+    size: int = key(512, "of these views", "pixels", least=32)
+
+
+def run(task: Task[SegmentKeys]) -> EditedScene:
+    """Make the segment; write its file, and edit.png with the clicks, their mask and the segment."""
+    from texgs.core.names import part_file
+    from texgs.edit.new_segment import model_name, new_segment
+    from texgs.edit.task import EditedScene
+    from texgs.models.by_name import mask_model
+
+    settings, device = task.settings, task.device
+    name = model_name(task.scene, settings.model, "edit.segment.model")
+    clicks = clicks_of(settings, task.lens, device)
+    made = new_segment(
+        *(task.scene, f"{name}/{settings.name}", clicks),
+        voters(task, name),
+        mask_model(settings.masks, device),
+        task.output / part_file("edit.segment.name", name, settings.name),
+        asdict(settings),
+        vote=settings.vote,  # type: ignore[arg-type]
+        connected=settings.connected,
+        title=f"{task.title} {task.edit.name}",
+    )
+    show(task, clicks, made)
+    return EditedScene(
+        made.scene,
+        f"{settings.masks}, {settings.vote}",
+        {"edit.png": "Clicks with the mask of their view, and the segment that all views agree on."},
+        notes={
+            "surfels": int(made.lifted.mask.sum()),
+            "views": {"used": made.lifted.used, "left out": made.lifted.left_out},
+        },
+    )
+
+
+def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
+    """Cameras of the views that vote on a model."""
+    from texgs.volume.cameras import icosphere_of
+    from texgs.volume.reduced import smaller
+
+    if task.settings.voters == "training":
+        cameras = [smaller(view.camera, task.reduce) for view in task.training_views(model)]
+    else:
+        cameras = icosphere_of(task.settings.views, task.lens.square(task.settings.size))
+    return [camera.to(task.device) for camera in cameras]
+
+
+def places_of(settings: SegmentKeys) -> list[list[float]]:
+    """The clicks, those beside the part last, as shares of the sides of the view.
+
+    Raises:
+        ArgumentError: if there is none on the part, one is outside of the view, or the view has no direction.
+    """
+    places = shares("edit.segment.points", [*settings.points, *settings.others])
+    if not settings.points:
+        raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
+    if len(settings.view) != 2:
+        raise ArgumentError(f"edit.segment.view: expected azimuth and polar angle, got {settings.view}")
+    return places
+
+
+def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
+    """Clicks in pixels of a view through a lens.
+
+    Raises:
+        ArgumentError: if one is no place in the view, or none is on the object.
+    """
+    import torch
+
+    from texgs.core.camera import orbit
+    from texgs.edit.clicks import Clicks
+
+    places, (azimuth, polar) = places_of(settings), settings.view
+    camera = orbit(azimuth, polar, *lens).to(device)
+    points = lens.width * torch.tensor(places, dtype=torch.float32, device=device)
+    positive = torch.arange(len(points), device=device) < len(settings.points)
+    return Clicks(camera, points, positive)
+
+
+def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
+    """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
+    import torch
+
+    from texgs.core.image_grid import write_strip
+    from texgs.edit.preview import overlay
+    from texgs.fields.surfels.model import Surfels
+    from texgs.volume.cameras import orbit_path
+
+    model, lifted = made.model, made.lifted
+    faint = lifted.mask.new_ones(len(model), dtype=torch.float32).masked_fill(~lifted.mask, DIMMED)
+    opacities = (model.parameters["opacities"].sigmoid() * faint).clamp(1e-6, 1 - 1e-6).logit()
+    dimmed = Surfels({**model.parameters, "opacities": opacities}, model.shading, model.metadata)
+
+    @torch.no_grad()
+    def shown(of: Surfels, camera: Camera) -> torch.Tensor:
+        return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
+
+    marked = overlay(shown(model, clicks.camera), lifted.reference, clicks.points, clicks.positive)
+    around = orbit_path(SHOWN, POLAR, *task.lens)
+    pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
+    titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
+    write_strip(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
+
+
+def check(settings: SegmentKeys) -> None:
+    """Require a name, clicks, and a number of views that an icosphere has.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    from texgs.volume.geodesic import frequency_of
+
+    require_name(settings.name, "edit.segment.name")
+    places_of(settings)
+    frequency_of(settings.views, "edit.segment.views")
+
+
+def weights(settings: SegmentKeys) -> Mapping[str, str]:
+    """The mask model's, where it has some."""
+    return mask_weights(settings.masks)
+
+
+def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:
+    """The segment.
+
+    Raises:
+        ConfigError: if there is no such model, or none is named of several.
+    """
+    model = settings.model or (models[0] if len(models) == 1 else "")
+    if model not in models:
+        raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model or 'none'}")
+    return [f"{model}/{settings.name}"]
+
+
+METHOD = Method(
+    "segment",
+    "make a segment of a model of a scene, by clicks of the configuration",
+    SegmentKeys,
+    run,
+    check,
+    weights,
+    needs=frozenset({"segments"}),
+    adds=adds,
+    is_look=False,
+)

@@ -1,0 +1,100 @@
+"""Text-driven editing of textures (the paper's section Text-Driven NPSE): what an instruction says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from texgs.core.keys import key
+from texgs.edit.method import Method
+from texgs.edit.methods.instruction import PICTURE, SHOWN, InstructionKeys
+
+if TYPE_CHECKING:
+    import numpy as np
+    from torch import Tensor
+
+    from texgs.edit.task import EditedScene, Task
+    from texgs.fields.surfels.model import Surfels
+    from texgs.volume.view_set import View
+
+
+@dataclass
+class TextKeys(InstructionKeys):
+    """What to do, what edits the views, and how texels follow."""
+
+    recipe: str = key(
+        "default",
+        "how texels follow: solved; as in the paper; or iterative: views are edited again and again, as in "
+        "Instruct-NeRF2NeRF",
+        choices=("default", "paper", "iterative"),
+    )
+    views: str | None = key(
+        None,
+        "that are edited: new ones along the axes, which the scene fills; the six training views nearest "
+        "to the axes, as in the paper; or all training views; default the recipe's",
+        choices=("axes", "nearest", "all"),
+    )
+    textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
+    size: int = key(512, "longer side of the six views", "pixels", least=64)
+
+
+def run(task: Task[TextKeys]) -> EditedScene:
+    """Give the parts the look; write views.png with the views that were edited."""
+    from texgs.core.image_grid import write_strip
+    from texgs.edit.task import EditedScene
+    from texgs.edit.text import edit_by_text
+    from texgs.fields.surfels.texels import untextured
+    from texgs.volume.reduced import smaller
+
+    settings, guidance = task.settings, task.settings.opened(task.device)
+    rows: dict[str, list[np.ndarray]] = {}
+    seen: dict[str, float] = {}
+
+    def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
+        result = edit_by_text(
+            model,
+            [smaller(view.camera, task.reduce).to(task.device) for view in views],
+            *(guidance, task.settings_for(name.split("/")[0]).instruction, settings.recipe),
+            views=settings.views,  # type: ignore[arg-type]
+            light=views[0].light,
+            surfels=surfels,
+            size=settings.size,
+            seed=task.edit.seed,
+        )
+        seen[name] = result.seen
+        rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN]]
+        rows[f"{name} edited"] = [image.cpu().numpy() for image in result.images[:SHOWN]]
+        return result.model if settings.textured else untextured(result.model, surfels)
+
+    scene = task.each_part(one)
+    titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]
+    write_strip(task.output / "views.png", rows, titles)
+    return EditedScene(
+        scene,
+        f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),
+        PICTURE,
+        notes={"instruction": task.followed or settings.instruction, "seen": seen},
+    )
+
+
+def numbers(settings: TextKeys) -> Mapping[str, Any]:
+    """Which views are edited, and how texels follow."""
+    from texgs.edit.text import RECIPES
+
+    recipe = RECIPES[settings.recipe]
+    return {"views": settings.views or recipe.views, **vars(recipe.policy)}
+
+
+METHOD = Method(
+    "text",
+    "give a scene the look that an instruction asks for",
+    TextKeys,
+    run,
+    lambda settings: settings.check(),
+    lambda settings: settings.weights(),
+    needs=frozenset({"texture", "relight"}),
+    follows="instruction",
+    followed=lambda settings: settings.instruction,
+    numbers=numbers,
+)

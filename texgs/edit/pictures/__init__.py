@@ -1,0 +1,40 @@
+"""Style pictures of texgs, files beside this one: own work, in which nobody else has a right.
+
+For demonstrations and tests: brush strokes, stained glass, polished marble, cloth, dots and printed fans.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PIL import Image
+
+from texgs.core.errors import ArgumentError
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+PICTURES = ("strokes", "glass", "marble", "weave", "dots", "waves")
+SIZE = 512  # pixels of each side of a file
+
+
+def picture(name: str, size: int = SIZE) -> Tensor:
+    """Read one of the pictures, square: [3, size, size] in [0, 1].
+
+    Args:
+        name: of PICTURES.
+        size: pixels of each side, reduced or enlarged if it is not that of the file.
+
+    Raises:
+        ArgumentError: if there is none of that name.
+    """
+    import torch  # not at the top: a plan of edits asks for the names only
+
+    if name not in PICTURES:
+        raise ArgumentError(f"picture: expected one of {', '.join(PICTURES)}, got {name!r}")
+    with files(__package__).joinpath(f"{name}.png").open("rb") as file, Image.open(file) as image:
+        shown = image if size == SIZE else image.resize((size, size), Image.Resampling.LANCZOS)
+        pixels = np.asarray(shown) / 255
+    return torch.from_numpy(pixels.astype(np.float32)).permute(2, 0, 1).contiguous()

@@ -1,0 +1,32 @@
+"""3D Gaussians with spherical harmonics (Kerbl et al. 2023, 3DGS): what several methods of editing build on.
+
+Lighting is baked into their colours, so that edits can change their opacity but not their light or palette.
+"""
+
+from __future__ import annotations
+
+from texgs.fields.kinds import Functions, Kind
+
+
+def functions() -> Functions:
+    """Import what reads (ours, or PLY of 3DGS), writes and joins Gaussians."""
+    from texgs.core.ply_file import is_ply
+    from texgs.fields.gaussians.composition import JoinedGaussians
+    from texgs.fields.gaussians.model_file import read_gaussians, write_gaussians
+    from texgs.fields.gaussians.ply import read_ply
+
+    return Functions(
+        lambda path: read_ply(path) if is_ply(path) else read_gaussians(path),
+        write_gaussians,
+        JoinedGaussians,
+    )
+
+
+FIELD = Kind(
+    "gaussians",
+    ("texgs-gaussians", "ply scale_2"),
+    frozenset({"opacity"}),
+    functions,
+    exports=("3dgs", "mesh"),
+    depth="depth",  # the mean, as the authors of 2DGS take it of 3D Gaussians
+)

@@ -1,0 +1,24 @@
+"""Small networks whose colours are mixtures of a palette: what StyleRF-VolVis builds on."""
+
+from __future__ import annotations
+
+from texgs.fields.kinds import Functions, Kind
+
+
+def functions() -> Functions:
+    """Import what reads, writes and composes fields of networks."""
+    from texgs.fields.palette.composition import PaletteScene
+    from texgs.fields.palette.file import read_palette, write_palette
+
+    return Functions(read_palette, write_palette, PaletteScene)
+
+
+FIELD = Kind(
+    "palette",
+    ("texgs-palette",),
+    frozenset({"opacity"}),
+    functions,
+    exports=("mesh",),
+    depth="depth",  # the mean
+    film_size=128,
+)

@@ -1,0 +1,28 @@
+"""Textured 2D Gaussians: what the paper is about. All edits work on them."""
+
+from __future__ import annotations
+
+from texgs.fields.kinds import ALL, Functions, Kind
+
+
+def functions() -> Functions:
+    """Import what reads (lossless, compact or PLY), writes (without loss) and joins surfels."""
+    from texgs.core.ply_file import is_ply
+    from texgs.fields.surfels.compact import open_model
+    from texgs.fields.surfels.composition import Composition
+    from texgs.fields.surfels.model_file import write_model
+    from texgs.fields.surfels.ply import read_ply
+
+    return Functions(
+        lambda path: read_ply(path) if is_ply(path) else open_model(path), write_model, Composition
+    )
+
+
+FIELD = Kind(
+    "surfels",
+    ("texgs-model", "texgs-compact", "ply scale_1"),
+    ALL,
+    functions,
+    exports=("3dgs", "2dgs", "release", "points", "mesh", "compact", "html"),
+    depth="median",
+)

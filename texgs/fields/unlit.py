@@ -1,0 +1,101 @@
+"""What fields with light in their colours have in common: in a scene, only their opacity changes."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Collection, Mapping, Sequence
+from typing import Generic, TypeVar
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
+from texgs.core.memory import MIB
+from texgs.fields.field import Field, Look
+from texgs.fields.part_edit import PartEdit, opacity_factors
+from texgs.raster import Render
+
+F = TypeVar("F", bound=Field)
+
+
+class UnlitScene(ABC, Generic[F]):
+    """Fields of one kind that are drawn together.
+
+    Args:
+        fields: at least one, all on one device.
+        segments: of each field; there may be none.
+
+    Raises:
+        ArgumentError: if there is no field, or there is a segment.
+    """
+
+    def __init__(self, fields: Sequence[F], segments: Sequence[Sequence[Tensor]] = ()) -> None:
+        if not fields:
+            raise ArgumentError("models: expected at least one, got none")
+        if any(segments):
+            raise ArgumentError(f"segments: expected none of {fields[0].kind}, got some; remove them")
+        self.kind, self.device = fields[0].kind, fields[0].device
+        self.counts = [len(field) for field in fields]
+
+    def __len__(self) -> int:
+        return sum(self.counts)
+
+    @property
+    def palettes(self) -> list[tuple[float, ...]]:
+        """Black for each field: edits of a scene replace no palette."""
+        return [(0.0, 0.0, 0.0)] * len(self.counts)
+
+    @torch.no_grad()
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        edits: Sequence[PartEdit] | None = None,
+        *,
+        look: Look = "shaded",
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render all visible fields.
+
+        Args:
+            camera: on the fields' device.
+            light: changes nothing: the colours are those of the views.
+            edits: one for each field, of opacity and visibility; by default nothing is changed.
+            look: only "shaded".
+            background: [3]; white by default.
+            outputs: that fields of this kind have.
+
+        Raises:
+            ArgumentError: if there are not as many edits as fields, or one cannot be shown.
+        """
+        if look != "shaded":
+            raise ArgumentError(
+                f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"
+            )
+        factors = opacity_factors(edits, len(self.counts), self.kind)
+        return self._blend(factors, camera, background, outputs)
+
+    @abstractmethod
+    def _blend(
+        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+    ) -> Render:
+        """Render all fields, each with a factor on its opacity."""
+
+
+def sizes_in_mib(
+    counted: Mapping[str, int], stored: Mapping[str, int], n_files: int | None = None
+) -> dict[str, float]:
+    """Return sizes in MiB by contents, see `Field.sizes`.
+
+    Args:
+        counted: bytes of each group, as the paper counts them.
+        stored: bytes of the same groups in a file.
+        n_files: bytes as the paper's tables of edits count; by default all that is counted.
+    """
+    total = sum(counted.values())
+    sizes = {**counted, "total": total, "files": total if n_files is None else n_files}
+    sizes |= {f"stored_{group}": count for group, count in {**stored, "total": sum(stored.values())}.items()}
+    return {f"{group}_mib": count / MIB for group, count in sizes.items()}

@@ -1,0 +1,120 @@
+"""The fit of a voxel grid: its settings, the schedule of its rates, and what runs it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import pi, sin
+
+from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.keys import key
+from texgs.fields.kinds.voxels import FIELD
+from texgs.fit.kinds import FitSpec, FitTask, Fitted
+
+
+@dataclass
+class GridStage:
+    """Part of a fit at one resolution."""
+
+    side: int = key(
+        64, "voxels along the longest side of the box; twice those of the stage before", least=8, most=1024
+    )
+    steps: int = key(100, "steps at this resolution", least=0)
+    total_variation: bool = key(True, "total variation is held down")
+
+
+@dataclass
+class Decay:
+    """A rate that falls log-linearly over the fit, after a sine ramp that starts at a hundredth."""
+
+    start: float = key(1.0, "rate at the start", above=0)
+    final: float = key(0.1, "rate at the end", above=0)
+    ramp: int = key(0, "steps of the ramp at the start", least=0)
+
+    def at(self, step: int, steps: int) -> float:
+        """Return the rate of a step, 0 to steps - 1."""
+        rate = self.start * (self.final / self.start) ** (step / steps)
+        if step >= self.ramp:
+            return rate
+        return rate * (0.01 + 0.99 * sin(0.5 * pi * step / self.ramp))
+
+
+def _stages() -> list[GridStage]:
+    return [GridStage(64, 60), GridStage(128, 300), GridStage(256, 800)]
+
+
+@dataclass
+class VoxelKeys:
+    """How a grid is fitted. The defaults are meant for two cores of a CPU and a minute."""
+
+    stages: list[GridStage] = field(
+        default_factory=_stages, metadata={"help": "resolutions, one after the other"}
+    )
+    degree: int = key(2, "degree of the spherical harmonics", least=0, most=2)
+    half_size: float = key(1.3, "half the side of the cube that is searched", "world units", above=0)
+    rays: int = key(8192, "rays in a step", least=1)
+    run: int = key(2, "rays that are neighbours: longer runs take less time a step, and more steps", least=1)
+    optimizer: str = key("rmsprop", "optimiser", choices=("rmsprop", "adam"))
+    density: Decay = field(
+        default_factory=lambda: Decay(40.0, 1.0, 50), metadata={"help": "rate of densities, per world unit"}
+    )
+    sh: Decay = field(
+        default_factory=lambda: Decay(4e-2, 4e-3), metadata={"help": "rate of spherical harmonics"}
+    )
+    tv_density: float = key(1e-5, "weight of total variation of densities", least=0)
+    tv_sh: float = key(2e-4, "weight of total variation of spherical harmonics", least=0)
+    tv_share: float = key(0.01, "share of all blocks whose total variation a step looks at", above=0, most=1)
+    start_density: float = key(0.1, "density of all voxels at the start, per world unit", above=0)
+    prune_weight: float = key(2e-3, "voxels whose largest blending weight is below are removed", least=0)
+    prune_share: float = key(0.1, "share of the training rays that pruning looks at", above=0, most=1)
+    occupy_every: int = key(50, "steps between updates of which cells show anything", least=1)
+    step: float = key(0.5, "distance between samples on rays", "voxels", least=0.1, most=8)
+    transmittance_min: float = key(1e-3, "a ray ends where less is left", least=0, below=1)
+
+    @property
+    def steps(self) -> int:
+        """Steps of all stages."""
+        return sum(stage.steps for stage in self.stages)
+
+    def check(self, where: str = "fit.voxels") -> None:
+        """Require values that fit each other; `where` are the keys.
+
+        Raises:
+            ArgumentError: if the stages do not double, or runs are longer than a step has rays.
+        """
+        sides = [stage.side for stage in self.stages]
+        if not sides or any(b != 2 * a for a, b in pairwise(sides)):
+            raise ArgumentError(
+                f"{where}.stages: expected sides that double from one to the next, got {sides}"
+            )
+        if self.run > self.rays:
+            raise ArgumentError(f"{where}.run: expected at most rays ({self.rays}), got {self.run}")
+
+
+def fit(task: FitTask[VoxelKeys]) -> Fitted:
+    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one.
+
+    Raises:
+        DeviceError: for another device than the CPU.
+    """
+    from texgs.fields.voxels.model import Voxels
+    from texgs.fit.checkpoint import FOLDER, run_to_end
+    from texgs.fit.voxels import VoxelFit
+
+    if task.device.type != "cpu":
+        raise DeviceError(f"device: expected cpu, got {task.device}; voxels are fitted on the CPU")
+    run = VoxelFit(task.images, task.settings, task.seed)
+    seconds = run_to_end(run, task.output / FOLDER, task.title)
+    notes = {"lattice": list(run.grid.size)}
+    return Fitted(Voxels(run.grid, run.march, task.metadata), seconds, run.iterations, run.losses, notes)
+
+
+FIT = FitSpec(
+    FIELD,
+    "fit a sparse grid of voxels",
+    phases=("voxels",),
+    settings=VoxelKeys,
+    fit=fit,
+    check=VoxelKeys.check,
+    devices=frozenset({"cpu"}),
+)

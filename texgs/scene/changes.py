@@ -1,0 +1,90 @@
+"""Changes of a scene as words, such as TF01.palette=#ff8800 or light=headlight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.light import HEADLIGHT
+from texgs.core.plain_yaml import parse_yaml
+from texgs.scene.parts import entry_of, place_of
+from texgs.scene.scene import WHITE
+from texgs.scene.scene_file import SEGMENT_KEYS, known, light_of
+from texgs.scene.session import Session
+
+
+def apply_all(session: Session, words: Sequence[str]) -> None:
+    """Make the changes that words ask for, see `texgs edit --help`.
+
+    Raises:
+        TexgsError: naming the word that cannot be done.
+    """
+    for word in words:
+        try:
+            _apply(session, word)
+        except TexgsError as error:
+            raise type(error)(f"{word}: {error}") from error
+
+
+def _apply(session: Session, word: str) -> None:
+    """Make the change that a word KEY=VALUE asks for."""
+    name, is_edit, text = word.partition("=")
+    if not is_edit:
+        raise ArgumentError("expected KEY=VALUE, such as TF01.opacity=0.5")
+    part, dot, key = name.rpartition(".")
+    if part in session.scene.models or (dot and "/" in part and "/" not in key):
+        _change_part(session, part, key, text)
+    elif "/" in name:
+        session.add_segment(name, _file(text)) if text else session.remove_segment(name)
+    elif dot:
+        models = ", ".join(session.scene.models)
+        raise ArgumentError(f"expected a model of the scene ({models}), got {part}")
+    else:
+        _change_scene(session, name, text)
+
+
+def _change_part(session: Session, part: str, key: str, text: str) -> None:
+    """Change one value of a part; an empty text takes it back."""
+    entry_of(session.scene, part)
+    known({key: text}, SEGMENT_KEYS, place_of(part))
+    if key == "texture":
+        session.set_texture(part, _file(text) if text else None)
+    elif key == "file":
+        session.set_file(part, _file(text))
+    elif text:
+        session.set(part, key, _plain(text))
+    else:
+        session.reset(part, key)
+
+
+def _change_scene(session: Session, key: str, text: str) -> None:
+    """Change the light or the background; an empty text takes it back."""
+    known({key: text}, ("light", "background"), "the scene")
+    value = _plain(text) if text else None
+    if key == "background":
+        session.set_background(value if text else WHITE)
+        return
+    if isinstance(value, list) and len(value) == 2:
+        value = dict(zip(("azimuth", "polar"), value, strict=True))
+    session.set_light(light_of(value) if text else HEADLIGHT)
+
+
+def _file(text: str) -> Path:
+    """Return the whole path of a file that is there."""
+    if not Path(text).is_file():
+        raise ArgumentError(f"expected a file that is there, got {text}")
+    return Path(text).resolve()
+
+
+def _plain(text: str) -> Any:
+    """Read a value as YAML; also r,g,b without brackets, and #rrggbb, which YAML takes for a comment."""
+    if text.startswith("#"):
+        return text
+    try:
+        return parse_yaml(f"[{text}]" if "," in text and not text.startswith("[") else text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        raise ArgumentError("expected a number, true, false, r,g,b or #rrggbb") from error
