@@ -1,25 +1,25 @@
 """Measures of scenes that leave some of them undefined, and of fields that have another one's surfaces."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 import torch
 
 from tests.fields.surfels.test_composition import ball
 from tests.models.clips import write_clip
-from texgs.edit.measures import agreement, clip_numbers
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.clip import clip_scores
+from texgs.metrics.edits import clip, consistency
+from texgs.metrics.metric import MeasuredScene
 from texgs.models.clip import Clip
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.volume.cameras import spiral as path
 
 CAMERAS = path(12, 4.0, 30.0, 32, 32)
-MISSING = {"vgg16": None, "lpips_vgg": None}
+MISSING = {"vgg16": None, "lpips_vgg": None, "none": None}
 
 
 @pytest.fixture
@@ -36,9 +36,16 @@ def scenes(tmp_path):
     return files
 
 
+def subject(before, after, geometry, **more):
+    """What metrics look at, of scene files."""
+    scenes = read_scene(before), read_scene(after)
+    some = {"cameras": CAMERAS, "some": CAMERAS[:4], "captions": ("", ""), "clip": "none"}
+    some |= {"weights": MISSING, "styles": [], "has_normals": True, **more}
+    return MeasuredScene("ball", scenes, tuple(scene.open() for scene in scenes), geometry, **some)
+
+
 def measured(shown, geometry):
-    scene = read_scene(shown)
-    return agreement(scene.open(), scene, geometry, CAMERAS, 4, MISSING)
+    return consistency.run(subject(geometry, shown, geometry))
 
 
 def test_a_scene_that_is_nowhere_opaque_has_no_consistency(scenes):
@@ -71,13 +78,12 @@ def test_surfaces_of_hidden_models_do_not_count(scenes, tmp_path):
 def test_clip_sees_the_edited_scene_and_the_one_before(scenes, tmp_path):
     (folder := tmp_path / "clip").mkdir()
     name = str(write_clip(folder))
-    before, after = (read_scene(scenes[each]) for each in ("clear", "faint"))
-    edit = SimpleNamespace(source_caption="a beetle", target_caption="a beetle made of gold")
-    settings = SimpleNamespace(edit=edit, clip=name, weights={name: "here"})
-    opened = after.open(), before.open()
-    scores = clip_numbers(settings, (after, before), opened, CAMERAS, "ball")
-    views = [[scene.render(camera).color.clamp(0, 1) for camera in CAMERAS] for scene in opened]
-    expected = clip_scores(Clip.load(name), *views, edit.source_caption, edit.target_caption)
+    captions = "a beetle", "a beetle made of gold"
+    files = scenes["clear"], scenes["faint"], scenes["clear"]
+    given = subject(*files, captions=captions, clip=name, weights={name: "here"})
+    scores = clip.run(given)
+    views = [[scene.render(camera).color.clamp(0, 1) for camera in CAMERAS] for scene in given.compositions]
+    expected = clip_scores(Clip.load(name), *reversed(views), *captions)
     assert scores["similarity"] == pytest.approx(expected.similarity, abs=1e-6)
     assert scores["direction"] == pytest.approx(expected.direction, abs=1e-6)
     assert abs(scores["direction"]) > 1e-4

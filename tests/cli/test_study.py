@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.fields.voxels.test_voxels import ball
-from tests.report.studies import WORDS, edit, fit
+from tests.study.studies import WORDS, edit, fit
 from texgs.cli.main import main
 from texgs.fields.voxels.file import write_voxels
 from texgs.scene.scene import Scene, SceneModel

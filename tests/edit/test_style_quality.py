@@ -8,7 +8,7 @@ from texgs.edit.pictures import picture
 from texgs.edit.recipe import preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import stylize
-from texgs.metrics.style import likeness
+from texgs.metrics.style import style_similarity
 from texgs.models.vgg import Vgg
 
 SIZE = 96
@@ -23,7 +23,7 @@ def vgg():
 
 @pytest.fixture(scope="module", params=[OPAQUE, TRANSLUCENT], ids=["opaque", "translucent"])
 def measured(vgg, request):
-    """Opacity, and likeness of views not trained on: of the style laid onto the surface, and of the edit."""
+    """Opacity, and similarity of views not trained on: of the style laid on the surface, and of the edit."""
     style = StylePicture.of(picture("waves", 256))
     scene, (cameras, lights) = ball(800, 7, request.param), views(15, SIZE)
     held, learned = slice(0, None, 5), [i for i in range(15) if i % 5]
@@ -34,7 +34,7 @@ def measured(vgg, request):
             scene, [cameras[i] for i in learned], [lights[i] for i in learned], style, chosen, vgg=vgg
         )
         scaled = style.scaled(2 * SIZE)
-        done[name] = likeness(edited.model, cameras[held], lights[held], scaled.image, vgg)
+        done[name] = style_similarity(edited.model, cameras[held], lights[held], scaled.image, vgg)
     return done
 
 

@@ -16,7 +16,7 @@ from PIL import Image
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.palette.test_palette import box
 from tests.fields.surfels.samples import sample
-from tests.report.studies import study
+from tests.study.studies import study
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
 from texgs.core.image import read_png
@@ -33,11 +33,11 @@ from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texture_file import with_texture, write_texture
 from texgs.fit.checkpoint import latest
 from texgs.models.tensors import read_tensors
-from texgs.report.ballots import read_ballot
-from texgs.report.study import read_key, write_key
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
+from texgs.study.ballots import read_ballot
+from texgs.study.questions import read_key, write_key
 from texgs.volume.prepare import prepare
 from texgs.volume.sources import open_source
 from texgs.volume.tf_files import read_tf

@@ -6,7 +6,7 @@ import torch
 from tests.edit.scenes import ball, views
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
-from texgs.metrics.style import gram, likeness
+from texgs.metrics.style import gram, style_similarity
 
 
 def test_gram_matrices_are_mean_products():
@@ -20,10 +20,10 @@ def test_gram_matrices_are_mean_products():
 def test_a_view_is_like_itself_and_less_like_noise(vgg):
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0]).color.permute(2, 0, 1)
-    itself = likeness(ball(), cameras, lights, shown, vgg)
+    itself = style_similarity(ball(), cameras, lights, shown, vgg)
     assert itself.nnfm < 1e-5
     noise = torch.rand(3, 64, 64, generator=torch.Generator().manual_seed(1))
-    other = likeness(ball(), cameras, lights, noise, vgg)
+    other = style_similarity(ball(), cameras, lights, noise, vgg)
     assert other.nnfm > itself.nnfm + 0.01
     assert other.gram > itself.gram
 
@@ -31,8 +31,8 @@ def test_a_view_is_like_itself_and_less_like_noise(vgg):
 def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0])
-    inside = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
-    around = likeness(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha < 0.1)
+    inside = style_similarity(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
+    around = style_similarity(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha < 0.1)
     assert inside.gram < 0.3 < around.gram
     assert max(abs(x) for x in inside.color) < 1e-5
 
@@ -42,7 +42,7 @@ def test_colours_are_those_of_opaque_pixels(vgg):
     color = torch.tensor([0.1, 0.5, 0.9])
     p = ball().parameters
     plain = Surfels({**p, "palette": color, "colors": torch.zeros_like(p["colors"])})
-    scores = likeness(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
+    scores = style_similarity(plain, cameras, lights, torch.full((3, 64, 64), 0.5), vgg)
     pixels = []
     for camera, light in zip(cameras, lights, strict=True):
         shown = Composition([plain]).render(camera, light)
@@ -54,5 +54,5 @@ def test_colours_are_those_of_opaque_pixels(vgg):
 def test_nothing_to_see_is_no_number(vgg):
     cameras, lights = views(1)
     faint = ball(opacity=-9.0)
-    scores = likeness(faint, cameras, lights, torch.rand(3, 64, 64), vgg)
+    scores = style_similarity(faint, cameras, lights, torch.rand(3, 64, 64), vgg)
     assert all(math.isnan(x) for x in (scores.nnfm, scores.gram, *scores.color))

@@ -1,11 +1,11 @@
 import pytest
 
 from tests.report.written import lines, metrics, records, rows
-from texgs.report.ablations import KEYS, MEASURES, ablation
+from texgs.report.fit_tables import RUNS, ablation
 from texgs.report.results import FitResult
 from texgs.report.table import UNLIKE
 
-TITLES = [column.title for column in MEASURES]
+KEYS, TITLES = list(RUNS), [column.title for column in RUNS.values()]
 VARIANTS = {"views": "views", "resolution": "image_px"}  # columns of the paper's files, by sweep
 
 
@@ -70,4 +70,4 @@ def test_other_sweeps_do_not_count_but_for_their_like(tmp_path):
     write_fit(tmp_path, lines("views")[0], "views", dataset="other", name="views_quick")
     write_fit(tmp_path, lines("views")[0], "views", dataset="third", name="viewshed")
     assert [row["data set"] for row in rows(ablation(records(tmp_path), "views"))] == ["other", "scan"]
-    assert ablation(records(tmp_path), "resolution").rows == []
+    assert ablation(records(tmp_path), "resolution").is_empty

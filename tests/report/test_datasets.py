@@ -1,6 +1,6 @@
-from tests.report.written import lines, metrics, records, rows
-from texgs.report.datasets import datasets
+from tests.report.written import lines, metrics, records, rows, sources
 from texgs.report.results import SheetResult, ViewsResult, VolumeResult
+from texgs.report.scene_tables import datasets
 from texgs.report.table import UNLIKE
 
 LATTICE = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
@@ -18,8 +18,8 @@ def test_data_sets_by_size_of_their_views(tmp_path):
     assert (small["volume, samples"], small["volume MiB"]) == ("4x5x6", 2.5)
     assert (small["samples (paper)"], small["MiB (paper)"]) == ("256x256x128", 32.0)
     assert (small["ms / frame (paper)"], large["ms / frame (paper)"]) == (UNLIKE, 16.14)
-    sources = [[path.stem for path in row.sources] for row in table.rows]
-    assert sorted(sources) == [["0000", "0001", "0002"], ["0000", "0003"]]
+    files = [[path.stem for path in paths] for paths in sources(table)]
+    assert sorted(files) == [["0000", "0001", "0002"], ["0000", "0003"]]
 
 
 def test_data_sets_are_in_the_papers_order_and_stand_ins_below(tmp_path):

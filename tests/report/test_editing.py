@@ -1,7 +1,7 @@
 import pytest
 
-from tests.report.written import lines, metrics, records, rows
-from texgs.report.editing import image_driven, text_driven, text_driven_frozen
+from tests.report.written import lines, metrics, records, rows, sources
+from texgs.report.edit_tables import image_driven, text_driven, text_driven_frozen
 from texgs.report.results import EditMeasures, EditResult
 
 OWN = {  # columns by the headings of the paper's files
@@ -27,16 +27,18 @@ def edit(
     measured = EditMeasures(
         name,
         method,
-        values.get("render_mean_ms", 4.0),
-        values.get("render_max_ms", 5.0),
-        round(values.get("primitives") or 9),
-        values.get("model_mb", 1.0),
-        kept,
-        width=facts.pop("pixels", 512),
-        height=512,
-        similarity=values.get("clip_similarity"),
-        direction=values.get("clip_directional_similarity"),
-        clip="B/32",
+        facts.pop("pixels", 512),
+        512,
+        {
+            "frame_mean_ms": values.get("render_mean_ms", 4.0),
+            "frame_max_ms": values.get("render_max_ms", 5.0),
+            "primitives": round(values.get("primitives") or 9),
+            "megabytes": values.get("model_mb", 1.0),
+            "geometry_kept": kept,
+            "similarity": values.get("clip_similarity"),
+            "direction": values.get("clip_directional_similarity"),
+            "clip": "B/32",
+        },
     )
     facts |= {"field": field}
     paths = [metrics(folder, f"edit_{method}", result, dataset, **facts)]
@@ -80,7 +82,7 @@ def test_each_kind_of_edit_has_its_own_table(tmp_path):
     assert [row["edit"] for row in of_images] == ["painted"]
     assert [row["edit"] for row in of_texts] == ["gold"]
     assert "CLIP similarity" not in of_images[0], "the paper measures it of texts"
-    assert text_driven_frozen(records(tmp_path)).rows == []
+    assert text_driven_frozen(records(tmp_path)).is_empty
 
 
 def test_other_methods_with_frozen_geometry_are_compared_by_themselves(tmp_path):
@@ -103,7 +105,7 @@ def test_a_row_leads_to_the_edit_and_its_measures(tmp_path):
     metrics(tmp_path, "edit_text", EditResult("late", "text", "how", 6.0, follows="instruction"))
     table = text_driven(records(tmp_path))
     gold, late = rows(table)[:2]
-    assert table.rows[0].sources == paths
+    assert sources(table)[0] == paths
     assert (gold["pixels"], gold["CLIP similarity"]) == ("512x512", 0.3)
     assert (late["pixels"], late["mean ms"], late["minutes"]) == (None, None, 0.1)
     assert "CLIP of the scores: B/32;" in table.caption

@@ -3,7 +3,7 @@ from dataclasses import replace
 import pytest
 
 from tests.report.written import lines, metrics, records, rows
-from texgs.report.fitting import fits, fitting
+from texgs.report.fit_tables import fits, fitting
 from texgs.report.results import FitResult
 from texgs.report.table import UNLIKE
 

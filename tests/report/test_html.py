@@ -8,11 +8,11 @@ from urllib.parse import unquote
 import pytest
 from PIL import Image
 
-from tests.report.studies import study
 from tests.report.written import metrics
-from texgs.report.ballots import Ballot, Votes
-from texgs.report.html import write_report
-from texgs.report.left_out import LeftOut
+from tests.study.studies import study
+from texgs.report.html import write_report as write_records
+from texgs.report.left_out import LeftOut, others
+from texgs.report.metrics_files import read_known
 from texgs.report.results import (
     ComparisonResult,
     EditResult,
@@ -24,6 +24,10 @@ from texgs.report.results import (
     TimingResult,
 )
 from texgs.report.sections import SECTIONS
+from texgs.study.ballots import Ballot, Votes
+from texgs.study.votes import study_table
+from texgs.study.votes_figure import shown
+from texgs.workflow.differences import differences_of
 
 VOID = {"meta", "img", "br"}
 
@@ -88,8 +92,16 @@ def paths(tmp_path):
             recipe=None,
         ),
         job(folder, "sheet", SheetResult(9, 2, 8, 4), ["sheet.png"], tf="TF01", recipe=None),
-        job(folder, "star_plot", SheetResult(9, 2, 8, 4), ["new.png"], recipe=None),
+        job(folder, "star_plot", timing, ["new.png"], recipe=None),
     ]
+
+
+def write_report(path, paths, left_out=(), votes=None):
+    """A report of metrics files with all tables, as `texgs report` writes it."""
+    found, old = read_known(paths)
+    given = {"user_study": study_table(found, votes), "differences": differences_of(found)}
+    more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
+    return write_records(path, found, [*left_out, *others(old)], given, more)
 
 
 def page(tmp_path, paths, left_out=()):

@@ -7,15 +7,18 @@ from pathlib import Path
 
 import pytest
 
-from texgs.report.latex import document, escape, tabular
-from texgs.report.table import Column, Row, Table
-from texgs.report.table_files import write_tables
+from texgs.report.latex import escape
+from texgs.report.table import SOURCES, Column, Table, write_tables
 
 HARD = r"50 % of $x_1$ & #2 {a} ~ ^ \ <|> [b] 'c' ± × λ β ≠ → é Ł µ 中 🎉"
 HARD_TABLE = Table(
     f"A caption with {HARD}\nin two lines.",
     (Column(HARD), Column("± PSNR", 2)),
-    [Row(("[first", 1.0), ()), Row((HARD, None), ()), Row(("two\nlines", 2.0), (Path("a_b"),))],
+    [
+        {HARD: "[first", "± PSNR": 1.0},
+        {HARD: HARD},
+        {HARD: "two\nlines", "± PSNR": 2.0, SOURCES: [Path("a_b")]},
+    ],
     heading=f"Heading {HARD}",
 )
 COMMAND = re.compile(r"\\(?:[A-Za-z]+|.)", re.DOTALL)
@@ -41,7 +44,7 @@ def check_grammar(text):
 
 
 def test_a_table_has_equal_rows_and_escapes_every_special_letter():
-    text = tabular(HARD_TABLE)
+    text = HARD_TABLE.latex()
     check_grammar(text)
     rows = [line for line in text.splitlines() if line.endswith(r" \\")]
     assert len(rows) == 4
@@ -70,8 +73,9 @@ def test_text_is_printed_as_it_is(text, expected):
     assert escape(text) == expected
 
 
-def test_the_document_has_the_tables_with_rows_and_their_captions():
-    text = document({"hard": HARD_TABLE, "empty": Table("none", HARD_TABLE.columns, [])})
+def test_the_document_has_the_tables_with_rows_and_their_captions(tmp_path):
+    write_tables(tmp_path, {"hard": HARD_TABLE, "empty": Table("none", HARD_TABLE.columns, [])})
+    text = (tmp_path / "tables.tex").read_text()
     check_grammar(text[text.index(r"\begin{document}") :])
     assert re.findall(r"\\fitted\{(.*?)\}", text) == ["hard.tex"]
     assert escape(HARD_TABLE.caption) in text

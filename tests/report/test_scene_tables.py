@@ -2,9 +2,10 @@ from dataclasses import replace
 
 import pytest
 
-from tests.report.written import lines, metrics, records, rows
+from tests.report.written import lines, metrics, records, rows, sources
+from texgs.report.fit_tables import model_size
 from texgs.report.results import Comparison, FitResult, PseResult, TimingResult
-from texgs.report.scene_tables import edits, model_size, rendering
+from texgs.report.scene_tables import edits, rendering
 from texgs.report.table import UNLIKE
 
 GROUPS = {"geometry MiB": "geometry_mib", "shading MiB": "shading_mib", "texture MiB": "texture_mib"}
@@ -38,8 +39,8 @@ def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
         for seed in (0, 1):
             metrics(tmp_path, "texture", result, tf=tf, dataset="wood", seed=seed)
     table = model_size(records(tmp_path))
-    own = [row for row in table.rows if row.sources]
-    assert [[path.stem for path in row.sources] for row in own] == [["0000", "0002"], ["0001", "0003"]]
+    own = [paths for paths in sources(table) if paths]
+    assert [[path.stem for path in paths] for paths in own] == [["0000", "0002"], ["0001", "0003"]]
     ours = [row for row in rows(table) if row["recipe"] != "the paper"]
     assert [row["recipe"] for row in ours] == ["quick", "quick-s1"]
     assert (ours[0]["basic scenes"], ours[0]["primitives"], ours[0]["texture MiB"]) == (2, 2000, 16.0)

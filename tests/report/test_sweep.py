@@ -7,9 +7,9 @@ from texgs.core.errors import ArgumentError
 from texgs.core.image_grid import DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.metrics_files import read
-from texgs.report.sweep import sweep
 from texgs.report.sweep_figure import ACROSS, PICTURE, WIDTH, sweep_figure
-from texgs.report.table import Table
+from texgs.report.sweep_table import sweep
+from texgs.report.table import SOURCES, Table
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 
@@ -60,7 +60,7 @@ def edit(folder, variant, seed=0, nnfm=0.5):
 
 
 def column(table: Table, title):
-    return [row.cells[[c.title for c in table.columns].index(title)] for row in table.rows]
+    return table.frame[title].tolist()
 
 
 def test_means_and_spread_over_seeds(tmp_path):
@@ -87,7 +87,7 @@ def test_a_sweep_of_edits_has_their_measures(tmp_path):
     assert column(table, "± NNFM") == [None, pytest.approx(0.02**0.5)]
     assert column(table, "minutes") == [0.5, 0.5]
     assert column(table, "Gram") == [None, None]
-    assert table.rows[0].sources == edit_sources(tmp_path, "0")
+    assert table.frame[SOURCES][0] == edit_sources(tmp_path, "0")
 
 
 def edit_sources(folder, variant):
@@ -128,7 +128,7 @@ def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):
 def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
     table = sweep(read(run(tmp_path, "a", phases=("shading",))), "mine")
     assert column(table, "seeds") == [0]
-    assert set(table.rows[0].cells[5:]) == {None}, "but for the name and the number of seeds"
+    assert set(table.frame.iloc[0, 5:-1]) == {None}, "but for the name and the number of seeds"
 
 
 def test_fits_of_another_sweep_do_not_count_and_other_files_are_named(tmp_path):

@@ -2,12 +2,12 @@ import csv
 import io
 from pathlib import Path
 
-from texgs.report.table import UNLIKE, Column, Row, Table
+from texgs.report.table import SOURCES, UNLIKE, Column, Table
 
 TABLE = Table(
     "A caption.",
     (Column("name"), Column("dB", 2)),
-    (Row(("five_jets", 36.834), (Path("a/metrics.json"),)), Row(("wood | stone", None), ())),
+    [{"name": "five_jets", "dB": 36.834, SOURCES: [Path("a/metrics.json")]}, {"name": "wood | stone"}],
 )
 
 
@@ -17,7 +17,7 @@ def test_csv_keeps_all_digits_and_leaves_gaps():
         ["five_jets", "36.834", "a/metrics.json"],
         ["wood | stone", "", ""],
     ]
-    unlike = Table("", TABLE.columns, [Row(("a", UNLIKE), ())])
+    unlike = Table("", TABLE.columns, [{"name": "a", "dB": UNLIKE}])
     assert unlike.csv().splitlines()[1] == "a,,", "columns of numbers stay such"
 
 
@@ -29,7 +29,7 @@ def test_markdown_says_what_was_not_measured():
 
 
 def test_a_row_is_one_line():
-    broken = Table("two\nlines", TABLE.columns, [Row(("a\nb", 1.0), ())], "Heading")
+    broken = Table("two\nlines", TABLE.columns, [{"name": "a\nb", "dB": 1.0}], "Heading")
     assert broken.markdown().splitlines() == [
         "## Heading",
         "",
@@ -39,3 +39,10 @@ def test_a_row_is_one_line():
         "",
         "two lines",
     ]
+
+
+def test_rows_keep_their_files_in_whatever_order_they_come():
+    frame = TABLE.frame.iloc[::-1]
+    table = Table("", TABLE.columns, frame)
+    assert table.frame["metrics files"][1] == [Path("a/metrics.json")]
+    assert table.frame["name"][0] == "wood | stone"

@@ -1,17 +1,21 @@
+import json
+import re
+
 import pytest
 
-from tests.report.studies import study
 from tests.report.written import lines, metrics, records
+from tests.study.studies import study
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
-from texgs.report.ballots import Ballot, Votes, votes_beside
 from texgs.report.left_out import LeftOut
-from texgs.report.metrics_files import paper, read
+from texgs.report.metrics_files import read
 from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
-from texgs.report.study import write_key
 from texgs.report.tables import specs, tables_of
-from texgs.workflow.stage_table import RULES
+from texgs.study.ballots import Ballot, Votes, votes_beside
+from texgs.study.questions import write_key
+from texgs.study.votes import study_table
+from texgs.workflow.stage_table import STAGES
 
 TABLES = specs()
 
@@ -26,19 +30,18 @@ def test_tables_are_in_the_papers_order_and_then_ours():
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
 def test_a_table_names_places_and_a_section_that_there_are(table):
-    assert set(table.places) <= set(RULES)
+    assert set(table.places) <= {stage.place for stage in STAGES.values()}
     assert table.section in SECTIONS
 
 
 @pytest.mark.parametrize("table", TABLES, ids=lambda table: table.name)
 def test_a_table_of_nothing_has_no_rows(table):
-    assert table.table([]).rows == []
+    assert table.table([]).frame.empty
 
 
 def test_the_papers_numbers_are_all_there():
-    assert len(paper("fitting", keys=2)) == 8 * 3
-    assert paper("fitting", keys=2)["supernova", "shading"]["psnr"] == "29.34"
-    assert [len(lines(name)) for name in ("datasets", "views", "resolution", "model_size")] == [12, 4, 3, 4]
+    names = ("fitting", "datasets", "views", "resolution", "model_size")
+    assert [len(lines(name)) for name in names] == [8 * 3, 12, 4, 3, 4]
 
 
 def test_each_sweep_has_a_table(tmp_path):
@@ -48,8 +51,8 @@ def test_each_sweep_has_a_table(tmp_path):
         metrics(tmp_path, phase, numbers, tf="TF01")
     tables = tables_of(records(tmp_path))
     assert list(tables)[-1] == "sweep-mine"
-    assert len(tables["sweep-mine"].rows) == 1
-    assert [row.cells[1] for row in tables["fits"].rows] == ["TF01"] * 3
+    assert len(tables["sweep-mine"].frame) == 1
+    assert tables["fits"].frame["TF"].tolist() == ["TF01"] * 3
     assert not [name for name in tables_of([]) if name.startswith("sweep")]
 
 
@@ -61,13 +64,14 @@ def test_a_sweep_without_fits_among_the_jobs_has_none(tmp_path):
 def test_a_user_study_has_its_votes_and_without_them_the_papers_where_its_data_are_edited(tmp_path):
     edit = EditResult("glass", "image", "how", 6.0, follows="style")
     metrics(tmp_path, "edit_image", edit, "scan")
-    assert tables_of(records(tmp_path))["user_study"].rows == []
+    assert study_table(records(tmp_path), None).is_empty
     votes = Votes(study("xyz"), [Ballot("a", [[1, 2, 3]])])
-    assert "1 ballots" in tables_of(records(tmp_path), votes=votes)["user_study"].caption
+    assert "1 ballots" in study_table(records(tmp_path), votes).caption
     metrics(tmp_path, "edit_image", edit, "engine")
-    table = tables_of(records(tmp_path))["user_study"]
+    given = {"user_study": study_table(records(tmp_path), None)}
+    table = tables_of(records(tmp_path), given=given)["user_study"]
     assert "No votes but the paper's." in table.caption
-    assert {row.cells[4] for row in table.rows} == {"the paper"}
+    assert set(table.frame["edit"]) == {"the paper"}
 
 
 def test_the_ballots_beside_a_key_are_counted(tmp_path):
@@ -110,3 +114,30 @@ def test_a_file_that_is_no_metrics_is_named(tmp_path):
     (tmp_path / "a.json").write_text("[]")
     with pytest.raises(ArgumentError, match=r"a\.json: expected the metrics of a job"):
         read([tmp_path / "a.json"])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": "x"}, "seed: expected a whole number, got 'x'"),
+        ({"dataset": 3}, "dataset: expected words, got 3"),
+        ({"variant": None}, "variant: expected words, got null"),
+        ({"peak_memory_mib": "much"}, "peak_memory_mib: expected a number, got 'much'"),
+        ({"numbers": [1]}, r"numbers: expected values by name, got \[1\]"),
+        ({"pictures": ["a.png"]}, r"pictures: expected values by name, got \['a.png'\]"),
+        ({"numbers": {"fit_seconds": 1.0, "primitives": "many"}}, "numbers.primitives: .*'many'"),
+        ({"numbers": {"fit_seconds": 1.0, "primitives": 9, "sizes": 3}}, "numbers.sizes: "),
+        (
+            {"result": "EditMeasures", "numbers": {"edit": "a", "method": "b", "style_gram": "x"}},
+            "numbers.style_gram: expected a number, got 'x'",
+        ),
+    ],
+)
+@pytest.mark.parametrize("verb", ["tables", "report"])
+def test_a_value_of_another_type_is_one_sentence_with_file_and_key(tmp_path, capsys, verb, change, message):
+    path = metrics(tmp_path, "shading", FitResult(60.0, 9), "scan", "TF01")
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    assert main([verb, str(path), "--output", str(tmp_path / "out")]) != 0
+    said = capsys.readouterr().err
+    assert re.search(rf"{path.name}: {message}", said), said
+    assert "Traceback" not in said

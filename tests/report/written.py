@@ -6,6 +6,7 @@ from importlib.resources import files
 
 from texgs.report.metrics_files import read
 from texgs.report.results import plain
+from texgs.report.table import SOURCES
 
 
 def metrics(folder, stage, result, dataset="engine", tf=None, recipe="quick", **facts):
@@ -26,7 +27,12 @@ def records(folder):
 
 def rows(table):
     """Cells by the headings of their columns."""
-    return [dict(zip([c.title for c in table.columns], row.cells, strict=True)) for row in table.rows]
+    return table.frame[[column.title for column in table.columns]].to_dict("records")
+
+
+def sources(table):
+    """The metrics files of each row."""
+    return table.frame[SOURCES].tolist()
 
 
 def lines(name):

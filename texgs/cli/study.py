@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import torch
 
-    from texgs.report.study import Question
+    from texgs.study.questions import Question
 
 LEAST, MOST = 64, 1024  # pixels of a clip
 KEY, PAGE = "key.json", "ballot.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to compare, how to show it, and where to."""
+    """Add what to compare, how to show it, and where to."""
     parser.add_argument("results", nargs="?", type=Path, default=Path("results"), help="folder (%(default)s)")
     parser.add_argument(
         "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
@@ -38,10 +38,10 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.device import torch_device
     from texgs.core.errors import ArgumentError
     from texgs.core.io import write_bytes
-    from texgs.report.ballot_page import ballot_page
     from texgs.report.left_out import others
     from texgs.report.metrics_files import below, read_known
-    from texgs.report.study import KINDS, Study, questions_of, write_key
+    from texgs.study.ballot_page import ballot_page
+    from texgs.study.questions import KINDS, Study, questions_of, write_key
 
     key, page = arguments.output / KEY, arguments.output / PAGE
     if key.exists():
@@ -69,11 +69,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def films_of(questions: "list[Question]", size: int, frames: int, device: "torch.device") -> list[bytes]:
-    """The film of each question, MP4."""
+    """Draw the film of each question, MP4."""
     from tempfile import TemporaryDirectory
 
-    from texgs.report.study_film import write_film
     from texgs.scene.scene_file import read_scene
+    from texgs.study.film import write_film
 
     films = []
     with TemporaryDirectory() as folder:

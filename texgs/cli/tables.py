@@ -3,10 +3,16 @@
 import argparse
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from texgs.report.metrics_files import Record
+    from texgs.report.table import Table
+    from texgs.study.ballots import Votes
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where the numbers are, and where the tables go."""
+def add_arguments(parser: argparse.ArgumentParser, output: str = "results/tables") -> None:
+    """Add where the numbers are, and where the tables or the report go."""
     parser.add_argument("metrics", nargs="*", type=Path, help="metrics.json files (all below results/)")
     parser.add_argument("--missing", type=Path, help="JSON file of what was left out, with reasons")
     parser.add_argument(
@@ -15,27 +21,41 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=Path("results/study/key.json"),
         help="key of a user study, with ballots in votes/ beside it (%(default)s)",
     )
-    parser.add_argument("--output", type=Path, default=Path("results/tables"), help="folder (%(default)s)")
+    parser.add_argument("--output", type=Path, default=Path(output), help="(%(default)s)")
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the tables and print those that have rows."""
-    from texgs.core.errors import ArgumentError
-    from texgs.report.ballots import votes_beside
     from texgs.report.left_out import others, read_left_out
-    from texgs.report.metrics_files import below, read_known
-    from texgs.report.table_files import write_tables
+    from texgs.report.table import write_tables
     from texgs.report.tables import tables_of
+    from texgs.study.ballots import votes_beside
 
-    paths = arguments.metrics or below("results")
-    if not paths:
-        raise ArgumentError("tables: no metrics.json below results; run something first, such as make demo")
-    records, old = read_known(paths)
+    records, old = records_of(arguments, "tables")
     for entry in others(old):
         print(f"Left out: {entry}", file=sys.stderr)
-    tables = tables_of(records, read_left_out(arguments.missing), votes_beside(arguments.study))
+    given = given_tables(records, votes_beside(arguments.study))
+    tables = tables_of(records, read_left_out(arguments.missing), given)
     write_tables(arguments.output, tables)
     for table in tables.values():
-        if table.rows:
+        if not table.is_empty:
             print(table.markdown())
     return 0
+
+
+def records_of(arguments: argparse.Namespace, verb: str) -> "tuple[list[Record[Any]], list[Path]]":
+    """Read the metrics files that are given, by default all, and name those of other versions of texgs."""
+    from texgs.core.errors import ArgumentError
+    from texgs.report.metrics_files import below, read_known
+
+    if not (paths := arguments.metrics or below("results")):
+        raise ArgumentError(f"{verb}: no metrics.json below results; run something first, such as make demo")
+    return read_known(paths)
+
+
+def given_tables(records: "list[Record[Any]]", votes: "Votes | None") -> "dict[str, Table]":
+    """Make the tables that need more than metrics files: votes, and the configuration."""
+    from texgs.study.votes import study_table
+    from texgs.workflow.differences import differences_of
+
+    return {"user_study": study_table(records, votes), "differences": differences_of(records)}

@@ -22,7 +22,7 @@ OPAQUE = 0.9  # of alpha, from which a pixel's colour counts
 
 
 @dataclass(frozen=True, eq=False)
-class Likeness:
+class StyleSimilarity:
     """Measures of a view, mean over views; NaN where no view shows enough of the model."""
 
     nnfm: float  # mean cosine distance of features on the object to the nearest of the style; exact search
@@ -31,15 +31,15 @@ class Likeness:
 
 
 @torch.no_grad()
-def likeness(
+def style_similarity(
     model: Field,
     cameras: Sequence[Camera],
     lights: Sequence[Light],
     style: Tensor,
     vgg: Vgg,
     region: Tensor | None = None,
-    title: str = "likeness",
-) -> Likeness:
+    title: str = "style",
+) -> StyleSimilarity:
     """Compare views over white with a style.
 
     Args:
@@ -73,7 +73,7 @@ def likeness(
             grams.append(float((gram(seen[:, where]) - target).norm() / target.norm()))
     mean_style = (style.flatten(1) if region is None else style[:, region]).mean(1)
     red, green, blue = (torch.cat(colors).mean(0) - mean_style).tolist()
-    return Likeness(mean(distances), mean(grams), (red, green, blue))
+    return StyleSimilarity(mean(distances), mean(grams), (red, green, blue))
 
 
 def gram(features: Tensor) -> Tensor:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Mapping
-
-from texgs.report.table import Table, one_line
+from collections.abc import Iterable, Mapping, Sequence
 
 SPECIAL = {
     "\\": r"\textbackslash{}",
@@ -56,50 +54,53 @@ HEAD = r"""% All tables of a report: pdflatex tables.tex
 """
 
 
-def tabular(table: Table) -> str:
-    """A table between rules of booktabs, with its caption as a comment."""
-    kinds = "".join("l" if column.digits is None else "r" for column in table.columns)
-    lines = [[column.title for column in table.columns], *table.texts()]
-    head, *body = (" & ".join(map(escape, line)) + r" \\" for line in lines)
-    rows = [rf"\begin{{tabular}}{{{kinds}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
-    return "\n".join([f"% {one_line(table.caption)}", *rows, r"\end{tabular}"]) + "\n"
+def tabular(kinds: str, titles: Sequence[str], rows: Iterable[Sequence[str]], caption: str) -> str:
+    """Return a table between rules of booktabs, with its caption as a comment.
+
+    Args:
+        kinds: of the columns, "l" or "r" each.
+        titles: of the columns.
+        rows: their cells.
+        caption: what the table shows.
+    """
+    head, *body = (" & ".join(map(escape, row)) + r" \\" for row in (titles, *rows))
+    lines = [rf"\begin{{tabular}}{{{kinds}}}", r"\toprule", head, r"\midrule", *body, r"\bottomrule"]
+    return "\n".join([f"% {one_line(caption)}", *lines, r"\end{tabular}"]) + "\n"
 
 
-def document(tables: Mapping[str, Table]) -> str:
-    """A document with the files NAME.tex of all tables that have rows, with their captions."""
+def document(tables: Mapping[str, tuple[str, str]]) -> str:
+    """Return a document with the files NAME.tex of tables, by name their headings and captions."""
     floats = [
         rf"""\begin{{table}}[p]
 \centering
-\textbf{{{escape(table.heading or name)}}}
+\textbf{{{escape(heading)}}}
 
 \medskip
-{escape(table.caption)}
+{escape(caption)}
 
 \medskip
 \fitted{{{name}.tex}}
 \end{{table}}
 \clearpage
 """
-        for name, table in tables.items()
-        if table.rows
+        for name, (heading, caption) in tables.items()
     ]
     return HEAD + "".join(floats) + "\\end{document}\n"
 
 
 def escape(text: str) -> str:
-    """Text as LaTeX prints it, in one line."""
-    return "".join(map(printed, one_line(text)))
+    """Return text as LaTeX prints it, in one line."""
+    return "".join(map(_printed, one_line(text)))
 
 
-def printed(letter: str) -> str:
-    """One letter; those that the fonts of pdflatex may not have, by their code."""
+def one_line(text: str) -> str:
+    """Return text without line breaks, which end a row of a table."""
+    return " ".join(text.split())
+
+
+def _printed(letter: str) -> str:
+    """Return one letter; one that the fonts of pdflatex may not have by its code."""
     if letter in SPECIAL:
         return SPECIAL[letter]
-    if letter.isascii() or is_accented(letter):
-        return letter
-    return rf"\texttt{{U+{ord(letter):04X}}}"
-
-
-def is_accented(letter: str) -> bool:
-    """Whether this is a letter of the alphabet with an accent that the encoding T1 has."""
-    return "LATIN" in unicodedata.name(letter, "") and ord(letter) <= 0x17F
+    is_accented = "LATIN" in unicodedata.name(letter, "") and ord(letter) <= 0x17F  # the encoding T1 has it
+    return letter if letter.isascii() or is_accented else rf"\texttt{{U+{ord(letter):04X}}}"

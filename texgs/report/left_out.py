@@ -19,7 +19,7 @@ class LeftOut:
 
     what: str  # such as "data set wood"
     why: str  # one sentence
-    places: list[str]  # of the jobs that there are none of, keys of `texgs.workflow.places.PLACES`
+    places: list[str]  # of the jobs that there are none of, names of rules of the workflow
 
     def __str__(self) -> str:
         why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves

@@ -2,39 +2,34 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
-from types import UnionType
 from typing import Any, Generic, TypeVar
 
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf.errors import OmegaConfBaseException, ValidationError
 
 from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
 from texgs.fit.kinds import fit_specs
-from texgs.report.results import Result, result_of
+from texgs.metrics.metric import metrics
+from texgs.report.results import EditMeasures, Result, result_of
 
-COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs, see texgs/track/sqlite.py
-REQUIRED = ("stage", "dataset", "device", "seconds", "peak_memory_mib", "versions")
-OF_TYPES: dict[type | UnionType, tuple[str, ...]] = {  # what metrics files say of jobs beside their numbers
-    str: (
-        *("stage", "dataset", "tf", "recipe", "field", "variant", "sweep", "edit", "stand_in", "device"),
-        *("config_sha", "code_sha", "git_sha", "run", "result"),
-    ),
-    int: ("seed", "fit_seed"),
-    int | float: ("seconds", "peak_memory_mib"),
-    dict: ("numbers", "pictures", "versions", "inputs", "made_from", "weights", "machine"),
+COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs
+WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "result")
+FACTS: dict[str, tuple[Any, str]] = {  # what a metrics file holds beside its numbers, as far as it is read
+    **dict.fromkeys((*WORDS, "tf", "recipe"), (str, "words")),
+    **dict.fromkeys(("seed", "fit_seed"), (int, "a whole number")),
+    **dict.fromkeys(("seconds", "peak_memory_mib"), (int | float, "a number")),
+    **dict.fromkeys(("numbers", "pictures", "versions"), (dict, "values by name")),
 }
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
 @dataclass(frozen=True)
 class Record(Generic[R_co]):
-    """A job: what it told, and what is known of it."""
+    """A job: its result, and what is known of it."""
 
     path: Path  # of metrics.json
     stage: str
@@ -51,17 +46,17 @@ class Record(Generic[R_co]):
 
     @property
     def recipe(self) -> str:
-        """Name of the recipe of the fit; empty for jobs before a fit."""
+        """Return the name of the recipe of the fit; empty for jobs before a fit."""
         return str(self.facts.get("recipe") or "")
 
     @property
     def title(self) -> str:
-        """The data set as tables name it."""
+        """Return the data set as tables name it."""
         return f"{self.dataset}, stand-in for {self.stand_in}" if self.stand_in else self.dataset
 
     @property
     def is_swept(self) -> bool:
-        """Whether this is a job of a sweep, whose numbers are in tables of their own."""
+        """Return whether this is a job of a sweep, whose numbers are in tables of their own."""
         return self.sweep not in ("", NO_SWEEP)
 
 
@@ -70,16 +65,17 @@ class OtherVersionError(ArgumentError):
 
 
 def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
-    """All metrics, in the order of their paths.
+    """Read all metrics, in the order of their paths.
 
     Raises:
-        ArgumentError: if a file is no metrics file, or of another version of texgs.
+        ArgumentError: if a file is no metrics file, of another version of texgs, or holds a value of another
+            type than declared.
     """
     return [_record(path) for path in sorted(map(Path, paths))]
 
 
 def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Path]]:
-    """The metrics of this version of texgs, as `read`, and the files of other versions.
+    """Read the metrics of this version of texgs, as `read`, and name the files of other versions.
 
     Raises:
         ArgumentError: if a file is no metrics file, or all are of other versions.
@@ -97,58 +93,79 @@ def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Pat
 
 
 def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
-    """Those with a result of one kind."""
+    """Return those with a result of one kind."""
     return [record for record in records if isinstance(record.result, kind)]
 
 
 def below(folder: str | Path) -> list[Path]:
-    """The metrics files of all results in a folder, but for jobs at work and the copies of tracked runs."""
+    """Find the metrics files of all results in a folder, not of jobs at work or copies of tracked runs."""
     paths = Path(folder).rglob("metrics.json")
     return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))
 
 
 def is_aside(folder: str) -> bool:
-    """Whether a folder holds no results, by its name."""
+    """Return whether a folder holds no results, by its name."""
     return folder.startswith(".") or folder == COPIES
 
 
 def phases() -> list[str]:
-    """The phases of all kinds of fields, in their order."""
+    """Return the phases of all kinds of fields, in their order."""
     return [phase for kind in fit_specs().values() for phase in kind.phases]
-
-
-def paper(name: str, keys: int = 1) -> dict[tuple[str, ...], dict[str, str]]:
-    """The paper's numbers of a table, by the values of its first columns; none for other tables."""
-    file = files("texgs.report").joinpath("paper", f"{name}.csv")
-    if not file.is_file():
-        return {}
-    lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    return {tuple(list(row.values())[:keys]): row for row in csv.DictReader(lines)}
 
 
 def _record(path: Path) -> Record[Any]:
     facts = read_json(path)
     if not isinstance(facts, dict) or "numbers" not in facts:
         raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
-    for kind, names in OF_TYPES.items():
-        for name in names:
-            if facts.get(name) is not None and not isinstance(facts[name], kind):
-                expected, got = getattr(kind, "__name__", "number"), type(facts[name]).__name__
-                raise ArgumentError(f"{path}: {name}: expected {expected}, got {got}; run the job again")
+    _check(path, facts)
     try:
         result = result_of(facts["result"], facts["numbers"])
-        stage, dataset, *_ = [facts[name] for name in REQUIRED]
-    except (KeyError, TypeError, ValueError, OmegaConfBaseException) as error:
+        if isinstance(result, EditMeasures):
+            _check_values(path, result.values)
+        stage, dataset = facts["stage"], facts["dataset"]
+    except ValidationError as error:
+        what = str(error).splitlines()[0]
+        raise ArgumentError(f"{path}: numbers.{error.full_key}: {what}; run the job again") from error
+    except (KeyError, OmegaConfBaseException) as error:
         raise OtherVersionError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
-    variant, sweep, field = (facts.get(name) or "" for name in ("variant", "sweep", "field"))
-    fit = (label(facts), field, variant, sweep, facts.get("seed") or 0)
-    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in") or "", result, facts)
+    variant, seed = facts.get("variant", ""), facts.get("seed") or 0
+    fit = (label(facts), facts.get("field", ""), variant, facts.get("sweep", ""), seed)
+    return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in", ""), result, facts)
+
+
+def _check(path: Path, facts: Mapping[str, Any]) -> None:
+    """Require facts of the types that they are written with; those that are missing or null count as such."""
+    for key, (kind, words) in FACTS.items():
+        value = facts.get(key)
+        if value is not None and (not isinstance(value, kind) or isinstance(value, bool)):
+            raise ArgumentError(f"{path}: {key}: expected {words}, got {value!r:.60}; run the job again")
+    for key in WORDS:
+        if key in facts and facts[key] is None:
+            raise ArgumentError(f"{path}: {key}: expected words, got null; run the job again")
+
+
+def _check_values(path: Path, values: Mapping[str, Any]) -> None:
+    """Require values of the metrics that there are, numbers for measures and words for notes.
+
+    Raises:
+        KeyError: for one of another metric.
+    """
+    words = {name for metric in metrics().values() for name in metric.notes or {}}
+    measures = {measure.name for metric in metrics().values() for measure in metric.measures}
+    for key, value in values.items():
+        if key not in words | measures:
+            raise KeyError(key)
+        if not isinstance(value, str if key in words else int | float):
+            expected = "words" if key in words else "a number"
+            raise ArgumentError(
+                f"{path}: numbers.{key}: expected {expected}, got {value!r:.60}; run the job again"
+            )
 
 
 def label(facts: Mapping[str, Any]) -> str:
-    """Recipe, variant, seed of the fit and seed of the edit of a job, those that are not 0."""
+    """Return recipe, variant, seed of the fit and seed of the edit of a job, those that are not 0."""
     recipe, seed = facts.get("recipe", ""), facts.get("seed") or 0
     if not recipe:
         return ""

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar
+from importlib.resources import files
+from statistics import fmean
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from texgs.report.metrics_files import Record, paper
-from texgs.report.results import FitResult, Result
-from texgs.report.table import UNLIKE, Cell, Row
+from texgs.report.metrics_files import Record
+from texgs.report.results import FitResult
+from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, data_frame
 
-R = TypeVar("R", bound=Result)
+if TYPE_CHECKING:
+    from pandas import DataFrame, Series
+
+R = TypeVar("R", bound=Record[Any])
 THEIRS = "the paper"  # in place of a recipe, in rows of its own numbers
 RECIPE = "paper"  # of conf/fit: what the paper's numbers are of
 VIEWS = 162  # training views, where the paper does not say another number
@@ -20,94 +25,177 @@ ALIKE = (
     f"the paper's; elsewhere there is {UNLIKE}, not like for like. Its transfer functions are not published: "
     "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
-Key = tuple[str, ...]  # of a line: its first columns, the data set first
-Line = Mapping[str, str]  # of a file of the paper's numbers
+DATA, LABEL = "data set", "recipe"  # titles of columns
 
 
-@dataclass(frozen=True)
-class Ours:
-    """A row of ours."""
+def paper(name: str, keys: Mapping[str, str], numbers: Mapping[str, str]) -> DataFrame:
+    """Read the paper's numbers of a table.
 
-    row: Row
-    record: Record[Any]  # one of its jobs
-    key: Key  # of the paper's line about the same
-    alike: bool  # whether that stands in the row
+    Args:
+        name: of its file.
+        keys: titles of the columns of names, by their headings in the file.
+        numbers: titles of the columns of numbers, by their headings in the file; others are left out.
+    """
+    import pandas as pd  # slow to import
+
+    text = files("texgs.report").joinpath("paper", f"{name}.csv").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("#")]
+    frame = pd.read_csv(io.StringIO("\n".join(lines)), dtype=str)
+    frame = frame.reindex(columns=[*keys, *numbers]).rename(columns={**keys, **numbers})
+    return frame.astype(dict.fromkeys(numbers.values(), float))
 
 
 @cache
-def images() -> dict[str, int]:
-    """Width and height of the paper's images, pixels, by data set in the paper's order."""
-    return {dataset: int(line["image_px"]) for (dataset,), line in paper("datasets").items()}
+def volumes() -> dict[str, dict[str, Any]]:
+    """Return the paper's table of data sets by their names, in its order; None where it has no number."""
+    names = ("volume_x", "volume_y", "volume_z", "image_px", "basic_scenes", "volume_mib", "dvr_ms")
+    frame = paper("datasets", {"dataset": DATA}, {name: name for name in names}).set_index(DATA)
+    return frame.astype(object).where(frame.notna(), None).to_dict("index")
+
+
+def images(dataset: str) -> int | None:
+    """Return the width and height of the paper's images of a data set, pixels; None of others."""
+    return int(volumes()[dataset]["image_px"]) if dataset in volumes() else None
 
 
 def meant(record: Record[Any]) -> str:
-    """The data set of a job, or the one that it stands in for."""
+    """Return the data set of a job, or the one that it stands in for."""
     return record.stand_in.replace(" ", "_") or record.dataset
 
 
-def in_order(records: Iterable[Record[R]]) -> list[Record[R]]:
-    """Records sorted by data set, basic TF and label."""
-    return sorted(records, key=lambda record: (place_of(record), record.tf or "", record.label))
+def in_order(records: Iterable[R]) -> list[R]:
+    """Return records sorted by data set, basic TF and label."""
+    return sorted(records, key=lambda record: (rank(record), record.tf or "", record.label))
 
 
-def place_of(record: Record[Any]) -> tuple[int, int, str]:
-    """Where a data set stands in tables: in the paper's order, stand-ins below the real ones, others last."""
-    place, _, _ = place_in_paper(meant(record))
+def rank(record: Record[Any]) -> tuple[int, int, str]:
+    """Return where a data set stands: in the paper's order, stand-ins below the real ones, others last."""
+    place, _, _ = rank_in_paper(meant(record))
     return place, 2 if record.stand_in else 0, record.dataset
 
 
-def place_in_paper(dataset: str) -> tuple[int, int, str]:
-    """The same for a row of the paper: below ours."""
-    order = list(images())
+def rank_in_paper(dataset: str) -> tuple[int, int, str]:
+    """Return the same for a row of the paper: below ours."""
+    order = list(volumes())
     return order.index(dataset) if dataset in order else len(order), 1, dataset
 
 
-def side_by_side(
-    ours: Sequence[Ours], published: Mapping[Key, Line], theirs: Callable[[Key, Line], Row]
-) -> list[Row]:
-    """Our rows in the paper's order, with rows of its own for the numbers that stand in none of ours.
-
-    Without a data set of the paper's, or a stand-in for one, there are only ours.
-
-    Args:
-        ours: rows.
-        published: lines of the paper.
-        theirs: makes the row of a line.
-    """
-    placed = [(place_of(each.record), each.row) for each in ours]
-    if any(meant(each.record) in images() for each in ours):
-        shown = {each.key for each in ours if each.alike}
-        rest = {key: line for key, line in published.items() if key not in shown}
-        placed += [(place_in_paper(key[0]), theirs(key, line)) for key, line in rest.items()]
-    return [row for _, row in sorted(placed, key=lambda each: each[0])]
+def cells(record: Record[Any], **more: Any) -> dict[str, Any]:
+    """Return what rows of all tables have of a job: its names, its place and its file."""
+    return {
+        DATA: record.title,
+        "TF": record.tf,
+        LABEL: record.label,
+        "rank": rank(record),
+        "published": "" if record.stand_in else record.dataset,  # whose numbers stand beside
+        SOURCES: [record.path],
+        **more,
+    }
 
 
 def is_alike(record: Record[FitResult], pixels: int | None = None, views: int = VIEWS) -> bool:
-    """Whether the paper's numbers of a fit may stand beside those of a phase.
+    """Return whether the paper's numbers of a fit may stand beside those of a phase.
 
     Args:
         record: of the phase.
         pixels: width and height of the paper's images; default those of the data set.
         views: the paper's training views.
     """
-    pixels = images().get(record.dataset) if pixels is None else pixels
+    pixels = images(record.dataset) if pixels is None else pixels
     seen = (record.result.width, record.result.height, record.result.train_views)
     is_other = bool(record.stand_in) or (bool(record.variant) and not record.is_swept)
     is_paper = record.recipe == RECIPE and not record.facts.get("recipe_changed")
     return is_paper and not is_other and seen == (pixels, pixels, views)
 
 
-def beside(line: Line | None, keys: Sequence[str], alike: bool) -> list[Cell]:
-    """The paper's numbers for the row of ours that they belong to, or the sign that they are of another.
+def mean(values: Series | Iterable[float | None]) -> float | None:
+    """Return the mean; None where a value is missing, or there is none."""
+    listed = list(values)
+    return fmean(listed) if listed and None not in listed else None
+
+
+def grouped(
+    rows: DataFrame, keys: Sequence[str], titles: Iterable[str], merge: Callable[[Series], Any] = mean
+) -> DataFrame:
+    """Return a row for each group of rows with the same keys.
 
     Args:
-        line: of the paper; None where it has none.
-        keys: columns of its file.
-        alike: whether they may stand there.
+        rows: of single basic scenes, made of `cells`, with `alike`.
+        keys: columns that tell groups apart.
+        titles: columns of numbers that are merged.
+        merge: of the numbers of a group.
     """
-    return [cell if cell is None or alike else UNLIKE for cell in numbers(line or {}, *keys)]
+    merged = [
+        {
+            **group.iloc[0],
+            **{title: merge(group[title]) for title in titles},
+            "basic scenes": group["TF"].nunique(dropna=False),
+            "alike": all(group["alike"]),
+            SOURCES: group[SOURCES].sum(),
+        }
+        for _, group in rows.groupby(list(keys), sort=False, dropna=False)
+    ]
+    return data_frame(merged, None if merged else [*rows.columns, "basic scenes"])
 
 
-def numbers(line: Line, *keys: str) -> list[Cell]:
-    """Numbers of the paper, where it has them."""
-    return [float(line[key]) if line.get(key) else None for key in keys]
+def beside(columns: Iterable[Column]) -> list[Column]:
+    """Return columns of the paper's numbers beside ours."""
+    return [Column(f"{column.title} (paper)", column.digits, UNPUBLISHED) for column in columns]
+
+
+def side_by_side(
+    ours: DataFrame, published: DataFrame, keys: Sequence[str], titles: Sequence[str]
+) -> DataFrame:
+    """Return our rows in the paper's order, with rows of its own for numbers that stand in none of ours.
+
+    Without a data set of the paper's, or a stand-in for one, there are only ours.
+
+    Args:
+        ours: rows as of `grouped`.
+        published: the paper's numbers.
+        keys: columns that both have, the data set first.
+        titles: columns of the numbers that stand beside ours.
+    """
+    import pandas as pd  # slow to import
+
+    own, theirs = ["published", *keys[1:]], published
+    numbers = published[[*keys, *titles]].astype(object)
+    rows = ours.merge(numbers, "left", left_on=own, right_on=list(keys), suffixes=("", " (paper)"))
+    is_alike = rows["alike"].astype(bool)
+    for title in titles:
+        cell = rows[f"{title} (paper)"]
+        rows[f"{title} (paper)"] = cell.mask(~is_alike & cell.notna(), UNLIKE)
+    if any(place < len(volumes()) for place, _, _ in rows["rank"]):
+        shown = set(rows.loc[is_alike, own].itertuples(index=False, name=None))
+        is_left = [key not in shown for key in published[list(keys)].itertuples(index=False, name=None)]
+        theirs = published[is_left]
+        theirs = theirs.assign(**{LABEL: THEIRS}, rank=[rank_in_paper(name) for name in theirs[DATA]])
+        rows = pd.concat([rows, theirs.astype(object)], ignore_index=True)
+    places = rows["rank"].tolist()
+    return rows.iloc[sorted(range(len(rows)), key=places.__getitem__)]
+
+
+def mean_rows(rows: DataFrame, keys: Sequence[str], titles: Iterable[str]) -> list[dict[str, Any]]:
+    """Return a row for each group of two rows or more with the same keys, of data sets that count.
+
+    A column of numbers has their mean where all rows have one; words stay where they are the same in all.
+    """
+    if not len(rows):
+        return []
+    groups = rows[rows["counts"].astype(bool)].groupby(list(keys), sort=False, dropna=False)
+    return [
+        {
+            DATA: f"mean of {len(group)}",
+            **group.iloc[0][list(keys)],
+            **{title: _mean_cell(group[title].tolist()) for title in titles},
+            SOURCES: group[SOURCES].sum(),
+        }
+        for _, group in groups
+        if len(group) > 1
+    ]
+
+
+def _mean_cell(values: Sequence[Any]) -> Any:
+    if all(isinstance(value, int | float) for value in values):
+        return fmean(values)
+    return values[0] if len(set(values)) == 1 else None

@@ -7,7 +7,7 @@ reads is in the module of its stage.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar
 
 from texgs.core.typed import typed
@@ -23,6 +23,15 @@ class Result:
         """Make a kind of result known, with the section of the report that its pictures belong to."""
         cls.pictured_in = section
         Result.kinds[cls.__name__] = cls
+
+    @classmethod
+    def of(cls, numbers: Mapping[str, Any]) -> Any:
+        """Return the result that `plain` made these numbers of.
+
+        Raises:
+            OmegaConfBaseException: for a key that is unknown or missing, or a value of another type.
+        """
+        return typed(cls, numbers)
 
 
 @dataclass(frozen=True)
@@ -200,29 +209,24 @@ class EditMeasures(Result):
 
     edit: str
     method: str
-    frame_mean_ms: float
-    frame_max_ms: float
-    primitives: int
-    megabytes: float  # of all models, as the paper counts
-    geometry_kept: bool
     width: int | None = None  # of the frames, pixels
     height: int | None = None
-    short_rmse: float | None = None  # between consecutive views, and views farther apart
-    short_lpips: float | None = None
-    long_rmse: float | None = None
-    long_lpips: float | None = None
-    style_nnfm: float | None = None
-    style_gram: float | None = None
-    clip: str | None = None  # backbone
-    similarity: float | None = None
-    direction: float | None = None
-    clip_missing: str | None = None  # why CLIP measured nothing
+    values: dict[str, Any] = field(default_factory=dict)  # of texgs/metrics/edits, by name
+
+    @classmethod
+    def of(cls, numbers: Mapping[str, Any]) -> EditMeasures:
+        """Return the measures that `plain` made these numbers of; who knows the metrics checks `values`."""
+        own = {each.name for each in fields(cls)} - {"values"}
+        known = {name: value for name, value in numbers.items() if name in own}
+        values = {name: value for name, value in numbers.items() if name not in own}
+        return typed(cls, {**known, "values": values})
 
 
 def plain(result: Result) -> dict[str, Any]:
-    """Return a result for JSON, without what was not measured."""
-    values: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
-    return {name: value for name, value in values.items() if value is not None}
+    """Return a result for JSON, without what was not measured; values by name stand among the rest."""
+    told: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
+    told |= told.pop("values", {})
+    return {name: value for name, value in told.items() if value is not None}
 
 
 def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
@@ -231,5 +235,5 @@ def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
     Raises:
         KeyError, OmegaConfBaseException: if they are those of no result.
     """
-    result: Result = typed(Result.kinds[kind], numbers)
+    result: Result = Result.kinds[kind].of(numbers)
     return result

@@ -1,35 +1,44 @@
-"""Tables of whole scenes: `model_size`, `rendering` and `edits`."""
+"""Tables of data sets and whole scenes: `datasets`, `rendering` and `edits`."""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
-from texgs.report.means import mean_rows
-from texgs.report.metrics_files import Record, of, paper
+from texgs.report.metrics_files import Record, of
 from texgs.report.published import (
-    ALIKE,
+    DATA,
+    LABEL,
     THEIRS,
-    Key,
-    Line,
-    Ours,
-    beside,
+    cells,
     images,
     in_order,
-    is_alike,
+    mean,
+    mean_rows,
     meant,
-    numbers,
-    side_by_side,
+    paper,
+    volumes,
 )
-from texgs.report.results import FitResult, PseResult, TimingResult
-from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
+from texgs.report.results import PseResult, SheetResult, TimingResult, ViewsResult, VolumeResult
+from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
 
-SIZES = ("geometry_mib", "shading_mib", "texture_mib")
-SIZE_COLUMNS = tuple(Column(title, 1) for title in ("geometry MiB", "shading MiB", "texture MiB"))
+DATASETS = (
+    Column(DATA),
+    Column("volume, samples"),
+    Column("image, pixels"),
+    Column("basic scenes", 0),
+    Column("volume MiB", 1),
+    Column("ms / frame", 1),
+    Column("device", None, UNPUBLISHED),
+    Column("samples (paper)", None, UNPUBLISHED),
+    Column("basic scenes (paper)", 0, UNPUBLISHED),
+    Column("MiB (paper)", 1, UNPUBLISHED),
+    Column("ms / frame (paper)", 1, UNPUBLISHED),
+)
 RENDERING = (
-    Column("data set"),
-    Column("recipe"),
+    Column(DATA),
+    Column(LABEL),
     Column("pixels"),
     Column("device"),
     Column("threads", 0, UNPUBLISHED),
@@ -40,92 +49,116 @@ RENDERING = (
     Column("volume / scene", 1),
     Column("volume, ms (paper)", 1, UNPUBLISHED),
 )
+EDITS = (
+    Column(DATA),
+    Column(LABEL),
+    Column("edit"),
+    Column("views", 0),
+    Column("PSNR", 2),
+    Column("SSIM", 4),
+)
 
 
-def model_size(records: Iterable[Record[Any]]) -> Table:
-    """Sizes of the models of a data set together, as the paper's appendix counts them."""
-    published = paper("model_size")
-    by_recipe: dict[tuple[str, str], list[Record[FitResult]]] = defaultdict(list)
-    for record in in_order(of(FitResult, records)):
-        if record.result.sizes and not record.is_swept:
-            by_recipe[record.title, record.label].append(record)
-    columns = (
-        Column("data set"),
-        Column("recipe"),
-        Column("basic scenes", 0),
-        *SIZE_COLUMNS,
-        Column("primitives", 0),
-        *(Column(f"{column.title} (paper)", column.digits, UNPUBLISHED) for column in SIZE_COLUMNS),
-        Column("primitives (paper)", 0, UNPUBLISHED),
+def datasets(records: Iterable[Record[Any]]) -> Table:
+    """Return the table of all data sets and of how long the volume renderer takes, by the size of views."""
+    caption = (
+        "Times are means over basic scenes of the median view. Where there is no volume, the views are as "
+        "published. The paper: ParaView on an RTX 4090, its volumes as 32-bit floats."
     )
-    ours = [size_of(parts, published) for parts in by_recipe.values()]
-    return Table(ALIKE, columns, side_by_side(ours, published, published_size))
+    records = list(records)
+    own = {record.dataset: record for record in of(VolumeResult, records)}
+    rendered: list[Record[Any]] = [*of(ViewsResult, records)]
+    known = {record.dataset for record in rendered}
+    given = [record for record in of(SheetResult, records) if record.dataset not in known]
+    groups: dict[tuple[str, int, int, str], list[Record[Any]]] = defaultdict(list)
+    for record in in_order([*rendered, *given]):
+        device = str(record.facts["device"]) if isinstance(record.result, ViewsResult) else ""
+        groups[record.dataset, record.result.width, record.result.height, device].append(record)
+    rows = [dataset_row(own.get(key[0]), group, key[3]) for key, group in groups.items()]
+    return Table(caption, DATASETS, rows)
 
 
-def size_of(parts: Sequence[Record[FitResult]], published: Mapping[Key, Line]) -> Ours:
-    """The models of a data set."""
-    first = parts[0]
-    line = None if first.stand_in else published.get((first.dataset,))
-    sums = [sum(part.result.sizes[group] for part in parts) for group in SIZES]
-    alike = all(map(is_alike, parts)) and line is not None and int(line["basic_scenes"]) == len(parts)
-    primitives = sum(part.result.primitives for part in parts)
-    cells: list[Cell] = [first.title, first.label, len(parts), *sums, primitives]
-    row = Row([*cells, *beside(line, (*SIZES, "primitives"), alike)], [part.path for part in parts])
-    return Ours(row, first, (first.dataset,), alike)
+def dataset_row(
+    volume: Record[VolumeResult] | None, views: Sequence[Record[Any]], device: str
+) -> dict[str, Any]:
+    """Return the row of views of one size of one data set, rendered by a device or as published."""
+    first, width, height = views[0], views[0].result.width, views[0].result.height
+    row = {
+        DATA: first.title,
+        "image, pixels": f"{width}x{height}",
+        "basic scenes": len({record.tf for record in views}),
+        "ms / frame": mean([getattr(record.result, "frame_ms", None) for record in views]),
+        "device": device or None,
+        SOURCES: [each.path for each in (volume, *views) if each],
+    }
+    if volume:
+        row |= {
+            "volume, samples": "x".join(map(str, volume.result.dims)),
+            "volume MiB": volume.result.volume_mib,
+        }
+    if (line := None if first.stand_in else volumes().get(first.dataset)) is not None:
+        row["samples (paper)"] = "x".join(f"{line[f'volume_{axis}']:.0f}" for axis in "xyz")
+        row["basic scenes (paper)"], row["MiB (paper)"] = line["basic_scenes"], line["volume_mib"]
+        row["ms / frame (paper)"] = milliseconds_in_paper(first, width, height)
+    return row
 
 
-def published_size(key: Key, line: Line) -> Row:
-    """A row of the paper's own."""
-    return Row([*key, THEIRS, *numbers(line, "basic_scenes", *SIZES, "primitives"), *[None] * 4], [])
+def milliseconds_in_paper(record: Record[Any], width: int, height: int) -> Any:
+    """Return the paper's time of a frame of a volume, or the sign that it is of another size."""
+    time = volumes().get("" if record.stand_in else record.dataset, {}).get("dvr_ms")
+    return time if time is None or (width, height) == (images(record.dataset),) * 2 else UNLIKE
 
 
 def rendering(records: Iterable[Record[Any]]) -> Table:
-    """Time of frames of whole scenes, and of their volumes in the same job."""
+    """Return the time of frames of whole scenes, and of their volumes in the same job."""
     timings = [record for record in in_order(of(TimingResult, records)) if not record.is_swept]
-    rows = {record.path: timing_of(record) for record in timings}
-    means = mean_rows([rows[record.path] for record in timings if not record.stand_in], keys=5)
-    theirs: list[Row] = []
-    if any(meant(record) in images() for record in timings):
-        theirs = [published_time("image", "800x800"), published_time("text", "512x512")]
-    return Table("", RENDERING, [*rows.values(), *means, *theirs])
+    rows = [timing_row(record) for record in timings]
+    keys = (LABEL, "pixels", "device", "threads")
+    titles = [column.title for column in RENDERING[5:]]
+    means = mean_rows(data_frame(rows), keys, titles)
+    if any(meant(record) in volumes() for record in timings):
+        means += [published_time("image", "800x800"), published_time("text", "512x512")]
+    return Table("", RENDERING, [*rows, *means])
 
 
-def timing_of(record: Record[TimingResult]) -> Row:
-    """The frames of one scene."""
+def timing_row(record: Record[TimingResult]) -> dict[str, Any]:
+    """Return the row of the frames of one scene."""
     frames, volume = record.result, record.result.volume_mean_ms
-    where = [f"{frames.width}x{frames.height}", record.facts["device"], frames.threads, frames.primitives]
-    ratio = None if volume is None else volume / frames.frame_mean_ms
-    line = None if record.stand_in else paper("datasets").get((record.dataset,))
-    alike = (frames.width, frames.height) == (images().get(record.dataset),) * 2
-    times = [frames.frame_mean_ms, frames.frame_max_ms, volume, ratio]
-    cells: list[Cell] = [record.title, record.label, *where, *times]
-    return Row([*cells, *beside(line, ("dvr_ms",), alike)], [record.path])
+    return cells(
+        record,
+        counts=not record.stand_in,
+        pixels=f"{frames.width}x{frames.height}",
+        device=record.facts["device"],
+        threads=frames.threads,
+        primitives=frames.primitives,
+        **{
+            "mean ms": frames.frame_mean_ms,
+            "max ms": frames.frame_max_ms,
+            "volume, mean ms": volume,
+            "volume / scene": None if volume is None else volume / frames.frame_mean_ms,
+            "volume, ms (paper)": milliseconds_in_paper(record, frames.width, frames.height),
+        },
+    )
 
 
-def published_time(driven: str, pixels: str) -> Row:
-    """The paper's times of its own scenes, from its table of edits by images or by texts."""
-    line = paper(f"{driven}_npse")["TexGS-VolVis",]
-    times = numbers(line, "primitives", "render_mean_ms", "render_max_ms")
-    labels: list[Cell] = ["mean of 4", f"{THEIRS}, {driven}-driven", pixels, "RTX 4090", None]
-    return Row([*labels, *times, *[UNPUBLISHED] * 3], [])
+def published_time(driven: str, pixels: str) -> dict[str, Any]:
+    """Return the paper's times of its own scenes, from its table of edits by images or by texts."""
+    numbers = {"primitives": "primitives", "render_mean_ms": "mean ms", "render_max_ms": "max ms"}
+    lines = paper(f"{driven}_npse", {"method": "method"}, numbers).set_index("method")
+    labels = {DATA: "mean of 4", LABEL: f"{THEIRS}, {driven}-driven", "pixels": pixels, "device": "RTX 4090"}
+    return {
+        **labels,
+        **lines.loc["TexGS-VolVis"],
+        **dict.fromkeys([column.title for column in RENDERING[8:]], UNPUBLISHED),
+    }
 
 
 def edits(records: Iterable[Record[Any]]) -> Table:
-    """Edited scenes against the volume with the same edits."""
-    columns = (
-        Column("data set"),
-        Column("recipe"),
-        Column("edit"),
-        Column("views", 0),
-        Column("PSNR", 2),
-        Column("SSIM", 4),
-    )
-    rows = []
-    for record in in_order(of(PseResult, records)):
-        if record.is_swept:
-            continue
-        result = record.result
-        for step in (*result.pse, *result.relight):
-            cells: list[Cell] = [record.title, record.label, step.title, result.views, step.psnr, step.ssim]
-            rows.append(Row(cells, [record.path]))
-    return Table("", columns, rows)
+    """Return edited scenes against the volume with the same edits."""
+    rows = [
+        cells(record, edit=step.title, views=record.result.views, PSNR=step.psnr, SSIM=step.ssim)
+        for record in in_order(of(PseResult, records))
+        if not record.is_swept
+        for step in (*record.result.pse, *record.result.relight)
+    ]
+    return Table("", EDITS, rows)

@@ -13,12 +13,13 @@ from PIL import Image
 from texgs.core.image_grid import DPI, content
 from texgs.core.plots import words
 from texgs.report.metrics_files import Record
-from texgs.report.sweep import deviation, mean, measured, values
-from texgs.report.sweep_runs import DIGITS, Run, natural, number, runs_of
+from texgs.report.sweep_table import digits_of, measured, natural, number, sweep_runs, variants
+from texgs.report.table import SOURCES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import SubFigure
+    from pandas import DataFrame
 
 ACROSS, WIDTH = 4, 2.6  # panels in a row, and inches of each
 HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
@@ -27,7 +28,7 @@ WIDE = 30.0  # a range of values is logarithmic where the last is so many times 
 
 
 def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
-    """A panel for each measure that differs between runs, and below them the edited scenes.
+    """Draw a panel for each measure that differs between runs, and below them the edited scenes.
 
     Variants that are numbers make an axis, with the standard deviation over seeds; others have bars.
 
@@ -41,62 +42,56 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    runs = runs_of(records, name)
-    titles, series, pictures = different(runs), grouped(runs), looks(runs)
-    variants = sorted({run.variant for run in runs}, key=natural)
-    is_axis = all(number(variant) is not None for variant in variants)
-    tall = HEIGHT if is_axis else 0.6 + BAR * len(variants) * len(series)
+    runs = sweep_runs(records, name)
+    titles, table, pictures = different(runs), variants(runs), looks(runs)
+    series = dict(list(table.groupby("series", sort=False)))
+    names = sorted(set(runs["variant"]), key=natural)
+    is_axis = all(number(variant) is not None for variant in names)
+    tall = HEIGHT if is_axis else 0.6 + BAR * len(names) * len(series)
     heights = [tall * -(-len(titles) // ACROSS) + 0.25, (PICTURE + 0.1) * len(pictures) + 0.3]
-    width = max(WIDTH * min(ACROSS, len(titles)), PICTURE * len(variants) if pictures else 0)
+    width = max(WIDTH * min(ACROSS, len(titles)), PICTURE * len(names) if pictures else 0)
     heights = heights if pictures else heights[:1]
     figure = Figure(figsize=(width, sum(heights)), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)
-    draw_panels(parts[0, 0], titles, series, name, [] if is_axis else variants)
+    draw_panels(parts[0, 0], titles, series, name, [] if is_axis else names)
     if pictures:
-        draw_pictures(parts[1, 0], pictures, variants)
+        draw_pictures(parts[1, 0], pictures, names)
     file = io.BytesIO()
     figure.savefig(file, format="png")
     return Image.open(file)
 
 
-def different(runs: Sequence[Run]) -> list[str]:
-    """The measures that differ between runs; all that there are, where none does."""
-    titles = measured([(*run.series, run.variant) for run in runs])
-    known = [title for title in titles if values(runs, title) or any(run.measures.get(title) for run in runs)]
-    differ = [title for title in known if len({run.measures.get(title) for run in runs} - {None}) > 1]
-    return differ or known or titles[:1]
-
-
-def grouped(runs: Sequence[Run]) -> dict[str, dict[str, list[Run]]]:
-    """The runs by what they are of and by variant."""
-    by_label: dict[str, dict[str, list[Run]]] = {}
-    for run in runs:
-        label = " ".join(filter(None, run.series))
-        by_label.setdefault(label, {}).setdefault(run.variant, []).append(run)
-    return by_label
+def different(runs: DataFrame) -> list[str]:
+    """Return the measures that differ between runs; all that there are, where none does."""
+    titles = measured(runs)
+    counts = runs[titles].nunique()
+    differ = [title for title in titles if counts[title] > 1]
+    return differ or [title for title in titles if counts[title]] or titles[:1]
 
 
 def draw_panels(
     figure: SubFigure,
     titles: Sequence[str],
-    series: Mapping[str, Mapping[str, Sequence[Run]]],
+    series: Mapping[str, DataFrame],
     name: str,
     bars: Sequence[str],
 ) -> None:
-    """A panel for each measure, with a line or a bar for each of `bars` for each of the series."""
+    """Draw a panel for each measure, with a line or a bar for each of `bars` for each of the series."""
     rows, thick = -(-len(titles) // ACROSS), 0.8 / len(series)
     panels = figure.subplots(rows, min(ACROSS, len(titles)), squeeze=False).ravel()
     for axes, title in zip(panels, titles, strict=False):
         axes.set_title(words(title), fontsize=9)
         axes.tick_params(labelsize=7)
-        for index, (label, by_variant) in enumerate(series.items()):
-            known = {each: runs for each, runs in by_variant.items() if mean(runs, title) is not None}
+        for index, (label, table) in enumerate(series.items()):
+            known = table[table[title].notna()]
+            means, spread = known[title].tolist(), known[f"± {title}"].astype(float).fillna(0.0).tolist()
             if bars:
-                places = [bars.index(each) + thick * (index - 0.5 * (len(series) - 1)) for each in known]
-                draw_bars(axes, dict(zip(places, known.values(), strict=True)), title, label, thick)
+                shift = thick * (index - 0.5 * (len(series) - 1))
+                places = [bars.index(each) + shift for each in known["variant"]]
+                draw_bars(axes, places, means, spread, label, thick, digits_of(title))
             else:
-                draw_line(axes, known, title, label)
+                draw_line(axes, [float(each) for each in known["variant"]], means, spread, label)
         if bars:
             axes.set_yticks(range(len(bars)), [words(variant) for variant in bars], fontsize=7)
             axes.invert_yaxis()
@@ -108,41 +103,44 @@ def draw_panels(
         figure.legend(*named, loc="outside upper left", ncols=len(series), fontsize=7, frameon=False)
 
 
-def draw_line(axes: Axes, by_variant: Mapping[str, Sequence[Run]], title: str, label: str) -> None:
-    """Means over the swept value, with their standard deviation where there are several seeds."""
-    at = [float(variant) for variant in by_variant]
-    means = [mean(runs, title) or 0.0 for runs in by_variant.values()]
-    spread = [deviation(runs, title) or 0.0 for runs in by_variant.values()]
+def draw_line(
+    axes: Axes, at: Sequence[float], means: Sequence[float], spread: Sequence[float], label: str
+) -> None:
+    """Draw means over the swept value, with their standard deviation where there are several seeds."""
     axes.errorbar(at, means, spread, label=words(label), marker="o", markersize=3, linewidth=1, capsize=2)
     if at and min(at) > 0 and max(at) / min(at) > WIDE:
         axes.set_xscale("log")
 
 
 def draw_bars(
-    axes: Axes, by_place: Mapping[float, Sequence[Run]], title: str, label: str, thick: float
+    axes: Axes,
+    places: Sequence[float],
+    means: Sequence[float],
+    spread: Sequence[float],
+    label: str,
+    thick: float,
+    digits: int,
 ) -> None:
-    """A bar with its number for each variant, at its place."""
-    means = [mean(runs, title) or 0.0 for runs in by_place.values()]
-    spread = [deviation(runs, title) or 0.0 for runs in by_place.values()]
-    bars = axes.barh([*by_place], means, thick, xerr=spread if any(spread) else None, label=words(label))
-    axes.bar_label(bars, [f"{value:.{DIGITS[title]}f}" for value in means], fontsize=6, padding=2)
+    """Draw a bar with its number for each variant, at its place."""
+    bars = axes.barh(places, means, thick, xerr=spread if any(spread) else None, label=words(label))
+    axes.bar_label(bars, [f"{value:.{digits}f}" for value in means], fontsize=6, padding=2)
     axes.margins(x=0.25)
     axes.locator_params(axis="x", nbins=4)
 
 
-def looks(runs: Sequence[Run]) -> dict[str, dict[str, np.ndarray]]:
-    """Pictures [H, W, 3] of the edited scenes by what they are of and by variant, of the first seed each."""
-    by_label: dict[str, dict[str, np.ndarray]] = {}
-    for run in runs:
-        by_variant = by_label.setdefault(" ".join(filter(None, run.series)), {}) if run.edit else {}
-        scene = run.sources[0].with_name("scene.yaml")
-        if run.edit and run.variant not in by_variant and scene.is_file():
-            by_variant[run.variant] = picture(scene)
-    return {label: by_variant for label, by_variant in by_label.items() if by_variant}
+def looks(runs: DataFrame) -> dict[str, dict[str, np.ndarray]]:
+    """Render pictures [H, W, 3] of the edited scenes by series and by variant, of the first seed each."""
+    by_series: dict[str, dict[str, np.ndarray]] = {}
+    for run in runs[runs["edit"] != ""].to_dict("records"):
+        by_variant = by_series.setdefault(run["series"], {})
+        scene = run[SOURCES][0].with_name("scene.yaml")
+        if run["variant"] not in by_variant and scene.is_file():
+            by_variant[run["variant"]] = picture(scene)
+    return {series: by_variant for series, by_variant in by_series.items() if by_variant}
 
 
 def picture(path: Path) -> np.ndarray:
-    """A scene as its first look from the front shows it."""
+    """Render a scene from the front."""
     import torch
 
     from texgs.core.lens import Lens
@@ -158,7 +156,7 @@ def picture(path: Path) -> np.ndarray:
 def draw_pictures(
     figure: SubFigure, pictures: Mapping[str, Mapping[str, np.ndarray]], variants: Sequence[str]
 ) -> None:
-    """A row of pictures for each edit, a column for each variant."""
+    """Draw a row of pictures for each edit, a column for each variant."""
     panels = figure.subplots(len(pictures), len(variants), squeeze=False)
     for row, (label, by_variant) in zip(panels, pictures.items(), strict=True):
         box = content(list(by_variant.values()))

@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from texgs.report.ablations import ablation
-from texgs.report.ballots import Votes
-from texgs.report.datasets import datasets
-from texgs.report.differences import differences
-from texgs.report.editing import image_driven, text_driven, text_driven_frozen
-from texgs.report.fitting import fits, fitting
+from texgs.report.edit_tables import image_driven, looks, text_driven, text_driven_frozen
+from texgs.report.fit_tables import ablation, fits, fitting, meshes, model_size
 from texgs.report.left_out import LeftOut, note
-from texgs.report.looks import looks
-from texgs.report.meshes import meshes
-from texgs.report.metrics_files import Record, of
-from texgs.report.published import images, meant
-from texgs.report.results import EditResult, FitResult, SheetResult
-from texgs.report.scene_tables import edits, model_size, rendering
-from texgs.report.sweep import sweep
+from texgs.report.metrics_files import Record
+from texgs.report.results import EditResult, FitResult
+from texgs.report.scene_tables import datasets, edits, rendering
+from texgs.report.sweep_table import sweep
 from texgs.report.table import Table
-from texgs.report.votes import user_study
 
 
 @dataclass(frozen=True)
@@ -34,19 +25,30 @@ class TableSpec:
     title: str
     caption: str
     section: str  # of the report, a key of `texgs.report.sections.SECTIONS`
-    places: tuple[str, ...]  # of the jobs that it reads, keys of `texgs.workflow.places.PLACES`
-    make: Callable[[Iterable[Record[Any]]], Table]
+    places: tuple[str, ...]  # of the jobs that it reads, names of rules of the workflow
+    make: Callable[[Sequence[Record[Any]]], Table] | None  # None: whoever writes the tables hands it in
     number: int | None = None  # among the paper's tables; none for ours
     paper: str = ""  # where the paper has it
 
     @property
     def heading(self) -> str:
-        """Number and title."""
+        """Return number and title."""
         return f"Table {self.number}. {self.title}" if self.number else self.title
 
-    def table(self, records: Iterable[Record[Any]], left_out: Sequence[LeftOut] = ()) -> Table:
-        """The table of some jobs, whose caption says what it shows and what is left out."""
-        made = self.make(records)
+    def table(
+        self,
+        records: Sequence[Record[Any]],
+        left_out: Sequence[LeftOut] = (),
+        given: Table | None = None,
+    ) -> Table:
+        """Return the table of some jobs, whose caption says what it shows and what is left out.
+
+        Args:
+            records: of the jobs.
+            left_out: what there is no job of.
+            given: the table, where it is not made of records alone.
+        """
+        made = self.make(records) if self.make else given or Table("", [], [])
         where = f"In the paper: {self.paper}." if self.paper else ""
         parts = (self.caption, where, made.caption, note(left_out, self.places))
         return replace(made, heading=self.heading, caption=" ".join(filter(None, parts)))
@@ -147,24 +149,7 @@ PAPERS = (
 )
 
 
-def of_recipes(records: Iterable[Record[Any]]) -> Table:
-    """Where the recipes and edits of some jobs differ from the paper; without rows where there are none."""
-    records = list(records)
-    recipes = sorted({record.recipe for record in of(FitResult, records)})
-    edits = sorted({record.result.edit for record in of(EditResult, records)})
-    table = differences(recipes, edits, views_of(records))
-    return table if recipes else replace(table, rows=[])
-
-
-def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
-    """Numbers of training and test views, each with the data sets that have so many; of sweeps none."""
-    views: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
-    for record in of(SheetResult, records):
-        for what, count in (("training views", record.result.train), ("test views", record.result.test)):
-            views[what][count].add(record.dataset)
-    return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in views.items()}
-
-
+STUDY = TableSpec("user_study", "User study", "", "study", EDITED, None, 9, "Table 6 of the appendix")
 OURS = (
     TableSpec("fits", "Fits of basic transfer functions", "", "fitting", ("phase",), fits),
     TableSpec(
@@ -177,41 +162,40 @@ OURS = (
     ),
     TableSpec("looks", "All measures of all edits", "", "more", EDITED, looks),
     TableSpec("meshes", "Meshes", "", "fitting", ("mesh",), meshes),
-    TableSpec("differences", "Where we differ", "", "differences", ("phase", "edit", "sheet"), of_recipes),
+    TableSpec("differences", "Where we differ", "", "differences", ("phase", "edit", "sheet"), None),
 )
 
 
-def specs(sweeps: Iterable[str] = (), votes: Votes | None = None) -> list[TableSpec]:
-    """All tables, with one for each of some sweeps, and the votes of a user study."""
-    return [*PAPERS, of_study(votes), *OURS, *map(of_sweep, sweeps)]
-
-
-def of_study(votes: Votes | None) -> TableSpec:
-    """The table of a user study; without votes the paper's, where there are edits of its data sets."""
-
-    def make(records: Iterable[Record[Any]]) -> Table:
-        is_shown = votes or any(meant(edit) in images() for edit in of(EditResult, records))
-        table = user_study(votes)
-        return table if is_shown else replace(table, rows=[])
-
-    paper = "Table 6 of the appendix"
-    return TableSpec("user_study", "User study", "", "study", EDITED, make, 9, paper)
+def specs(sweeps: Iterable[str] = ()) -> list[TableSpec]:
+    """Return all tables, with one for each of some sweeps."""
+    return [*PAPERS, STUDY, *OURS, *map(of_sweep, sweeps)]
 
 
 def of_sweep(name: str) -> TableSpec:
-    """The table of a sweep, with the spread over its seeds."""
+    """Return the table of a sweep, with the spread over its seeds."""
     places, make = ("phase", *EDITED), partial(sweep, name=name)
     return TableSpec(f"sweep-{name}", f"Sweep {name}", "", "ablations", places, make)
 
 
 def sweeps_of(records: Iterable[Record[Any]]) -> list[str]:
-    """The sweeps among some jobs whose fits or edits can be compared, each once."""
+    """Return the sweeps among some jobs whose fits or edits can be compared, each once."""
     compared = [record for record in records if isinstance(record.result, FitResult | EditResult)]
     return sorted({record.sweep for record in compared if record.is_swept and record.variant})
 
 
 def tables_of(
-    records: Sequence[Record[Any]], left_out: Sequence[LeftOut] = (), votes: Votes | None = None
+    records: Sequence[Record[Any]],
+    left_out: Sequence[LeftOut] = (),
+    given: Mapping[str, Table] | None = None,
 ) -> dict[str, Table]:
-    """All tables of some jobs and votes by their names, also those without rows."""
-    return {spec.name: spec.table(records, left_out) for spec in specs(sweeps_of(records), votes)}
+    """Return all tables of some jobs by their names, also those without rows.
+
+    Args:
+        records: of the jobs.
+        left_out: what there is no job of.
+        given: tables by name that need more than records, see `texgs.study` and `texgs.workflow`.
+    """
+    given = given or {}
+    return {
+        spec.name: spec.table(records, left_out, given.get(spec.name)) for spec in specs(sweeps_of(records))
+    }

@@ -18,6 +18,7 @@ from texgs.core.checksum import digest
 from texgs.core.io import write_atomic
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
+from texgs.metrics.metric import metrics
 from texgs.report.results import Result
 from texgs.workflow.code import code_digest
 
@@ -103,15 +104,17 @@ class Stage:
         return folder_of(self.rule.name, config, phase=self.name)
 
     def code(self, settings: Mapping[str, Any]) -> str:
-        """Return the digest of the code that a job runs: of its stage, its kind of field and its method.
+        """Return the digest of the code that a job runs: of its stage, kind of field, method and metrics.
 
-        The last two are imported by the names in its settings, so the sources of the stage do not tell.
+        All but the first are found by their names, so the sources of the stage do not tell.
         """
         modules = [self.module, self.fits] if self.fits else [self.module]
         if self.place != "phase" and "fit" in settings:
             modules.append(kinds()[settings["fit"]["field"]].module)
         if "edit" in settings:
             modules.append(methods()[settings["edit"]["method"]].module)
+        if self.name == "edit_metrics":
+            modules += [metric.run.__module__ for metric in metrics().values()]
         return digest(" ".join(map(code_digest, modules)))
 
 

@@ -11,7 +11,7 @@ from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
 from texgs.core.memory import collect_rarely
 from texgs.core.waiting import waiting
-from texgs.report.table_files import DOCUMENT, FORMATS
+from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 from texgs.workflow import last_words, parents
 from texgs.workflow.code import code_digest

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.views import ViewKeys
-from texgs.edit.method import methods
+from texgs.edit.method import method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditMeasures
 from texgs.workflow.inputs import view_settings, with_recipe
@@ -16,10 +15,12 @@ from texgs.workflow.places import made
 from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
 from texgs.workflow.stages.edit import Settings as EditSettings
 from texgs.workflow.stages.edit import edit_settings, edited_scene
-from texgs.workflow.stages.timing import FRAMES, milliseconds
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
+
+    from texgs.metrics.metric import StyledModel
+    from texgs.scene.scene import Scene
 
 
 @dataclass
@@ -40,35 +41,46 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         output: folder.
     """
     from texgs.core.device import torch_device
-    from texgs.edit.measures import agreement, clip_numbers, is_geometry_kept, megabytes, style_distance
+    from texgs.metrics.metric import MeasuredScene, values_of
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral, spread
 
-    edit, views, weights = settings.edit, settings.views, settings.weights
-    title, kind = f"{settings.dataset}: {edit.name}", kinds()[settings.fit.field]
-    device = torch_device(settings.fit.device)
-    after, before = read_scene(inputs["scene"]), read_scene(inputs["before"])
-    scenes = after.open(device, is_lean=True), before.open(device)
+    edit, views, device = settings.edit, settings.views, torch_device(settings.fit.device)
+    before, after = read_scene(inputs["before"]), read_scene(inputs["scene"])
     cameras = [camera.to(device) for camera in spiral(max(2, views.test.count), *views.lens)]
-    some = spread(cameras, settings.compared)
-    frames = milliseconds(
-        lambda camera: scenes[0].render(camera, after.light, after.edits), spread(cameras, FRAMES), title
+    measured = MeasuredScene(
+        title=f"{settings.dataset}: {edit.name}",
+        scenes=(before, after),
+        compositions=(before.open(device), after.open(device, is_lean=True)),
+        geometry_file=inputs["geometry"],
+        cameras=cameras,
+        some=spread(cameras, settings.compared),
+        captions=(edit.source_caption, edit.target_caption),
+        clip=settings.clip,
+        weights=settings.weights,
+        styles=styles_of(settings, after, max(cameras[0].width, cameras[0].height)),
+        has_normals="normals" in kinds()[settings.fit.field].can,
     )
-    result = EditMeasures(
-        edit.name,
-        edit.method,
-        fmean(frames),
-        max(frames),
-        len(scenes[0]),
-        megabytes=megabytes(after),
-        geometry_kept=is_geometry_kept(*scenes, some, "normals" in kind.can),
-        width=views.width,
-        height=views.height,
-        **agreement(scenes[0], after, inputs["geometry"], cameras, settings.compared, weights),
-        **style_distance(settings, after, some, device, title),
-        **clip_numbers(settings, (after, before), scenes, cameras, title),
-    )
-    return Outcome(result)
+    return Outcome(EditMeasures(edit.name, edit.method, views.width, views.height, values_of(measured)))
+
+
+def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledModel]:
+    """Return the styles of models, `longest` pixels large; none of segments, words or several pictures."""
+    from texgs.edit.parts import parts_of
+    from texgs.metrics.metric import StyledModel
+
+    edit = settings.edit
+    parts, method = parts_of(scene, edit.parts), method_of(edit)
+    if method.style is None or any(part.segment for part in parts):
+        return []
+    styles = []
+    for part in parts:
+        picture = method.style(method.of(edit, settings.followed.get(part.model)))
+        if picture is None:
+            return []
+        style = picture.scaled(longest)
+        styles.append(StyledModel(part.model, part.name, style.image, style.region))
+    return styles
 
 
 def select(config: DictConfig) -> dict[str, Any]:

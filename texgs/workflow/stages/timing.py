@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import fmean, median
-from typing import TYPE_CHECKING
 
-from texgs.core.progress import progress
 from texgs.report.results import TimingResult
 from texgs.workflow.inputs import has_scene, scene_and_volume, scene_settings
 from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
 
-if TYPE_CHECKING:
-    from texgs.core.camera import Camera
-
-WARM = 3  # frames before those that count
-FRAMES, VOLUME_FRAMES = 61, 12  # spread over the path: more say the same; the volume's take long
+VOLUME_FRAMES = 12  # spread over the path: they take long
 
 
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -33,6 +25,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     import torch
 
     from texgs.core.device import torch_device
+    from texgs.metrics.timing import FRAMES, milliseconds
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral, spread
     from texgs.workflow.stages.volume_scene import VolumeScene
@@ -65,28 +58,6 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         )
         result = replace(result, volume_mean_ms=fmean(of_volume), volume_max_ms=max(of_volume))
     return Outcome(result)
-
-
-def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:
-    """Return milliseconds of each frame, the first ones not counted."""
-    for camera in cameras[:WARM]:
-        render(camera)
-    settle()
-    times = []
-    for camera in progress(cameras, title=title, unit="frame"):
-        start = time.perf_counter()
-        render(camera)
-        settle()
-        times.append(1e3 * (time.perf_counter() - start))
-    return times
-
-
-def settle() -> None:
-    """Wait for a GPU, where one is at work."""
-    import torch
-
-    if torch.cuda.is_initialized():
-        torch.cuda.synchronize()
 
 
 STAGE = Stage(

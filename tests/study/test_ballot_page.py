@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.report.studies import study
-from texgs.report.ballot_page import ballot_page, picture_uri
+from tests.study.studies import study
+from texgs.study.ballot_page import ballot_page, picture_uri
 
 TWO = study("xyz", "yx").questions
 TEXT = study("xy", follows="instruction").questions

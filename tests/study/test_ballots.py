@@ -2,9 +2,9 @@
 
 import pytest
 
-from tests.report.studies import study
+from tests.study.studies import study
 from texgs.core.errors import ArgumentError
-from texgs.report.ballots import read_ballot, read_votes
+from texgs.study.ballots import read_ballot, read_votes
 
 STUDY = study("xyz", "zy")
 LINES = ["1,A,2", "1,B,3", "1,C,1", "2,A,1", "2,B,2"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from texgs.report.study import Compared
+from texgs.study.questions import Compared
 
 CONFIDENCE = 0.95  # of intervals
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import asdict, astuple, dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from texgs.report.ballots import Votes
-from texgs.report.looks import words_of
-from texgs.report.metrics_files import paper
-from texgs.report.rankings import CONFIDENCE, Rankings, firsts, friedman, together
-from texgs.report.study import KINDS, Compared
-from texgs.report.table import UNPUBLISHED, Cell, Column, Row, Table
+from texgs.report.edit_tables import words_of
+from texgs.report.metrics_files import Record, of
+from texgs.report.published import meant, paper, volumes
+from texgs.report.results import EditResult
+from texgs.report.table import UNPUBLISHED, Column, Table
+from texgs.study.ballots import Votes
+from texgs.study.questions import KINDS, Compared
+from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, together
 
 METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files that name those of a kind
 PUBLISHED = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
@@ -41,16 +44,24 @@ class Panel:
     votes: Rankings
 
 
+def study_table(records: Sequence[Record[Any]], votes: Votes | None) -> Table:
+    """Return the table of a study; without votes the paper's, where some jobs edit data sets of it."""
+    is_shown = votes or any(meant(edit) in volumes() for edit in of(EditResult, records))
+    table = user_study(votes)
+    return table if is_shown else replace(table, rows=[])
+
+
 def user_study(votes: Votes | None) -> Table:
-    """The table of a study; without votes only those of the paper.
+    """Return the table of a study; without votes only those of the paper.
 
     Votes are added up over the data sets on which the same methods were compared.
     """
     groups = compared(votes)
     ranks = max(len(panels[0].votes.methods) for _, panels in groups)
-    rows = [row for kind, panels in groups for row in rows_of(kind, panels, ranks)]
+    rows = [row for kind, panels in groups for row in rows_of(kind, panels)]
     numbered = [Column(f"rank {rank}", 0, UNPUBLISHED) for rank in range(1, ranks + 1)]
-    return Table(caption(votes), [*map(Column, BEFORE), *numbered, *AFTER], rows)
+    names = [Column(title, None, UNPUBLISHED) for title in BEFORE]
+    return Table(caption(votes), [*names, *numbered, *AFTER], rows)
 
 
 def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
@@ -76,22 +87,18 @@ def counted(votes: Votes) -> dict[str, list[Panel]]:
 
 
 def published() -> dict[str, list[Panel]]:
-    """The paper's votes, by what its methods follow."""
-    lines: dict[str, dict[str, list[int]]] = defaultdict(dict)  # by data set and method
-    for (dataset, method), line in paper("user_study", keys=2).items():
-        lines[dataset][method] = [int(line[rank]) for rank in PUBLISHED]
-    panels: dict[str, list[Panel]] = {}
+    """Return the paper's votes, by what its methods follow."""
+    votes = paper(
+        "user_study", {"dataset": "dataset", "method": "method"}, {rank: rank for rank in PUBLISHED}
+    )
+    panels: dict[str, list[Panel]] = {follows: [] for follows in METHODS}
     for follows, table in METHODS.items():
-        known = {method for (method,) in paper(table)}
-        panels[follows] = [
-            Panel(
-                dataset,
-                "-",
-                Rankings([Compared("-", THE_PAPER, name) for name in by], np.array([*by.values()])),
-            )
-            for dataset, by in lines.items()
-            if set(by) == known
-        ]
+        known = set(paper(table, {"method": "method"}, {})["method"])
+        for dataset, lines in votes.groupby("dataset", sort=False):
+            if set(lines["method"]) == known:
+                methods = [Compared("-", THE_PAPER, name) for name in lines["method"]]
+                counts = lines[list(PUBLISHED)].to_numpy(int)
+                panels[follows].append(Panel(str(dataset), "-", Rankings(methods, counts)))
     return panels
 
 
@@ -108,32 +115,38 @@ def total(panels: Iterable[Panel]) -> Rankings:
     return together([panel.votes for panel in panels])
 
 
-def rows_of(kind: str, panels: Sequence[Panel], ranks: int) -> list[Row]:
-    """Rows of questions with the same methods: of each question, of all together, and of the test of all."""
+def rows_of(kind: str, panels: Sequence[Panel]) -> list[dict[str, Any]]:
+    """Return rows of questions with the same methods: of each question, of all together, and of the test."""
     rows = []
     for panel in panels:
-        rows += method_rows([kind, panel.dataset, panel.followed], panel.votes, ranks)
-    votes, name = total(panels), f"all {len(panels)}"
-    shares: list[list[Cell]] = [[each.low, each.high, f"{each.p:.2g}"] for each in firsts(votes)]
-    for row, share in zip(method_rows([kind, name, "-"], votes, ranks), shares, strict=True):
-        rows.append(Row([*row.cells[: -len(share) - 2], *share, None, None], []))
+        names = {"kind": kind, "data set": panel.dataset, "follows": panel.followed}
+        rows += [{**names, **row} for row in method_rows(panel.votes)]
+    votes, every = total(panels), {"kind": kind, "data set": f"all {len(panels)}"}
+    for row, share in zip(method_rows(votes), firsts(votes), strict=True):
+        tested = {"from": share.low, "to": share.high, "p (binomial)": f"{share.p:.2g}"}
+        rows.append({**every, "follows": "-", **row, **tested})
     test, edits = friedman(votes), {method.edit for method in votes.methods}
-    result: list[Cell] = [None, NO_BALLOTS if votes.ranks is None else TWO]
+    rows.append({**every, "follows": "-", "recipe": "-", "method": "all"})
+    rows[-1]["edit"] = edits.pop() if len(edits) == 1 else "-"
+    rows[-1]["p (Friedman)"] = NO_BALLOTS if votes.ranks is None else TWO
     if test is not None:
-        result = [test.statistic, f"{test.p:.2g}"]
-    edit = edits.pop() if len(edits) == 1 else "-"
-    rows.append(Row([kind, name, "-", "-", edit, "all", *[None] * (ranks + 5), *result], []))
+        rows[-1] |= {"chi2 (Friedman)": test.statistic, "p (Friedman)": f"{test.p:.2g}"}
     return rows
 
 
-def method_rows(start: Sequence[Cell], votes: Rankings, ranks: int) -> list[Row]:
-    """A row for each method, without tests."""
-    rows = []
-    for method, counts, mean in zip(votes.methods, votes.counts.tolist(), votes.means.tolist(), strict=True):
-        padded = [*counts, *[None] * (ranks - len(counts))]
-        cells = [*start, *astuple(method), *padded, mean, counts[0] / votes.number]
-        rows.append(Row([*cells, *[None] * 5], []))
-    return rows
+def method_rows(votes: Rankings) -> list[dict[str, Any]]:
+    """Return a row for each method, without tests."""
+    return [
+        {
+            **asdict(method),
+            **{f"rank {rank}": count for rank, count in enumerate(counts, start=1)},
+            "mean rank": mean,
+            "first": counts[0] / votes.number,
+        }
+        for method, counts, mean in zip(
+            votes.methods, votes.counts.tolist(), votes.means.tolist(), strict=True
+        )
+    ]
 
 
 def caption(votes: Votes | None) -> str:

@@ -3,16 +3,22 @@
 import pytest
 from omegaconf import OmegaConf
 
+from tests.report.written import rows
 from texgs.config.compose import compose
 from texgs.config.describe import keys
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
-from texgs.report.differences import ALL, compared, differences, published, text
+from texgs.workflow.differences import ALL, compared, differences, published, text
+
+
+def cells(table):
+    """Cells of each row."""
+    return [tuple(row.values()) for row in rows(table)]
 
 
 def told(*arguments, **options):
     """Rows of keys: what, the paper, here, in."""
-    return [tuple(row.cells[:4]) for row in differences(*arguments, **options).rows if row.cells[3] != ALL]
+    return [row[:4] for row in cells(differences(*arguments, **options)) if row[3] != ALL]
 
 
 def override(claim):
@@ -52,11 +58,13 @@ def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
 
 
 def test_recipes_with_the_same_difference_share_a_row():
-    rows = told(["quick", "default"])
-    assert ("fit.materials", "surfel", "shared", "quick, default") in rows
-    assert ("fit.shading.iterations", "20000", "2000", "quick") in rows
-    assert ("fit.shading.iterations", "20000", "8000", "default") in rows
-    assert not {"fit.surfels.rates.sh", "fit.texture.rate"} & {row[0] for row in rows}, "of what is not run"
+    entries = told(["quick", "default"])
+    assert ("fit.materials", "surfel", "shared", "quick, default") in entries
+    assert ("fit.shading.iterations", "20000", "2000", "quick") in entries
+    assert ("fit.shading.iterations", "20000", "8000", "default") in entries
+    assert not {"fit.surfels.rates.sh", "fit.texture.rate"} & {row[0] for row in entries}, (
+        "of what is not run"
+    )
 
 
 def test_other_numbers_of_views_make_rows_with_their_data_sets():
@@ -65,11 +73,11 @@ def test_other_numbers_of_views_make_rows_with_their_data_sets():
 
 
 def test_numbers_of_an_edits_recipe_are_those_it_runs_with():
-    rows = told([], ["style", "text_quick", "style_untextured"])
-    assert ("edit.image.recipe.iterations", "3000", "100", "style, style_untextured") in rows
-    assert ("edit.image.recipe.lambda_s", "0.9", "1", "style, style_untextured") in rows
-    assert ("edit.text.recipe.views", "nearest", "axes", "text_quick") in rows
-    assert ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick") in rows
+    entries = told([], ["style", "text_quick", "style_untextured"])
+    assert ("edit.image.recipe.iterations", "3000", "100", "style, style_untextured") in entries
+    assert ("edit.image.recipe.lambda_s", "0.9", "1", "style, style_untextured") in entries
+    assert ("edit.text.recipe.views", "nearest", "axes", "text_quick") in entries
+    assert ("edit.text.guidance", "instruct_pix2pix", "filters", "text_quick") in entries
 
 
 def test_what_has_nothing_to_compare_is_left_out():
@@ -78,10 +86,10 @@ def test_what_has_nothing_to_compare_is_left_out():
 
 
 def test_what_no_key_expresses_is_always_told():
-    rows = [row.cells for row in differences([]).rows]
-    assert len(rows) == len(published().others) > 10
-    assert all(all(cells) for cells in rows)
-    assert {"transfer functions", "style pictures", "text prompts"} <= {cells[0] for cells in rows}
+    entries = cells(differences([]))
+    assert len(entries) == len(published().others) > 10
+    assert all(all(row) for row in entries)
+    assert {"transfer functions", "style pictures", "text prompts"} <= {row[0] for row in entries}
 
 
 def test_a_file_that_cannot_be_composed_is_named(tmp_path, monkeypatch):
@@ -102,4 +110,4 @@ def test_values_are_written_as_in_files(value, expected):
 
 
 def test_cells_do_not_break_tables():
-    assert "|" not in "".join(cell for row in differences(["quick"], ["style"]).rows for cell in row.cells)
+    assert "|" not in "".join(cell for row in cells(differences(["quick"], ["style"])) for cell in row)

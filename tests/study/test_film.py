@@ -11,8 +11,8 @@ from tests.fields.voxels.test_voxels import ball
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.fields.voxels.file import write_voxels
-from texgs.report.study_film import cell, extent, filled, mosaic, write_film
 from texgs.scene.scene import Scene, SceneModel
+from texgs.study.film import cell, extent, filled, mosaic, write_film
 
 
 @pytest.mark.parametrize("count", range(1, 12))

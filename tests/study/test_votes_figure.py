@@ -4,10 +4,10 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from tests.report.test_votes import BALLOTS, STUDY
-from texgs.report.ballots import Votes
-from texgs.report.votes import compared
-from texgs.report.votes_figure import draw, write_votes
+from tests.study.test_votes import BALLOTS, STUDY
+from texgs.study.ballots import Votes
+from texgs.study.votes import compared
+from texgs.study.votes_figure import draw, write_votes
 
 
 def test_bars_are_as_long_as_there_are_votes_from_the_best_rank_on():

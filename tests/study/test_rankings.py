@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import friedmanchisquare
 
-from texgs.report.rankings import Rankings, firsts, friedman, together
+from texgs.study.rankings import Rankings, firsts, friedman, together
 
 METHODS = tuple("abcd")
 WEIGHTS = np.array([4.0, 2.0, 1.0, 0.5])

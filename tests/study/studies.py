@@ -3,7 +3,7 @@
 import json
 
 from texgs.report.results import EditResult, FitResult, SceneResult, plain
-from texgs.report.study import Option, Question, Study
+from texgs.study.questions import Option, Question, Study
 
 STYLE = {"TF01": "waves"}
 WORDS = {"TF01": "make it gold"}

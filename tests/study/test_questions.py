@@ -2,11 +2,11 @@
 
 import pytest
 
-from tests.report.studies import WORDS, edit, fit, job, study
+from tests.study.studies import WORDS, edit, fit, job, study
 from texgs.core.errors import ArgumentError
 from texgs.report.metrics_files import below, read
 from texgs.report.results import EditResult
-from texgs.report.study import questions_of, rank_name, read_key, write_key
+from texgs.study.questions import questions_of, rank_name, read_key, write_key
 
 
 def questions(results, edits=(), seed=0):

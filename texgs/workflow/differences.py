@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from typing import Any
@@ -16,7 +16,9 @@ from texgs.config.project import members
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.typed import typed
 from texgs.edit.method import NO_METHOD, method_of
-from texgs.report.table import Column, Row, Table
+from texgs.report.metrics_files import Record, of
+from texgs.report.results import EditResult, FitResult, SheetResult
+from texgs.report.table import Column, Table
 
 COLUMNS = (
     Column("what"),
@@ -72,7 +74,7 @@ class Published:
 
 @cache
 def published() -> Published:
-    """What the paper says, from recipe.yaml."""
+    """Read what the paper says from recipe.yaml."""
     file = files("texgs.report").joinpath("paper", "recipe.yaml")
     return typed(Published, parse_yaml(file.read_text(encoding="utf-8")))
 
@@ -82,7 +84,7 @@ def differences(
     edits: Sequence[str] = (),
     views: Mapping[str, Mapping[int, Sequence[str]]] | None = None,
 ) -> Table:
-    """The table of what differs from the paper.
+    """Return the table of what differs from the paper.
 
     A difference that several files share is one row. Names without a file in conf/, such as variants of a
     sweep, are left out, and so is what has nothing to compare: fits of other fields than surfels, and edits
@@ -105,21 +107,39 @@ def differences(
     claims = {claim.key: claim for claim in published().keys}
     order = list(claims)
     rows = [
-        Row([count.what, text(count.paper), text(here), ", ".join(some), count.where], [])
+        (count.what, text(count.paper), text(here), ", ".join(some), count.where)
         for count in published().views
         for here, some in sorted((views or {}).get(count.what, {}).items())
         if here != count.paper
     ]
     rows += [
-        Row([key, text(claims[key].paper), here, ", ".join(some), claims[key].where], [])
+        (key, text(claims[key].paper), here, ", ".join(some), claims[key].where)
         for (key, here), some in sorted(names.items(), key=lambda item: order.index(item[0][0]))
     ]
-    rows += [Row([each.what, each.paper, each.here, ALL, each.where], []) for each in published().others]
-    return Table(CAPTION, COLUMNS, rows)
+    rows += [(each.what, each.paper, each.here, ALL, each.where) for each in published().others]
+    titles = [column.title for column in COLUMNS]
+    return Table(CAPTION, COLUMNS, [dict(zip(titles, row, strict=True)) for row in rows])
+
+
+def differences_of(records: Sequence[Record[Any]]) -> Table:
+    """Return where the recipes and edits of some jobs differ from the paper; no rows where there are none."""
+    recipes = sorted({record.recipe for record in of(FitResult, records)})
+    edits = sorted({record.result.edit for record in of(EditResult, records)})
+    table = differences(recipes, edits, views_of(records))
+    return table if recipes else replace(table, rows=[])
+
+
+def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
+    """Return numbers of training and test views, each with the data sets that have so many."""
+    views: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for record in of(SheetResult, records):
+        for what, count in (("training views", record.result.train), ("test views", record.result.test)):
+            views[what][count].add(record.dataset)
+    return {what: {n: sorted(names) for n, names in counts.items()} for what, counts in views.items()}
 
 
 def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
-    """Claims of the paper that a file of conf/ can be compared with, each with the value there."""
+    """Yield claims of the paper that a file of conf/ can be compared with, each with the value there."""
     config, prefix, numbers = compose((f"{group}={name}",)), f"{group}.", dict[str, Any]()
     if group == "fit" and config.fit.field != "surfels":
         return
@@ -139,12 +159,12 @@ def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
 
 
 def plain(value: Any) -> Any:
-    """A value to compare: sequences of any kind as lists."""
+    """Return a value to compare: sequences of any kind as lists."""
     return list(value) if isinstance(value, Sequence) and not isinstance(value, str) else value
 
 
 def text(value: Any) -> str:
-    """A value as files of conf/ have it."""
+    """Return a value as files of conf/ have it."""
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     if isinstance(value, float):

@@ -5,21 +5,16 @@ from math import comb
 
 import pytest
 
-from tests.report.studies import study
-from texgs.report.ballots import Ballot, Votes
-from texgs.report.metrics_files import paper
-from texgs.report.votes import user_study
+from tests.report.written import lines, rows
+from tests.study.studies import study
+from texgs.study.ballots import Ballot, Votes
+from texgs.study.votes import user_study
 
 STUDY = study("xyz", "zyx")
 BALLOTS = [  # ranks by letter: x is the best, y is mostly second
     Ballot("aa", [[1, 2, 3], [3, 2, 1]]),
     Ballot("bb", [[1, 3, 2], [3, 2, 1]]),
 ]
-
-
-def rows(table):
-    titles = [column.title for column in table.columns]
-    return [dict(zip(titles, row.cells, strict=True)) for row in table.rows]
 
 
 def test_votes_go_to_methods_whatever_their_letter():
@@ -92,8 +87,8 @@ def test_without_votes_there_are_those_of_the_paper():
 
 def test_the_papers_file_holds_ten_votes_in_each_row_and_column():
     by_dataset = {}
-    for (dataset, _), line in paper("user_study", keys=2).items():
-        by_dataset.setdefault(dataset, []).append([int(votes) for votes in list(line.values())[2:]])
+    for line in lines("user_study"):
+        by_dataset.setdefault(line["dataset"], []).append(list(line.values())[2:])
     assert len(by_dataset) == 8
     for counts in by_dataset.values():
         assert (

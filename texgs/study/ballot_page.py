@@ -10,8 +10,8 @@ from importlib.resources import files
 from typing import Any
 
 from texgs.core.image import open_picture
-from texgs.report.study import Question, rank_name
-from texgs.report.study_film import cell
+from texgs.study.film import cell
+from texgs.study.questions import Question, rank_name
 
 PICTURE = 320  # pixels, the longest side of a style picture
 TASKS = {  # what was asked for, by what methods follow
@@ -83,4 +83,4 @@ def policy_hash(text: str) -> str:
 
 def text_of(name: str) -> str:
     """A file beside this one."""
-    return files("texgs.report").joinpath(name).read_text(encoding="utf-8")
+    return files("texgs.study").joinpath(name).read_text(encoding="utf-8")

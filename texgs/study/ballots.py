@@ -10,7 +10,7 @@ from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.core.reading import reading
-from texgs.report.study import Question, Study, read_key
+from texgs.study.questions import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]
 LARGEST = 1 << 20  # bytes

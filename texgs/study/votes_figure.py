@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import numpy as np
+from PIL import Image
 
 from texgs.core.io import write_atomic
 from texgs.core.plots import words
-from texgs.report.ballots import Votes
-from texgs.report.study import Compared, rank_name
-from texgs.report.votes import THE_PAPER, Panel, compared, total
+from texgs.report.sections import Figure, data_uri
+from texgs.study.ballots import Votes
+from texgs.study.questions import Compared, rank_name
+from texgs.study.votes import THE_PAPER, Panel, compared, total
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,16 +31,23 @@ def write_votes(path: str | Path, votes: Votes | None) -> Path:
         The path.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Page
 
     charts = compared(votes)
     heights = [AROUND + BAR * len(panels[0].votes.methods) for _, panels in charts]
-    figure = Figure(figsize=(WIDTH, sum(heights)), dpi=DPI, layout="constrained")
+    figure = Page(figsize=(WIDTH, sum(heights)), dpi=DPI, layout="constrained")
     FigureCanvasAgg(figure)
     places = figure.subplots(len(charts), squeeze=False, height_ratios=heights)[:, 0]
     for axes, (kind, panels) in zip(places, charts, strict=True):
         draw(axes, kind, panels)
     return write_atomic(path, lambda file: figure.savefig(file, format="png", metadata={"Software": None}))
+
+
+def shown(votes: Votes | None) -> Figure:
+    """Return the figure as a report has it."""
+    with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
+        command = "texgs votes" if votes else ""
+        return Figure("votes", "", "Votes for each rank.", data_uri(picture), command, is_narrow=True)
 
 
 def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:

@@ -1,0 +1,50 @@
+"""A metric is one file: the stage's measures, all tables and sweeps have it, and metrics.json keeps it."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+import texgs.metrics.edits
+from tests.cli.test_edit_metrics import scenes, subject  # noqa: F401
+from tests.report.written import metrics as write_metrics
+from tests.report.written import records, rows
+from texgs.core.specifications import specifications
+from texgs.metrics.metric import metrics, values_of
+from texgs.report.edit_tables import looks, text_driven
+from texgs.report.results import EditMeasures, EditResult
+from texgs.report.sweep_table import sweep
+
+TOY = Path(__file__).parents[1] / "toys" / "brightness.py"
+
+
+@pytest.fixture
+def toy(tmp_path, monkeypatch):
+    """The toy among the metrics."""
+    folder = tmp_path / "own_metrics"
+    folder.mkdir()
+    shutil.copy(TOY, folder)
+    monkeypatch.setattr(texgs.metrics.edits, "__path__", [*texgs.metrics.edits.__path__, str(folder)])
+    specifications.cache_clear()
+    yield
+    specifications.cache_clear()
+
+
+@pytest.mark.usefixtures("toy")
+def test_a_metric_of_one_file_is_measured_and_has_its_columns(tmp_path, scenes):  # noqa: F811
+    assert list(metrics())[-1] == "brightness"
+    values = values_of(subject(scenes["clear"], scenes["faint"], scenes["clear"]))
+    assert 0.9 < values["brightness"] <= 1, "the scene is faint, on white"
+    (folder := tmp_path / "results").mkdir()
+    for facts in ({}, {"sweep": "mine", "variant": "a"}):
+        edit = EditResult("gold", "text", "how", 6.0, follows="instruction")
+        write_metrics(folder, "edit_text", edit, **facts)
+        write_metrics(folder, "edit_metrics", EditMeasures("gold", "text", values=values), **facts)
+    for table in (looks(records(folder)), text_driven(records(folder)), sweep(records(folder), "mine")):
+        assert rows(table)[0]["mean brightness"] == values["brightness"]
+        assert f"{values['brightness']:.3f}" in table.markdown()
+
+
+def test_columns_and_names_are_stated_once():
+    measures = [measure for metric in metrics().values() for measure in metric.measures]
+    assert len({measure.name for measure in measures}) == len({m.title for m in measures}) == len(measures)

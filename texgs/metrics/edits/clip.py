@@ -1,0 +1,50 @@
+"""Metric `clip`: how well an edit fits its caption, as InstructPix2Pix measures it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from texgs.metrics.metric import Measure, MeasuredScene, Metric
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+def run(measured: MeasuredScene) -> dict[str, Any]:
+    """Score all views with CLIP, or say why not."""
+    import torch
+
+    from texgs.core.progress import progress
+    from texgs.metrics.clip import clip_scores
+    from texgs.models.clip import Clip
+
+    if measured.weights[measured.clip] is None:
+        return {"clip_missing": f"the weights of {measured.clip} are not on this machine"}
+    if not all(measured.captions):
+        return {"clip_missing": "the edit has no captions"}
+    clip = Clip.load(measured.clip, measured.shown.device)
+
+    def views_of(index: int) -> Iterator[Tensor]:
+        scene, composition = measured.scenes[index], measured.compositions[index]
+        for camera in progress(measured.cameras, title=f"{measured.title}, CLIP", unit="view"):
+            yield composition.render(camera, scene.light, scene.edits).color.clamp(0, 1)
+
+    with torch.no_grad():
+        scores = clip_scores(clip, views_of(1), views_of(0), *measured.captions)
+    return {"clip": scores.backbone, "similarity": scores.similarity, "direction": scores.direction}
+
+
+METRIC = Metric(
+    "clip",
+    (
+        Measure("similarity", "CLIP similarity", 3, "up", "clip_similarity"),
+        Measure("direction", "CLIP direction", 3, "up", "clip_directional_similarity"),
+    ),
+    run,
+    notes={
+        "clip": "CLIP of the scores: {}; that of a loss stands beside its method.",
+        "clip_missing": "CLIP not measured: {}.",
+    },
+    order=10,
+)

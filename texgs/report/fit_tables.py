@@ -1,0 +1,203 @@
+"""Tables of fits: `fitting`, `fits`, `views`, `resolution`, `model_size` and `meshes`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from texgs.fit.kinds import fit_specs
+from texgs.report.metrics_files import Record, of, phases
+from texgs.report.published import (
+    ALIKE,
+    DATA,
+    LABEL,
+    beside,
+    cells,
+    grouped,
+    in_order,
+    is_alike,
+    paper,
+    rank,
+    side_by_side,
+    volumes,
+)
+from texgs.report.results import FitResult, MeshResult
+from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, data_frame
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Run = dict[str, Record[FitResult]]  # a fit by its phases
+PHASES = {  # columns of the table of phases, by the headings of the paper's file
+    "psnr": Column("PSNR", 2),
+    "ssim": Column("SSIM", 4),
+    "minutes": Column("minutes", 2),
+    "cpu_gb": Column("CPU GiB", 2),
+    "gpu_gb": Column("GPU GiB", 2, UNPUBLISHED),
+    "primitives": Column("primitives", 0),
+}
+RUNS = {  # the same for the tables of ablations
+    "train_psnr": Column("PSNR, training", 2),
+    "train_ssim": Column("SSIM, training", 4),
+    "test_psnr": Column("PSNR", 2),
+    "test_ssim": Column("SSIM", 4),
+    "fitting_min": Column("minutes", 2),
+    "primitives": Column("primitives", 0),
+}
+SIZES = {
+    "geometry_mib": Column("geometry MiB", 1),
+    "shading_mib": Column("shading MiB", 1),
+    "texture_mib": Column("texture MiB", 1),
+    "primitives": Column("primitives", 0),
+}
+SCENES = Column("basic scenes", 0)
+VARIANTS = {  # by the sweep: the heading of its variants, and that of the paper's file
+    "views": ("training views", "views"),
+    "resolution": ("pixels", "image_px"),
+}
+MESHES = {
+    "chamfer": Column("Chamfer", 5),
+    "accuracy": Column("mesh to surface", 5),
+    "completeness": Column("surface to mesh", 5),
+    "f_score": Column("F-score", 3),
+    "tolerance": Column("tolerance", 3),
+    "normal_angle": Column("normals, degrees", 1),
+    "triangles": Column("triangles", 0),
+    "mesh_seconds": Column("seconds", 1),
+}
+
+
+def published(name: str, keys: Mapping[str, str], columns: Mapping[str, Column]) -> DataFrame:
+    """Read the paper's numbers of fits, with the number of basic scenes of each data set."""
+    frame = paper(name, {"dataset": DATA, **keys}, {key: column.title for key, column in columns.items()})
+    return frame.assign(**{SCENES.title: [volumes()[dataset]["basic_scenes"] for dataset in frame[DATA]]})
+
+
+def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
+    """Return the phases of fits that are of no sweep, by data set, label and order; unknown ones last."""
+    order = {phase: place for place, phase in enumerate(phases())}
+    unswept = [record for record in of(FitResult, records) if not record.is_swept]
+    unswept.sort(key=lambda each: (rank(each), each.label, order.get(each.stage, len(order))))
+    return [_phase_row(record, record.result) for record in unswept]
+
+
+def _phase_row(record: Record[FitResult], result: FitResult) -> dict[str, Any]:
+    gpu = result.peak_gpu_memory_mib
+    measured = {
+        "PSNR": result.psnr,
+        "SSIM": result.ssim,
+        "minutes": result.fit_seconds / 60,
+        "CPU GiB": record.facts["peak_memory_mib"] / 1024,
+        "GPU GiB": None if gpu is None else gpu / 1024,
+        "primitives": result.primitives,
+    }
+    return cells(record, phase=record.stage, alike=is_alike(record), **measured)
+
+
+def fitting(records: Iterable[Record[Any]]) -> Table:
+    """Return the table of all phases of fits: means over the basic scenes of a data set."""
+    titles, keys = [column.title for column in PHASES.values()], (DATA, "phase")
+    names = (DATA, "TF", LABEL, "phase", "rank", "published", "alike", SOURCES, *titles)
+    ours = grouped(data_frame(phase_rows(records), names), (DATA, LABEL, "phase"), titles)
+    rows = side_by_side(ours, published("fitting", {"phase": "phase"}, PHASES), keys, titles)
+    labels = [Column(DATA), Column(LABEL), Column("phase"), SCENES]
+    return Table(ALIKE, [*labels, *PHASES.values(), *beside(PHASES.values())], rows)
+
+
+def fits(records: Iterable[Record[Any]]) -> Table:
+    """Return the table of all phases of fits, each basic TF by itself."""
+    rows = sorted(phase_rows(records), key=lambda row: (row["rank"], row["TF"] or ""))
+    labels = [Column(title) for title in (DATA, "TF", LABEL, "phase")]
+    return Table("Test views; minutes of the phase itself.", [*labels, *PHASES.values()], rows)
+
+
+def runs_of(records: Iterable[Record[Any]]) -> list[Run]:
+    """Return fits by their phases, each basic TF of each variant and seed by itself."""
+    runs: dict[tuple[str, str | None, str], Run] = {}
+    for record in of(FitResult, records):
+        runs.setdefault((record.dataset, record.tf, record.label), {})[record.stage] = record
+    return list(runs.values())
+
+
+def end_of(run: Run) -> Record[FitResult] | None:
+    """Return the last phase of a fit; None where one is missing, or its kind of field is not known here."""
+    return next((run[kind.phases[-1]] for kind in fit_specs().values() if set(kind.phases) <= set(run)), None)
+
+
+def measures_of(run: Run) -> dict[str, Any]:
+    """Return what is measured of a fit after its last phase, with the minutes of all phases, by titles."""
+    if (end := end_of(run)) is None:
+        return {}
+    result = end.result
+    return {
+        "PSNR, training": result.train_psnr,
+        "SSIM, training": result.train_ssim,
+        "PSNR": result.psnr,
+        "SSIM": result.ssim,
+        "minutes": sum(part.result.fit_seconds for part in run.values()) / 60,
+        "memory GiB": max(part.facts["peak_memory_mib"] for part in run.values()) / 1024,
+        "primitives": result.primitives,
+    }
+
+
+def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
+    """Return the table of one of the paper's sweeps: means over seeds and basic scenes.
+
+    Args:
+        records: jobs; those of other sweeps do not count.
+        sweep: a key of `VARIANTS`; the names of its like begin with it, such as `views_quick`.
+    """
+    variant, heading = VARIANTS[sweep]
+    own = [each for each in records if each.sweep == sweep or each.sweep.startswith(f"{sweep}_")]
+    rows = []
+    for run in runs_of(in_order([each for each in own if each.variant])):
+        first, end = next(iter(run.values())), end_of(run)
+        number = int(first.variant) if first.variant.isdigit() else 0
+        row = cells(first, **measures_of(run), alike=end is not None and is_variant(end, sweep, number))
+        row |= {LABEL: first.recipe, variant: first.variant, SOURCES: [part.path for part in run.values()]}
+        rows.append(row)
+    rows.sort(key=lambda row: (len(row[variant]), row[variant]))  # numbers, as words
+    titles = [column.title for column in RUNS.values()]
+    names = (DATA, "TF", LABEL, variant, "rank", "published", "alike", SOURCES, *titles)
+    ours = grouped(data_frame(rows, names), (DATA, LABEL, variant), titles)
+    table = side_by_side(ours, published(sweep, {heading: variant}, RUNS), (DATA, variant), titles)
+    labels = [Column(DATA), Column(LABEL), Column(variant), SCENES]
+    return Table(ALIKE, [*labels, *RUNS.values(), *beside(RUNS.values())], table)
+
+
+def is_variant(end: Record[FitResult], sweep: str, number: int) -> bool:
+    """Return whether a fit is what the paper's number of its variant is of."""
+    return is_alike(end, views=number) if sweep == "views" else is_alike(end, pixels=number)
+
+
+def model_size(records: Iterable[Record[Any]]) -> Table:
+    """Return the sizes of the models of a data set together, as the paper's appendix counts them."""
+    titles = [column.title for column in SIZES.values()]
+    rows = []
+    for record in in_order(of(FitResult, records)):
+        if record.result.sizes and not record.is_swept:
+            numbers = {**record.result.sizes, "primitives": record.result.primitives}
+            sizes = {column.title: numbers[key] for key, column in SIZES.items()}
+            rows.append(cells(record, alike=is_alike(record), **sizes))
+    names = (DATA, "TF", LABEL, "rank", "published", "alike", SOURCES, *titles)
+    ours = grouped(data_frame(rows, names), (DATA, LABEL), titles, sum)
+    theirs = published("model_size", {}, SIZES)
+    scenes = dict(zip(theirs[DATA], theirs[SCENES.title], strict=True))
+    counts = zip(ours["published"], ours[SCENES.title], ours["alike"], strict=True)
+    ours["alike"] = [alike and scenes.get(dataset) == count for dataset, count, alike in counts]
+    table = side_by_side(ours, theirs, (DATA,), titles)
+    labels = [Column(DATA), Column(LABEL), SCENES]
+    return Table(ALIKE, [*labels, *SIZES.values(), *beside(SIZES.values())], table)
+
+
+def meshes(records: Iterable[Record[Any]]) -> Table:
+    """Return the table of surfaces of fits against isosurfaces of their volumes."""
+    caption = (
+        "Meshes fused from depth, against what training views see of the isosurface. Lengths in world units: "
+        "the longest side of a volume is 1. The paper shows this comparison as a picture only."
+    )
+    rows = [
+        cells(record, **{column.title: getattr(record.result, key) for key, column in MESHES.items()})
+        for record in in_order(of(MeshResult, records))
+    ]
+    return Table(caption, [*map(Column, (DATA, "TF", LABEL)), *MESHES.values()], rows)

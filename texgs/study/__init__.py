@@ -1,0 +1,1 @@
+"""User studies of edited scenes: questions, the page for voters, ballots, and the table of votes."""
