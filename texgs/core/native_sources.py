@@ -16,6 +16,7 @@ from typing import Any
 
 SUFFIXES = (".h", ".cpp", ".cu", ".cuh", ".txt")
 LENGTH = 12  # hexadecimal digits
+RASTER = Path(__file__).parents[1] / "raster"  # has the sources, or the libraries that were built from them
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")  # of native libraries
 # Comments, which do not count; then what does: literals, words, and any other character but blanks.
 TOKENS = re.compile(
@@ -39,9 +40,8 @@ def essence(path: Path) -> str:
 
 
 @cache
-def library_sources() -> str:
+def library_sources(folder: Path = RASTER) -> str:
     """Digest of the native sources: those of the source tree, else those that the library was built from."""
-    folder = Path(__file__).parents[1] / "raster"
     if (folder / "csrc").is_dir():
         return native_digest(folder / "csrc")
     library = folder / "_native" / f"libtexgs{SUFFIX}"

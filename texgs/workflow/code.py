@@ -35,7 +35,8 @@ def code_digest(module: str) -> str:
         waiting += imported
     SOURCES.save()
     parts = [f"{name}\n{seen[name]}" for name in sorted(seen)]
-    return digest("\n".join([*parts, library_sources()] if NATIVE in seen else parts))
+    parts += [library_sources(ROOT / "texgs" / "raster")] if NATIVE in seen else []
+    return digest("\n".join(parts))
 
 
 @cache
