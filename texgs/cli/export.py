@@ -70,11 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def chosen(scene: "Scene", name: str) -> "SceneModel":
-    """The model of a scene that has a name.
-
-    Raises:
-        ArgumentError: if there is none.
-    """
+    """The model of a scene that has a name."""
     from texgs.core.errors import ArgumentError
 
     if name not in scene.models:
@@ -83,11 +79,7 @@ def chosen(scene: "Scene", name: str) -> "SceneModel":
 
 
 def kind_of(arguments: argparse.Namespace) -> str:
-    """What to export.
-
-    Raises:
-        ArgumentError: if the ending of the file is of another kind, or a scene has no such thing.
-    """
+    """What to export."""
     from texgs.core.errors import ArgumentError
     from texgs.scene.export_file import OF_MODELS
 

@@ -82,12 +82,7 @@ def changed(overrides: list[str]) -> list[str]:
 
 
 def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
-    """The configuration as it will be with the new data set, but without basic TFs and tracking.
-
-    Raises:
-        ArgumentError: if the file has a name that no configuration can hold.
-        ConfigError: if a key is unknown or has the wrong type.
-    """
+    """The configuration as it will be with the new data set, but without basic TFs and tracking."""
     from omegaconf import OmegaConf
 
     from texgs.config.compose import compose
@@ -111,11 +106,7 @@ def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
 
 
 def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -> dict[str, TransferFunction]:
-    """TFs from files, or suggested from the volume's histogram.
-
-    Raises:
-        ArgumentError: if a file is no TF, or two overlap.
-    """
+    """TFs from files, or suggested from the volume's histogram."""
     import numpy as np
 
     from texgs.core.io import read_json
@@ -187,11 +178,7 @@ def document(config: DictConfig, keys: list[str]) -> str:
 
 
 def check_document(text: str, config: DictConfig) -> None:
-    """Require that the configuration reads a document as the data set that it was written for.
-
-    Raises:
-        ConfigError: if it does not.
-    """
+    """Require that the configuration reads a document as the data set that it was written for."""
     from omegaconf import OmegaConf
 
     from texgs.config.compose import compose

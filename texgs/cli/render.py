@@ -82,11 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def frames_of(arguments: argparse.Namespace) -> int:
-    """How many frames to render.
-
-    Raises:
-        ArgumentError: if there is none, or more than a film has.
-    """
+    """How many frames to render."""
     from texgs.core.errors import ArgumentError
 
     count = PATHS[arguments.path] if arguments.frames is None else int(arguments.frames)
@@ -97,11 +93,7 @@ def frames_of(arguments: argparse.Namespace) -> int:
 
 
 def shots_of(arguments: argparse.Namespace, light: "Light", count: int) -> "Iterator[tuple[Camera, Light]]":
-    """Camera and light of each frame, of so many.
-
-    Raises:
-        ArgumentError: if a number is out of range.
-    """
+    """Camera and light of each frame, of so many."""
     from texgs.core.camera import orbit
     from texgs.core.light import Light
     from texgs.volume.cameras import orbit_path, spiral

@@ -34,11 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Call snakemake in this process; its exit code.
-
-    Raises:
-        KeyboardInterrupt: if the user ended it, after snakemake has cleaned up.
-    """
+    """Call snakemake in this process; its exit code."""
     interruptions = []
 
     def note(_signal: int, _frame: FrameType | None) -> None:
@@ -56,12 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def snakemake(words: Sequence[str]) -> bool:
-    """Run the workflow of texgs in this process; whether it ended well.
-
-    Raises:
-        ArgumentError: for a key without its value.
-        SystemExit: for a mistake that snakemake or the Snakefile has told.
-    """
+    """Run the workflow of texgs in this process; whether it ended well."""
     from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
 
     given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
@@ -81,11 +72,7 @@ def snakemake(words: Sequence[str]) -> bool:
 
 
 def require_pairs(words: Sequence[str]) -> None:
-    """Require that none of the words is the key of a choice alone, as in `dataset engine`.
-
-    Raises:
-        ArgumentError: naming the key.
-    """
+    """Require that none of the words is the key of a choice alone, as in `dataset engine`."""
     from texgs.workflow.plan import GROUPS
 
     for word, after in pairwise((*words, "NAME")):
@@ -116,11 +103,7 @@ def located(words: Sequence[str]) -> list[str]:
 
 
 def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
-    """The words as one entry of snakemake's `--config`, which reads values as YAML.
-
-    Raises:
-        ArgumentError: if the user has such an entry as well.
-    """
+    """The words as one entry of snakemake's `--config`, which reads values as YAML."""
     import yaml
 
     if not words:

@@ -130,11 +130,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def clicks_of(arguments: argparse.Namespace, device: "torch.device") -> "Clicks":
-    """The clicks, each in the middle of its pixel.
-
-    Raises:
-        ArgumentError: if there is none on the object, or the view is out of range.
-    """
+    """The clicks, each in the middle of its pixel."""
     import torch
 
     from texgs.core.camera import orbit
@@ -152,11 +148,7 @@ def clicks_of(arguments: argparse.Namespace, device: "torch.device") -> "Clicks"
 
 
 def require_output(arguments: argparse.Namespace) -> None:
-    """Require a name and a file for the segment and its scene, unless there is a preview only.
-
-    Raises:
-        ArgumentError: if the name cannot be one, or there is no file of scenes.
-    """
+    """Require a name and a file for the segment and its scene, unless there is a preview only."""
     from texgs.core.errors import ArgumentError
     from texgs.core.names import SCENES, require_name
 

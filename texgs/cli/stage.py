@@ -80,12 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def require_fits(words: tuple[str, ...]) -> None:
-    """Require several recipes, each without mistakes.
-
-    Raises:
-        ConfigError: if there are not several, or one is not fitted on the device.
-        ArgumentError: if settings of one do not fit each other.
-    """
+    """Require several recipes, each without mistakes."""
     from texgs.config.compose import compose
     from texgs.core.errors import ConfigError
     from texgs.workflow.fit_checks import check_fit
@@ -98,11 +93,7 @@ def require_fits(words: tuple[str, ...]) -> None:
 
 
 def require_edit(stage: Stage, config: DictConfig) -> None:
-    """Require that the edit of a configuration is one for this stage, without mistakes.
-
-    Raises:
-        ConfigError, ArgumentError: naming what is not as it should be.
-    """
+    """Require that the edit of a configuration is one for this stage, without mistakes."""
     from texgs.core.errors import ConfigError
     from texgs.edit.method import methods
     from texgs.workflow.edit_checks import check_edit
@@ -118,11 +109,7 @@ def require_edit(stage: Stage, config: DictConfig) -> None:
 
 
 def fetch_weights(config: DictConfig) -> None:
-    """Download the weights that an edit works with, where they are not on this machine.
-
-    Raises:
-        MissingDataError, ArgumentError: if they are not to be had, or damaged.
-    """
+    """Download the weights that an edit works with, where they are not on this machine."""
     from texgs.models.weights import locate
     from texgs.workflow.weights import needed
 
@@ -131,11 +118,7 @@ def fetch_weights(config: DictConfig) -> None:
 
 
 def fetch_volume(config: DictConfig) -> None:
-    """Download the volume's file, where it is not on this machine.
-
-    Raises:
-        ArgumentError: if it cannot be had, or is not the one expected.
-    """
+    """Download the volume's file, where it is not on this machine."""
     from texgs.volume.download import download
     from texgs.workflow.locate import cached_volume, source_file
 

@@ -63,11 +63,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def listen(host: str, port: int | None) -> socket.socket:
-    """A socket that listens; on any port where none is asked for and the usual one is taken.
-
-    Raises:
-        ArgumentError: if there is no such host or port, or it is taken.
-    """
+    """A socket that listens; on any port where none is asked for and the usual one is taken."""
     from texgs.core.errors import ArgumentError
 
     if port is not None and not 0 <= port <= 65535:

@@ -27,11 +27,7 @@ NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNOREC
 
 
 def check(config: DictConfig) -> None:
-    """Compare values with the choices and bounds of the schema.
-
-    Raises:
-        ConfigError: naming the first key that is out of bounds.
-    """
+    """Compare values with the choices and bounds of the schema."""
     check_name("dataset.name", config.dataset.name)
     check_own_name("gallery.name", config.gallery.name)
     if not re.fullmatch(r"[A-Za-z0-9_-]*", config.sweep.name):
@@ -48,11 +44,7 @@ def check(config: DictConfig) -> None:
 
 
 def check_below(top: str, config: DictConfig) -> None:
-    """Compare the values of one key at the top, or of all below it, with the schema.
-
-    Raises:
-        ConfigError: naming the first key that is out of bounds.
-    """
+    """Compare the values of one key at the top, or of all below it, with the schema."""
     if top == "fit":
         check_own_name("fit.name", config.fit.name)
     if top == "edit":
@@ -67,22 +59,14 @@ def check_below(top: str, config: DictConfig) -> None:
 
 
 def check_own_name(key: str, name: str) -> None:
-    """Require a name as `check_name` does, and not one of the folders beside the fits.
-
-    Raises:
-        ConfigError: naming the key.
-    """
+    """Require a name as `check_name` does, and not one of the folders beside the fits."""
     check_name(key, name)
     if re.fullmatch("sheet|comparison|views.*", name):
         raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
 
 
 def check_meshes(config: DictConfig) -> None:
-    """Require of the basic TFs with meshes that the data set has them, and a volume to compare with.
-
-    Raises:
-        ConfigError: naming what it has not.
-    """
+    """Require of the basic TFs with meshes that the data set has them, and a volume to compare with."""
     known = list(config.dataset.basic_tfs)
     if config.mesh.tfs and config.dataset.views_folder is not None:
         raise ConfigError(
@@ -95,11 +79,7 @@ def check_meshes(config: DictConfig) -> None:
 
 
 def check_value(entry: Key, name: str, value: Any) -> None:
-    """Compare one value with the choices and bounds of its key.
-
-    Raises:
-        ConfigError: naming the key, and the file where the value is from one.
-    """
+    """Compare one value with the choices and bounds of its key."""
     if entry.choices and value not in entry.choices:
         choices = f"{', '.join(entry.choices)}, got {shortened(value)}{close(value, entry.choices)}"
         raise ConfigError(f"{origin(name, value)}{name}: expected one of {choices}")

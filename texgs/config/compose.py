@@ -71,11 +71,7 @@ def _assembled(overrides: Words, places: Places) -> DictConfig:
 
 
 def check_named(overrides: Words, config: DictConfig) -> None:
-    """Require of chosen files that they have their own names: results would go to the folder of another.
-
-    Raises:
-        ConfigError: naming the file and what to write there.
-    """
+    """Require of chosen files that they have their own names: results would go to the folder of another."""
     for group in NAMED:
         chosen = [word.partition("=")[2].strip("'\"") for word in overrides if word.startswith(f"{group}=")]
         if any(re.match(rf"[+]*{group}\.name=", word) for word in overrides) or not chosen:
@@ -96,10 +92,6 @@ def configuration(made: dict[str, Any]) -> DictConfig:
     """A configuration with the types of the schema, interpolations resolved; read only.
 
     Two configurations of a run are nearly the same. Tables with the same values are made once, and shared.
-
-    Raises:
-        ConfigError: for a value that is out of bounds.
-        OmegaConfBaseException: for an unknown key, or a value of the wrong type.
     """
     tables = [key for key, node in schema().items() if OmegaConf.is_dict(node) and key in made]
     plain = {key: value for key, value in made.items() if key not in tables}

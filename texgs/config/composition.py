@@ -48,10 +48,6 @@ def composition(overrides: Words, places: Places) -> dict[str, Any]:
     Args:
         overrides: words in Hydra's syntax.
         places: folders with configurations, that of texgs last.
-
-    Raises:
-        HydraException, OmegaConfBaseException, YAMLError: for what Hydra does not understand.
-        ArithmeticError, OSError, RecursionError, TypeError, ValueError: for files that cannot be read.
     """
     depends_on = repr((overrides, places, fingerprint(*places), libraries()))
     made_of = hashlib.sha256(depends_on.encode()).hexdigest()

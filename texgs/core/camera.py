@@ -95,9 +95,6 @@ def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tenso
 
     Returns:
         viewmat [4, 4], dtype and device of `position`.
-
-    Raises:
-        ArgumentError: if the camera is at its target, or looks along `up`.
     """
     for name, vector in (("position", position), ("target", target)):
         check.shape(name, vector, "3")
@@ -126,9 +123,6 @@ def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
         fov_y: vertical field of view, degrees, above 0 and below 180.
         width: pixels.
         height: pixels.
-
-    Raises:
-        ArgumentError: if `fov_y` is out of range.
     """
     if not 0 < fov_y < 180:
         raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")

@@ -42,10 +42,6 @@ def to_pillow(color: Tensor, alpha: Tensor | None = None) -> Image.Image:
     Args:
         color: [H, W, 3] or [H, W, 1]; premultiplied where `alpha` is given. Any device and dtype.
         alpha: [H, W]; colour is divided by it, so that the file holds straight alpha.
-
-    Raises:
-        ShapeError: if the shapes do not fit.
-        ArgumentError: if a value is NaN or infinite.
     """
     if color.ndim != 3 or color.shape[2] not in (1, 3):
         raise ShapeError(f"color: expected [H, W, 3] or [H, W, 1], got {list(color.shape)}")
@@ -100,9 +96,6 @@ def read_png(path: str | Path) -> tuple[Tensor, Tensor]:
 
     Returns:
         Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; alpha is 1 in a file without it.
-
-    Raises:
-        ArgumentError: if the file is missing or no image.
     """
     image = torch.from_numpy(read_rgba(path).astype(np.float32) / 255)
     alpha = image[..., 3]

@@ -88,11 +88,7 @@ def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> Non
 
 
 def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float, crf: int) -> None:
-    """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even.
-
-    Raises:
-        ArgumentError: if the codec does not take the size.
-    """
+    """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even."""
     import av
 
     first = next(frames)

@@ -20,11 +20,7 @@ class PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
     depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """A node of the text.
-
-        Raises:
-            ArgumentError: if it is an alias, has a tag, or is too deep below others.
-        """
+        """A node of the text."""
         if self.check_event(yaml.AliasEvent):
             line = self.peek_event().start_mark.line + 1
             raise ArgumentError(f"expected values, got an alias (*name) in line {line}; write them out")

@@ -14,11 +14,7 @@ ADVICE = "is the file damaged or cut off?"
 
 
 def require_file(path: str | Path, what: str = "a file") -> Path:
-    """Require a regular file: a named pipe would be waited for, and a device may never end.
-
-    Raises:
-        ArgumentError: if there is nothing of that name, or something else.
-    """
+    """Require a regular file: a named pipe would be waited for, and a device may never end."""
     path = Path(path)
     try:
         mode = path.stat().st_mode

@@ -38,9 +38,6 @@ def axis_cameras(like: Camera, points: Tensor) -> dict[str, Camera]:
 
     Returns:
         Camera by name, in the order of `ANGLES`, on the device of `like`.
-
-    Raises:
-        ArgumentError: if `like` is too near to see the scene from there.
     """
     center = _center(points)
     radius = float((like.position.cpu().double() - center).norm())
@@ -66,9 +63,6 @@ def nearest_to_axes(cameras: Sequence[Camera], points: Tensor) -> dict[str, Came
 
     Returns:
         Camera by name, in the order of `ANGLES`.
-
-    Raises:
-        ArgumentError: if there are too few cameras.
     """
     from scipy.optimize import linear_sum_assignment
 

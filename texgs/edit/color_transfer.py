@@ -22,9 +22,6 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
 
     Returns:
         A [3, 3] and b [3], float64.
-
-    Raises:
-        ShapeError: if a shape does not fit.
     """
     from kornia.enhance import zca_mean
 

@@ -79,11 +79,6 @@ def update_field(
         shown: views that are returned, at most.
         seed: of all random numbers.
         title: of the progress bar.
-
-    Raises:
-        ArgumentError, ShapeError: if the instruction is empty, or what the guidance returned is not as it
-            should be.
-        FitError: if the loss is no longer finite.
     """
     instruction, generator = require_instruction(instruction), torch.Generator().manual_seed(seed)
     edits = _Edits(learner, images, guidance, instruction, keeps_renders, generator)

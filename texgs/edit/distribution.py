@@ -35,9 +35,6 @@ class FeatureDistribution:
             features: [C, h, w].
             region: [h, w] bool, what of the picture counts; by default all.
             seed: of the directions, and of the draw of 16,384 features where there are more.
-
-        Raises:
-            ShapeError: if the shapes do not fit.
         """
         generator = torch.Generator().manual_seed(seed)
         rows = drawn(features.detach(), region, STYLE_MOST, generator)
@@ -58,9 +55,6 @@ class FeatureDistribution:
             where: [h, w] bool, positions that count; by default all.
             bank: set of directions, any number: it is taken modulo their count.
             seed: of the draw of 2,048 features where there are more.
-
-        Raises:
-            ShapeError: if the shapes do not fit.
         """
         check.shape("features", features, "C h w", C=self.directions.shape[2])
         rows = drawn(features, where, MOST, torch.Generator().manual_seed(seed))

@@ -40,10 +40,6 @@ def stylize_gaussians(
 
     Returns:
         The Gaussians, and the weighted terms of the loss by name, a value for each iteration.
-
-    Raises:
-        ArgumentError: if a model that the recipe needs is missing.
-        FitError: if the loss is no longer finite.
     """
     width, height = cameras[0].width, cameras[0].height
     scaled = style.to(model.device).scaled(recipe.pattern * max(width, height))

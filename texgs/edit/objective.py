@@ -51,9 +51,6 @@ class Objective:
             reduce: pixels each way that features see as one.
             vgg: needed by NNFM.
             clip: a differentiable loss of an image [H, W, 3], needed where lambda_s is below 1.
-
-        Raises:
-            ArgumentError: if a model is needed and not given.
         """
         if recipe.needs_vgg and vgg is None:
             raise ArgumentError(
@@ -118,11 +115,7 @@ class Objective:
         return terms
 
     def content(self, image: Tensor, target: Tensor) -> Tensor:
-        """Mean squared distance [] of the features of an image and a target, both [3, h, w], as ARF has it.
-
-        Raises:
-            ArgumentError: if the recipe has no features.
-        """
+        """Return the mean squared distance [] of features of an image and a target, both [3, h, w] (ARF)."""
         if self.vgg is None:
             raise ArgumentError("vgg: expected a VGG for the distance of contents, got none; load it")
         features = self.vgg.features(self.small(image))
@@ -166,11 +159,7 @@ def view_order(views: int, recipe: Recipe) -> list[int]:
 
 
 def finite_values(terms: Mapping[str, Tensor], iteration: int) -> dict[str, float]:
-    """Values of the terms of a loss.
-
-    Raises:
-        FitError: if one is not finite.
-    """
+    """Values of the terms of a loss."""
     values = {name: float(term.detach()) for name, term in terms.items()}
     if not all(map(isfinite, values.values())):
         raise FitError(

@@ -73,10 +73,6 @@ def stylize_palette(
         weights: of what is added to it.
         vgg: for NNFM, if the recipe wants it.
         title: of progress bars.
-
-    Raises:
-        ArgumentError: if there are not as many styles as palette colours, or a model is missing.
-        FitError: if the loss is no longer finite.
     """
     if len(styles) != len(field.colors):
         raise ArgumentError(

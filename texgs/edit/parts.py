@@ -128,11 +128,7 @@ def edit_fields(
 
 
 def surfels_of(part: ScenePart, entry: SceneModel, masks: Sequence[Tensor], model: Surfels) -> Tensor | None:
-    """Surfels [N] bool of a part, those of no segment for a model that has some; None for all of them.
-
-    Raises:
-        ArgumentError: if there is none.
-    """
+    """Surfels [N] bool of a part, those of no segment for a model that has some; None for all of them."""
     if not masks:
         return None
     labels = labels_of(masks, len(model)).to(model.device)

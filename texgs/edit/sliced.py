@@ -39,9 +39,6 @@ class PatchStatistics:
             picture: [3, h, w], at least 7 pixels each way; levels that would be smaller are left out.
             region: [h, w] bool, where patches have to be centred; by default everywhere.
             seed: of the directions.
-
-        Raises:
-            ShapeError: if a shape does not fit.
         """
         size = check.shape("picture", picture, "3 h w")
         generator = torch.Generator().manual_seed(seed)
@@ -114,9 +111,6 @@ def sliced_wasserstein(
         where: [H, W], patches centred where it is above 1/2 count; by default all.
         bank: set of directions, any number: it is taken modulo their count.
         seed: of the draw of patches, where there are more than 4,096.
-
-    Raises:
-        ShapeError: if a shape does not fit.
     """
     size = check.shape("image", image, "3 H W")
     where = image.new_ones(size["H"], size["W"]) if where is None else where.to(image)

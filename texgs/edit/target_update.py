@@ -102,11 +102,6 @@ def update(
         surfels: [N] bool, which may change; all by default. Others keep their colours bit for bit.
         seed: of all random numbers; with the same one, machine and versions, results are the same.
         title: of progress bars.
-
-    Raises:
-        OutOfMemoryError: if the views would not fit into memory.
-        ArgumentError, ShapeError: if the model has no texture, no surfel may change, no view shows one that
-            may, the instruction is empty, or what the guidance returned is not finite or of another size.
     """
     require_texture(model)
     instruction = require_instruction(instruction)
@@ -196,11 +191,7 @@ def _group(round_: int, size: int | None, count: int) -> list[int]:
 
 
 def _changing(model: Surfels, surfels: Tensor | None) -> Tensor:
-    """Which surfels may change [N], bool.
-
-    Raises:
-        ArgumentError, ShapeError: if none may, or the mask is of another model.
-    """
+    """Which surfels may change [N], bool."""
     n = len(model)
     if surfels is None:
         return torch.ones(n, dtype=torch.bool, device=model.device)
@@ -214,11 +205,7 @@ def _changing(model: Surfels, surfels: Tensor | None) -> Tensor:
 
 
 def _share(weights: Tensor, model: Surfels, changing: Tensor) -> float:
-    """Share of the texels that may change that are seen.
-
-    Raises:
-        ArgumentError: if none is.
-    """
+    """Share of the texels that may change that are seen."""
     share = float(seen_texels(weights)[changing_texels(model, changing)].double().mean())
     if share == 0:
         raise ArgumentError(

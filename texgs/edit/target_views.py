@@ -18,11 +18,7 @@ from texgs.raster.shading import blinn_phong_texture
 
 
 def require_texture(model: Surfels) -> None:
-    """Require a textured model.
-
-    Raises:
-        ArgumentError: naming the stage found.
-    """
+    """Require a textured model."""
     if model.stage != "texture":
         raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
 
@@ -70,9 +66,6 @@ def render_views(
         cameras: of one size, on the model's device.
         light: or None for bare colours.
         conditions: [V, H, W, 3] of the views returned; what is rendered now, by default.
-
-    Raises:
-        ArgumentError: if there is no camera or they differ in size.
     """
     sizes = {(camera.width, camera.height) for camera in cameras}
     if len(sizes) != 1:

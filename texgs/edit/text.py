@@ -68,10 +68,6 @@ def edit_by_text(
         surfels: [N] bool, which may change; all by default.
         size: pixels along the longer side of the six views; all training views are edited as they are.
         seed: of all random numbers.
-
-    Raises:
-        ArgumentError: if there is no camera, the recipe or the views are unknown, or an argument is not as
-            `update`, `axis_cameras` and `nearest_to_axes` expect it.
     """
     if recipe not in RECIPES:
         raise ArgumentError(f"recipe: expected one of {', '.join(RECIPES)}, got {recipe!r}")
@@ -95,11 +91,7 @@ def edit_by_text(
 
 
 def chosen(views: Views, cameras: Sequence[Camera], means: Tensor, size: int) -> list[Camera]:
-    """The cameras of the views to edit, from those of the training views; see `edit_by_text`.
-
-    Raises:
-        ArgumentError: if the views are unknown, or there are too few to choose from.
-    """
+    """The cameras of the views to edit, from those of the training views; see `edit_by_text`."""
     if views not in get_args(Views):
         raise ArgumentError(f"views: expected one of {', '.join(get_args(Views))}, got {views!r}")
     if views == "all":

@@ -30,9 +30,6 @@ def project(parameters: Mapping[str, Tensor], picture: Tensor, pixel: float) -> 
 
     Returns:
         Colours in [0, 1]; black where the list has texels that no surfel owns.
-
-    Raises:
-        ShapeError: if the picture has another shape.
     """
     check.shape("picture", picture, "3 h w")
     p = parameters

@@ -66,9 +66,6 @@ def turns(schedule: Schedule, count: int, generator: torch.Generator) -> Iterato
         schedule: of edits.
         count: of views.
         generator: of views and levels of noise.
-
-    Raises:
-        ArgumentError: if rounds are too short for all of their views: some would never be edited.
     """
     size, following = min(schedule.views or count, count), 0
     least = ceil(size / schedule.group)

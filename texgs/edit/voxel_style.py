@@ -66,10 +66,6 @@ def stylize_voxels(
 
     Returns:
         The grid, and the weighted terms of the loss by name, a value for each iteration.
-
-    Raises:
-        ArgumentError: if a model that the recipe needs is missing, or no view shows anything.
-        FitError: if the loss is no longer finite.
     """
     generator = torch.Generator().manual_seed(recipe.seed)
     stride = max(1, round((images.planes[:, 0].numel() / COUNTED) ** 0.5))

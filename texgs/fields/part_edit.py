@@ -64,9 +64,6 @@ def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> 
         edits: one for each field.
         count: of fields.
         kind: of all of them.
-
-    Raises:
-        ArgumentError: if there are not as many edits as fields, or one that fields of this kind cannot show.
     """
     if edits is None:
         return [1.0] * count

@@ -36,11 +36,7 @@ def numbered(name: str, values: Tensor) -> dict[str, Tensor]:
 
 
 def write_columns(path: str | Path, columns: Mapping[str, Tensor]) -> Path:
-    """Create or replace a binary PLY file of float32 vertices in one step.
-
-    Raises:
-        ArgumentError: if the file cannot be written.
-    """
+    """Create or replace a binary PLY file of float32 vertices in one step."""
     from plyfile import PlyData, PlyElement
 
     vertices = np.empty(len(columns["x"]), [(name, "<f4") for name in columns])
@@ -50,11 +46,7 @@ def write_columns(path: str | Path, columns: Mapping[str, Tensor]) -> Path:
 
 
 def take(vertices: np.ndarray, *names: str) -> Tensor:
-    """Properties as columns [N, k] float32.
-
-    Raises:
-        ArgumentError: naming the property that is missing or no number.
-    """
+    """Properties as columns [N, k] float32."""
     given = vertices.dtype.names or ()
     for name in names:
         if name not in given or vertices.dtype[name].kind not in "iuf":
@@ -63,11 +55,7 @@ def take(vertices: np.ndarray, *names: str) -> Tensor:
 
 
 def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
-    """Raw means, quaternions, `axes` scales and opacities.
-
-    Raises:
-        ArgumentError: as `take`.
-    """
+    """Raw means, quaternions, `axes` scales and opacities."""
     scales = take(vertices, *(f"scale_{k}" for k in range(axes)))  # first: without, there is nothing to draw
     return {
         "means": take(vertices, "x", "y", "z"),
@@ -78,11 +66,7 @@ def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
 
 
 def take_harmonics(vertices: np.ndarray) -> Tensor:
-    """[N, K, 3] with as many coefficients as the file has.
-
-    Raises:
-        ArgumentError: as `take`, or where their number is that of no degree.
-    """
+    """[N, K, 3] with as many coefficients as the file has."""
     dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")[:, None]  # [N, 1, 3]
     n_rest = sum(name.startswith("f_rest_") for name in vertices.dtype.names or ())
     if n_rest % 3 or 1 + n_rest // 3 not in DEGREES:

@@ -67,9 +67,6 @@ class UnlitScene(ABC, Generic[F]):
             look: only "shaded".
             background: [3]; white by default.
             outputs: that fields of this kind have.
-
-        Raises:
-            ArgumentError: if there are not as many edits as fields, or one cannot be shown.
         """
         if look != "shaded":
             raise ArgumentError(

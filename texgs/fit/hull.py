@@ -26,9 +26,6 @@ def hull_points(images: Images, box: Box, count: int, generator: torch.Generator
 
     Returns:
         [count, 3], or fewer where the hull is but a tiny part of the box.
-
-    Raises:
-        ArgumentError: if no point is in the hull: the views show nothing, or their cameras are wrong.
     """
     inside: list[Tensor] = []
     for _ in range(ROUNDS):

@@ -147,11 +147,7 @@ class Fit:
 
 
 def require_finite(iteration: int, tensors: Mapping[str, Tensor]) -> None:
-    """Stop a fit that has gone wrong; the loss alone does not tell, as the rasterizer skips surfels with NaN.
-
-    Raises:
-        FitError: naming the first tensor with NaN or infinity.
-    """
+    """Stop a fit that has gone wrong; its loss alone does not tell: surfels with NaN are skipped."""
     try:
         check.finite(**tensors)
     except ArgumentError as error:

@@ -98,11 +98,7 @@ class PaletteFit:
         ]
 
     def run(self) -> Iterator[PaletteProgress]:
-        """The grid and the networks, or what is left of them.
-
-        Raises:
-            FitError: if the loss or a parameter is no longer finite, or the grid shows nothing.
-        """
+        """The grid and the networks, or what is left of them."""
         for done in self.voxels.run():
             self.iteration = done.step
             yield PaletteProgress(done.step, done.loss)
@@ -131,11 +127,7 @@ class PaletteFit:
         self.parameters = self.optimizer.parameters
 
     def step(self, part: Part) -> PaletteProgress:
-        """A loss, and a step of the optimiser.
-
-        Raises:
-            FitError: if the loss or a parameter is no longer finite, where they are looked at.
-        """
+        """A loss, and a step of the optimiser."""
         loss, error = part.loss(self.geometry)
         loss.backward()
         self.optimizer.step((self.own - part.start) / (part.end - part.start))

@@ -22,11 +22,7 @@ LEAST_DENSITY = 0.1  # of its voxels, so that points of rays are there
 
 
 def places(fit: VoxelFit, levels: HashLevels, step: float) -> Geometry:
-    """Voxels that show in the training views: networks are looked at only in cells next to them.
-
-    Raises:
-        FitError: if none shows.
-    """
+    """Voxels that show in the training views: networks are looked at only in cells next to them."""
     s, grid = fit.settings, fit.grid
     seen = seen_voxels(grid, fit.rays, fit.march, s.prune_weight, s.prune_share)
     if not seen.any():

@@ -101,9 +101,6 @@ def seed_gaussians(images: Images, views: ViewSet, seeds: Seeds, degree: int, se
         seeds: where; "voxels" needs a volume and is refused.
         degree: of the spherical harmonics, those above the zeroth being zero.
         seed: of random numbers.
-
-    Raises:
-        ArgumentError: as `seed_surfels`.
     """
     surfels, colors = seed_surfels(images, views, **asdict(seeds), seed=seed)
     thickness = surfels["scales"].amin(dim=1, keepdim=True)  # seeds of surfels are round, or nearly so
@@ -113,11 +110,7 @@ def seed_gaussians(images: Images, views: ViewSet, seeds: Seeds, degree: int, se
 
 
 def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> tuple[Tensor, Tensor]:
-    """Points and colours [N, 3] of a volume where the views' transfer function shows it.
-
-    Raises:
-        ArgumentError: if there is no volume or no transfer function.
-    """
+    """Points and colours [N, 3] of a volume where the views' transfer function shows it."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
             f"{views.folder}: seeds.kind=voxels needs a volume and views that name their transfer function; "
@@ -131,11 +124,7 @@ def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> 
 
 
 def box_of(views: ViewSet, half_size: float | None) -> Box:
-    """The box of the data with a margin, or a cube around its middle, see `seed_surfels`.
-
-    Raises:
-        ArgumentError: if the metadata's `aabb` is no box, or half_size is not above 0.
-    """
+    """The box of the data with a margin, or a cube around its middle, see `seed_surfels`."""
     if half_size is not None and not half_size > 0:
         raise ArgumentError(f"seeds.half_size: expected more than 0, got {half_size}")
     aabb = views.metadata.get("aabb")
@@ -158,11 +147,7 @@ def box_of(views: ViewSet, half_size: float | None) -> Box:
 
 
 def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
-    """Points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file.
-
-    Raises:
-        ArgumentError: if the file is missing, no PLY file, has no finite x, y and z, or colours out of range.
-    """
+    """Points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file."""
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
     vertices = read_vertices(path)
@@ -198,9 +183,6 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
         points: [N, 3] world units, at least four.
         opacity: of each.
         generator: of random numbers.
-
-    Raises:
-        ArgumentError: if there are fewer than four points.
     """
     from scipy.spatial import cKDTree
 

@@ -45,9 +45,6 @@ def refine(
         sparsity: weight of the mean absolute value of the image of the texels alone, see `texel_map`.
         seed: of the order of views.
         title: of the progress bar.
-
-    Raises:
-        FitError: if texels are no longer finite.
     """
     rates = {"texels": Rate(rate, final)} | ({"palette": Rate(palette_rate, final)} if palette_rate else {})
     optimizer = Optimizer({name: model.parameters[name] for name in ("texels", "palette")}, rates)

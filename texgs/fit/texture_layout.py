@@ -76,9 +76,6 @@ def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:
     Args:
         scales: standard deviations [N, 2], world units.
         texels: of all surfels.
-
-    Raises:
-        ArgumentError: if the budget is not positive, or one surfel would get more than the rasterizer takes.
     """
     if texels < 1:
         raise ArgumentError(f"texels: expected at least 1, got {texels}")
@@ -95,9 +92,6 @@ def sizes_where_seen(scales: Tensor, sight: Sight) -> Tensor:
     Args:
         scales: standard deviations [N, 2], world units.
         sight: of the training views.
-
-    Raises:
-        ArgumentError: if one surfel would get more texels than the rasterizer takes.
     """
     return _sizes(scales, sight.pixel / sight.largest.sqrt())
 

@@ -40,9 +40,6 @@ def solve(
 
     Returns:
         The model with new texels; the one given, if these would not lower the squared error.
-
-    Raises:
-        FitError: if texels are no longer finite.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
     moving = Surfels({**model.parameters, "texels": texels}, model.shading, model.metadata)

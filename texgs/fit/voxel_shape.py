@@ -28,9 +28,6 @@ def hull_grid(images: Images, side: int, half_size: float, degree: int, density:
         half_size: half the side of the cube around the origin that is searched, world units.
         degree: of the spherical harmonics.
         density: of all voxels, per world unit.
-
-    Raises:
-        ArgumentError: if no point is in the hull.
     """
     low, high = hull_box(images, half_size)
     spacing = float((high - low).max()) / (side - 1)
@@ -42,11 +39,7 @@ def hull_grid(images: Images, side: int, half_size: float, degree: int, density:
 
 
 def hull_box(images: Images, half_size: float) -> Box:
-    """The box around the visual hull in a cube around the origin.
-
-    Raises:
-        ArgumentError: if nothing is in it.
-    """
+    """The box around the visual hull in a cube around the origin."""
     spacing = 2 * half_size / SEARCHED
     low = torch.full((3,), -half_size + spacing / 2)
     points = lattice([SEARCHED] * 3, low, spacing)

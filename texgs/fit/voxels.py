@@ -71,11 +71,7 @@ class VoxelFit:
         return self.settings.steps
 
     def run(self) -> Iterator[VoxelProgress]:
-        """All stages, or what is left of them.
-
-        Raises:
-            FitError: if the loss or a density is no longer finite, or no voxel shows.
-        """
+        """All stages, or what is left of them."""
         start = 0
         for index, stage in enumerate(self.settings.stages):
             if index and self.iteration == start:
@@ -121,11 +117,7 @@ class VoxelFit:
 
     @torch.no_grad()
     def step(self, stage: GridStage) -> VoxelProgress:
-        """Rays, their mean squared error, a step of the optimiser.
-
-        Raises:
-            FitError: if the loss or a density is no longer finite, where they are looked at.
-        """
+        """Rays, their mean squared error, a step of the optimiser."""
         s = self.settings
         if self.iteration % s.occupy_every == 0:
             self.grid.refresh_occupancy()

@@ -34,9 +34,6 @@ def clip_scores(
         originals: the same views of the scene before the edit.
         source: caption of the original, such as "a beetle"; a caption, not an instruction.
         target: caption of the edit, such as "a beetle made of gold".
-
-    Raises:
-        ArgumentError: if there is no view, their numbers differ, or a caption is empty.
     """
     captions = clip.texts([source, target])
     after = [clip.images(image[None])[0] for image in edited]
@@ -55,11 +52,7 @@ def clip_scores(
 
 
 def similarity(images: Tensor, text: Tensor) -> Tensor:
-    """Cosine [V] between features of images [V, D] and of a text [D]; differentiable.
-
-    Raises:
-        ShapeError: if the features are of different models.
-    """
+    """Cosine [V] between features of images [V, D] and of a text [D]; differentiable."""
     size = check.shape("images", images, "V D")["D"]
     check.shape("text", text, "D", D=size)
     return torch.cosine_similarity(images, text[None], dim=1)
@@ -76,9 +69,6 @@ def direction(originals: Tensor, edited: Tensor, source: Tensor, target: Tensor)
         edited: [V, D] of the same views.
         source: features [D] of the caption of the original.
         target: [D] of the caption of the edit.
-
-    Raises:
-        ShapeError: if the features do not fit each other.
     """
     sizes = check.shape("originals", originals, "V D")
     check.shape("edited", edited, "V D", **sizes)

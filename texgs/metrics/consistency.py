@@ -83,9 +83,6 @@ def consistency(
 
     Returns:
         For each of `apart`, but those at which no pair sees the same.
-
-    Raises:
-        ArgumentError, ShapeError: if there is no pair, or a frame does not fit itself.
     """
     if min(apart) < 1 or len(frames) <= max(apart):
         raise ArgumentError(
@@ -153,9 +150,6 @@ def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> 
 
     Returns:
         Colours [H, W, 3], interpolated bilinearly, and [H, W] bool.
-
-    Raises:
-        ShapeError: if images, depths and cameras do not fit each other.
     """
     from kornia.geometry import remap
 

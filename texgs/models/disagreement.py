@@ -33,11 +33,7 @@ class Disagreeing:
         self.name, self.lit = f"{guidance.name} that disagree by {amount:g}", guidance.lit
 
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
-        """Edited images [V, H, W, 3] over white; see `Guidance`.
-
-        Raises:
-            ArgumentError: as the other guidance.
-        """
+        """Edited images [V, H, W, 3] over white; see `Guidance`."""
         shifts, gains = self.amount * torch.randn(2, len(views), 1, 1, 3, generator=generator).to(
             views.images
         )

@@ -21,9 +21,6 @@ def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[A
         folder: with config.json, and weights as safetensors.
         kind: the model_type of config.json, such as "clip".
         names: of classes of transformers that can be read from a folder.
-
-    Raises:
-        ArgumentError: if transformers is missing, or the folder holds another model or a damaged one.
     """
     try:
         import transformers

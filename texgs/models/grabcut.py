@@ -30,11 +30,7 @@ class GrabCut:
     name = "GrabCut"
 
     def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """The object [H, W] bool in an image, on the image's device; see `MaskModel`.
-
-        Raises:
-            ArgumentError, ShapeError: if no point is positive, or one is outside of the image.
-        """
+        """The object [H, W] bool in an image, on the image's device; see `MaskModel`."""
         import cv2
 
         check_clicks(image, points, positive)

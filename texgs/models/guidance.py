@@ -66,9 +66,6 @@ class Guidance(Protocol):
 
         Returns:
             [V, H, W, 3] edited images over white.
-
-        Raises:
-            ArgumentError: if the instruction is empty or not understood.
         """
 
 

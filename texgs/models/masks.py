@@ -39,11 +39,7 @@ class MaskModel(Protocol):
 
 
 def check_clicks(image: Tensor, points: Tensor, positive: Tensor) -> None:
-    """Require what every mask model takes.
-
-    Raises:
-        ArgumentError, ShapeError: naming the argument, and the point that is outside of the image.
-    """
+    """Require what every mask model takes."""
     size = check.shape("image", image, "H W 3")
     count = check.shape("points", points, "P 2")["P"]
     check.shape("positive", positive, "P", P=count)

@@ -68,11 +68,7 @@ class Sam:
 
     @torch.no_grad()
     def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """The object [H, W] bool in an image, on the image's device; see `MaskModel`.
-
-        Raises:
-            ArgumentError, ShapeError: if no point is positive, or one is outside of the image.
-        """
+        """The object [H, W] bool in an image, on the image's device; see `MaskModel`."""
         check_clicks(image, points, positive)
         shape = (image.shape[0], image.shape[1])
         height, width = self.fitted(*shape)
@@ -98,9 +94,6 @@ def published_sam(
         path: the file; by default where it is found.
         device: that computes.
         dtype: of the encoder, which takes nearly all of the time; by default `fast_dtype`.
-
-    Raises:
-        ArgumentError, MissingDataError: if there is no such file, or it is another one.
     """
     from kornia.models.sam import Sam as Network
     from kornia.models.sam import SamConfig
@@ -141,9 +134,6 @@ def sam_folder(
         folder: with config.json and model.safetensors.
         device: that computes.
         dtype: of the encoder; by default `fast_dtype`.
-
-    Raises:
-        ArgumentError: if transformers is missing, or the folder holds no SAM or a damaged one.
     """
     dtype = fast_dtype(device) if dtype is None else dtype
     (model,) = read_folder(folder, "sam", ("SamModel",))

@@ -18,9 +18,6 @@ def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[s
     Args:
         path: with the ending .safetensors, or any other for torch's; nothing in it is executed.
         names: of the tensors wanted; by default all. Others are not read.
-
-    Raises:
-        ArgumentError: if the file is missing, damaged, of another format, or lacks a name.
     """
     from safetensors import safe_open
 

@@ -62,10 +62,6 @@ def rasterize(
     Returns:
         Render with color [H, W, C], alpha [H, W], and the outputs asked for. Images are views of planar
         memory.
-
-    Raises:
-        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
-        OutOfMemoryError: naming the bytes needed, before they are allocated.
     """
     geometry = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
     camera = {"viewmat": viewmat, "K": K} | ({} if background is None else {"background": background})
@@ -108,10 +104,6 @@ def splat(
 
     Returns:
         Sums [N, C] over all pixels of blending weight times image, and the sums [N] of the weights.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
-        OutOfMemoryError: if a GPU has too little memory.
     """
     size = check.shape("image", image, "H W C")
     n = check.shape("means", means, "N 3")["N"]

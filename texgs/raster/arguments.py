@@ -36,12 +36,7 @@ AXES = {  # after N
 def surfel_tensors(
     geometry: dict[str, Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
 ) -> SurfelTensors:
-    """All tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities.
-
-    Raises:
-        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
-        OutOfMemoryError: where there are more surfels than memory can hold.
-    """
+    """All tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities."""
     tensors = geometry | _colors(features, texture)
     if shift is not None:
         tensors["shift"] = shift
@@ -83,12 +78,7 @@ def view(
     outputs: Collection[str],
     options: Options,
 ) -> View:
-    """The rest of the arguments; `camera` holds viewmat, K and perhaps background, `size` is (width, height).
-
-    Raises:
-        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
-        OutOfMemoryError: where the images do not fit into memory.
-    """
+    """Check the rest; `camera` holds viewmat, K and perhaps background, `size` is (width, height)."""
     _check_camera(camera, surfels)
     if isinstance(outputs, str):
         raise ArgumentError(f"outputs: expected a collection of names, got a string; pass ({outputs!r},)")

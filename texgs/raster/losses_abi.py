@@ -35,11 +35,7 @@ def _describe(device_type: str) -> None:
 
 
 def call(name: str, *arguments: Tensor | float | None, device: torch.device) -> None:
-    """Call a function on dense tensors (NULL for None) and numbers.
-
-    Raises:
-        TexgsError: with the library's own sentence.
-    """
+    """Call a function on dense tensors (NULL for None) and numbers."""
     _describe(device.type)
     plain = [x.data_ptr() if isinstance(x, Tensor) else x for x in arguments]
     native.call(name, *plain, device=device)

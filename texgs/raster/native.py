@@ -143,11 +143,7 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
 
 
 def _require_own_sources(lib: ctypes.CDLL) -> None:
-    """Require of a library in a source tree that it was built from the sources there as they are now.
-
-    Raises:
-        NativeError: if a source was changed since.
-    """
+    """Require of a library in a source tree that it was built from the sources there as they are now."""
     expected, built = library_sources(), built_from(function(lib, "texgs_sources"))
     if CSRC.is_dir() and built != expected:
         raise NativeError(

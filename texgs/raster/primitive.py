@@ -15,12 +15,7 @@ def are_gaussians(scales: Tensor) -> bool:
 
 
 def check_primitive(scales: Tensor, has_texture: bool, outputs: Collection[str]) -> None:
-    """Require scales [N, 2] or [N, 3], and of 3D Gaussians nothing that only surfels have.
-
-    Raises:
-        ShapeError: for scales of another shape.
-        ArgumentError: for a texture or a normal of 3D Gaussians.
-    """
+    """Require scales [N, 2] or [N, 3], and of 3D Gaussians nothing that only surfels have."""
     if scales.ndim != 2 or scales.shape[1] not in (2, 3):
         hint = "2 draw surfels, 3 draw 3D Gaussians"
         raise ShapeError(f"scales: expected [N, 2] or [N, 3], got {list(scales.shape)}; {hint}")

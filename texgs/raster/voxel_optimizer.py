@@ -77,9 +77,6 @@ def add_total_variation(
         density: weight of the density's variation.
         sh: weight of the coefficients'.
         into: where the gradient is added.
-
-    Raises:
-        ArgumentError, ShapeError, DeviceError: naming the argument at fault.
     """
     into.check(grid)
     check.same_device(rows=grid.rows, blocks=blocks)

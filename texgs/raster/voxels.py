@@ -53,11 +53,7 @@ class RowGradient:
         self.touched = torch.zeros_like(grid.distance).flatten()  # blocks with a gradient
 
     def check(self, grid: VoxelGrid) -> None:
-        """Require a grid of the same layout, on the same device.
-
-        Raises:
-            ShapeError, DeviceError: naming both sizes, or both devices.
-        """
+        """Require a grid of the same layout, on the same device."""
         check.same_device(rows=grid.rows, into=self.rows)
         given, expected = (
             (list(self.rows.shape), len(self.touched)),
@@ -155,9 +151,6 @@ def render_rays(
         into: where the backward pass adds its gradient, in place of `grid.rows.grad`.
         keep: the samples, 36 bytes each, for the backward pass; False: it marches piece by piece again
             (deferred back-propagation, Zhang et al. 2022), for views that memory does not suffice for.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
     """
     check.constant(rays=rays)
     if into:

@@ -147,11 +147,7 @@ def _check(path: Path, facts: Mapping[str, Any]) -> None:
 
 
 def _check_values(path: Path, values: Mapping[str, Any]) -> None:
-    """Require values of the metrics that there are, numbers for measures and words for notes.
-
-    Raises:
-        KeyError: for one of another metric.
-    """
+    """Require values of the metrics that there are, numbers for measures and words for notes."""
     words = {name for metric in metrics().values() for name in metric.notes or {}}
     measures = {measure.name for metric in metrics().values() for measure in metric.measures}
     for key, value in values.items():

@@ -230,10 +230,6 @@ def plain(result: Result) -> dict[str, Any]:
 
 
 def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
-    """Return the result that `plain` made these numbers of.
-
-    Raises:
-        KeyError, OmegaConfBaseException: if they are those of no result.
-    """
+    """Return the result that `plain` made these numbers of."""
     result: Result = Result.kinds[kind].of(numbers)
     return result

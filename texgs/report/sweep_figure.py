@@ -35,9 +35,6 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     Args:
         records: jobs; the scenes of edits lie beside their metrics.
         name: of the sweep.
-
-    Raises:
-        ArgumentError: if none is of the sweep.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure

@@ -37,9 +37,6 @@ def sweep(records: Iterable[Record[Any]], name: str) -> Table:
     Args:
         records: jobs; those of other fits and edits do not count.
         name: of the sweep.
-
-    Raises:
-        ArgumentError: if none is of the sweep.
     """
     runs = sweep_runs(records, name)
     table, titles = variants(runs), measured(runs)
@@ -61,9 +58,6 @@ def sweep_runs(records: Iterable[Record[Any]], name: str) -> DataFrame:
     """Return the runs of a sweep, each seed of each variant: fits, then edits, variants by number or name.
 
     A fit is one run with all its phases; one that misses a phase has no measures.
-
-    Raises:
-        ArgumentError: if there is none.
     """
     own = [record for record in records if record.variant and record.sweep == name]
     runs = [*(fit_run(list(run.values())) for run in runs_of(own)), *edit_runs(own)]

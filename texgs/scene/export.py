@@ -27,9 +27,6 @@ def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
 
     Returns:
         A model with one harmonic, that of the colour without light (palette + offset + mean texel).
-
-    Raises:
-        ArgumentError: if nothing is visible, or the number of edits is not that of parts and segments.
     """
     surfels = [_surfels(part, own) for part, own in zip(parts, by_part(parts, edits), strict=True)]
     together = {name: torch.cat([each[name] for each in surfels]) for name in surfels[0]}
@@ -45,9 +42,6 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
         path: target.
         model: any stage; before shading, colours are those of the constant harmonic.
         least_opacity: of a surfel that becomes a point.
-
-    Raises:
-        ArgumentError: if no surfel is so opaque, or the file cannot be written.
     """
     from plyfile import PlyData, PlyElement
 

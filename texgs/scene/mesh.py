@@ -35,11 +35,7 @@ def points(view: DepthView) -> Tensor:
 
 
 def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
-    """A lattice of voxels that holds the box from `low` to `high` [3].
-
-    Raises:
-        OutOfMemoryError: if there are too many.
-    """
+    """A lattice of voxels that holds the box from `low` to `high` [3]."""
     x, y, z = (int(n) for n in ((high - low) / (BLOCK * voxel)).ceil().long() + 1)
     what = f"a mesh of {BLOCK * x} x {BLOCK * y} x {BLOCK * z} voxels"
     require_memory(5 * 4 * x * y * z * BLOCK**3, what, "choose a larger voxel")

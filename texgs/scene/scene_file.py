@@ -44,11 +44,7 @@ def read_scene(path: str | Path) -> Scene:
 
 
 def read_values(path: Path) -> Any:
-    """The plain values of a YAML file.
-
-    Raises:
-        ArgumentError: if it is missing or no YAML.
-    """
+    """The plain values of a YAML file."""
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; texgs compose writes one")
     with reading(path, "a scene in YAML", "correct it"):
@@ -66,9 +62,6 @@ def scene_of(values: Any, folder: Path) -> Scene:
     Args:
         values: as `read_values` returns them.
         folder: that files are relative to.
-
-    Raises:
-        ArgumentError: naming the key that is not as it should be.
     """
     known(values, KEYS, "the scene")
     if values.get("texgs-scene") != VERSION:

@@ -30,10 +30,6 @@ def write_segment(
         model: of any stage, that the mask belongs to.
         mask: [N] bool.
         metadata: JSON, such as the clicks that it came from.
-
-    Raises:
-        ArgumentError, ShapeError: if the mask is not one of this model or empty, metadata is no JSON, or the
-            file cannot be written.
     """
     check.shape("mask", mask, "N", N=len(model))
     if mask.dtype != torch.bool or not bool(mask.any()):
@@ -46,11 +42,7 @@ def write_segment(
 
 
 def read_segment(path: str | Path, model: Surfels) -> Tensor:
-    """The mask [N] bool of a segment, on the model's device.
-
-    Raises:
-        ArgumentError: if the file is missing, of another kind, or of another model.
-    """
+    """The mask [N] bool of a segment, on the model's device."""
     tensors = _read(Path(path))
     mask, anchors, expected = tensors["mask"], tensors["anchors"], _anchors(model)
     # A model without surfels has no places; segments of it are empty, and refused when they are written.

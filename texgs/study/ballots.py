@@ -60,11 +60,7 @@ def votes_beside(key: str | Path) -> Votes | None:
 
 
 def read_ballot(study: Study, path: Path) -> Ballot:
-    """Read one ballot.
-
-    Raises:
-        ArgumentError: if it is none, or not a complete one of this study.
-    """
+    """Read one ballot."""
     rows = rows_of(path)
     expected = {
         "study": (study.study, "count it with the key of its study"),
@@ -95,11 +91,7 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    """The lines of a ballot by column, at least one.
-
-    Raises:
-        ArgumentError: if the file has other columns.
-    """
+    """The lines of a ballot by column, at least one."""
     with reading(path, WHAT, ADVICE):
         if path.stat().st_size > LARGEST:
             raise ArgumentError(f"{path}: expected {WHAT} of at most {LARGEST} bytes; is it another file?")
@@ -111,11 +103,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def ranks_of(where: str, question: Question, given: Mapping[str, str]) -> list[int]:
-    """The rank of each option of a question.
-
-    Raises:
-        ArgumentError: if an option is unknown, or each rank is not given once.
-    """
+    """The rank of each option of a question."""
     for letter in given:
         if letter not in tuple(question.letters):
             raise ArgumentError(

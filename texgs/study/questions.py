@@ -138,11 +138,7 @@ def question_of(
 
 
 def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) -> Path:
-    """The scene before the edits: of the fits that are closest to their test views.
-
-    Raises:
-        ArgumentError: if none of the fits has a scene.
-    """
+    """The scene before the edits: of the fits that are closest to their test views."""
     scenes = {
         fit_of(record): record.path.with_name("scene.yaml")
         for record in of(SceneResult, records)

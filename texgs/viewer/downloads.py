@@ -46,10 +46,6 @@ class Downloads:
             asked: what to write.
             name: of the file, without its ending.
             watch: of the job.
-
-        Raises:
-            Stopped: if it had to stop.
-            TexgsError: if the scene cannot be written so.
         """
         return await self._jobs.run(partial(self._write, scene, asked, name), watch)
 
@@ -85,11 +81,7 @@ def exports_of(kind: Kind) -> list[str]:
 
 
 def require_kind(scene: Scene, kind: str) -> None:
-    """Require that a scene can be written as something.
-
-    Raises:
-        ArgumentError: naming what it can be written as.
-    """
+    """Require that a scene can be written as something."""
     able = exports_of(kind_of(next(iter(scene.models.values())).file))
     if kind not in able:
         raise ArgumentError(f"export: expected one of {', '.join(able)}, got {kind!r:.100}")

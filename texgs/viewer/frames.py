@@ -61,29 +61,17 @@ class Frames:
         self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))
 
     async def frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
-        """A header and a JPEG picture, see `packed`.
-
-        Raises:
-            TexgsError: if the scene cannot be rendered.
-        """
+        """A header and a JPEG picture, see `packed`."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._frame, view, scene, pace)
 
     async def still(self, view: View, scene: Scene) -> bytes:
-        """A PNG file with the pixels that `texgs render` writes.
-
-        Raises:
-            TexgsError: if the scene cannot be rendered.
-        """
+        """A PNG file with the pixels that `texgs render` writes."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._still, view, scene)
 
     def pixels(self, view: View, scene: Scene, scale: float = 1.0) -> np.ndarray:
-        """What a view shows [H, W, 3], uint8, with sides of this part of the pixels.
-
-        Raises:
-            TexgsError: if the scene cannot be rendered.
-        """
+        """What a view shows [H, W, 3], uint8, with sides of this part of the pixels."""
         if view.mode == "truth" or view.mode == "difference":
             return self._origins.frame(view, scene, scale)
         return self._session.frame(view.camera.camera(scale), view.mode, scene)

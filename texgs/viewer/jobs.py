@@ -46,9 +46,6 @@ class Jobs:
         Args:
             work: to do in the thread.
             watch: is told in this thread about the loops in it; see `texgs.core.progress`.
-
-        Raises:
-            Stopped: if it had to stop.
         """
         loop = asyncio.get_running_loop()
 

@@ -65,11 +65,7 @@ class Looks:
         self._recent = Recent(Path(self._folder.name))
 
     def edit_of(self, asked: Look) -> Any:
-        """The edit, as conf/edit has it, with a recipe whose weights are on this machine.
-
-        Raises:
-            ArgumentError: if there is no such picture, or the instruction is none that can be followed.
-        """
+        """The edit, as conf/edit has it, with a recipe whose weights are on this machine."""
         if bool(asked.style) == bool(asked.instruction):
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
         if asked.style:
@@ -100,10 +96,6 @@ class Looks:
             output: folder.
             watch: of the job.
             show: is called in the job's thread with a part and the file of its texture on its way.
-
-        Raises:
-            Stopped: if it had to stop; the folder is not there then.
-            TexgsError: if a part cannot have a look.
         """
         return await self._jobs.run(partial(self._make, scene, edit, output, show), watch)
 

@@ -178,11 +178,7 @@ VIEWS = TypeAdapter(View)
 
 
 def parse(text: str | bytes, adapter: TypeAdapter[Any] = MESSAGES) -> Any:
-    """Return the message that a text holds.
-
-    Raises:
-        ArgumentError: naming the first key that is not as it should be.
-    """
+    """Return the message that a text holds."""
     try:
         return adapter.validate_json(text)
     except ValidationError as error:

@@ -53,11 +53,7 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
 
 
 def only_scene(folder: Path) -> Path:
-    """The scene file in a folder or below.
-
-    Raises:
-        ArgumentError: if there is none, or several.
-    """
+    """The scene file in a folder or below."""
     files = sorted(folder.rglob(SCENE))
     if len(files) != 1:
         some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])

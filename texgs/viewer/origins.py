@@ -46,11 +46,7 @@ class Origin:
 
     @cached_property
     def images(self) -> list[Image]:
-        """Its training views.
-
-        Raises:
-            ArgumentError: if they are damaged.
-        """
+        """Its training views."""
         return read_views(self.file.parent).train
 
     @cached_property
@@ -97,9 +93,6 @@ class Origins:
 
         Returns:
             [H, W, 3] uint8, the view in the middle.
-
-        Raises:
-            ArgumentError: if several models are visible, or there are no views of the one that is.
         """
         camera = view.camera.camera(scale)
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]

@@ -26,9 +26,6 @@ def pack(path: Path, composition: Composition) -> str:
     Args:
         path: of the page, for messages.
         composition: of the scene.
-
-    Raises:
-        ArgumentError: if a texel is farther from the palette than a page can hold.
     """
     from safetensors.numpy import save
 
@@ -48,11 +45,7 @@ def pack(path: Path, composition: Composition) -> str:
 
 
 def require_range(path: Path, texels: Tensor) -> None:
-    """Require texels [T, 3] that 16 bits hold.
-
-    Raises:
-        ArgumentError: naming the file and the largest of them.
-    """
+    """Require texels [T, 3] that 16 bits hold."""
     largest = float(texels.abs().max()) if len(texels) else 0.0
     if largest > MOST_STEPS * STEP:
         raise ArgumentError(

@@ -116,11 +116,7 @@ class Page:
             await self._send_frame(view)
 
     def shown(self, view: View) -> Scene:
-        """What a view shows on this page.
-
-        Raises:
-            ArgumentError: if there is no such model.
-        """
+        """What a view shows on this page."""
         return self._edits.shown(view, self._trial)
 
     def _tell_newest(self, message: dict[str, Any]) -> None:

@@ -49,11 +49,7 @@ class Segmenter:
         self._opened: tuple[list[object], Surfels] | None = None  # states of its files
 
     async def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
-        """The mask of a view as a message with a PNG picture, which is transparent elsewhere.
-
-        Raises:
-            TexgsError: if a click is beside the model, or there is no such model.
-        """
+        """The mask of a view as a message with a PNG picture, which is transparent elsewhere."""
         return await self._jobs.run(partial(self._mask, scene, asked), Watch())
 
     async def lift(self, scene: Scene, asked: Segment, watch: Watch) -> Lifted:
@@ -63,10 +59,6 @@ class Segmenter:
             scene: whose light is in all views.
             asked: a new name, and the clicks.
             watch: of the job.
-
-        Raises:
-            Stopped: if it had to stop.
-            TexgsError: as `lift`.
         """
         return await self._jobs.run(partial(self._lift, scene, asked), watch)
 
@@ -118,11 +110,7 @@ class Segmenter:
 
 
 def alone(scene: Scene, name: str) -> Scene:
-    """The scene with one of its models, as it is clicked on: with its textures and no other edit.
-
-    Raises:
-        ArgumentError: if there is no such model.
-    """
+    """The scene with one of its models, as it is clicked on: with its textures and no other edit."""
     entry_of(scene, name)
     models = {}
     for each, entry in scene.models.items():

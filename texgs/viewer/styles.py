@@ -35,9 +35,6 @@ class Styles:
         Args:
             name: that its author gave it, with an ending.
             content: of the file.
-
-        Raises:
-            ArgumentError: if it is no picture that a style can be taken from, or there are too many.
         """
         with self._adding:
             return self._add(name, content)
@@ -57,11 +54,7 @@ class Styles:
         return known
 
     def source(self, name: str) -> str:
-        """What `edit.image.style` is for a picture.
-
-        Raises:
-            ArgumentError: if there is none of that name.
-        """
+        """What `edit.image.style` is for a picture."""
         if name not in PICTURES and name not in self._files:
             raise ArgumentError(f"style: expected one of {', '.join(PICTURES)}, or a file; got {name!r:.100}")
         return str(self._files.get(name, name))
@@ -73,11 +66,7 @@ class Styles:
 
 @lru_cache
 def thumbnail(name: str) -> bytes:
-    """A small view of a picture that texgs paints, as JPEG.
-
-    Raises:
-        ArgumentError: if there is none of that name.
-    """
+    """A small view of a picture that texgs paints, as JPEG."""
     pixels = picture(name, 4 * THUMBNAIL).permute(1, 2, 0).numpy()
     file = io.BytesIO()
     shown = Image.fromarray((255 * pixels).round().astype(np.uint8)).resize((THUMBNAIL, THUMBNAIL))

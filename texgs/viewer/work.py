@@ -59,11 +59,7 @@ class Work:
         self._stop = threading.Event()
 
     def begin_segment(self, asked: Segment, page: Page) -> None:
-        """Begin to make a segment.
-
-        Raises:
-            ArgumentError: if a job is at work, or the segment cannot have this name.
-        """
+        """Begin to make a segment."""
         require_new(self._edits.scene, asked.part)
         name = split(self._edits.scene, asked.part)[1]
         require_name(name, "segment")
@@ -71,23 +67,14 @@ class Work:
         self._begin(page, partial(self._segment, asked, page))
 
     async def begin_look(self, asked: Look, page: Page) -> None:
-        """Begin to make a new look, or a preview of one; its picture and the weights are looked at first.
-
-        Raises:
-            ArgumentError: if a job is at work, there is no such part or picture, or the instruction is none
-                that can be followed.
-        """
+        """Begin to make a new look, or a preview of one; its picture and the weights are looked at first."""
         for part in asked.parts:
             entry_of(self._edits.scene, part)
         edit = await asyncio.to_thread(self._looks.edit_of, asked)
         self._begin(page, partial(self._look, asked, edit, page))
 
     def begin_export(self, asked: Export, page: Page) -> None:
-        """Begin to write a file.
-
-        Raises:
-            ArgumentError: if a job is at work, or there is no such kind of file.
-        """
+        """Begin to write a file."""
         require_kind(self._edits.scene, asked.kind)
         self._begin(page, partial(self._export, asked, page))
 

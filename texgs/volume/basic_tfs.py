@@ -18,9 +18,6 @@ def split(tf: TransferFunction, ranges: Sequence[tuple[float, float]]) -> list[T
     Args:
         tf: the whole.
         ranges: (low, high) per basic function, in data units; they may touch but not overlap.
-
-    Raises:
-        ArgumentError: naming a range that is empty, overlaps another, or in which all is transparent.
     """
     for i, range_ in enumerate(ranges):
         check_range(f"ranges[{i}]", range_)

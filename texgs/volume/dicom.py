@@ -41,10 +41,6 @@ def read_dicom(folder: Path, series: str | None) -> tuple[dict[str, Any], np.nda
     Args:
         folder: with a file for each slice.
         series: number or UID of one of several.
-
-    Raises:
-        ArgumentError: if there is no such series, or its slices are no lattice.
-        OutOfMemoryError: if the samples do not fit into memory.
     """
     sitk.ProcessObject.GlobalWarningDisplayOff()
     try:
@@ -115,11 +111,7 @@ def slice_of(path: Path) -> Slice:
 
 
 def slice_distance(slices: list[Slice]) -> float:
-    """Return the distance from slice to slice, in mm, of a series in the order of its places.
-
-    Raises:
-        ArgumentError: if a slice is unlike the first, missing, there twice, or not behind the one before.
-    """
+    """Return the distance from slice to slice, in mm, of a series in the order of its places."""
     first = slices[0]
     if len(slices) < 2:
         raise ArgumentError("expected at least 2 slices, got 1")

@@ -41,10 +41,6 @@ def open_foreign(
         spacing: replaces that of the result.
         origin: replaces that of the result.
         series: of several in a folder, its number or UID.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is damaged, or holds something else than a scalar volume.
-        OutOfMemoryError: if its samples do not fit into memory.
     """
     suffix = path.suffix.lower()
     what = "a folder of DICOM slices" if path.is_dir() else f"a {suffix} file"

@@ -70,11 +70,7 @@ def image_of(
 
 
 def complain(printed: str) -> None:
-    """Raise what a library has printed instead of raising it.
-
-    Raises:
-        ArgumentError: with the first line that is about more than a doubt.
-    """
+    """Raise what a library has printed instead of raising it."""
     for line in printed.splitlines():
         if COMPLAINT.search(line) and "warning" not in line.lower():
             raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")

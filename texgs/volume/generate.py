@@ -60,9 +60,6 @@ def orbital(size: int, n: int = 4, degree: int = 3, order: int = 0) -> Grid:
         n: principal quantum number.
         degree: quantum number l.
         order: quantum number m.
-
-    Raises:
-        ArgumentError: if `size` is too small, or there is no such orbital.
     """
     _check_size(size)
     return _grid(torch.from_numpy(0.5 + 0.5 * orbital_cube(size, n, degree, order)))
@@ -79,9 +76,6 @@ def turbulence(size: int, seed: int = 0, duration: float = 1.5, viscosity: float
         seed: of the initial motion.
         duration: simulated time; an eddy turns over in about 1. Tubes have formed by 1, then they decay.
         viscosity: kinematic, for a box 2 pi wide and an initial speed of 1 (root mean square, per axis).
-
-    Raises:
-        ArgumentError: if an argument is out of range.
     """
     _check_size(size)
     if not (duration >= 0 and viscosity > 0):
@@ -108,9 +102,6 @@ def jets(size: int, seed: int = 0) -> Grid:
     Args:
         size: samples along each side, at least 16.
         seed: of the disturbance that breaks the jets.
-
-    Raises:
-        ArgumentError: if `size` is too small.
     """
     _check_size(size)
     n_frames, speed = 48, 0.5  # snapshots; speed at which the shear layers rise

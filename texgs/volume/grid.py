@@ -49,11 +49,7 @@ class Grid:
 
 
 def dims_of(shape: tuple[int, ...]) -> Dims:
-    """Dims (x, y, z) of an array [Z, Y, X].
-
-    Raises:
-        ShapeError: if the array has other than three axes.
-    """
+    """Dims (x, y, z) of an array [Z, Y, X]."""
     if len(shape) != 3:
         components = f", {shape[-1]} components per sample?" if shape and shape[-1] in (2, 3, 4) else ""
         raise ShapeError(f"expected a scalar field [Z, Y, X], got the shape {list(shape)}{components}")
@@ -62,11 +58,7 @@ def dims_of(shape: tuple[int, ...]) -> Dims:
 
 
 def check_lattice(dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
-    """Check what a lattice needs to be rendered: three axes with an extent, and real numbers.
-
-    Raises:
-        ArgumentError: naming what is wrong.
-    """
+    """Check what a lattice needs to be rendered: three axes with an extent, and real numbers."""
     if len(dims) != 3 or not all(size >= 2 for size in dims):
         raise ArgumentError(f"dims: expected at least 2 samples along x, y and z, got {list(dims)}")
     if dtype.kind not in "biuf":
@@ -92,9 +84,6 @@ def require_room(dims: Dims, dtype: np.dtype, beside: int = 0) -> None:
         dims: samples along x, y, z.
         dtype: of a sample.
         beside: bytes that reading takes besides.
-
-    Raises:
-        OutOfMemoryError: naming the size that the header claims.
     """
     what = f"{' x '.join(map(str, dims))} samples of {dtype.name}"
     require_memory(

@@ -28,11 +28,7 @@ class StoredSamples(NamedTuple):
 
 
 def read_fields(path: Path) -> tuple[dict[str, str], int]:
-    """Read the fields of a header, and its length in bytes; names are in lower case and without spaces.
-
-    Raises:
-        ArgumentError: if the file has no such header.
-    """
+    """Read the fields of a header, and its length in bytes; names are in lower case and without spaces."""
     is_nrrd = path.suffix.lower() in NRRD
     with path.open("rb") as file:
         head = BytesIO(file.read(LONGEST_HEADER))
@@ -66,11 +62,7 @@ def samples_of(header: Path) -> Path | None:
 
 
 def stored_samples(path: Path) -> StoredSamples | None:
-    """Find the samples of a header; None where they are text of MetaImage.
-
-    Raises:
-        ArgumentError: if the header is damaged, or the file that it names is not there.
-    """
+    """Find the samples of a header; None where they are text of MetaImage."""
     fields, end = read_fields(path)
     samples = _file_of(path, fields)
     if not samples.is_file():

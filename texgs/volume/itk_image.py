@@ -27,12 +27,7 @@ SOURCE_LINE = re.compile(r"^.*?(?:sitk::ERROR|ITK ERROR|itk::ERROR): (?:\w+\(0x[
 
 
 def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarray | None]:
-    """Read the lattice in the file's own space, and samples [Z, Y, X] unless only the header is asked for.
-
-    Raises:
-        ArgumentError: if ITK cannot read the file, or it holds something else than a scalar volume.
-        OutOfMemoryError: if the samples do not fit into memory.
-    """
+    """Read the lattice in the file's own space, and samples [Z, Y, X] unless only the header is asked for."""
     sitk.ProcessObject.GlobalWarningDisplayOff()
     reader = sitk.ImageFileReader()
     reader.SetFileName(str(path))
@@ -60,11 +55,7 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
 def require_volume(
     sizes: list[int], pixel_id: int, n_components: int
 ) -> tuple[tuple[int, int, int], np.dtype]:
-    """Require three axes of scalar samples, and return dims and sample type.
-
-    Raises:
-        ArgumentError: if there are other axes or components, or samples are no real numbers.
-    """
+    """Require three axes of scalar samples, and return dims and sample type."""
     if n_components != 1:
         raise ArgumentError(f"expected a scalar volume, got {n_components} components per sample")
     if len(sizes) != 3:

@@ -14,11 +14,7 @@ from texgs.volume.slabs import ArraySource
 
 
 def open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> ArraySource:
-    """Open a NIfTI image, its axes permuted and flipped to the closest R, A, S; mapped if uncompressed.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is damaged or no scalar volume.
-    """
+    """Open a NIfTI image, its axes permuted and flipped to the closest R, A, S; mapped if uncompressed."""
     import nibabel
     from nibabel.imageglobals import LoggingOutputSuppressor
 

@@ -80,11 +80,7 @@ def through_osmesa() -> str:
 
 
 def probe() -> str:
-    """What answers: VTK where it is installed, else EGL, else OSMesa.
-
-    Raises:
-        OSError: if nothing does.
-    """
+    """What answers: VTK where it is installed, else EGL, else OSMesa."""
     if importlib.util.find_spec("vtkmodules"):
         return through_vtk()
     if sys.platform != "linux":

@@ -28,9 +28,6 @@ def orbital_cube(size: int, n: int, degree: int, order: int) -> Array:
 
     Returns:
         [size, size, size] (z, y, x), divided by the largest amplitude anywhere: between -1 and 1.
-
-    Raises:
-        ArgumentError: if there is no such orbital.
     """
     if not 0 <= abs(order) <= degree < n:
         raise ArgumentError(

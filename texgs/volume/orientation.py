@@ -24,11 +24,7 @@ UPRIGHT: dict[str, AxisPermutation] = {
 
 
 def upright(up: str) -> AxisPermutation:
-    """Return the permutation that makes the volume's axis `up` the world's +y.
-
-    Raises:
-        ArgumentError: if `up` is no axis.
-    """
+    """Return the permutation that makes the volume's axis `up` the world's +y."""
     if up not in UPRIGHT:
         raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up!r}")
     return UPRIGHT[up]

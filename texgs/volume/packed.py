@@ -25,10 +25,6 @@ def unpacked(stored: StoredSamples, dims: Dims, dtype: np.dtype) -> np.ndarray:
         stored: where and how they are.
         dims: samples along x, y, z.
         dtype: sample type with byte order.
-
-    Raises:
-        ArgumentError: if there are fewer or more.
-        OutOfMemoryError: if they do not fit into memory.
     """
     if stored.encoding == "text":
         return _from_text(stored, dims, dtype)

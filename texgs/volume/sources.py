@@ -124,11 +124,7 @@ def open_raw(
     spacing: Triple | None,
     origin: Triple | None,
 ) -> RawSource:
-    """Open plain samples; the file's size must fit exactly, the only check there is.
-
-    Raises:
-        ArgumentError: if something is missing or does not fit the file.
-    """
+    """Open plain samples; the file's size must fit exactly, the only check there is."""
     if dims is None or dtype is None:
         missing = " and ".join(key for key, value in (("dims", dims), ("dtype", dtype)) if value is None)
         raise ArgumentError(f"plain samples have no header; set {missing}, and endian and skip where needed")
@@ -156,11 +152,7 @@ def open_raw(
 
 
 def open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
-    """Open a NumPy array [Z, Y, X].
-
-    Raises:
-        ArgumentError, ShapeError: if the file is damaged or no scalar volume.
-    """
+    """Open a NumPy array [Z, Y, X]."""
     with reading_as("a .npy file"):
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(values, np.memmap):

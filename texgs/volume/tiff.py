@@ -75,9 +75,6 @@ def open_tiff(path: Path, spacing: Triple | None, origin: Triple | None) -> Sour
     """Open a TIFF file with a page per z slice, or a folder of single TIFFs in natural order.
 
     TIFF says nothing dependable about the lattice: spacing is 1 unless given.
-
-    Raises:
-        ArgumentError, ShapeError: if a file is damaged or there is no scalar volume.
     """
     lattice = (spacing or (1.0, 1.0, 1.0), origin or (0.0, 0.0, 0.0))
     return _open_folder(path, *lattice) if path.is_dir() else _open_file(path, *lattice)

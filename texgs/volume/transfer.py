@@ -139,11 +139,7 @@ class TransferFunction:
 
 
 def check_range(name: str, range_: tuple[float, float]) -> None:
-    """Require a range that is not empty, with finite ends.
-
-    Raises:
-        ArgumentError: naming it.
-    """
+    """Require a range that is not empty, with finite ends."""
     low, high = range_
     if not (-MAXIMUM <= low < high <= MAXIMUM):
         raise ArgumentError(f"{name}: expected low < high, both finite, got {row_text(range_)}")

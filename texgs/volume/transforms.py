@@ -29,9 +29,6 @@ def world_to_camera(where: str, matrix: Any) -> Tensor:
     Args:
         where: file and frame, for messages.
         matrix: four rows of four numbers; the last row is taken as 0 0 0 1.
-
-    Raises:
-        ArgumentError: if the matrix is no rotation and position.
     """
     try:
         rigid = torch.tensor(matrix, dtype=torch.float64)
@@ -72,9 +69,6 @@ def lens_matrix(where: str, values: Mapping[str, Any], width: int, height: int) 
 
     Focal lengths default to `camera_angle_x` (horizontal, radians) and square pixels, the principal point
     to the middle.
-
-    Raises:
-        ArgumentError: if there is neither `fl_x` nor `camera_angle_x`, or a value is out of range.
     """
     if "fl_x" in values:
         focal_x = number(where, values, "fl_x")
@@ -91,11 +85,7 @@ def lens_matrix(where: str, values: Mapping[str, Any], width: int, height: int) 
 
 
 def number(where: str, values: Mapping[str, Any], key: str, default: float | None = None) -> float:
-    """The finite number at `key`.
-
-    Raises:
-        ArgumentError: if it is missing and there is no default, or is something else.
-    """
+    """The finite number at `key`."""
     value = values.get(key, default)
     if value is None:
         raise ArgumentError(f"{where}: expected the key {key}, found {', '.join(values) or 'no keys'}")

@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 
 
 def aim(target: vtkCamera, camera: Camera) -> None:
-    """Give a VTK camera the place, direction and lens of a `Camera`.
-
-    Raises:
-        ArgumentError: if the pixels are not square or the principal point is not in the middle.
-    """
+    """Give a VTK camera the place, direction and lens of a `Camera`."""
     K, viewmat = camera.K.double().cpu().numpy(), camera.viewmat.double().cpu().numpy()
     centre = (0.5 * camera.width, 0.5 * camera.height)
     if not np.allclose(K[0, 0], K[1, 1], rtol=1e-5) or not np.allclose(K[:2, 2], centre, atol=1e-3):

@@ -15,12 +15,7 @@ from texgs.volume.grid import dims_of, require_room
 
 
 def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
-    """Read lattice and samples [Z, Y, X]: the scalars, or else the first point array.
-
-    Raises:
-        ArgumentError: if the file is damaged, or holds another kind of data set or no scalar field.
-        OutOfMemoryError: if the samples do not fit into memory.
-    """
+    """Read lattice and samples [Z, Y, X]: the scalars, or else the first point array."""
     window = vtkStringOutputWindow()
     vtkOutputWindow.SetInstance(window)
     vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)

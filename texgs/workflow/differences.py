@@ -94,9 +94,6 @@ def differences(
         recipes: of fits, files of conf/fit.
         edits: files of conf/edit.
         views: numbers of "training views" and "test views", each with the data sets that have so many.
-
-    Raises:
-        ConfigError: if a file cannot be composed.
     """
     names: dict[tuple[str, str], list[str]] = defaultdict(list)  # by key and value here
     for group, given in (("fit", recipes), ("edit", edits)):

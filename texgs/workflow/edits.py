@@ -13,11 +13,7 @@ OF_ONE = ("edit.name=", "edit.method=", "edit.base=", "edit.parts=")  # not of w
 
 
 def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """The words of each edit of the experiment, those that it starts from before it; none without edits.
-
-    Raises:
-        ConfigError: if an edit is named twice, has no file, or starts from itself in the end.
-    """
+    """The words of each edit of the experiment, those that it starts from before it; none without edits."""
     config = compose(words)
     repeated = [name for name in config.edits if config.edits.count(name) > 1]
     if repeated:
@@ -36,9 +32,6 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
     """Name and words of an edit and of all that it starts from, the first one first.
 
     Changed values hold for all of them, but for the name, the kind, the base and the parts.
-
-    Raises:
-        ConfigError: if it starts from itself or from what is not there, or changes a part that is not there.
     """
     chain: list[tuple[str, tuple[str, ...]]] = []
     following: tuple[str, ...] | None = words
@@ -54,11 +47,7 @@ def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
 
 
 def is_made(words: tuple[str, ...]) -> bool:
-    """Whether an edit starts from a scene that is there already, and not from another edit of conf/edit.
-
-    Raises:
-        ConfigError: if it starts from neither.
-    """
+    """Whether an edit starts from a scene that is there already, and not from another edit of conf/edit."""
     config = compose(words)
     base, known = config.edit.base, members("edit")
     if is_scene_file(base):
@@ -74,11 +63,7 @@ def is_made(words: tuple[str, ...]) -> bool:
 
 
 def require_parts(chain: list[tuple[str, tuple[str, ...]]]) -> None:
-    """Require of edits, each of which starts from the one before it, that the parts they change are there.
-
-    Raises:
-        ConfigError: naming the part that will not be.
-    """
+    """Require of edits, each of which starts from the one before it, that the parts they change are there."""
     first = compose(chain[0][1])
     if first.edit.base is not None:  # a scene that is there already, and says so at once
         return

@@ -136,11 +136,7 @@ def add_part(words: Words, aimed: Mapping[str, Words], selection: Selection) -> 
 
 
 def joined(aimed: Mapping[str, Sequence[str]], later: Mapping[str, Sequence[str]]) -> dict[str, Words]:
-    """The words that are aimed at each data set, first those of an experiment.
-
-    Raises:
-        ConfigError: if the experiment names a data set that there is not.
-    """
+    """The words that are aimed at each data set, first those of an experiment."""
     known = members("dataset")
     if unknown := [name for name in aimed if name not in known]:
         raise ConfigError(f"aimed: expected names of data sets, got {unknown[0]}{close(unknown[0], known)}")
@@ -148,11 +144,7 @@ def joined(aimed: Mapping[str, Sequence[str]], later: Mapping[str, Sequence[str]
 
 
 def parts(words: Words, base: DictConfig) -> list[Words]:
-    """The words of each experiment of a union, or the words as they are.
-
-    Raises:
-        ConfigError: if the union sets more than its experiments, or no experiment has the data sets named.
-    """
+    """The words of each experiment of a union, or the words as they are."""
     if not base.experiments:
         return [words]
     rest = without(words, "experiment", "experiments")
@@ -178,11 +170,7 @@ def parts(words: Words, base: DictConfig) -> list[Words]:
 
 
 def require_union(union: DictConfig, plain: DictConfig) -> None:
-    """Require of an experiment of experiments that it says nothing else: it would hold for none of them.
-
-    Raises:
-        ConfigError: naming the key.
-    """
+    """Require of an experiment of experiments that it says nothing else: it would hold for none of them."""
     for key in (each.name for each in fields(Config)):
         if key not in OF_A_UNION and union[key] != plain[key]:
             raise ConfigError(

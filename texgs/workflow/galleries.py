@@ -66,9 +66,6 @@ def places_of(config: DictConfig) -> list[tuple[GridKeys, list[list[Place]]]]:
     """The grids of a gallery, each with the places of its rows; rows and columns without any are left out.
 
     Cached, because a large one takes a second, and its inputs and its settings need them.
-
-    Raises:
-        ConfigError: naming what is not there, or has another form.
     """
     return _places_of(Same(config))
 
@@ -118,11 +115,7 @@ def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
 
 
 def place_of(config: DictConfig, shot: ShotKeys, where: str) -> Place:
-    """A place with the file of its scene.
-
-    Raises:
-        ConfigError: for an edit, a recipe, a variant or a part that is not there, or other than two angles.
-    """
+    """A place with the file of its scene."""
     for name, count in NUMBERS.items():
         given = getattr(shot, name)
         if given and (len(given) != count or (name == "box" and not is_inside(given))):
@@ -143,11 +136,7 @@ def is_inside(box: Sequence[float]) -> bool:
 
 
 def all_looks(config: DictConfig) -> GridKeys:
-    """The scene as fitted and all scenes of the experiment with a new look, in two views.
-
-    Raises:
-        ConfigError: if there are no edits.
-    """
+    """The scene as fitted and all scenes of the experiment with a new look, in two views."""
     if not config.edits:
         raise ConfigError("edits: expected some to show, such as edits=[glass,gold], got none")
     columns = [ShotKeys("volume", show="volume"), ShotKeys("as fitted")]

@@ -17,11 +17,7 @@ ANYWHERE = ("background", "light")  # changes of the whole scene
 
 
 def fit_of(config: DictConfig, shot: ShotKeys, where: str) -> DictConfig:
-    """The configuration of the fit whose scene is shown.
-
-    Raises:
-        ConfigError: for a recipe, a variant or an edit that the experiment has not.
-    """
+    """The configuration of the fit whose scene is shown."""
     of_fit = with_fit(config, recipe_of(config, shot, where))
     variants = list(swept(config))
     if (shot.variant or "") not in (variants or [""]):
@@ -39,11 +35,7 @@ def with_fit(config: DictConfig, name: str) -> DictConfig:
 
 
 def recipe_of(config: DictConfig, shot: ShotKeys, where: str) -> str:
-    """The recipe whose scene is shown.
-
-    Raises:
-        ConfigError: if it is none of the experiment, or the edit is none or does not work on any.
-    """
+    """The recipe whose scene is shown."""
     recipes = list(config.fits) or [config.fit.name]
     if shot.fit is not None and shot.fit not in recipes:
         raise ConfigError(
@@ -58,11 +50,7 @@ def recipe_of(config: DictConfig, shot: ShotKeys, where: str) -> str:
 
 
 def takers(config: DictConfig, edit: str, where: str) -> list[str]:
-    """The recipes of the experiment that an edit works on.
-
-    Raises:
-        ConfigError: if it is no edit of the experiment.
-    """
+    """The recipes of the experiment that an edit works on."""
     recipes = list(config.fits) or [config.fit.name]
     if edit == AS_FITTED:
         return recipes
@@ -87,11 +75,7 @@ def ancestry(name: str) -> list[DictConfig]:
 
 
 def check_changes(config: DictConfig, shot: ShotKeys, where: str) -> None:
-    """Require of changes that the parts are there which they change.
-
-    Raises:
-        ConfigError: naming the first one that is not.
-    """
+    """Require of changes that the parts are there which they change."""
     models = tf_names(config)
     parts = list(models)
     for edit in ancestry(shot.edit) if shot.edit not in (None, AS_FITTED) else ():

@@ -65,11 +65,7 @@ def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
 
 
 def all_models(config: DictConfig) -> dict[str, Path]:
-    """Return the models of all basic TFs after the last phase, by name.
-
-    Raises:
-        ConfigError: if one basic TF is chosen.
-    """
+    """Return the models of all basic TFs after the last phase, by name."""
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
     return {name: made("phase", config, last_phase(config), name) for name in tf_names(config)}
@@ -179,11 +175,7 @@ def _with_recipe(same: Any, name: str) -> DictConfig:
 
 
 def scene_before(config: DictConfig) -> Path:
-    """Return the scene.yaml that an edit starts from.
-
-    Raises:
-        MissingDataError: if it is a file that is not there.
-    """
+    """Return the scene.yaml that an edit starts from."""
     from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
 
     base = config.edit.base

@@ -60,9 +60,6 @@ def views_folder(config: DictConfig, tf: str | None = None) -> Path | None:
     """Folder of the views that a data set without volume starts from; None for one with a volume.
 
     By default that of `config.tf`.
-
-    Raises:
-        MissingDataError: if the folder has no views; says how to get them.
     """
     if config.dataset.views_folder is None:
         return None
@@ -77,11 +74,7 @@ def views_folder(config: DictConfig, tf: str | None = None) -> Path | None:
 
 
 def basic_tf(config: DictConfig) -> DictConfig:
-    """The basic TF that `config.tf` names.
-
-    Raises:
-        ConfigError: if the data set has none of that name.
-    """
+    """The basic TF that `config.tf` names."""
     known = config.dataset.basic_tfs
     if config.tf not in known:
         names = ", ".join(known) or "none"

@@ -10,12 +10,7 @@ CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by
 
 
 def looks_of(config: DictConfig) -> dict[str, str]:
-    """What each model of a scene follows; empty where all follow what the edit itself says.
-
-    Raises:
-        ConfigError: naming the basic TF that has no look; or if the method follows neither a picture nor an
-            instruction.
-    """
+    """What each model of a scene follows; empty where all follow what the edit itself says."""
     edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
     if not edit.looks:
         return {}

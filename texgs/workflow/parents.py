@@ -28,9 +28,6 @@ def begin(plan: Plan, words: tuple[str, ...]) -> dict[str, track.Run]:
     Args:
         plan: of the run.
         words: overrides of the configuration, which it was made of.
-
-    Raises:
-        ArgumentError, TrackingError: if the tracking store cannot be used.
     """
     place = Path(plan.results).absolute().as_posix()
     key = digest("\n".join([place, *words]))

@@ -87,11 +87,7 @@ class Plan:
 
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
-    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep.
-
-    Raises:
-        ConfigError: for a key that it has not, a value that cannot be split into words, or two sweeps.
-    """
+    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep."""
     from texgs.workflow.product import as_sweep
 
     if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
@@ -118,9 +114,6 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     Args:
         words: overrides of the configuration.
         is_job: whether this is a job of a run that has left its plan.
-
-    Raises:
-        ConfigError, ArgumentError: for a mistake in the configuration.
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
@@ -194,12 +187,7 @@ def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
 def add_jobs(
     configs: Iterable[DictConfig], checksums: Checksums, jobs: dict[str, Job], missing: list[str]
 ) -> list[str]:
-    """Add the jobs of some configurations to those by folder, and what is missing for some; their folders.
-
-    Raises:
-        ConfigError: if two different jobs have one folder, or a field is not fitted on the device.
-        ArgumentError: if settings of a fit do not fit each other.
-    """
+    """Add the jobs of some configurations to those by folder, and what is missing for some; their folders."""
     from texgs.workflow import stage_table as stages
     from texgs.workflow.fit_checks import check_fit
     from texgs.workflow.job import Job

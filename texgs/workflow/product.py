@@ -42,11 +42,7 @@ def as_sweep(words: tuple[str, ...]) -> tuple[str, ...]:
 
 @lru_cache(maxsize=64)
 def combinations(over: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
-    """The overrides of each combination of the values of some keys, by the values.
-
-    Raises:
-        ConfigError: if a key has not several values, or two combinations have one name.
-    """
+    """The overrides of each combination of the values of some keys, by the values."""
     overrides: dict[str, tuple[str, ...]] = {}
     for choice in product(*map(values, over)):
         name = "-".join(map(label, choice))
@@ -59,11 +55,7 @@ def combinations(over: tuple[str, ...]) -> Mapping[str, tuple[str, ...]]:
 
 
 def values(word: str) -> list[str]:
-    """The values that a word gives its key, in Hydra's syntax; 1e5 is 100000 where an integer is expected.
-
-    Raises:
-        ConfigError: if there are not several, or they cannot be listed.
-    """
+    """The values that a word gives its key, in Hydra's syntax; 1e5 is 100000 where an integer is expected."""
     override = parsed(word)
     if override is None or not (override.is_choice_sweep() or override.is_range_sweep()):
         raise ConfigError(

@@ -35,11 +35,7 @@ TIMES = "times.json"  # of single views; like METRICS it differs from one run to
 
 @contextmanager
 def alone(output: Path) -> Iterator[None]:
-    """Keep other processes out of a job's folder; where one works there, say so and wait for it to end.
-
-    Raises:
-        ArgumentError: if the folder above it cannot be written to.
-    """
+    """Keep other processes out of a job's folder; where one works there, say so and wait for it to end."""
     lock = FileLock(output.parent / f".{output.name}.lock")
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
@@ -63,9 +59,6 @@ def run_alone(results: str) -> FileLock:
 
     Returns:
         The lock, to be kept.
-
-    Raises:
-        ArgumentError: if another run works there.
     """
     lock = FileLock(Path(results, ".run.lock"))
     try:
@@ -91,9 +84,6 @@ def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> 
         output: folder of the result.
         identity: of the job.
         is_fresh: whether to begin from nothing; then the result stays in any case until it is replaced.
-
-    Raises:
-        ArgumentError: if the result's folder holds files that are not of texgs, or is no folder.
     """
     require_own(output)
     work = work_folder(output)
@@ -181,11 +171,7 @@ def is_complete(output: Path, checksums: Checksums) -> bool:
 
 
 def require_own(output: Path) -> None:
-    """Require a folder that is of texgs alone, so that nothing else is lost when it is replaced.
-
-    Raises:
-        ArgumentError: naming what else is there.
-    """
+    """Require a folder that is of texgs alone, so that nothing else is lost when it is replaced."""
     if output.is_symlink() or (output.exists() and not output.is_dir()):
         raise ArgumentError(f"{output}: expected a folder, got a link or a file; move it away")
     if not output.exists() or not any(output.iterdir()):
@@ -213,9 +199,6 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
 
     A file from elsewhere counts with its contents. A header counts with its samples as well, a folder with
     its slices, and the transforms_train.json of views from elsewhere with all images and points beside it.
-
-    Raises:
-        ArgumentError: if something cannot be read.
     """
     folder = path.parent
     made_files = recorded(folder)
@@ -237,11 +220,7 @@ def fingerprint(path: Path, checksums: Checksums) -> str:
 
 
 def require_intact(path: Path) -> None:
-    """Require of an input that the result it belongs to is as it was made; reads all of its files.
-
-    Raises:
-        ArgumentError: if a file is missing or damaged; the next run makes it again.
-    """
+    """Require of an input that the result it belongs to is as it was made; reads all of its files."""
     folder = path.parent
     if not (lost := damaged(folder, None)):
         return

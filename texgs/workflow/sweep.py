@@ -25,9 +25,6 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     """The words of each variant of the sweep with each seed; the given ones, where there is none.
 
     Variants that change the views have a folder of their own for them, unless they name one.
-
-    Raises:
-        ConfigError: if the sweep has no seed or edit, or a variant changes what must be the same for all.
     """
     config = compose(words)
     by_variant, sweep = changes(config), config.sweep
@@ -57,11 +54,7 @@ def own_views(config: DictConfig, name: str) -> tuple[str, ...]:
 
 
 def check_variant(name: str, listed: Sequence[str]) -> None:
-    """Require of a variant that it changes what may differ between variants.
-
-    Raises:
-        ConfigError: naming what may not.
-    """
+    """Require of a variant that it changes what may differ between variants."""
     if not name:
         raise ConfigError("sweep.variants: expected a name for each variant, got an empty one")
     for change in listed:
@@ -76,11 +69,7 @@ def check_variant(name: str, listed: Sequence[str]) -> None:
 
 
 def check_seeds(config: DictConfig) -> None:
-    """Require seeds, each once, and none that would not count.
-
-    Raises:
-        ConfigError: naming the key that has to change.
-    """
+    """Require seeds, each once, and none that would not count."""
     for key, listed in SEEDS.items():
         seeds, own = list(config.sweep[listed]), OmegaConf.select(config, key)
         if not seeds:
@@ -92,11 +81,7 @@ def check_seeds(config: DictConfig) -> None:
 
 
 def edits_of_sweep(config: DictConfig) -> tuple[str, ...]:
-    """The word with the edits of the sweep, where the experiment has none of its own.
-
-    Raises:
-        ConfigError: if the variants are of edits and there is none.
-    """
+    """The word with the edits of the sweep, where the experiment has none of its own."""
     if config.edits or config.edit.method != NO_METHOD:
         return ()
     if is_of_edits(config) and not config.sweep.edits:
@@ -108,11 +93,7 @@ def edits_of_sweep(config: DictConfig) -> tuple[str, ...]:
 
 
 def check_edits(words: tuple[str, ...]) -> None:
-    """Require of each edit of a sweep of edits alone that its variants differ.
-
-    Raises:
-        ConfigError: naming the edit and its method.
-    """
+    """Require of each edit of a sweep of edits alone that its variants differ."""
     config = compose(words)
     listed = [change for each in changes(config).values() for change in each]
     if len(config.sweep.edit_seeds) > 1 or not all(map(changes_edits, listed)):

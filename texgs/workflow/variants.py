@@ -13,11 +13,7 @@ OF_EDITS = "edit"
 
 
 def changes(config: DictConfig) -> Mapping[str, tuple[str, ...]]:
-    """The overrides of each variant of the sweep, by name; none without a sweep.
-
-    Raises:
-        ConfigError: if the sweep has no name, or nothing to compare.
-    """
+    """The overrides of each variant of the sweep, by name; none without a sweep."""
     sweep = config.sweep
     if sweep.over and sweep.variants:
         raise ConfigError("sweep.over: expected none beside sweep.variants; leave out one of the two")

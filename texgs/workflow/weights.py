@@ -56,11 +56,7 @@ def _short(name: str, checksums: Checksums) -> str | None:
 
 
 def require_same(recorded: Mapping[str, str | None]) -> None:
-    """Require that the weights on this machine are those of a job's settings.
-
-    Raises:
-        MissingDataError: naming the weights that came, went or changed since the job was planned.
-    """
+    """Require that the weights on this machine are those of a job's settings."""
     checksums = Checksums.load()
     for name, expected in recorded.items():
         if (present := _short(name, checksums)) != expected:

@@ -121,11 +121,7 @@ def style_of(settings: ImageKeys) -> StylePicture:
 
 
 def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
-    """The recipe of an edit, with what the configuration changes about it.
-
-    Raises:
-        ArgumentError: naming the value that is out of range.
-    """
+    """The recipe of an edit, with what the configuration changes about it."""
     from texgs.edit.recipe import preset
 
     changes: dict[str, Any] = {
@@ -151,11 +147,7 @@ def how(recipes: Sequence[Recipe], clip: str) -> str:
 
 
 def check(settings: ImageKeys) -> None:
-    """Require numbers that a recipe can have, and a picture.
-
-    Raises:
-        ArgumentError: naming what is not as it should be.
-    """
+    """Require numbers that a recipe can have, and a picture."""
     recipe_of(settings)
     style.check(settings, KEYS)
 

@@ -35,11 +35,7 @@ class InstructionKeys:
     )
 
     def opened(self, device: torch.device) -> Guidance:
-        """What edits the views.
-
-        Raises:
-            MissingDataError: if its weights are not on this machine.
-        """
+        """What edits the views."""
         from texgs.models.disagreement import Disagreeing
 
         editor = self._editor(device)
@@ -63,11 +59,7 @@ class InstructionKeys:
         )
 
     def check(self) -> None:
-        """Require an instruction that the guidance understands.
-
-        Raises:
-            ArgumentError: if there is none.
-        """
+        """Require an instruction that the guidance understands."""
         from texgs.models.filters.vocabulary import understand
         from texgs.models.instruction import require_instruction
 

@@ -16,11 +16,7 @@ def mask_weights(masks: str) -> dict[str, str]:
 
 
 def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
-    """Clicks as shares of the sides of a picture.
-
-    Raises:
-        ArgumentError: naming the key, if one is no place in the picture.
-    """
+    """Clicks as shares of the sides of a picture."""
     for point in points:
         is_pair = isinstance(point, list) and len(point) == 2
         if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):

@@ -98,11 +98,7 @@ def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
 
 
 def places_of(settings: SegmentKeys) -> list[list[float]]:
-    """The clicks, those beside the part last, as shares of the sides of the view.
-
-    Raises:
-        ArgumentError: if there is none on the part, one is outside of the view, or the view has no direction.
-    """
+    """The clicks, those beside the part last, as shares of the sides of the view."""
     places = shares("edit.segment.points", [*settings.points, *settings.others])
     if not settings.points:
         raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
@@ -112,11 +108,7 @@ def places_of(settings: SegmentKeys) -> list[list[float]]:
 
 
 def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
-    """Clicks in pixels of a view through a lens.
-
-    Raises:
-        ArgumentError: if one is no place in the view, or none is on the object.
-    """
+    """Clicks in pixels of a view through a lens."""
     import torch
 
     from texgs.core.camera import orbit
@@ -155,11 +147,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
 
 
 def check(settings: SegmentKeys) -> None:
-    """Require a name, clicks, and a number of views that an icosphere has.
-
-    Raises:
-        ArgumentError: naming what is not as it should be.
-    """
+    """Require a name, clicks, and a number of views that an icosphere has."""
     from texgs.volume.geodesic import frequency_of
 
     require_name(settings.name, "edit.segment.name")
@@ -173,11 +161,7 @@ def weights(settings: SegmentKeys) -> Mapping[str, str]:
 
 
 def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:
-    """The segment.
-
-    Raises:
-        ConfigError: if there is no such model, or none is named of several.
-    """
+    """The segment."""
     model = settings.model or (models[0] if len(models) == 1 else "")
     if model not in models:
         raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model or 'none'}")

@@ -174,9 +174,6 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
         name: or path.
         key: that it is the value of.
         find: returns the part that counts, see `read_style`; by default all.
-
-    Raises:
-        ArgumentError: if there is neither, or the file holds no picture that can be used.
     """
     from texgs.edit.pictures import PICTURES, picture
     from texgs.edit.style_picture import StylePicture, read_style
@@ -192,11 +189,7 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
 
 
 def check(settings: StyleKeys, where: str) -> None:
-    """Require a picture that is there, and clicks on it.
-
-    Raises:
-        ArgumentError: naming the key.
-    """
+    """Require a picture that is there, and clicks on it."""
     from texgs.edit.pictures import PICTURES
 
     if settings.style not in PICTURES:
@@ -205,11 +198,7 @@ def check(settings: StyleKeys, where: str) -> None:
 
 
 def style_of(settings: StyleKeys, where: str) -> StylePicture:
-    """The picture, of it the object that was clicked on.
-
-    Raises:
-        ArgumentError, MissingDataError: as `check`, or if weights are missing.
-    """
+    """The picture, of it the object that was clicked on."""
     import torch
 
     from texgs.models.by_name import mask_model

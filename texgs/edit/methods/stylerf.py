@@ -64,11 +64,7 @@ def recipe_of(settings: StyleRfKeys, views: int, seed: int = 0) -> Recipe:
 
 
 def check(settings: StyleRfKeys) -> None:
-    """Require pictures that are there.
-
-    Raises:
-        ArgumentError: naming the key.
-    """
+    """Require pictures that are there."""
     from texgs.edit.pictures import PICTURES
 
     LOOK.check(settings)
@@ -78,11 +74,7 @@ def check(settings: StyleRfKeys) -> None:
 
 
 def check_fit(settings: StyleRfKeys, fit: Any) -> None:
-    """Require a style for each palette colour of a fit.
-
-    Raises:
-        ArgumentError: naming both numbers.
-    """
+    """Require a style for each palette colour of a fit."""
     if settings.styles and len(settings.styles) != fit.palette.colors:
         raise ArgumentError(
             f"{STYLES}: expected one for each of {fit.palette.colors} palette colours of "

@@ -33,11 +33,7 @@ class UpdateKeys(InstructionKeys):
     lpips: float = key(0.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)
 
     def closeness(self, device: Any) -> Closeness:
-        """The loss on views.
-
-        Raises:
-            MissingDataError: if the weights of LPIPS are not on this machine.
-        """
+        """The loss on views."""
         from texgs.edit.closeness import Closeness
         from texgs.models.lpips import Lpips
         from texgs.models.precision import fast_dtype
@@ -136,11 +132,7 @@ def edit_by_updates(
 
 
 def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float], ...]:
-    """One range of noise for all rounds.
-
-    Raises:
-        ArgumentError: naming the key, if it is none.
-    """
+    """One range of noise for all rounds."""
     if len(noise) != 2 or not 0 <= noise[0] <= noise[1] <= 1:
         raise ArgumentError(f"{where}: expected two shares from 0 to 1, the smaller one first, got {noise}")
     return ((noise[0], noise[1]),)

@@ -26,9 +26,6 @@ def picture(name: str, size: int = SIZE) -> Tensor:
     Args:
         name: of PICTURES.
         size: pixels of each side, reduced or enlarged if it is not that of the file.
-
-    Raises:
-        ArgumentError: if there is none of that name.
     """
     import torch  # not at the top: a plan of edits asks for the names only
 

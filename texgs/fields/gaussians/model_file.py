@@ -31,10 +31,6 @@ def write_gaussians(path: str | Path, model: Gaussians) -> Path:
 
     Returns:
         The path.
-
-    Raises:
-        ArgumentError: if the model could not be read back (a tensor is not finite or of another type,
-            metadata is no JSON), or the file cannot be written.
     """
     _check(path, model)
     description = {
@@ -46,12 +42,7 @@ def write_gaussians(path: str | Path, model: Gaussians) -> Path:
 
 
 def read_gaussians(path: str | Path) -> Gaussians:
-    """Read a model file as `write_gaussians` writes it, bit for bit, to the CPU. Nothing in it is executed.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is missing, no safetensors, cut short, of another program or a
-            newer version, or a tensor is missing, unknown, not finite or of another type or shape.
-    """
+    """Read a file of `write_gaussians`, bit for bit, to the CPU; nothing in it is executed."""
     path = Path(path)
     description, tensors = read_tensor_file(path, FORMAT, VERSION)
     model = _model(path, description, tensors)
@@ -75,11 +66,7 @@ def _model(path: Path, description: Mapping[str, Any], tensors: Mapping[str, Ten
 
 
 def _check(path: str | Path, model: Gaussians) -> None:
-    """Require finite float32 values.
-
-    Raises:
-        ArgumentError: naming the file and the tensor.
-    """
+    """Require finite float32 values."""
     for name, tensor in model.parameters.items():
         if tensor.dtype != torch.float32:
             raise ArgumentError(f"{path}: {name}: expected torch.float32, got {tensor.dtype}; convert it")

@@ -35,12 +35,7 @@ def write_ply(path: str | Path, model: Gaussians) -> Path:
 
 
 def read_ply(path: str | Path) -> Gaussians:
-    """Read 3D Gaussians from a PLY file of 3DGS or of a program that writes such files.
-
-    Raises:
-        ArgumentError: if the file is missing, no PLY, cut short or without Gaussians, or values are not
-            finite.
-    """
+    """Read 3D Gaussians from a PLY file of 3DGS or of a program that writes such files."""
     vertices = read_vertices(path)
     try:
         parameters = {**take_geometry(vertices, 3), "sh": take_harmonics(vertices)}

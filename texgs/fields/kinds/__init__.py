@@ -79,11 +79,7 @@ def kinds() -> dict[str, Kind]:
 
 
 def require(kind: str, needs: Collection[str], what: str, only: Collection[str] = ()) -> None:
-    """Require of a kind of field that it is capable of something, or one of some kinds.
-
-    Raises:
-        ConfigError: naming what it cannot do.
-    """
+    """Require of a kind of field that it is capable of something, or one of some kinds."""
     if only and kind not in only:
         raise ConfigError(f"{what}: expected a fit of {' or '.join(sorted(only))}, got one of {kind}")
     if missing := sorted(set(needs) - kinds()[kind].can):

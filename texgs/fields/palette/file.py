@@ -31,9 +31,6 @@ def write_palette(path: str | Path, field: PaletteField) -> Path:
     Args:
         path: target.
         field: to write. Its metadata must be JSON.
-
-    Raises:
-        ArgumentError: if a value is not finite, metadata is no JSON, or the file cannot be written.
     """
     geometry = field.geometry
     networks = {name: x.detach().contiguous() for name, x in field.parameters.items()}
@@ -52,11 +49,7 @@ def write_palette(path: str | Path, field: PaletteField) -> Path:
 
 
 def read_palette(path: str | Path) -> PaletteField:
-    """Read a file of a palette field as `write_palette` writes it, bit for bit. Nothing in it is executed.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is missing, damaged, of another kind or a newer version.
-    """
+    """Read a file of a palette field as `write_palette` writes it, bit for bit. Nothing in it is executed."""
     path = Path(path)
     description, tensors = read_tensor_file(path, FORMAT, VERSION)
     try:
@@ -78,11 +71,7 @@ def _geometry(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> 
 
 
 def _check_networks(networks: Mapping[str, Tensor], levels: HashLevels) -> None:
-    """Require all networks, those of free colours perhaps, in the right shapes.
-
-    Raises:
-        ShapeError, ArgumentError: naming the one at fault.
-    """
+    """Require all networks, those of free colours perhaps, in the right shapes."""
     colors = check.shape("palette.colors", networks["palette.colors"], "P 3")["P"]
     absent = {"base"} if any(name.startswith("free.") for name in networks) else {"base", "free"}
     shapes = {

@@ -127,11 +127,7 @@ def render_fields(
     background: Tensor | None = None,
     outputs: Collection[str] = (),
 ) -> Render:
-    """Render fields together, each with a factor on its densities.
-
-    Raises:
-        ArgumentError: for another output than depth.
-    """
+    """Render fields together, each with a factor on its densities."""
     if unknown := sorted(set(outputs) - set(OUTPUTS)):
         raise ArgumentError(f"outputs: expected {', '.join(OUTPUTS)} of palette fields, got {unknown[0]}")
     rays = camera_rays(camera).flatten(0, 1)

@@ -71,11 +71,7 @@ def write_compact(
 
 
 def read_compact(path: str | Path) -> Surfels:
-    """Read a compact model file to the CPU. Nothing in it is executed.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is missing, damaged, of another format or a newer version.
-    """
+    """Read a compact model file to the CPU. Nothing in it is executed."""
     from safetensors.numpy import load
 
     with reading(
@@ -88,11 +84,7 @@ def read_compact(path: str | Path) -> Surfels:
 
 
 def open_model(path: str | Path) -> Surfels:
-    """Read a model file of either kind, lossless or compact, told apart by how it begins.
-
-    Raises:
-        ArgumentError, ShapeError: as `read_model` and `read_compact`.
-    """
+    """Read a model file of either kind, lossless or compact, told apart by how it begins."""
     path = Path(path)
     try:
         with path.open("rb") as file:
@@ -209,11 +201,7 @@ def _header(path: Path, line: bytes) -> dict[str, Any]:
 
 
 def _unpacked(path: Path, packed: bytes) -> bytes:
-    """The safetensors file in an xz stream; its header says how long it is, and nothing more is unpacked.
-
-    Raises:
-        OutOfMemoryError: if it does not fit into memory.
-    """
+    """The safetensors file in an xz stream; its header says how long it is, and nothing more is unpacked."""
     stream = lzma.LZMADecompressor(lzma.FORMAT_XZ, MEMORY)
     start = _taken(stream, 8, packed)
     header = _taken(stream, min(int.from_bytes(start, "little"), LONGEST_HEADER))

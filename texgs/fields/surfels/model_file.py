@@ -49,11 +49,7 @@ def write_model(path: str | Path, model: Surfels) -> Path:
 
 
 def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
-    """Describe a model for the JSON of a file at `path`, and check that its tensors can be written.
-
-    Raises:
-        ArgumentError, ShapeError: as `write_model`.
-    """
+    """Describe a model for the JSON of a file at `path`, and check that its tensors can be written."""
     _check(path, model, model.stage)
     description = {
         "version": VERSION,
@@ -77,11 +73,7 @@ def read_model(path: str | Path) -> Surfels:
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Surfels:
-    """Make a model of the tensors of a file and its description (see `describe`).
-
-    Raises:
-        ArgumentError, ShapeError: as `read_model`.
-    """
+    """Make a model of the tensors of a file and its description (see `describe`)."""
     try:
         stage, shading = str(description["stage"]), _optics(description["optics"])
         model = Surfels(tensors, shading, dict(description["metadata"]))
@@ -106,11 +98,7 @@ def _optics(stored: dict[str, Any]) -> ShadingModel:
 
 
 def _check(path: str | Path, model: Surfels, stage: str) -> None:
-    """Require the tensors of a stage with finite values, of the right type, in a layout that can be drawn.
-
-    Raises:
-        ArgumentError, ShapeError: naming the file and the tensor.
-    """
+    """Require the tensors of a stage with finite values, of the right type, in a layout that can be drawn."""
     given = model.parameters
     if stage not in NEEDED:
         raise ArgumentError(f"{path}: expected stage {', '.join(NEEDED)}, got {stage!r}")

@@ -88,9 +88,6 @@ def read_ply(path: str | Path) -> Surfels:
     material "paper" and colours of at least 0, as it clamps them; its textured ones, of stage texture, see
     `read_texture` of release_texture.py; all others, of stage surfels. The low-pass filter is that of 2DGS,
     as no file says; `dataclasses.replace` gives a model another.
-
-    Raises:
-        ArgumentError: if the file is missing, no PLY, cut short or without surfels, or values are not finite.
     """
     path = Path(path)
     vertices = read_vertices(path)

@@ -31,9 +31,6 @@ def read_texture(folder: Path, n: int) -> dict[str, Tensor]:
 
     Returns:
         palette [3], texels [T, 3], sizes [N, 2] and offsets [N] of a model, surfel after surfel.
-
-    Raises:
-        ArgumentError, ShapeError: if a file is missing, of another kind, or does not fit the surfels.
     """
     texels, dims = _arrays(folder / "texture.npz")
     check.shape("texture_dims", dims, "N 3", N=n)

@@ -51,9 +51,6 @@ def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
 
     It has the finest of their spacings. Grids that have another lattice are interpolated at its voxels, which
     blurs them by less than one.
-
-    Raises:
-        ShapeError: if the grids lie so far apart that a lattice around them has too many voxels.
     """
     spacing = min(grid.spacing for grid in grids)
     lower, upper = (torch.stack(ends) for ends in zip(*map(_bounds, grids), strict=True))  # [G, 3]

@@ -27,9 +27,6 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
     Args:
         path: target.
         field: to write. Its metadata must be JSON.
-
-    Raises:
-        ArgumentError: if a value is not finite, metadata is no JSON, or the file cannot be written.
     """
     grid = field.grid
     density, sh = unpack_rows(grid.rows.detach())
@@ -47,11 +44,7 @@ def write_voxels(path: str | Path, field: Voxels) -> Path:
 
 
 def read_voxels(path: str | Path) -> Voxels:
-    """Read a file of voxels as `write_voxels` writes it, bit for bit. Nothing in it is executed.
-
-    Raises:
-        ArgumentError, ShapeError: if the file is missing, damaged, of another kind or a newer version.
-    """
+    """Read a file of voxels as `write_voxels` writes it, bit for bit. Nothing in it is executed."""
     path = Path(path)
     description, tensors = read_tensor_file(path, FORMAT, VERSION)
     try:
@@ -67,12 +60,7 @@ def read_voxels(path: str | Path) -> Voxels:
 
 
 def grid_of(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> VoxelGrid:
-    """The grid of masks, densities and coefficients, and of a lattice.
-
-    Raises:
-        ArgumentError, ShapeError: naming the value at fault.
-        KeyError, TypeError, ValueError: if one is missing, or something else.
-    """
+    """The grid of masks, densities and coefficients, and of a lattice."""
     masks, density, sh = (tensors[name] for name in ("masks", "density", "sh"))
     check.shape("masks", masks, "X Y Z")
     n = check.shape("density", density, "N")["N"]

@@ -38,11 +38,7 @@ class GaussianKeys:
         )
 
     def check(self) -> None:
-        """Require a start that Gaussians can have.
-
-        Raises:
-            ArgumentError: for voxels of a volume, at which surfels alone start.
-        """
+        """Require a start that Gaussians can have."""
         if self.seeds.kind == "voxels":
             raise ArgumentError(
                 "fit.gaussians.seeds.kind: expected no voxels, which are for surfels alone; choose visible"

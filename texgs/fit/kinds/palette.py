@@ -53,11 +53,7 @@ class PaletteKeys:
         return self.voxels.steps + self.seed_steps + self.base_steps + self.palette_steps
 
     def check(self) -> None:
-        """Require values that fit each other.
-
-        Raises:
-            ArgumentError: naming the keys.
-        """
+        """Require values that fit each other."""
         self.voxels.check("fit.palette.voxels")
         if self.hash.entries & (self.hash.entries - 1):
             raise ArgumentError(f"fit.palette.hash.entries: expected a power of two, got {self.hash.entries}")
@@ -69,11 +65,7 @@ class PaletteKeys:
 
 
 def fit(task: FitTask[PaletteKeys]) -> Fitted:
-    """Fit networks to random rays, from the last checkpoint if there is one.
-
-    Raises:
-        DeviceError: for another device than the CPU.
-    """
+    """Fit networks to random rays, from the last checkpoint if there is one."""
     from texgs.fit.checkpoint import FOLDER, run_to_end
     from texgs.fit.palette import PaletteFit
 

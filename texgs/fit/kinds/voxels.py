@@ -77,11 +77,7 @@ class VoxelKeys:
         return sum(stage.steps for stage in self.stages)
 
     def check(self, where: str = "fit.voxels") -> None:
-        """Require values that fit each other; `where` are the keys.
-
-        Raises:
-            ArgumentError: if the stages do not double, or runs are longer than a step has rays.
-        """
+        """Require values that fit each other; `where` are the keys."""
         sides = [stage.side for stage in self.stages]
         if not sides or any(b != 2 * a for a, b in pairwise(sides)):
             raise ArgumentError(
@@ -92,11 +88,7 @@ class VoxelKeys:
 
 
 def fit(task: FitTask[VoxelKeys]) -> Fitted:
-    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one.
-
-    Raises:
-        DeviceError: for another device than the CPU.
-    """
+    """Fit a grid to random rays, coarse to fine, from the last checkpoint if there is one."""
     from texgs.fields.voxels.model import Voxels
     from texgs.fit.checkpoint import FOLDER, run_to_end
     from texgs.fit.voxels import VoxelFit

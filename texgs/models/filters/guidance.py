@@ -59,11 +59,7 @@ class ProceduralFilters:
 
     @torch.no_grad()
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
-        """Edit the views; see `Guidance`.
-
-        Raises:
-            ArgumentError: if the instruction is empty or not in the vocabulary.
-        """
+        """Edit the views; see `Guidance`."""
         name, color = understand(instruction)
         function = FILTERS[name] if color is None else partial(material.tint, color=color)
         surface, where = surface_of(views, self.scale, self.seed)

@@ -64,10 +64,6 @@ def rasterize(
 
     Returns:
         Render with color [H, W, C], alpha [H, W], and the outputs asked for.
-
-    Raises:
-        ArgumentError: where there is no colour, and for textures or normals of 3D Gaussians.
-        ShapeError: for scales of another shape.
     """
     check_primitive(scales, texture is not None, outputs)
     kind, size = kind_of(scales), (width, height)

@@ -128,11 +128,7 @@ def edit_settings(config: DictConfig) -> dict[str, Any]:
 
 
 def edited_scene(config: DictConfig) -> dict[str, Path]:
-    """Return the scene that an edit starts from with its models, their training views, and files of styles.
-
-    Raises:
-        ConfigError: if one basic TF is chosen, or the edit starts from itself.
-    """
+    """Return the scene that an edit starts from, its models, their training views, and files of styles."""
     from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
 
     if config.edit.base == config.edit.name:

@@ -103,11 +103,7 @@ def reference_of(settings: Settings, volume: Path) -> Mesh:
 
 
 def shown_by(field: Field) -> Callable[[Camera], Render]:
-    """Return what renders a field with the depth that its meshes are made of.
-
-    Raises:
-        ArgumentError: for a field without depth.
-    """
+    """Return what renders a field with the depth that its meshes are made of."""
     import torch
 
     output = kinds()[field.kind].depth

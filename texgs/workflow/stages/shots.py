@@ -57,11 +57,7 @@ class Studio:
         self._open: tuple[str, Session] | None = None
 
     def take(self, shot: Shot) -> Taken:
-        """Return one picture.
-
-        Raises:
-            TexgsError: for a change that the scene cannot show, or a file that is not as it should be.
-        """
+        """Return one picture."""
         import torch
 
         from texgs.core.light import Light

@@ -20,9 +20,6 @@ def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high:
         tf_values: "data", or "fraction" where the points are on fractions of the data's range.
         low: smallest value of the data.
         high: largest value of the data.
-
-    Raises:
-        ArgumentError: if a point is wrong, or none of the data would be visible.
     """
     from texgs.volume.transfer import TransferFunction
 

@@ -44,11 +44,7 @@ class Run:
         """Record tags that were not known when the run began."""
 
     def artifact(self, path: str | Path, folder: str | None = None) -> None:
-        """Record a copy of a file or folder, in a folder of the run where one is given.
-
-        Raises:
-            ArgumentError: if there is no such file.
-        """
+        """Record a copy of a file or folder, in a folder of the run where one is given."""
 
     def end(self, status: str, error: Exception | None = None) -> None:
         """End the run: FINISHED, FAILED with the error, or KILLED. `run` does this by itself."""
@@ -134,10 +130,6 @@ def begin(
         tags: tags of the run; the tag `PARENT` says which run it is inside of.
         params: parameters; nested mappings become dotted names, lists JSON.
         key: where there is a run with the same one, that goes on.
-
-    Raises:
-        ArgumentError: if `uri` is of another kind.
-        TrackingError: if the store cannot be used.
     """
     if uri is None:
         return Run()

@@ -45,10 +45,6 @@ def connect(uri: str, experiment: str) -> tuple[MlflowClient, str]:
 
     Returns:
         A client and the experiment's identifier.
-
-    Raises:
-        ArgumentError: if it is an address of another kind.
-        TrackingError: if the store cannot be used.
     """
     os.environ.update({key: value for key, value in SETTINGS.items() if key not in os.environ})
     import mlflow  # sets the levels of its loggers, so that it comes before they are changed
@@ -72,11 +68,7 @@ def connect(uri: str, experiment: str) -> tuple[MlflowClient, str]:
 
 
 def path_of(uri: str) -> Path:
-    """Return the absolute path of the file that an address such as `sqlite:///results/mlflow.db` names.
-
-    Raises:
-        ArgumentError: if it names none.
-    """
+    """Return the absolute path of the file that an address such as `sqlite:///results/mlflow.db` names."""
     path = uri.removeprefix("sqlite:///")
     if path in (uri, "", ":memory:") or "?" in path:
         raise ArgumentError(
