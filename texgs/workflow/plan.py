@@ -253,7 +253,9 @@ def notes(results: str, checksums: Checksums) -> dict[str, str]:
     from texgs.workflow.stage import note_result
 
     made = recall(written_file(results), "") or {}
-    changed = sorted(path for path, sha in made.items() if Path(path).exists() and checksums.of(path) != sha)
+    changed = sorted(
+        path for path, sha in made.items() if Path(path).exists() and checksums.of(Path(path)) != sha
+    )
     files = {}
     for name, place in {"tables": f"{results}/tables", "report": f"{results}/report.html"}.items():
         files[name] = f"{results}/.conf/{name}.txt"

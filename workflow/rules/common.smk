@@ -40,7 +40,7 @@ if workflow.is_main_process and (warning := PLAN.warning()):
 
 PARENTS = {}  # tracked runs that hold those of jobs
 RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
-TARGETS = dict.fromkeys(rule.target for rule in RULES.values() if rule.target)
+TARGETS = dict.fromkeys(each.target for each in RULES.values() if each.target)
 TABLES = specs(PLAN.swept())
 STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table
 BESIDE = {  # what tables and the report show beside the jobs of this run
@@ -50,42 +50,44 @@ BESIDE = {  # what tables and the report show beside the jobs of this run
     "study": f"{STUDY}/key.json",
     "ballots": sorted(map(str, STUDY.glob("votes/*.csv"))),
 }
-config["captions"] = {rule.name: rule.shown for rule in RULES.values()}  # what workflow/report/figure.rst shows
+config["captions"] = {
+    each.name: each.shown for each in RULES.values()
+}  # what workflow/report/figure.rst shows
 
 
-def job(rule, wildcards):
+def job(each, wildcards):
     """Folder of the job that wildcards describe, and what the plan says of it."""
-    folder = Path(RESULTS, rule.folder.format(**dict(wildcards.items()))).as_posix()
+    folder = Path(RESULTS, each.folder.format(**dict(wildcards.items()))).as_posix()
     return folder, PLAN.jobs[folder]
 
 
-def reads(rule):
+def reads(each):
     """The files a job reads, first its settings, as a function of wildcards."""
 
     def of(wildcards):
-        _, planned = job(rule, wildcards)
+        _, planned = job(each, wildcards)
         return [planned["settings"], *planned["inputs"].values()]
 
     return of
 
 
-def writes(rule):
+def writes(each):
     """The files a job writes that others read; pictures go into the report of Snakemake, too."""
 
     def of(file):
-        path = f"<results>/{rule.folder}/{file}"
-        if file not in rule.shown:
+        path = f"<results>/{each.folder}/{file}"
+        if file not in each.shown:
             return path
-        return report(path, caption="../report/figure.rst", category=rule.target, subcategory=rule.name)
+        return report(path, caption="../report/figure.rst", category=each.target, subcategory=each.name)
 
-    return [of(file) for file in (*rule.files, "metrics.json")]
+    return [of(file) for file in (*each.files, "metrics.json")]
 
 
-def words(rule):
+def words(each):
     """The words of a job's command, first its stage, as a function of wildcards."""
 
     def of(wildcards):
-        folder, planned = job(rule, wildcards)
+        folder, planned = job(each, wildcards)
         inputs = [f"{name}={path}" for name, path in planned["inputs"].items()]
         files = ["--input", *inputs] if inputs else []
         return [planned["stage"], "--settings", planned["settings"], *files, "--output", folder]
@@ -93,14 +95,14 @@ def words(rule):
     return of
 
 
-def code(rule):
+def code(each):
     """The digest of the code that a job runs, as a function of wildcards."""
-    return lambda wildcards: job(rule, wildcards)[1]["code"]
+    return lambda wildcards: job(each, wildcards)[1]["code"]
 
 
-def log_of(rule):
+def log_of(each):
     """The log of a job."""
-    return f"<logs>/{rule.folder}.log"
+    return f"<logs>/{each.folder}.log"
 
 
 def any_of(names, otherwise="none"):
@@ -120,7 +122,7 @@ def begin():
             # A limit of jobs a second makes Snakemake look at all jobs once more after each look, so that a long
             # run looks at them all the time, with half of a core: github.com/snakemake/snakemake/issues/2967.
             workflow.scheduler.job_rate_limiter = None
-        jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in RULES]
+        jobs = [job for job in workflow.dag.needrun_jobs() if job.each.name in RULES]
         if workflow.local_exec and len(jobs) > 1:
             FORK_SERVER = fork_server.start(ENVIRONMENT)
         PARENTS = parents.begin(PLAN, WORDS)

@@ -11,9 +11,9 @@ rule tables:
     log:
         "<logs>/tables.log",
     params:
+        **BESIDE,
         code=code_digest("texgs.cli.tables"),
         folder=subpath(output[0], parent=True),
-        **BESIDE,
     shell:
         "texgs tables {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "
         "--study {params.study:q} --output {params.folder:q} 2>&1 | tee {log:q}"
@@ -28,8 +28,8 @@ rule report:
     log:
         "<logs>/report.log",
     params:
-        code=code_digest("texgs.cli.report"),
         **BESIDE,
+        code=code_digest("texgs.cli.report"),
     shell:
         "texgs report {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "
         "--study {params.study:q} --output {output:q} 2>&1 | tee {log:q}"
