@@ -122,7 +122,7 @@ def begin():
             # A limit of jobs a second makes Snakemake look at all jobs once more after each look, so that a long
             # run looks at them all the time, with half of a core: github.com/snakemake/snakemake/issues/2967.
             workflow.scheduler.job_rate_limiter = None
-        jobs = [job for job in workflow.dag.needrun_jobs() if job.each.name in RULES]
+        jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in RULES]
         if workflow.local_exec and len(jobs) > 1:
             FORK_SERVER = fork_server.start(ENVIRONMENT)
         PARENTS = parents.begin(PLAN, WORDS)
