@@ -12,7 +12,7 @@ from benchmarks import scenes, workload
 from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.raster import normals, shading, smoothness, spherical_harmonics, ssim
+from texgs.raster import losses, normals, shading, spherical_harmonics
 from texgs.raster.reference import losses as definition
 from texgs.raster.reference import shading as shading_definition
 
@@ -68,14 +68,14 @@ def images(settings: Settings) -> Iterator[Comparison]:
     with torch.no_grad():
         made.arguments["means"] += 0.003
     target = made.image().color[..., :3]
-    l1_dssim = {"texgs": ssim.l1_dssim, "kornia": definition.l1_dssim}
+    l1_dssim = {"texgs": losses.l1_dssim, "kornia": definition.l1_dssim}
     yield Comparison("l1_dssim", l1_dssim, [color], (target, LAMBDA_DSSIM))
     noise = torch.rand(3, *target.shape[:2], generator=torch.Generator().manual_seed(3)).to(settings.device)
     yield Comparison("l1_dssim, no pixel equal", l1_dssim, [color], (noise.permute(1, 2, 0), LAMBDA_DSSIM))
     pair = {"texgs": normals.normal_consistency, "torch": definition.normal_consistency}
     inputs = [render.normal, render.depth]
     yield Comparison("normal_consistency", pair, inputs, (render.alpha, camera.viewmat, camera.K))
-    pair = {"texgs": smoothness.bilateral_smoothness, "kornia": definition.bilateral_smoothness}
+    pair = {"texgs": losses.bilateral_smoothness, "kornia": definition.bilateral_smoothness}
     yield Comparison("bilateral_smoothness, 4 channels", pair, [attributes], (target, render.alpha))
 
 

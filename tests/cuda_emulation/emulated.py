@@ -17,8 +17,7 @@ from unittest.mock import patch
 import torch
 from filelock import FileLock
 
-from texgs.raster import grid_abi, losses_abi, native
-from texgs.volume import caster
+from texgs.raster import native
 from texgs.workflow.code import library_sources
 
 SOURCE = Path(__file__).parent
@@ -60,10 +59,6 @@ def library() -> ctypes.CDLL:
     """The emulated library, described to ctypes as the others are."""
     with patch.object(native, "library_path", lambda device_type: build() / "libtexgs_cuda_emulated.so"):
         lib = native.library.__wrapped__("cuda")
-    with patch.object(native, "library", lambda device_type="cpu": lib):
-        losses_abi._describe.__wrapped__("cpu")
-        grid_abi._describe.__wrapped__("cpu")
-        caster._describe.__wrapped__("cpu")
     describe(lib)
     return lib
 
@@ -86,7 +81,7 @@ def synchronize(lib: ctypes.CDLL) -> None:
 
 def _call(name: str, *arguments: object, device: torch.device) -> None:
     lib = library()
-    status = native.function(lib, name)(*arguments, None)
+    status = native.function(lib, name)(*native.plain(arguments), None)
     synchronize(lib)
     native._require_success(status, lib, device)
 
@@ -99,8 +94,5 @@ def emulated_cuda(seed: int) -> Iterator[None]:
     with (
         patch.object(native, "library", lambda device_type="cpu": lib),
         patch.object(native, "call", _call),
-        patch.object(losses_abi, "_describe", lambda device_type: None),
-        patch.object(grid_abi, "_describe", lambda device_type: None),
-        patch.object(caster, "_describe", lambda device_type: None),
     ):
         yield

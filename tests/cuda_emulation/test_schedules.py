@@ -8,11 +8,10 @@ from tests.raster import test_normals, test_shading, test_smoothness, test_ssim
 from tests.raster.agreement import evaluate
 from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything, voxels
+from texgs.raster.losses import bilateral_smoothness, l1_dssim
 from texgs.raster.normals import normal_consistency
 from texgs.raster.shading import blinn_phong_texture
-from texgs.raster.smoothness import bilateral_smoothness
 from texgs.raster.spherical_harmonics import spherical_harmonics
-from texgs.raster.ssim import l1_dssim
 
 pytestmark = pytest.mark.emulated
 

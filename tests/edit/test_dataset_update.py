@@ -19,7 +19,7 @@ from texgs.edit.turns import Schedule
 from texgs.edit.voxel_learner import VoxelLearner, VoxelLearning, corner
 from texgs.fields.optimizer import Rate
 from texgs.fit.settings import CommonRates
-from texgs.raster.ssim import ssim
+from texgs.raster.losses import ssim
 from texgs.volume.boxes import Box
 from texgs.volume.images import Images
 

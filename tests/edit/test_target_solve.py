@@ -14,7 +14,7 @@ from texgs.edit.target_views import render_views
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import bare_colors, owners
-from texgs.raster.ssim import l1_dssim
+from texgs.raster.losses import l1_dssim
 
 STRIPES = 9.0  # for each world unit
 

@@ -12,7 +12,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.fit.texels import mean_color, textured, texturize
 from texgs.fit.texture_layout import Sight, look, offsets_of, sizes_for_budget, sizes_where_seen
-from texgs.raster.atlas import check_texture
+from texgs.raster.arguments import check_texture
 from texgs.raster.types import Texture
 
 

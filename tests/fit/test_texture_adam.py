@@ -16,8 +16,8 @@ from texgs.fit.texels import textured, texturize, without_offset
 from texgs.fit.texture_adam import refine, texel_map
 from texgs.fit.texture_layout import sizes_for_budget
 from texgs.raster import Texture, rasterize, reference
+from texgs.raster.losses import l1_dssim
 from texgs.raster.reference import shading
-from texgs.raster.ssim import l1_dssim
 from texgs.volume.images import Target
 
 PLAIN = {"rate": 0.0025, "palette_rate": 0.0, "final": 0.1, "sparsity": 0.0, "seed": 0, "title": ""}

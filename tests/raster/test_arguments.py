@@ -9,10 +9,9 @@ import torch
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
 from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
-from texgs.raster import native
+from texgs.raster import autograd, native
 from texgs.raster.api import rasterize, splat
-from texgs.raster.autograd import Frame
-from texgs.raster.inputs import SurfelTensors, View
+from texgs.raster.autograd import Frame, SurfelTensors, View
 from texgs.raster.reference import rasterize as reference
 from texgs.raster.types import Options, Texture
 
@@ -139,7 +138,7 @@ def test_library_refuses_what_gaussians_do_not_have():
     handle = ctypes.c_void_p()
 
     def forward(surfels, **images):
-        image = native.Image(**{name: native.address(x) for name, x in images.items()})
+        image = autograd.Image(**{name: native.address(x) for name, x in images.items()})
         native.call(
             "texgs_forward",
             *view.structures(surfels),
@@ -163,7 +162,7 @@ def test_library_refuses_what_is_not_of_the_forward_call():
     view = View(scene.viewmat, scene.K, 8, 8, None, None, None, frozenset(), Options())
     surfels = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
     color, alpha = torch.empty(scene.features.shape[1], 8, 8), torch.empty(8, 8)
-    image = native.Image(color=native.address(color), alpha=native.address(alpha))
+    image = autograd.Image(color=native.address(color), alpha=native.address(alpha))
     handle = ctypes.c_void_p()
 
     def call(name, *arguments, of=surfels, view=view):
@@ -174,12 +173,14 @@ def test_library_refuses_what_is_not_of_the_forward_call():
     )
     for name in ("depth", "median", "distortion"):
         with pytest.raises(ArgumentError, match="a gradient of depth, median or distortion without"):
-            call("texgs_backward", image, native.Image(**{name: native.address(alpha)}), native.Gradients())
+            call(
+                "texgs_backward", image, autograd.Image(**{name: native.address(alpha)}), autograd.Gradients()
+            )
     fewer = SurfelTensors(*(None if x is None else x[1:] for x in surfels))
     with pytest.raises(ArgumentError, match="frame: expected as many surfels, scales and channels as"):
-        call("texgs_backward", image, native.Image(), native.Gradients(), of=fewer)
+        call("texgs_backward", image, autograd.Image(), autograd.Gradients(), of=fewer)
     with pytest.raises(ArgumentError, match="frame: expected an image as large as in the forward call"):
-        call("texgs_contribute", native.Contributions(), view=replace(view, width=9))
+        call("texgs_contribute", autograd.Contributions(), view=replace(view, width=9))
     Frame(handle.value, torch.device("cpu"))  # gives it back
 
 
@@ -194,7 +195,7 @@ def test_library_refuses_colours_that_do_not_add_up():
         structures = view.structures(surfels)
         structures[0].channels = channels
         handle = ctypes.byref(ctypes.c_void_p())
-        native.call("texgs_forward", *structures, native.Image(), handle, device=torch.device("cpu"))
+        native.call("texgs_forward", *structures, autograd.Image(), handle, device=torch.device("cpu"))
 
     with pytest.raises(ArgumentError, match="features: expected C - 3 beside a texture"):
         forward(colored, 3)

@@ -35,6 +35,7 @@ def test_file_that_is_no_library(replaced, tmp_path):
 
 
 def test_library_that_lacks_a_function(replaced):
+    native.library("cpu")
     replaced(_ctypes.__file__)  # a shared library that every Python has
     with pytest.raises(NativeError, match="has no function texgs_abi_version; install texgs again"):
         open_library("cpu")

@@ -8,8 +8,8 @@ import torch
 from tests.raster.agreement import evaluate
 from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.raster.losses import bilateral_smoothness
 from texgs.raster.reference import losses as definition
-from texgs.raster.smoothness import bilateral_smoothness
 
 SIZES = [(1, 1, 1), (2, 3, 4), (33, 7, 1), (7, 33, 4), (150, 300, 2), (359, 641, 1)]
 

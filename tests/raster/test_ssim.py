@@ -7,8 +7,8 @@ import torch
 from tests.raster.agreement import evaluate
 from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from texgs.raster.losses import l1_dssim, ssim
 from texgs.raster.reference import losses as definition
-from texgs.raster.ssim import l1_dssim, ssim
 
 SIZES = [(1, 1, 3), (33, 7, 1), (7, 33, 4), (150, 300, 3), (359, 641, 1)]
 ONES = torch.ones(4, 5, 3)

@@ -10,7 +10,7 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.edit.objective import LOSS_SCALE
 from texgs.models.lpips import Lpips
-from texgs.raster.ssim import l1_dssim
+from texgs.raster.losses import l1_dssim
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from texgs.core.progress import progress
 from texgs.edit.exposures import Exposure
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
-from texgs.raster.ssim import l1_dssim
+from texgs.raster.losses import l1_dssim
 
 DSSIM = 0.2
 

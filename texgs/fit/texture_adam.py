@@ -12,7 +12,7 @@ from texgs.fields.bounds import visible_part
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import Texture, rasterize
-from texgs.raster.ssim import l1_dssim
+from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images
 
 DSSIM = 0.2

@@ -13,7 +13,7 @@ from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.texels import EXTENT
 from texgs.raster import Texture, rasterize
-from texgs.raster.atlas import MOST_TEXELS
+from texgs.raster.arguments import MOST_TEXELS
 from texgs.volume.images import Images
 
 

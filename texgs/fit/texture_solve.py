@@ -12,7 +12,7 @@ from texgs.fields.bounds import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import footprint
 from texgs.fit.texture_layout import Sight
-from texgs.raster.ssim import l1_dssim
+from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images, Target
 
 STEP = 0.6  # of a Newton step in a typical view: 2 is the limit of stability, and views differ

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from torch import Tensor
 
-from texgs.raster.ssim import ssim as structural_similarity
+from texgs.raster.losses import ssim as structural_similarity
 
 BEST = 100.0  # dB, of equal images
 
@@ -22,5 +22,5 @@ def psnr(image: Tensor, target: Tensor) -> float:
 
 
 def ssim(image: Tensor, target: Tensor) -> float:
-    """Structural similarity; see `texgs.raster.ssim.ssim`."""
+    """Structural similarity; see `texgs.raster.losses.ssim`."""
     return structural_similarity(image.clamp(0, 1), target).item()

@@ -1,19 +1,138 @@
-"""The native rasterizer as a differentiable function of torch."""
+"""The native rasterizer as a differentiable function of torch, and what one call of it works on."""
 
 from __future__ import annotations
 
 import ctypes
 import weakref
-from typing import Any
+from ctypes import Structure, c_float, c_int32, c_int64, c_void_p
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
 from texgs.raster import native
-from texgs.raster.inputs import SurfelTensors, View
-from texgs.raster.types import Statistics
+from texgs.raster.types import Options, Statistics
 
 IMAGES = ("color", "alpha", "depth", "median", "normal", "distortion")
+
+
+def _fields(pointers: str, **numbers: type) -> list[tuple[str, type]]:
+    return [(name, c_void_p) for name in pointers.split()] + list(numbers.items())
+
+
+class Surfels(Structure):
+    """`texgs_surfels`."""
+
+    _fields_ = [
+        ("n", c_int64),
+        ("axes", c_int32),
+        *_fields("means quats scales opacities shift", channels=c_int32),
+        *_fields("features base gain texels sizes offsets", n_texels=c_int64),
+    ]
+
+
+class Camera(Structure):
+    """`texgs_camera`."""
+
+    _fields_ = _fields("viewmat K", width=c_int32, height=c_int32)
+
+
+class RenderOptions(Structure):
+    """`texgs_options`."""
+
+    _fields_ = [
+        ("background", c_void_p),
+        *((name, c_float) for name in ("low_pass", "filter_sigma", "dilation")),
+        ("antialiased", c_int32),
+        *((name, c_float) for name in ("alpha_min", "transmittance_min", "near_plane", "far_plane")),
+    ]
+
+
+class Image(Structure):
+    """`texgs_image`."""
+
+    _fields_ = _fields("color alpha depth median normal distortion radii")
+
+
+class Gradients(Structure):
+    """`texgs_gradients`."""
+
+    _fields_ = _fields("means quats scales opacities shift features base gain texels")
+
+
+class Contributions(Structure):
+    """`texgs_contributions`."""
+
+    _fields_ = [("image", c_void_p), ("channels", c_int32), *_fields("sums weight_sum weight_max pixels")]
+
+
+SCENE = (Surfels, Camera, RenderOptions)
+native.declare("texgs_forward", *SCENE, Image, "p")
+native.declare("texgs_backward", "p", *SCENE, Image, Image, Gradients)
+native.declare("texgs_contribute", "p", *SCENE, Contributions)
+native.declare("texgs_release", "p", result=None, stream=False)
+
+
+class SurfelTensors(NamedTuple):
+    """Everything that gradients are computed for, in the order of `texgs_gradients`."""
+
+    means: Tensor  # [N, 3]
+    quats: Tensor  # [N, 4]
+    scales: Tensor  # [N, 2] of surfels, [N, 3] of 3D Gaussians
+    opacities: Tensor  # [N]
+    shift: Tensor | None = None  # [N, 2]
+    features: Tensor | None = None  # [N, C], or [N, C - 3] beside a texture:
+    base: Tensor | None = None  # [N, 3]
+    gain: Tensor | None = None  # [N]
+    texels: Tensor | None = None  # [T, 3]
+
+    @property
+    def channels(self) -> int:
+        """Channels C of the colour: those of the texture, then those of the features."""
+        plain = 0 if self.features is None else self.features.shape[1]
+        return plain if self.base is None else 3 + plain
+
+
+@dataclass(frozen=True)
+class View:
+    """What does not take part in differentiation: camera, options, texture layout, wanted outputs."""
+
+    viewmat: Tensor  # [4, 4]
+    K: Tensor  # [3, 3]
+    width: int
+    height: int
+    background: Tensor | None  # [C]
+    sizes: Tensor | None  # [N, 2] of the texture
+    offsets: Tensor | None  # [N]
+    outputs: frozenset[str]
+    options: Options
+
+    def structures(self, surfels: SurfelTensors) -> tuple[Surfels, Camera, RenderOptions]:
+        """Surfels, camera and options as the library takes them."""
+        o = self.options
+        scene = Surfels(
+            n=len(surfels.means),
+            axes=surfels.scales.shape[1],
+            channels=surfels.channels,
+            sizes=native.address(self.sizes),
+            offsets=native.address(self.offsets),
+            n_texels=0 if surfels.texels is None else len(surfels.texels),
+            **{name: native.address(x) for name, x in surfels._asdict().items()},
+        )
+        camera = Camera(native.address(self.viewmat), native.address(self.K), self.width, self.height)
+        options = RenderOptions(
+            native.address(self.background),
+            min(o.low_pass, 1e30),  # infinite: no filter; the library multiplies it by 0 at the centre
+            o.filter_sigma,
+            o.dilation,
+            o.antialiased,
+            o.alpha_min,
+            o.transmittance_min,
+            o.near,
+            min(o.far, 1e30),  # infinite: far / (far - near) is 1
+        )
+        return scene, camera, options
 
 
 class Frame:
@@ -21,15 +140,15 @@ class Frame:
 
     def __init__(self, handle: int | None, device: torch.device) -> None:
         self.handle = handle
-        weakref.finalize(self, native.library(device.type).texgs_release, handle)
+        weakref.finalize(self, native.function(native.library(device.type), "texgs_release"), handle)
 
 
 def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> Frame:
     """Project, sort and bin the surfels, and render into `images` where it has a "color"."""
     device = surfels.means.device
     handle = ctypes.c_void_p()
-    image = native.Image(**{name: native.address(x) for name, x in images.items()})
-    native.call("texgs_forward", *view.structures(surfels), image, ctypes.byref(handle), device=device)
+    image = Image(**{name: native.address(x) for name, x in images.items()})
+    native.call("texgs_forward", *view.structures(surfels), image, ctypes.addressof(handle), device=device)
     return Frame(handle.value, device)
 
 
@@ -41,9 +160,7 @@ def contribute(
     n, channels = len(means), 0 if image is None else len(image)
     sums = means.new_empty(n, channels)
     weight_sum, weight_max, pixels = means.new_empty(3, n)
-    out = native.Contributions(
-        native.address(image), channels, *(native.address(x) for x in (sums, weight_sum, weight_max, pixels))
-    )
+    out = Contributions(*native.plain((image, channels, sums, weight_sum, weight_max, pixels)))
     native.call("texgs_contribute", frame.handle, *view.structures(surfels), out, device=means.device)
     return sums, weight_sum, weight_max, pixels
 
@@ -89,9 +206,9 @@ class RasterizeFunction(torch.autograd.Function):
             "texgs_backward",
             ctx.frame.handle,
             *ctx.view.structures(surfels),
-            native.Image(**{name: native.address(x) for name, x in images.items()}),
-            native.Image(**{name: native.address(x) for name, x in dense.items()}),
-            native.Gradients(**{name: native.address(x) for name, x in results.items()}),
+            Image(**{name: native.address(x) for name, x in images.items()}),
+            Image(**{name: native.address(x) for name, x in dense.items()}),
+            Gradients(**{name: native.address(x) for name, x in results.items()}),
             device=surfels.means.device,
         )
         return None, None, *(results.get(name) for name in names)

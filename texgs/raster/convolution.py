@@ -7,9 +7,9 @@ than kernels do.
 
 from __future__ import annotations
 
-from ctypes import POINTER, Structure, byref, c_int32, c_void_p
+from ctypes import Structure, c_int32, c_void_p
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any
 
 import torch
@@ -40,6 +40,9 @@ class NativeConvolution(Structure):
         ("bias", c_void_p),
         ("is_rectified", c_int32),
     ]
+
+
+native.declare("texgs_convolve", NativeConvolution, "ppp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,34 +124,18 @@ class _Convolve(torch.autograd.Function):
 
 def _call(kernel: Tensor, images: Tensor, gate: Tensor | None, bias: Tensor | None) -> Tensor:
     """[N, out, H, W] of whole blocks of channels, rectified where there is a bias."""
-    _describe()
     inputs, outputs = kernel.shape[2], BLOCK * kernel.shape[1]
     images = F.pad(images, (0, 0, 0, 0, 0, inputs - images.shape[1])) if images.shape[1] < inputs else images
     images = images.contiguous(memory_format=torch.channels_last)
     count, _, height, width = images.shape
     result = images.new_empty(count, height, width, outputs)
-    shape = NativeConvolution(
-        width, height, inputs, outputs, kernel.data_ptr(), native.address(bias), bias is not None
-    )
+    shape = NativeConvolution(*native.plain((width, height, inputs, outputs, kernel, bias, bias is not None)))
     for index in range(count):
-        native.call(
-            "texgs_convolve",
-            byref(shape),
-            images[index].data_ptr(),
-            None if gate is None else gate[index].data_ptr(),
-            result[index].data_ptr(),
-            device=torch.device("cpu"),
-        )
+        planes = images[index], None if gate is None else gate[index], result[index]
+        native.call("texgs_convolve", shape, *planes, device=torch.device("cpu"))
     return result.permute(0, 3, 1, 2)
 
 
 def _require_cpu(name: str, x: Tensor) -> None:
     if x.device.type != "cpu":
         raise DeviceError(f"{name}: expected a tensor on cpu, got {x.device}; torch convolves on GPUs")
-
-
-@cache
-def _describe() -> None:
-    """Tell ctypes the argument types."""
-    arguments = [POINTER(NativeConvolution), c_void_p, c_void_p, c_void_p, c_void_p]
-    native.function(native.library("cpu"), "texgs_convolve").argtypes = arguments

@@ -5,7 +5,7 @@ On the CPU; deterministic for any number of threads.
 
 from __future__ import annotations
 
-from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
+from ctypes import Structure, c_float, c_int32, c_void_p
 from dataclasses import dataclass, field
 
 import torch
@@ -35,6 +35,9 @@ class NativeView(Structure):
         *(("viewmat", c_void_p), ("K", c_void_p), ("width", c_int32), ("height", c_int32)),
         *(("depth", c_void_p), ("color", c_void_p)),
     ]
+
+
+native.declare("texgs_fuse", NativeLattice, "np", NativeView, "f")
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,18 +120,8 @@ class Lattice:
             (c_int32 * 3)(*(BLOCK * n for n in self.blocks)),
             (c_float * 3)(*self.lower.tolist()),
             self.spacing,
-            *(values.data_ptr() for values in (self.distance, self.views, self.color)),
+            *native.plain((self.distance, self.views, self.color)),
         )
         size = (view.camera.width, view.camera.height)
-        seen = NativeView(*(x.data_ptr() for x in matrices), *size, depth.data_ptr(), color.data_ptr())
-        _describe()
-        native.call(
-            *("texgs_fuse", byref(lattice), len(chosen), chosen.data_ptr(), byref(seen), truncation),
-            device=torch.device("cpu"),
-        )
-
-
-def _describe() -> None:
-    """Tell ctypes the argument types."""
-    arguments = [POINTER(NativeLattice), c_int64, c_void_p, POINTER(NativeView), c_float, c_void_p]
-    native.function(native.library("cpu"), "texgs_fuse").argtypes = arguments
+        seen = NativeView(*native.plain((*matrices, *size, depth, color)))
+        native.call("texgs_fuse", lattice, len(chosen), chosen, seen, truncation, device=torch.device("cpu"))

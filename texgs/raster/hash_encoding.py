@@ -6,9 +6,9 @@ On the CPU; deterministic for any number of threads.
 from __future__ import annotations
 
 import ctypes
-from ctypes import POINTER, Structure, byref, c_int32, c_int64, c_void_p
+from ctypes import Structure, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from math import ceil, log2
 from typing import Any
 
@@ -20,12 +20,17 @@ from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster import native
 
 FEATURES = 2  # of each level
+CPU = torch.device("cpu")
 
 
 class NativeHash(Structure):
     """`texgs_hash`."""
 
     _fields_ = [("levels", c_int32), ("resolution", c_void_p), ("first", c_void_p)]
+
+
+native.declare("texgs_hash_encode", NativeHash, "nppp")
+native.declare("texgs_hash_backward", NativeHash, "nppp")
 
 
 @dataclass(frozen=True)
@@ -121,7 +126,7 @@ class _Encode(torch.autograd.Function):
         ctx.save_for_backward(points)
         ctx.levels, ctx.table = levels, table.shape
         planes = points.new_empty(levels.width, len(points))
-        _call("texgs_hash_encode", levels, points, table, planes)
+        native.call("texgs_hash_encode", levels.structure(), len(points), points, table, planes, device=CPU)
         return planes.T  # matrix products take it as it is
 
     @staticmethod
@@ -129,22 +134,6 @@ class _Encode(torch.autograd.Function):
     def backward(ctx: Any, features: Tensor) -> tuple[None, Tensor, None]:
         (points,) = ctx.saved_tensors
         gradient = points.new_empty(ctx.table)
-        _call("texgs_hash_backward", ctx.levels, points, features.T.contiguous(), gradient)
+        arguments = ctx.levels.structure(), len(points), points, features.T.contiguous(), gradient
+        native.call("texgs_hash_backward", *arguments, device=CPU)
         return None, gradient, None
-
-
-def _call(name: str, levels: HashLevels, points: Tensor, *tensors: Tensor) -> None:
-    _describe()
-    structure = levels.structure()
-    addresses = map(native.address, tensors)
-    native.call(
-        name, byref(structure), len(points), points.data_ptr(), *addresses, device=torch.device("cpu")
-    )
-
-
-@cache
-def _describe() -> None:
-    """Tell ctypes the argument types."""
-    arguments = [POINTER(NativeHash), c_int64, c_void_p, c_void_p, c_void_p, c_void_p]
-    for name in ("texgs_hash_encode", "texgs_hash_backward"):
-        native.function(native.library("cpu"), name).argtypes = arguments

@@ -3,12 +3,14 @@
 `libtexgs` works on CPU tensors, `libtexgs_cuda` on CUDA tensors; both export the functions of `csrc/texgs.h`,
 `texgs_losses.h`, `texgs_grid.h` and `texgs_volume.h`, the first also those of `texgs_fusion.h` and
 `texgs_neural.h`. They know raw pointers only, so that one build serves every version of torch and Python.
+A module declares the structures and functions that it calls.
 """
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from collections.abc import Iterable
 from contextlib import nullcontext
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
 from functools import cache
@@ -30,81 +32,44 @@ ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError}
 PASSES = ("project", "sort", "bin", "forward", "backward", "reduce")  # in the order of `texgs_pass`
 
 
-def _fields(pointers: str, **numbers: type) -> list[tuple[str, type]]:
-    return [(name, c_void_p) for name in pointers.split()] + list(numbers.items())
+TYPES = {"p": c_void_p, "i": c_int32, "n": c_int64, "f": c_float}
+DECLARED: dict[str, tuple[list[Any], Any]] = {}  # arguments and result of each function of the libraries
 
 
-class Surfels(Structure):
-    """`texgs_surfels`."""
+def declare(name: str, *arguments: str | type[Structure], result: Any = c_int32, stream: bool = True) -> None:
+    """State the C types of a function.
 
-    _fields_ = [
-        ("n", c_int64),
-        ("axes", c_int32),
-        *_fields("means quats scales opacities shift", channels=c_int32),
-        *_fields("features base gain texels sizes offsets", n_texels=c_int64),
-    ]
-
-
-class Camera(Structure):
-    """`texgs_camera`."""
-
-    _fields_ = _fields("viewmat K", width=c_int32, height=c_int32)
-
-
-class RenderOptions(Structure):
-    """`texgs_options`."""
-
-    _fields_ = [
-        ("background", c_void_p),
-        *((name, c_float) for name in ("low_pass", "filter_sigma", "dilation")),
-        ("antialiased", c_int32),
-        *((name, c_float) for name in ("alpha_min", "transmittance_min", "near_plane", "far_plane")),
-    ]
+    Args:
+        name: of the function.
+        arguments: structures, which it takes by address, and letters: p pointer, i int32, n int64, f float.
+        result: a status by default.
+        stream: whether a stream follows the arguments, as `call` passes it.
+    """
+    types: list[Any] = []
+    for each in arguments:
+        types += (
+            [TYPES[letter] for letter in each if letter != " "] if isinstance(each, str) else [POINTER(each)]
+        )
+    DECLARED[name] = [*types, c_void_p] if stream else types, result
 
 
-class Image(Structure):
-    """`texgs_image`."""
-
-    _fields_ = _fields("color alpha depth median normal distortion radii")
-
-
-class Gradients(Structure):
-    """`texgs_gradients`."""
-
-    _fields_ = _fields("means quats scales opacities shift features base gain texels")
-
-
-class Contributions(Structure):
-    """`texgs_contributions`."""
-
-    _fields_ = [("image", c_void_p), ("channels", c_int32), *_fields("sums weight_sum weight_max pixels")]
-
-
-SCENE = [POINTER(Surfels), POINTER(Camera), POINTER(RenderOptions)]
-PROTOTYPES = {
-    "texgs_forward": [*SCENE, POINTER(Image), POINTER(c_void_p), c_void_p],
-    "texgs_backward": [c_void_p, *SCENE, POINTER(Image), POINTER(Image), POINTER(Gradients), c_void_p],
-    "texgs_contribute": [c_void_p, *SCENE, POINTER(Contributions), c_void_p],
-    "texgs_require_memory": [c_int64],
-    "texgs_release": [c_void_p],
-    "texgs_trim": [],
-    "texgs_use_openmp": [c_void_p],
-    "texgs_set_threads": [c_int32],
-    "texgs_memory": [c_int32],
-}
-RESULTS = {  # int32_t but for
-    "texgs_error": c_char_p,
-    "texgs_instruction_set": c_char_p,
-    "texgs_memory": c_int64,
-    "texgs_release": None,
-    "texgs_trim": None,
-    "texgs_use_openmp": None,
-    "texgs_set_threads": None,
-}
+for _name, _result, _arguments in (
+    ("texgs_abi_version", c_int32, ""),
+    ("texgs_sources", c_char_p, ""),
+    ("texgs_error", c_char_p, ""),
+    ("texgs_instruction_set", c_char_p, ""),
+    ("texgs_require_memory", c_int32, "n"),
+    ("texgs_trim", None, ""),
+    ("texgs_use_openmp", None, "p"),
+    ("texgs_set_threads", None, "i"),
+    ("texgs_memory", c_int64, "i"),
+    ("texgs_pass_seconds", None, "p"),
+):
+    declare(_name, _arguments, result=_result, stream=False)
 
 
 def library_path(device_type: str = "cpu") -> Path:
-    """Where the library for "cpu" or "cuda" tensors lies, or would."""
+    """Return where the library for "cpu" or "cuda" tensors lies, or would."""
     name = "texgs_cuda" if device_type == "cuda" else "texgs"
     return FOLDER / f"{'' if sys.platform == 'win32' else 'lib'}{name}{SUFFIX}"
 
@@ -131,14 +96,10 @@ def library(device_type: str = "cpu") -> ctypes.CDLL:
     if version != ABI_VERSION:
         raise NativeError(f"{path.name}: interface version {ABI_VERSION} expected, got {version}; {INSTALL}")
     _require_own_sources(lib)
-    for name, arguments in PROTOTYPES.items():
-        function(lib, name).argtypes = arguments
-    for name, result in RESULTS.items():
-        function(lib, name).restype = result
     if device_type == "cpu":
-        lib.texgs_use_openmp(_openmp_of_torch())
-    if lib.texgs_instruction_set() is None:
-        raise NativeError(lib.texgs_error().decode())
+        function(lib, "texgs_use_openmp")(_openmp_of_torch())
+    if function(lib, "texgs_instruction_set")() is None:
+        raise NativeError(function(lib, "texgs_error")().decode())
     return lib
 
 
@@ -153,19 +114,22 @@ def _require_own_sources(lib: ctypes.CDLL) -> None:
 
 
 def function(lib: ctypes.CDLL, name: str) -> Any:
-    """A function of a library.
+    """Return a function of a library, as it is declared.
 
     Raises:
         NativeError: if the library lacks it, as one of other sources may.
     """
     try:
-        return getattr(lib, name)
+        found = getattr(lib, name)
     except AttributeError:
         raise NativeError(f"{Path(lib._name).name}: has no function {name}; {INSTALL}") from None
+    if found.argtypes is None:
+        found.argtypes, found.restype = DECLARED[name]
+    return found
 
 
 def _openmp_of_torch() -> int | None:
-    """Address of GOMP_parallel in the OpenMP runtime that torch uses; None where torch has none.
+    """Return the address of GOMP_parallel in the OpenMP runtime that torch uses; None where torch has none.
 
     Two thread pools in one process spin against each other after every parallel loop; sharing torch's avoids
     it.
@@ -178,27 +142,27 @@ def _openmp_of_torch() -> int | None:
 
 
 def instruction_set(device_type: str = "cpu") -> str:
-    """Instruction set ("avx512", "avx2", "portable") or CUDA architectures that the library runs."""
-    return library(device_type).texgs_instruction_set().decode()
+    """Return the instruction set ("avx512", "avx2", "portable") or CUDA architectures in use."""
+    return str(function(library(device_type), "texgs_instruction_set")().decode())
 
 
 def threads() -> int:
-    """Number of threads that the CPU library works with: as many as torch."""
+    """Return the number of threads that the CPU library works with: as many as torch."""
     return torch.get_num_threads()
 
 
 def peak_memory(reset: bool = False, device_type: str = "cpu") -> int:
-    """The most bytes of scratch memory that a library held since the last reset."""
-    return int(library(device_type).texgs_memory(int(reset)))
+    """Return the most bytes of scratch memory that a library held since the last reset."""
+    return int(function(library(device_type), "texgs_memory")(int(reset)))
 
 
 def release_memory(device_type: str = "cpu") -> None:
     """Free the scratch memory that a library keeps for the next views."""
-    library(device_type).texgs_trim()
+    function(library(device_type), "texgs_trim")()
 
 
 def pass_seconds() -> dict[str, float]:
-    """Seconds that each of PASSES took in the calling thread's latest calls of the CPU library."""
+    """Return the seconds that each of PASSES took in the calling thread's latest calls of the CPU library."""
     seconds = (c_double * len(PASSES))()
     function(library(), "texgs_pass_seconds")(seconds)
     return dict(zip(PASSES, seconds, strict=True))
@@ -207,23 +171,30 @@ def pass_seconds() -> dict[str, float]:
 def call(name: str, *arguments, device: torch.device) -> None:
     """Call a function of the library for `device` with its current stream as the last argument.
 
+    Tensors are dense; the library gets their address, and NULL for None.
+
     Raises:
         ArgumentError, OutOfMemoryError, DeviceError: with the library's own sentence.
     """
     lib = library(device.type)
     if device.type == "cpu":
-        lib.texgs_set_threads(threads())
+        function(lib, "texgs_set_threads")(threads())
         stream = None
     else:
         stream = torch.cuda.current_stream(device).cuda_stream
-    _require_success(function(lib, name)(*arguments, stream), lib, device)
+    _require_success(function(lib, name)(*plain(arguments), stream), lib, device)
+
+
+def plain(arguments: Iterable[Any]) -> list[Any]:
+    """Return arguments as ctypes takes them."""
+    return [x.data_ptr() if isinstance(x, Tensor) else x for x in arguments]
 
 
 def require_memory(n_bytes: int, device: torch.device) -> None:
     """Raise OutOfMemoryError, naming `n_bytes`, where less memory than that is left."""
     lib = library(device.type)
     with torch.cuda.device(device) if device.type == "cuda" else nullcontext():
-        status = lib.texgs_require_memory(n_bytes)
+        status = function(lib, "texgs_require_memory")(n_bytes)
     _require_success(status, lib, device)
     if device.type == "cpu":  # the C library hands out more than there is
         memory.require_memory(n_bytes, "texgs.raster: the images", "choose smaller ones")
@@ -235,9 +206,9 @@ def _require_success(status: int, lib: ctypes.CDLL, device: torch.device) -> Non
     error = ERRORS.get(status, NativeError)
     kept_by_torch = error is OutOfMemoryError and device.type == "cuda"
     hint = "; torch.cuda.empty_cache() gives back what torch keeps" if kept_by_torch else ""
-    raise error(f"texgs.raster: {lib.texgs_error().decode()}{hint}")
+    raise error(f"texgs.raster: {function(lib, 'texgs_error')().decode()}{hint}")
 
 
 def address(tensor: Tensor | None) -> int | None:
-    """Address of a dense tensor's first element, NULL for None."""
+    """Return the address of a dense tensor's first element, NULL for None."""
     return None if tensor is None else tensor.data_ptr()

@@ -10,10 +10,12 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster import arguments
-from texgs.raster.fused import fused_loss
-from texgs.raster.losses_abi import call
-from texgs.raster.ssim import planar
+from texgs.raster import arguments, native
+from texgs.raster.losses import fused_loss, planar
+
+native.declare("texgs_depth_to_normal", "ppp ii p")
+native.declare("texgs_depth_to_normal_backward", "ppp ii pp")
+native.declare("texgs_normal_consistency", "ppppp ii ppp")
 
 
 def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
@@ -69,7 +71,9 @@ def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Te
     def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
         value = depth.new_empty(())
         gradients = [torch.empty_like(x) if want else None for x, want in zip(tensors, wanted, strict=False)]
-        call("texgs_normal_consistency", *tensors, *depth.shape, value, *gradients, device=depth.device)
+        native.call(
+            "texgs_normal_consistency", *tensors, *depth.shape, value, *gradients, device=depth.device
+        )
         return value, gradients
 
     return fused_loss(evaluate, [planar(normal), depth.contiguous()], constants)
@@ -93,7 +97,7 @@ class _DepthToNormal(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
         normal = depth.new_empty(3, *depth.shape)
-        call("texgs_depth_to_normal", depth, viewmat, K, *depth.shape, normal, device=depth.device)
+        native.call("texgs_depth_to_normal", depth, viewmat, K, *depth.shape, normal, device=depth.device)
         ctx.save_for_backward(depth, viewmat, K)
         return normal
 
@@ -103,5 +107,5 @@ class _DepthToNormal(torch.autograd.Function):
         depth, viewmat, K = ctx.saved_tensors
         gradient = torch.empty_like(depth)
         arguments = (depth, viewmat, K, *depth.shape, upstream.contiguous(), gradient)
-        call("texgs_depth_to_normal_backward", *arguments, device=depth.device)
+        native.call("texgs_depth_to_normal_backward", *arguments, device=depth.device)
         return gradient, None, None

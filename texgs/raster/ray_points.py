@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from ctypes import c_int64, c_void_p
-from functools import cache
+from ctypes import c_int64
 from typing import NamedTuple
 
 import torch
 from torch import Tensor
 
 from texgs.core.errors import DeviceError
-from texgs.raster import grid_abi, native
-from texgs.raster.voxel_grid import VoxelGrid
-from texgs.raster.voxels import March, Samples
+from texgs.raster import native
+from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
+from texgs.raster.voxels import March, NativeMarch, Samples
+
+native.declare("texgs_grid_count", "p", result=c_int64, stream=False)
+native.declare("texgs_grid_points", "p", NativeGrid, NativeMarch, "pp")
 
 
 class RayPoints(NamedTuple):
@@ -34,22 +36,8 @@ def ray_points(grid: VoxelGrid, rays: Tensor, march: March) -> RayPoints:
     if rays.device.type != "cpu":
         raise DeviceError(f"rays: expected a tensor on cpu, got {rays.device}; points are listed on the CPU")
     samples = Samples(grid, march, rays)
-    _describe()
     count = native.function(native.library("cpu"), "texgs_grid_count")(samples.handle)
     points, lengths = rays.new_empty(count, 3), torch.empty(len(rays), dtype=torch.int32)
     structures = grid.structure(), march.structure(rays)
-    native.call(
-        *("texgs_grid_points", samples.handle, *structures, points.data_ptr(), lengths.data_ptr()),
-        device=rays.device,
-    )
+    native.call("texgs_grid_points", samples.handle, *structures, points, lengths, device=rays.device)
     return RayPoints(points, torch.repeat_interleave(torch.arange(len(rays)), lengths))
-
-
-@cache
-def _describe() -> None:
-    """Tell ctypes the argument types."""
-    names = "texgs_grid_count", "texgs_grid_points"
-    count, points = (native.function(native.library("cpu"), name) for name in names)
-    count.argtypes, count.restype = [c_void_p], c_int64
-    structures = [grid_abi.TYPES["g"], grid_abi.TYPES["m"]]
-    points.argtypes = [c_void_p, *structures, c_void_p, c_void_p, c_void_p]

@@ -10,9 +10,11 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster.losses_abi import call
+from texgs.raster import native
 
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")
+native.declare("texgs_blinn_phong", "n ppppp i pppp i pp")
+native.declare("texgs_blinn_phong_backward", "n ppppp i pppp i pp ppppppp")
 
 
 def blinn_phong(
@@ -108,7 +110,7 @@ class _BlinnPhong(torch.autograd.Function):
     def forward(ctx: Any, facing: bool, *tensors: Tensor) -> tuple[Tensor, Tensor]:
         color = tensors[0]
         base, gain = torch.empty_like(color), color.new_empty(len(color))
-        call("texgs_blinn_phong", *_arguments(tensors, facing), base, gain, device=color.device)
+        native.call("texgs_blinn_phong", *_arguments(tensors, facing), base, gain, device=color.device)
         ctx.save_for_backward(*tensors)
         ctx.facing = facing
         ctx.set_materialize_grads(False)
@@ -123,7 +125,7 @@ class _BlinnPhong(torch.autograd.Function):
         wanted = zip(tensors, ctx.needs_input_grad[1:], strict=True)
         gradients = [torch.empty_like(x) if want else None for x, want in wanted]
         arguments = (*_arguments(tensors, ctx.facing), grad_base, grad_gain, *gradients[:7])
-        call("texgs_blinn_phong_backward", *arguments, device=grad_base.device)
+        native.call("texgs_blinn_phong_backward", *arguments, device=grad_base.device)
         return None, *gradients
 
 

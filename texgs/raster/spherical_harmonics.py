@@ -10,10 +10,12 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.raster.losses_abi import call
+from texgs.raster import native
 
 Y00 = 0.5 / sqrt(pi)  # the constant harmonic
 DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # by number of coefficients
+native.declare("texgs_spherical_harmonics", "n i ppp p")
+native.declare("texgs_spherical_harmonics_backward", "n i ppp pp pp")
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
@@ -51,7 +53,7 @@ class _SphericalHarmonics(torch.autograd.Function):
     def forward(ctx: Any, sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
         color = torch.empty_like(means)
         inputs = (len(sh), DEGREES[sh.shape[1]], sh, means, camera_position)
-        call("texgs_spherical_harmonics", *inputs, color, device=sh.device)
+        native.call("texgs_spherical_harmonics", *inputs, color, device=sh.device)
         ctx.save_for_backward(sh, means, camera_position, color)
         return color
 
@@ -63,5 +65,5 @@ class _SphericalHarmonics(torch.autograd.Function):
         wanted = zip((sh, means), ctx.needs_input_grad, strict=False)
         gradients = [torch.empty_like(x) if want else None for x, want in wanted]
         arguments = (*inputs, upstream.contiguous(), *gradients)
-        call("texgs_spherical_harmonics_backward", *arguments, device=sh.device)
+        native.call("texgs_spherical_harmonics_backward", *arguments, device=sh.device)
         return *gradients, None

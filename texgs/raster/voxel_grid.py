@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from ctypes import Structure, c_float, c_int32, c_int64, c_void_p
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any
@@ -13,13 +14,29 @@ from torch.nn.functional import embedding_bag
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.raster import grid_abi, native
+from texgs.raster import native
 
 FLOATS = {0: 4, 1: 16, 2: 32}  # of a row, by degree of the spherical harmonics
 DEGREES = {floats: degree for degree, floats in FLOATS.items()}
 SIDES = range(8, 1025, 4)  # voxels along an axis
 PIECE = 1 << 17  # points that are interpolated at a time
 EMPTY = 1  # rows before those of voxels: that of all others
+
+
+class NativeGrid(Structure):
+    """`texgs_grid`."""
+
+    _fields_ = [
+        ("size", c_int32 * 3),
+        ("lower", c_float * 3),
+        ("spacing", c_float),
+        ("degree", c_int32),
+        ("n", c_int64),
+        *((name, c_void_p) for name in ("masks", "first", "occupied", "distance", "rows", "density")),
+    ]
+
+
+native.declare("texgs_grid_occupy", NativeGrid, "pp")
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,18 +73,15 @@ class VoxelGrid:
         """Number of voxels with a row."""
         return len(self.rows) - EMPTY
 
-    def structure(self) -> grid_abi.Grid:
+    def structure(self) -> NativeGrid:
         """The grid as the library takes it."""
-        return grid_abi.Grid(
+        return NativeGrid(
             self.size,
             self.lower,
             self.spacing,
             self.degree,
             len(self.rows),
-            *map(
-                native.address,
-                (self.masks, self.first, self.occupied, self.distance, self.rows, self.density),
-            ),
+            *native.plain((self.masks, self.first, self.occupied, self.distance, self.rows, self.density)),
         )
 
     @torch.no_grad()
@@ -78,7 +92,7 @@ class VoxelGrid:
 
     def refresh_occupancy(self) -> None:
         """Find the cells that can show something, where the density is up to date."""
-        grid_abi.call(
+        native.call(
             "texgs_grid_occupy", self.structure(), self.occupied, self.distance, device=self.rows.device
         )
 

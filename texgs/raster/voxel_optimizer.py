@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from ctypes import Structure, c_float
 from dataclasses import dataclass
 
 import torch
@@ -9,12 +10,24 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.raster import grid_abi
-from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster import native
+from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 from texgs.raster.voxels import RowGradient
 
 EPSILON = 1e-8
 BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}
+
+
+class NativeRule(Structure):
+    """`texgs_rule`."""
+
+    _fields_ = [
+        (name, c_float) for name in ("rate_density", "rate_base", "rate_sh", "beta1", "beta2", "epsilon")
+    ]
+
+
+native.declare("texgs_grid_total_variation", NativeGrid, "np ff pp")
+native.declare("texgs_grid_step", NativeGrid, NativeRule, "pppp")
 
 
 @dataclass(frozen=True)
@@ -57,9 +70,9 @@ class VoxelOptimizer:
 
     def step(self, rates: VoxelRates) -> None:
         """Move the rows that have a gradient, and forget it."""
-        rule = grid_abi.Rule(rates.density, rates.base, rates.sh, *self.betas, EPSILON)
+        rule = NativeRule(rates.density, rates.base, rates.sh, *self.betas, EPSILON)
         state = (self.gradient.rows, self.gradient.touched, self.first, self.second)
-        grid_abi.call("texgs_grid_step", self.grid.structure(), rule, *state, device=self.grid.rows.device)
+        native.call("texgs_grid_step", self.grid.structure(), rule, *state, device=self.grid.rows.device)
         torch.autograd.graph.increment_version(self.grid.rows)  # autograd sees no writes of the library
 
 
@@ -83,7 +96,7 @@ def add_total_variation(
     blocks = blocks.int().contiguous()
     if len(blocks) and not 0 <= int(blocks.min()) <= int(blocks.max()) < grid.masks.numel():
         raise ArgumentError(f"blocks: expected places from 0 to {grid.masks.numel() - 1}, got others")
-    grid_abi.call(
+    native.call(
         "texgs_grid_total_variation",
         grid.structure(),
         len(blocks),

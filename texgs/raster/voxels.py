@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import weakref
+from ctypes import Structure, c_float, c_int64, c_void_p
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,10 +14,28 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.raster import grid_abi, native
-from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster import native
+from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 
 PIECE = 16_384  # rays at a time, where memory is to be saved
+
+
+class NativeMarch(Structure):
+    """`texgs_march`."""
+
+    _fields_ = [
+        ("n", c_int64),
+        ("rays", c_void_p),
+        ("background", c_float * 3),
+        ("step", c_float),
+        ("transmittance_min", c_float),
+    ]
+
+
+native.declare("texgs_grid_render", NativeGrid, NativeMarch, "pppp")
+native.declare("texgs_grid_backward", "p", NativeGrid, NativeMarch, "pppp")
+native.declare("texgs_grid_mark", "p", NativeGrid, NativeMarch, "p")
+native.declare("texgs_grid_release", "p", result=None, stream=False)
 
 
 @dataclass(frozen=True)
@@ -27,9 +46,9 @@ class March:
     step: float = 0.5  # between samples, in spacings of voxels
     transmittance_min: float = 1e-3  # a ray ends with the sample that leaves less
 
-    def structure(self, rays: Tensor) -> grid_abi.March:
+    def structure(self, rays: Tensor) -> NativeMarch:
         """The march along rays [N, 6] as the library takes it."""
-        return grid_abi.March(
+        return NativeMarch(
             len(rays), native.address(rays), self.background, self.step, self.transmittance_min
         )
 
@@ -84,7 +103,8 @@ class Samples:
         handle = ctypes.c_void_p()
         _march(grid, march, self.rays, out, ctypes.addressof(handle))
         self.handle = handle.value
-        weakref.finalize(self, native.library(rays.device.type).texgs_grid_release, handle.value)
+        release = native.function(native.library(rays.device.type), "texgs_grid_release")
+        weakref.finalize(self, release, handle.value)
 
     def add_gradient(self, color: Tensor | None, alpha: Tensor | None, into: RowGradient) -> None:
         """Add the gradient of rows from those of colours [N, 3] and alphas [N]."""
@@ -109,7 +129,7 @@ class Samples:
 
     def _call(self, name: str, *arguments: Tensor | None) -> None:
         structures = self.grid.structure(), self.march.structure(self.rays)
-        grid_abi.call(name, self.handle, *structures, *arguments, device=self.rays.device)
+        native.call(name, self.handle, *structures, *arguments, device=self.rays.device)
 
 
 def _gradient(name: str, gradient: Tensor, spec: str, rays: Tensor) -> Tensor:
@@ -126,7 +146,7 @@ def _march(grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None, sample
     check.floating("rays", rays)
     check.same_device(rays=rays, rows=grid.rows)
     structures, outputs = (grid.structure(), march.structure(rays)), out or (None,) * 3
-    grid_abi.call("texgs_grid_render", *structures, *outputs, samples, device=rays.device)
+    native.call("texgs_grid_render", *structures, *outputs, samples, device=rays.device)
 
 
 def render_rays(

@@ -13,9 +13,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Collection
 from copy import copy
-from ctypes import POINTER, Structure, byref, c_float, c_int32, c_int64, c_void_p
+from ctypes import Structure, c_float, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
-from functools import cache
 from math import hypot, inf
 from typing import Any
 
@@ -67,6 +66,12 @@ class NativeView(Structure):
     ]
 
 
+native.declare("texgs_volume_bricks", NativeVolume, "p", result=c_int64, stream=False)
+native.declare("texgs_volume_extremes", NativeVolume, "pp")
+native.declare("texgs_volume_distance", NativeVolume, "p", NativeTransfer, "p")
+native.declare("texgs_cast", NativeVolume, NativeTransfer, "p", NativeView)
+
+
 @dataclass(frozen=True, eq=False)
 class Cast:
     """What rays see; float32."""
@@ -108,12 +113,12 @@ class Caster:
         self._volume = NativeVolume(
             self._values.data_ptr(), TYPES.index(kind), (c_int32 * 3)(*grid.dims), (c_float * 3)(*half)
         )
-        _describe(self._device.type)
-        bricks = native.library(self._device.type).texgs_volume_bricks(byref(self._volume), (c_int32 * 3)())
+        count_bricks = native.function(native.library(self._device.type), "texgs_volume_bricks")
+        bricks = count_bricks(self._volume, (c_int32 * 3)())
         require_memory(8 * bricks, "a volume's bricks", "crop it, or reduce it by dataset.volume.reduce")
         self._extremes = torch.empty(bricks, 2, device=self._device)
         missing = torch.zeros(1, dtype=torch.int64, device=self._device)
-        self._call("texgs_volume_extremes", self._extremes.data_ptr(), missing.data_ptr())
+        self._call("texgs_volume_extremes", self._extremes, missing)
         self.missing = int(missing)
         self._prepared: tuple[TransferFunction, Tensor, Tensor] | None = None
 
@@ -160,7 +165,7 @@ class Caster:
             *(seen[name].data_ptr() if name in seen else None for name in ("rgba", *OUTPUTS)),
         )
         transfer = NativeTransfer(len(points), points.data_ptr())
-        self._call("texgs_cast", byref(transfer), distance.data_ptr(), byref(view))
+        self._call("texgs_cast", transfer, distance, view)
         return Cast(**seen)
 
     def _check(self, camera: Camera) -> None:
@@ -182,13 +187,12 @@ class Caster:
             points = points_of(tf).to(self._device)
             distance = torch.zeros(len(self._extremes) + PADDING, dtype=torch.uint8, device=self._device)
             transfer = NativeTransfer(len(points), points.data_ptr())
-            addresses = self._extremes.data_ptr(), byref(transfer), distance.data_ptr()
-            self._call("texgs_volume_distance", *addresses)
+            self._call("texgs_volume_distance", self._extremes, transfer, distance)
             prepared = self._prepared = tf, points, distance
         return prepared[1:]
 
     def _call(self, name: str, *arguments: Any) -> None:
-        native.call(name, byref(self._volume), *arguments, device=self._device)
+        native.call(name, self._volume, *arguments, device=self._device)
 
 
 def bytes_of(values: NDArray[Any]) -> Tensor:
@@ -227,19 +231,3 @@ def _right_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray
 
 def _left_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[np.float64]:
     return right_limit([(-at, *rest) for at, *rest in reversed(points)], np.array(-value))
-
-
-@cache
-def _describe(device_type: str) -> None:
-    """Tell ctypes the argument types."""
-    volume, transfer, view = (POINTER(kind) for kind in (NativeVolume, NativeTransfer, NativeView))
-    signatures = {
-        "texgs_volume_extremes": [volume, c_void_p, c_void_p, c_void_p],
-        "texgs_volume_distance": [volume, c_void_p, transfer, c_void_p, c_void_p],
-        "texgs_cast": [volume, transfer, c_void_p, view, c_void_p],
-    }
-    library = native.library(device_type)
-    for name, arguments in signatures.items():
-        native.function(library, name).argtypes = arguments
-    count = native.function(library, "texgs_volume_bricks")
-    count.argtypes, count.restype = [volume, c_void_p], c_int64

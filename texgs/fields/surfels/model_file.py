@@ -18,7 +18,7 @@ from texgs.fields.surfels.groups import GEOMETRY, TEXTURE
 from texgs.fields.surfels.model import SHAPES, Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Texture
-from texgs.raster.atlas import check_texture
+from texgs.raster.arguments import check_texture
 from texgs.raster.shading import MATERIAL
 
 FORMAT = "texgs-model"

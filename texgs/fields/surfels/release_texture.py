@@ -14,7 +14,7 @@ from texgs.core.memory import require_memory
 from texgs.core.reading import reading
 from texgs.core.torch_file import load_torch
 from texgs.raster import Texture
-from texgs.raster.atlas import check_texture
+from texgs.raster.arguments import check_texture
 
 RELEASE = "the release writes it beside the surfels"
 

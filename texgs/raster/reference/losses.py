@@ -10,7 +10,7 @@ WINDOW = 11  # pixels each way, weighted by a Gaussian of standard deviation 1.5
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
-    """Mean structural similarity of [H, W, C] images; see `texgs.raster.ssim`."""
+    """Mean structural similarity of [H, W, C] images; see `texgs.raster.losses`."""
     from kornia.metrics import ssim as similarities
 
     x, y = (pad(each.permute(2, 0, 1)[None], (WINDOW // 2,) * 4) for each in (image, target))
@@ -47,7 +47,7 @@ def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Te
 
 
 def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
-    """Mean of alpha * exp(-g(grey)) * g(attribute); see `texgs.raster.smoothness`."""
+    """Mean of alpha * exp(-g(grey)) * g(attribute); see `texgs.raster.losses`."""
     channels = attribute[None] if attribute.ndim == 2 else attribute.permute(2, 0, 1)  # [C, H, W]
     weight = alpha * torch.exp(-edges(guide.mean(-1)[None]))  # [1, H, W]
     return (weight * edges(channels)).mean()

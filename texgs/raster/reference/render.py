@@ -14,10 +14,17 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.raster.primitive import are_gaussians, check_primitive
 from texgs.raster.reference import gaussians, surfels
 from texgs.raster.reference.fragments import Fragments
-from texgs.raster.types import DEFAULT_OPTIONS, Options, Render, Statistics, Texture
+from texgs.raster.types import (
+    DEFAULT_OPTIONS,
+    Options,
+    Render,
+    Statistics,
+    Texture,
+    are_gaussians,
+    check_primitive,
+)
 
 TEXTURE_SIGMA = 3.0  # a texture spans so many standard deviations to either side of the mean
 

@@ -1,0 +1,162 @@
+"""Losses of images whose library function returns the gradient along with the value.
+
+L1 and structural similarity, which are the photometric loss of 3DGS, and smoothness but across edges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from texgs.core import check
+from texgs.core.errors import ArgumentError, ShapeError
+from texgs.raster import native
+
+# Inputs and constants, and whether each input's gradient is wanted, to the value [] and those gradients.
+Evaluate = Callable[[Sequence[Tensor], Sequence[bool]], tuple[Tensor, Sequence[Tensor | None]]]
+native.declare("texgs_l1_dssim", "pp iii ff pp")
+native.declare("texgs_bilateral_smoothness", "ppp iii pp")
+
+
+def ssim(image: Tensor, target: Tensor) -> Tensor:
+    """Mean structural similarity of two images with values in [0, 1].
+
+    Gaussian window of 11 x 11 pixels with sigma 1.5, zeros outside the image, C1 = 0.01^2, C2 = 0.03^2,
+    averaged over pixels and channels (Wang et al. 2004, with the window and padding of 3DGS). Windows in
+    which both images are equal cost almost nothing. Differentiable in `image`; for a loss take `l1_dssim`,
+    which is one pass less.
+
+    Args:
+        image: [H, W, C] or [H, W]. Planar memory ([C, H, W] seen as [H, W, C], as the rasterizer returns) is
+            not copied.
+        target: the same shape.
+
+    Returns:
+        [] between -1 and 1; exactly 1 for equal images.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    return 1.0 - _weighted(image, target, 0.0, 1.0)
+
+
+def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor:
+    """Photometric loss (1 - lambda) mean |image - target| + lambda (1 - SSIM) (Kerbl et al. 2023, eq. 7).
+
+    Differentiable in `image`; pixels equal to the target have no L1 gradient. SSIM is that of `ssim`. Alpha
+    is a second image: add `weight * l1_dssim(alpha, target_alpha)`.
+
+    Args:
+        image: [H, W, C] or [H, W], values in [0, 1]. Planar memory is not copied.
+        target: the same shape.
+        lambda_dssim: in [0, 1].
+
+    Returns:
+        [] 0 or more; exactly 0 for equal images.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    if not 0.0 <= lambda_dssim <= 1.0:
+        raise ArgumentError(f"lambda_dssim: expected 0 to 1, got {lambda_dssim}")
+    return _weighted(image, target, 1.0 - lambda_dssim, lambda_dssim)
+
+
+def planar(image: Tensor) -> Tensor:
+    """[H, W, C] or [H, W] as dense [C, H, W]; no copy where the memory is laid out so."""
+    return (image[None] if image.ndim == 2 else image.permute(2, 0, 1)).contiguous()
+
+
+def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
+    """l1 * mean |image - target| + dssim * (1 - SSIM), checked."""
+    check.shape("image", image, "H W" if image.ndim == 2 else "H W C")
+    if target.shape != image.shape:
+        raise ShapeError(f"target: expected {list(image.shape)} as image, got {list(target.shape)}")
+    if image.numel() == 0:
+        raise ShapeError(f"image: expected at least one pixel, got {list(image.shape)}")
+    check.floating("image", image)
+    check.floating("target", target)
+    check.same_device(image=image, target=target)
+    check.constant(target=target)
+
+    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
+        x, dense_target = tensors
+        value = x.new_empty(())
+        gradient = torch.empty_like(x) if wanted[0] else None
+        native.call("texgs_l1_dssim", x, dense_target, *x.shape, l1, dssim, value, gradient, device=x.device)
+        return value, [gradient]
+
+    return fused_loss(evaluate, [planar(image)], [planar(target)])
+
+
+def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
+    """Bilateral smoothness of attribute maps: mean of alpha * exp(-g(grey)) * g(attribute).
+
+    g = |Sobel x| + |Sobel y|, 3 x 3 and not normalised, zeros outside the image; grey is the mean of the
+    guide's channels. An attribute may change where the guide does (Gao et al. 2024; the paper's L_b). Linear
+    in the scale of the attribute: an exponent of 0 to 50 counts fifty times as much as a factor of 0 to 1.
+    Differentiable in `attribute`.
+
+    Args:
+        attribute: [H, W] or [H, W, C] rendered attributes, averaged over channels. Planar memory is not
+            copied.
+        guide: [H, W, 3] ground-truth image in [0, 1].
+        alpha: [H, W] ground-truth alpha in [0, 1].
+
+    Returns:
+        [] 0 or more.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    sizes = check.shape("attribute", attribute, "H W" if attribute.ndim == 2 else "H W C")
+    if attribute.numel() == 0:
+        raise ShapeError(f"attribute: expected at least one pixel, got {list(attribute.shape)}")
+    check.shape("guide", guide, "H W 3", **sizes)
+    check.shape("alpha", alpha, "H W", **sizes)
+    for name, tensor in (("attribute", attribute), ("guide", guide), ("alpha", alpha)):
+        check.floating(name, tensor)
+    check.same_device(attribute=attribute, guide=guide, alpha=alpha)
+    check.constant(guide=guide, alpha=alpha)
+
+    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
+        x, *constants = tensors
+        value = x.new_empty(())
+        gradient = torch.empty_like(x) if wanted[0] else None
+        native.call("texgs_bilateral_smoothness", x, *constants, *x.shape, value, gradient, device=x.device)
+        return value, [gradient]
+
+    return fused_loss(evaluate, [planar(attribute)], [planar(guide), alpha.contiguous()])
+
+
+def fused_loss(evaluate: Evaluate, inputs: Sequence[Tensor], constants: Sequence[Tensor]) -> Tensor:
+    """Value [] of a loss, differentiable once in `inputs`.
+
+    Autograd refuses a second backward pass after one of the tensors was changed.
+    """
+    wanted = [torch.is_grad_enabled() and x.requires_grad for x in inputs]
+    return _FusedLoss.apply(evaluate, wanted, *inputs, *constants)
+
+
+class _FusedLoss(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, evaluate: Evaluate, wanted: list[bool], *tensors: Tensor) -> Tensor:
+        value, ctx.gradients = evaluate(tensors, wanted)
+        ctx.evaluate, ctx.wanted = evaluate, wanted
+        ctx.save_for_backward(*tensors)
+        return value
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
+        # Autograd may accumulate into what it is handed: another pass through a retained graph computes anew.
+        gradients = ctx.gradients or ctx.evaluate(ctx.saved_tensors, ctx.wanted)[1]
+        ctx.gradients = None
+        # A weight of 1 is common and scaling a pass over the image; looking at it would make a GPU wait.
+        if upstream.device.type != "cpu" or upstream.item() != 1.0:
+            gradients = [g if g is None else g.mul_(upstream) for g in gradients]
+        constants = len(ctx.needs_input_grad) - 2 - len(gradients)
+        return None, None, *gradients, *[None] * constants
