@@ -150,11 +150,11 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
 
 
 def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatch):
-    from texgs.workflow.stages import figure
+    from texgs.report import fit_figure
 
     drawn = []
-    write = figure.write_fit_figure
-    monkeypatch.setattr(figure, "write_fit_figure", lambda *args: drawn.append(args) or write(*args))
+    write = fit_figure.write_fit_figure
+    monkeypatch.setattr(fit_figure, "write_fit_figure", lambda *args: drawn.append(args) or write(*args))
     assert main(["figure", *TINY]) == 0
     ((path, models, views, reduce, title),) = drawn
     assert list(models) == ["surfels", "shading", "texture"]
@@ -167,17 +167,18 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatc
 
 
 def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
-    from texgs.workflow.stages import figure
+    from texgs.report import fit_figure
+    from texgs.volume import view_set
 
     shown = []
-    read = figure.read_views
-    monkeypatch.setattr(figure, "read_views", lambda folder: replace(read(folder), test=[]))
+    read = view_set.read_views
+    monkeypatch.setattr(view_set, "read_views", lambda folder: replace(read(folder), test=[]))
 
     def write(path, _models, views, *_):
         shown.extend(views)
         path.touch()
 
-    monkeypatch.setattr(figure, "write_fit_figure", write)
+    monkeypatch.setattr(fit_figure, "write_fit_figure", write)
     assert main(["figure", *TINY]) == 0
     assert shown == ["training view 0", "training view 4"]
 

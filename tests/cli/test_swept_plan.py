@@ -72,8 +72,8 @@ def test_a_run_of_a_sweep_makes_what_it_shows_and_what_that_needs():
 
 
 def test_every_gpu_that_some_configuration_needs_is_asked_for(planned):
-    assert planned("").fit_gpu == 0
-    assert planned("datasets=[sphere,orbital] dataset.orbital.device=cuda").fit_gpu == 1
+    assert planned("").gpu == []
+    assert planned("datasets=[sphere,orbital] dataset.orbital.device=cuda").gpu == ["fit", "views"]
 
 
 def test_two_variants_of_one_folder_are_refused(planned):

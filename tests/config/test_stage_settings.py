@@ -1,7 +1,6 @@
 """The dataclass of a stage has all values that its row selects, and no others."""
 
 from dataclasses import is_dataclass
-from importlib import import_module
 
 import pytest
 
@@ -42,6 +41,6 @@ def test_a_stage_reads_what_its_row_selects(name):
     selected = stage.settings(compose(WORDS.get(name, ("dataset=turbulence",))))
     if stage.place in ("edit", "edit_metrics"):
         selected["weights"] = {"vgg16": "0123", "lpips_vgg": None}
-    settings = typed(import_module(stage.module).Settings, selected)
+    settings = typed(stage.schema, selected)
     assert is_dataclass(settings)
     assert same(selected, settings)

@@ -45,7 +45,7 @@ def require_fit(stage: Stage, config: DictConfig) -> None:
             f"fit.field: texgs {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
             f"run texgs {kind.phases[-1]} or choose another fit"
         )
-    if stage.place == "mesh" and not kind.field.depth:
+    if stage.place == "mesh" and not kinds()[fit.field].depth:
         able = " or ".join(other.name for other in kinds().values() if other.depth)
         raise ConfigError(
             f"fit.field: texgs mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
