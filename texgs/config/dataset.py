@@ -3,8 +3,6 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from omegaconf import II, MISSING
-
 from texgs.core.keys import key
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -63,8 +61,8 @@ class LookKeys:
 class Dataset:
     """A volume with its basic transfer functions, or a folder of views."""
 
-    name: str = key(MISSING, "name, also of the folder under results/")
-    title: str = key(II(".name"), "name in tables")
+    name: str = key("???", "name, also of the folder under results/")
+    title: str = key("${.name}", "name in tables")
     source: str = key("", "who made the data, and its licence")
     stand_in: str = key("", "what the data stand in for, where the real ones are not public")
     image: int = key(800, "width and height of views", "pixels", least=1)

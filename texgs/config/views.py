@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass, field
 
-from omegaconf import II
-
 from texgs.core.keys import key
 from texgs.core.lens import Lens
 
@@ -46,8 +44,8 @@ class ViewKeys:
     name: str = key("views", "of their folder; a sweep over views has several")
     train: CameraPath = key(CameraPath, "training views")
     test: CameraPath = key(CameraPath, "test views")
-    width: int = key(II("dataset.image"), "width of views", "pixels", least=1)
-    height: int = key(II("dataset.image"), "height of views", "pixels", least=1)
+    width: int = key("${dataset.image}", "width of views", "pixels", least=1)
+    height: int = key("${dataset.image}", "height of views", "pixels", least=1)
     fov_y: float = key(LENS.fov_y, "vertical field of view", "degrees", above=0, below=180)
     radius: float = key(
         LENS.radius, "distance of cameras; the volume's longest side is 1", "world units", above=0
@@ -64,7 +62,7 @@ class ViewKeys:
     step: float = key(0.25, "sample distance along rays", "voxels", above=0)
     opacity_unit: float = key(0.005, "length over which a TF's opacity applies", "world units", above=0)
     mapper: str = key(
-        II("device.mapper"),
+        "${device.mapper}",
         "what renders: the caster, on the CPU or a GPU; or VTK",
         choices=("cpu", "gpu", "vtk"),
     )

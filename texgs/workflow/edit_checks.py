@@ -1,6 +1,8 @@
 """Mistakes in the configuration of an edit, told before any job runs and any earlier result goes."""
 
-from omegaconf import DictConfig
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from texgs.config.compose import compose
 from texgs.config.project import members
@@ -10,6 +12,9 @@ from texgs.fields.kinds import require
 from texgs.workflow.edits import lineage
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.looks import looks_of
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 
 def require_base(words: tuple[str, ...]) -> None:

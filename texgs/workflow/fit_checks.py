@@ -1,6 +1,8 @@
 """Mistakes in the choice of a fit, told before any job runs."""
 
-from omegaconf import DictConfig
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from texgs.core.errors import ConfigError
 from texgs.core.typed import typed
@@ -8,6 +10,9 @@ from texgs.fields.kinds import kinds
 from texgs.fields.surfels.material import require_material
 from texgs.fit.kinds import fit_specs
 from texgs.workflow.stage import Stage
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 
 def check_fit(config: DictConfig) -> None:

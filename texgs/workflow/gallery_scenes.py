@@ -1,6 +1,8 @@
 """The scene that a place of a gallery shows: which recipe, edit and variant, and the parts that it has."""
 
-from omegaconf import DictConfig
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from texgs.config.check import is_scene_file
 from texgs.config.compose import changed, compose
@@ -12,6 +14,9 @@ from texgs.edit.method import method_of
 from texgs.workflow.inputs import with_recipe
 from texgs.workflow.locate import tf_names
 from texgs.workflow.variants import changes as swept
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 ANYWHERE = ("background", "light")  # changes of the whole scene
 

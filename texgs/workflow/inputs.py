@@ -1,11 +1,11 @@
 """What several stages read, files and settings, and which configurations go through them."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
-
-from omegaconf import DictConfig
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.project import members
 from texgs.core.errors import ConfigError, MissingDataError
@@ -14,6 +14,9 @@ from texgs.fit.kinds import fit_specs
 from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.places import edit_folder, folder_of, made
 from texgs.workflow.stage import plain
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 
 def is_fit(config: DictConfig) -> bool:

@@ -1,14 +1,18 @@
 """Where the data of a data set are on this machine, and its basic TFs."""
 
-from pathlib import Path
+from __future__ import annotations
 
-from omegaconf import DictConfig
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from texgs.config.dataset import Volume
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder
 from texgs.core.names import file_name
 from texgs.core.reading import is_there
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 
 def source_file(config: DictConfig) -> Path | None:

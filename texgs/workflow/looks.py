@@ -1,10 +1,15 @@
 """What edits of a whole experiment make of each basic scene: the table `looks` of its data set."""
 
-from omegaconf import DictConfig
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 from texgs.core.errors import ConfigError
 from texgs.edit.method import method_of
 from texgs.workflow.locate import tf_names
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
 

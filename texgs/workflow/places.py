@@ -1,8 +1,12 @@
 """Where the jobs of the workflow put their files, below the folder of results."""
 
-from pathlib import Path
+from __future__ import annotations
 
-from omegaconf import DictConfig
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 
 def folder_of(rule: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:

@@ -5,14 +5,14 @@ named after their contents. That file is an input of the job and the digest of t
 changed value or line of code reruns what depends on it.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal, cast
-
-from omegaconf import DictConfig, OmegaConf
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from texgs.core.checksum import digest
 from texgs.core.io import write_atomic
@@ -21,6 +21,9 @@ from texgs.fields.kinds import kinds
 from texgs.metrics.metric import metrics
 from texgs.report.results import Result
 from texgs.workflow.code import code_digest
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 LONG_AGO = 946684800  # the year 2000, in seconds
 EVERY = 1024  # threads, of which a job gets as many as there are
@@ -150,6 +153,8 @@ def settings_digest(settings: dict[str, Any]) -> str:
 
 def plain(value: Any) -> Any:
     """Return a value of a configuration, or tables and lists of them, as plain dicts and lists."""
+    from omegaconf import OmegaConf  # not at the top: the list of verbs needs stages, and none of this
+
     if OmegaConf.is_config(value):
         return OmegaConf.to_container(value, resolve=True)
     if isinstance(value, Mapping):
@@ -158,6 +163,8 @@ def plain(value: Any) -> Any:
 
 
 def _yaml(settings: dict[str, Any]) -> str:
+    from omegaconf import OmegaConf
+
     return OmegaConf.to_yaml(OmegaConf.create(settings), sort_keys=True)
 
 

@@ -3,13 +3,17 @@
 A module defines one `STAGE`, or several alike as `STAGES`; modules without either are helpers of others.
 """
 
+from __future__ import annotations
+
 import pkgutil
 from collections.abc import Iterator
 from importlib import import_module
-
-from omegaconf import DictConfig
+from typing import TYPE_CHECKING
 
 from texgs.workflow.stage import Rule, Stage, for_tf
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
 
 PACKAGE = "texgs.workflow.stages"
 
