@@ -11,8 +11,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from texgs.core.camera import Camera, orbit
-from texgs.core.image_grid import content, write_strip
 from texgs.core.lens import Lens
+from texgs.core.picture_grid import content, write_grid
 from texgs.core.progress import progress
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene
@@ -59,7 +59,7 @@ def write_looks(path: Path) -> None:
     lens = Lens().square(512)
     sides = {"front": orbit(30, 20, *lens), "from above": orbit(150, 50, *lens)}
     rows = {side: [shown(title, camera) for title in titles] for side, camera in sides.items()}
-    small(Image.open(write_strip(path, rows, titles)), path)
+    small(Image.open(write_grid(path, rows, titles)), path)
 
 
 def write_views(path: Path) -> None:

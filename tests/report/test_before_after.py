@@ -24,10 +24,10 @@ def test_only_what_can_be_relit_is_shown_under_another_light(kind, columns, tmp_
     write_model(tmp_path / "ball.safetensors", ball(1))
     scene = Scene({"ball": SceneModel(tmp_path / "ball.safetensors")})
     monkeypatch.setattr(before_after, "TURN", 3)
-    strips = []
-    monkeypatch.setattr(before_after, "write_strip", lambda path, rows, titles: strips.append((rows, titles)))
+    grids = []
+    monkeypatch.setattr(before_after, "write_grid", lambda path, rows, titles: grids.append((rows, titles)))
     write_before_and_after(scene, scene, kind, Lens(), tmp_path, torch.device("cpu"), "ball")
-    ((rows, titles),) = strips
+    ((rows, titles),) = grids
     assert [len(row) for row in rows.values()] == [columns, columns]
     assert len(titles) == columns
     assert ("light from the side" in titles) == (columns == 4)

@@ -39,23 +39,23 @@ def drawn(monkeypatch):
 def test_each_view_has_a_row_of_fits_and_one_of_their_errors(tmp_path, views, drawn):
     write_comparison(tmp_path / "a.png", {name: MODELS[name] for name in "abc"}, views)
     assert [row.name for row in drawn] == ["test view 0", "errors", "test view 1", "errors"]
-    assert [panel.title for panel in drawn[0].panels] == ["ground truth", "a", "b", "c"]
-    assert len({panel.words for panel in drawn[0].panels[1:]}) == 3
+    assert [panel.title for panel in drawn[0].cells] == ["ground truth", "a", "b", "c"]
+    assert len({panel.words for panel in drawn[0].cells[1:]}) == 3
     (camera, *_), planes = cameras(2), ball_planes(views["test view 0"].camera)
     image = MODELS["b"].render(camera).color.clamp(0, 1)
     error = ((image - planes[:3].permute(1, 2, 0)) ** 2).mean().item()
-    of_b = float(drawn[0].panels[2].words.split()[1])
+    of_b = float(drawn[0].cells[2].words.split()[1])
     assert of_b == pytest.approx(-10 * math.log10(error), abs=0.05)  # the views have 8 bits
-    assert len({panel.pixels.shape for row in drawn for panel in row.panels if panel.pixels is not None}) == 1
+    assert len({panel.pixels.shape for row in drawn for panel in row.cells if panel.pixels is not None}) == 1
 
 
 def test_more_recipes_than_a_row_has_room_for_go_on_below(tmp_path, views, drawn):
     write_comparison(tmp_path / "a.png", MODELS, {"view": views["test view 0"]})
-    assert [[panel.title for panel in row.panels] for row in drawn[::2]] == [
+    assert [[panel.title for panel in row.cells] for row in drawn[::2]] == [
         ["ground truth", "a", "b", "c"],
         ["ground truth", "d", "e", "f"],
     ]
-    assert torch.equal(drawn[0].panels[0].pixels, drawn[2].panels[0].pixels)
+    assert torch.equal(drawn[0].cells[0].pixels, drawn[2].cells[0].pixels)
     assert [len(line) for line in lines("abcdefg")] == [4, 3]
     assert [len(line) for line in lines("abcdefghi")] == [3, 3, 3]
     assert lines("ab") == ["ab"]

@@ -11,14 +11,14 @@ from PIL import Image
 from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
 from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
+from texgs.core.picture_grid import Scale
 from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
-from texgs.report.figure_page import Scale
 from texgs.report.fit_figure import (
     compare,
     frame,
-    map_panel,
+    map_cell,
     maps,
     signed_error,
     write_fit_figure,
@@ -164,14 +164,14 @@ def test_maps_of_a_material_per_surfel_are_means(view):
 
 def test_values_are_colours_over_white():
     values, alpha = torch.tensor([[1.0, 3.0, 0.0]]), torch.tensor([[1.0, 0.5, 0.0]])
-    panel = map_panel("", values, alpha)
+    panel = map_cell("", values, alpha)
     assert (panel.scale.low, panel.scale.high) == pytest.approx((1, 3), abs=0.05)
     first, last = (torch.tensor(colormaps["viridis"](end)[:3]) for end in (0.0, 1.0))
     expected = torch.stack([first, 0.5 * last + 0.5, torch.ones(3)])[None]
     torch.testing.assert_close(panel.pixels, expected.float(), atol=1e-5, rtol=0)
-    flat = map_panel("", torch.ones(1, 2), torch.ones(1, 2))
+    flat = map_cell("", torch.ones(1, 2), torch.ones(1, 2))
     assert (flat.scale.low, flat.scale.high) == (1, 2)
-    assert map_panel("", torch.ones(1, 2), torch.zeros(1, 2)).scale == Scale(0, 1)
+    assert map_cell("", torch.ones(1, 2), torch.zeros(1, 2)).scale == Scale(0, 1)
 
 
 @pytest.mark.parametrize("points", [[(7, 9)], [(0, 0), (3, 30)], [(5, 12), (20, 14)], [(0, 0), (23, 35)]])

@@ -4,10 +4,10 @@ import pytest
 
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
-from texgs.core.image_grid import DPI
+from texgs.core.picture_grid import CELL, DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.metrics_files import read
-from texgs.report.sweep_figure import ACROSS, PICTURE, WIDTH, sweep_figure
+from texgs.report.sweep_figure import ACROSS, WIDTH, sweep_figure
 from texgs.report.sweep_table import sweep
 from texgs.report.table import SOURCES, Table
 from texgs.scene.scene import Scene, SceneModel
@@ -117,7 +117,7 @@ def test_the_figure_shows_the_scenes_of_edits(tmp_path):
     for path in paths[::2]:
         write_scene(path.with_name("scene.yaml"), scene)
     _, height = sweep_figure(read(paths), "mine").size
-    assert height > without + PICTURE * DPI
+    assert height > without + CELL * DPI
 
 
 def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):

@@ -9,10 +9,10 @@ import numpy as np
 import torch
 
 from texgs.core.camera import Camera
-from texgs.core.image_grid import write_strip
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.movie import write_frames
+from texgs.core.picture_grid import write_grid
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.frame import frame
@@ -49,7 +49,7 @@ def write_before_and_after(
     for name, scene in scenes.items():
         shown = pictures(scene, cameras, lights, device)
         rows[name] = list(progress(shown, len(cameras), title=f"{title}, {name}", unit="picture"))
-    write_strip(output / "edit.png", rows, titles)
+    write_grid(output / "edit.png", rows, titles)
     turn = orbit_path(TURN, POLAR, *lens.square(kind.film_size))
     halves = [pictures(scene, turn, [scene.light] * TURN, device) for scene in scenes.values()]
     frames = (np.concatenate(pair, axis=1) for pair in zip(*halves, strict=True))

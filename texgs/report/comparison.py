@@ -10,12 +10,12 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.picture_grid import COLUMNS, Cell, Row
 from texgs.fields.field import Field
-from texgs.report.figure_page import COLUMNS, Panel, PanelRow
 from texgs.report.fit_figure import compare, draw_visible
 from texgs.volume.view_set import View
 
-KEY = Panel("", words="of the worst channel\nred: too bright\nblue: too dark")
+KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 
 
 @torch.no_grad()
@@ -46,14 +46,14 @@ def write_comparison(
     """
     if not views or not models:
         raise ArgumentError(f"{path}: expected models and views, got {len(models)} and {len(views)}")
-    rows: list[PanelRow] = []
+    rows: list[Row] = []
     visible: list[Tensor] = []
     for name, view in views.items():
         for recipes in lines(list(models)):
             compared = [compare({recipe: models[recipe]}, view, reduce) for recipe in recipes]
             truth, _, _ = compared[0][0]
-            rows.append(PanelRow(name, [truth, *(fit for (_, fit, _), _ in compared)]))
-            rows.append(PanelRow("errors", [KEY, *(error for (_, _, error), _ in compared)]))
+            rows.append(Row(name, [truth, *(fit for (_, fit, _), _ in compared)]))
+            rows.append(Row("errors", [KEY, *(error for (_, _, error), _ in compared)]))
             visible += [where for _, where in compared]
     return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
 

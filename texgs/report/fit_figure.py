@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.picture_grid import Cell, Row, Scale, draw
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.shading import material
@@ -18,12 +19,13 @@ from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
 from texgs.raster.shading import MATERIAL
-from texgs.report.error_map import DIVERGING, ERROR, MAGNIFIED, signed_error
-from texgs.report.figure_page import Panel, PanelRow, Scale, draw
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
 
 VISIBLE = 2 / 255  # alpha
+MAGNIFIED = 4  # a quarter of the range of colours has the full colour
+DIVERGING = "bwr"  # 0 is white
+ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)  # red where too bright, blue where too dark
 MARGIN = 1.06  # of what is shown around what is visible
 
 
@@ -39,7 +41,7 @@ def write_fit_figure(
 
     A row for each view: the view, the model after each phase with its PSNR, and the error of the last one,
     that of the worst channel with its sign, four times enlarged. Then the maps of the last model in the first
-    view: normals, depth, alpha and material. All panels show the same part of the frame, on white; PSNR is of
+    view: normals, depth, alpha and material. All cells show the same part of the frame, on white; PSNR is of
     the whole frame.
 
     Args:
@@ -62,53 +64,59 @@ def write_fit_figure(
             f"and {len(views)} views"
         )
     compared = [compare(models, view, reduce) for view in views.values()]
-    rows = [PanelRow(name, panels) for name, (panels, _) in zip(views, compared, strict=True)]
+    rows = [Row(name, cells) for name, (cells, _) in zip(views, compared, strict=True)]
     name, view = next(iter(views.items()))
-    rows.append(PanelRow(name, maps(last, view, reduce)))
+    rows.append(Row(name, maps(last, view, reduce)))
     return draw_visible(path, rows, torch.stack([visible for _, visible in compared]).any(dim=0), title)
 
 
-def draw_visible(path: str | Path, rows: list[PanelRow], visible: Tensor, title: str) -> Path:
-    """Draw of all panels the part around what is visible [H, W]."""
+def draw_visible(path: str | Path, rows: list[Row], visible: Tensor, title: str) -> Path:
+    """Draw of all cells the part around what is visible [H, W]."""
     box = frame(visible)
-    return draw(path, [PanelRow(row.name, [crop(panel, box) for panel in row.panels]) for row in rows], title)
+    return draw(path, [Row(row.name, [crop(cell, box) for cell in row.cells]) for row in rows], title)
 
 
-def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tuple[list[Panel], Tensor]:
-    """Panels of one view, and where it or one of its renderings shows something, [H, W]."""
+def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tuple[list[Cell], Tensor]:
+    """Cells of one view, and where it or one of its renderings shows something, [H, W]."""
     planes = over_white(view, reduce)
     truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
     height, width = visible.shape
-    panels = [Panel("ground truth", truth, f"PSNR over {width} × {height} pixels")]
+    cells = [Cell("ground truth", truth, f"PSNR over {width} × {height} pixels")]
     for phase, model in models.items():
         if model is None:
-            panels.append(Panel(phase, words="seeds only"))
+            cells.append(Cell(phase, words="seeds only"))
             continue
         image = model.render(smaller(view.camera, reduce).to(model.device), view.light)
         color = image.color.cpu().clamp(0, 1)
         visible = visible | (image.alpha.cpu() > VISIBLE)
-        panels.append(Panel(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
-    panels.append(Panel(f"error × {MAGNIFIED} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
-    return panels, visible
+        cells.append(Cell(phase, color, f"PSNR {psnr(color, truth):.2f} dB"))
+    cells.append(Cell(f"error × {MAGNIFIED} ({DIVERGING})", ERROR(signed_error(color, truth)), scale=ERROR))
+    return cells, visible
 
 
-def maps(model: Field, view: View, reduce: int) -> list[Panel]:
-    """Panels of depth and alpha in one view; of surfels also normals and material."""
+def signed_error(image: Tensor, target: Tensor) -> Tensor:
+    """Return errors [H, W] of the channel that is farthest off; above 0 where the image is too bright."""
+    error = image - target
+    return error.gather(2, error.abs().argmax(dim=2, keepdim=True))[..., 0]
+
+
+def maps(model: Field, view: View, reduce: int) -> list[Cell]:
+    """Cells of depth and alpha in one view; of surfels also normals and material."""
     camera = smaller(view.camera, reduce).to(model.device)
     has_normals = isinstance(model, Surfels)
     image = model.render(camera, view.light, outputs=("normal", "depth") if has_normals else ("depth",))
     alpha, depth = image.alpha.cpu(), image.depth.cpu()  # type: ignore[union-attr]
     cover, grey = alpha[..., None], Scale(0, 1, "gray_r")
-    panels = [map_panel("depth, world units", depth, alpha), Panel("alpha", grey(alpha), scale=grey)]
+    cells = [map_cell("depth, world units", depth, alpha), Cell("alpha", grey(alpha), scale=grey)]
     if not isinstance(model, Surfels):
-        return panels
+        return cells
     normal = image.normal.cpu()  # type: ignore[union-attr]
-    panels.insert(0, Panel("normals", (0.5 * (normal + cover) + 1 - cover).clamp(0, 1), "xyz as RGB"))
+    cells.insert(0, Cell("normals", (0.5 * (normal + cover) + 1 - cover).clamp(0, 1), "xyz as RGB"))
     features = material_maps(model.parameters, model.shading)
     if features is None:
         factors = material(model.parameters, model.shading.material)
         lines = [f"{name:9} {value.item():6.3f}" for name, value in factors.items()]
-        return [*panels, Panel("material of all surfels", words="\n".join(lines))]
+        return [*cells, Cell("material of all surfels", words="\n".join(lines))]
     size = (camera.width, camera.height)
     blended = rasterize(
         *geometry(model.parameters),
@@ -119,15 +127,15 @@ def maps(model: Field, view: View, reduce: int) -> list[Panel]:
         options=model.shading.options,
     ).color.cpu()
     means = (blended / cover.clamp_min(1e-6)).unbind(dim=2)  # of the surfels that a pixel shows
-    return [*panels, *(map_panel(name, mean, alpha) for name, mean in zip(MATERIAL, means, strict=True))]
+    return [*cells, *(map_cell(name, mean, alpha) for name, mean in zip(MATERIAL, means, strict=True))]
 
 
-def map_panel(title: str, values: Tensor, alpha: Tensor) -> Panel:
+def map_cell(title: str, values: Tensor, alpha: Tensor) -> Cell:
     """Values [H, W] as colours over white, from the lowest percent of them to the highest."""
     seen = values[alpha > 0.1].numpy()
     low, high = np.percentile(seen, (1, 99)) if seen.size else (0.0, 1.0)
     scale = Scale(float(low), float(high) if high > low else float(low) + 1)
-    return Panel(title, torch.lerp(torch.ones(3), scale(values), alpha[..., None]).clamp(0, 1), scale=scale)
+    return Cell(title, torch.lerp(torch.ones(3), scale(values), alpha[..., None]).clamp(0, 1), scale=scale)
 
 
 def frame(visible: Tensor) -> tuple[slice, slice]:
@@ -143,6 +151,6 @@ def frame(visible: Tensor) -> tuple[slice, slice]:
     return rows, columns
 
 
-def crop(panel: Panel, box: tuple[slice, slice]) -> Panel:
-    """The part of a panel's picture in a box."""
-    return panel if panel.pixels is None else replace(panel, pixels=panel.pixels[box])
+def crop(cell: Cell, box: tuple[slice, slice]) -> Cell:
+    """The part of a cell's picture in a box."""
+    return cell if cell.pixels is None else replace(cell, pixels=cell.pixels[box])

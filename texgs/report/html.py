@@ -10,7 +10,7 @@ from typing import Any
 
 from texgs.core.io import write_bytes
 from texgs.report.left_out import LeftOut
-from texgs.report.losses import loss_figures
+from texgs.report.loss_figures import loss_figures
 from texgs.report.metrics_files import Record
 from texgs.report.published import THEIRS
 from texgs.report.sections import SECTIONS, Figure, data_uri, figures

@@ -9,9 +9,9 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.lens import Lens
+from texgs.core.picture_grid import Cell, Row, Scale
 from texgs.metrics.surface import Points, distances, sample
 from texgs.raster import Render, rasterize
-from texgs.report.figure_page import Panel, PanelRow, Scale
 from texgs.report.fit_figure import VISIBLE, draw_visible
 from texgs.volume.cameras import orbit_path
 from texgs.volume.isosurface import Mesh
@@ -49,11 +49,11 @@ def write_mesh_figure(
             drawn(ours, mesh, errors, camera),
         ]
         names = {"isosurface of the volume": None, "mesh of the fit": None, "error, world units": error}
-        panels = [
-            Panel(name, view.color.clamp(0, 1), scale=scale)
+        cells = [
+            Cell(name, view.color.clamp(0, 1), scale=scale)
             for (name, scale), view in zip(names.items(), views, strict=True)
         ]
-        rows.append(PanelRow(f"view {index}", panels))
+        rows.append(Row(f"view {index}", cells))
         visible += [view.alpha > VISIBLE for view in views]
     return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -10,20 +9,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
-from texgs.core.image_grid import DPI, content
-from texgs.core.plots import words
+from texgs.core.figures import as_picture, new_figure, words
+from texgs.core.picture_grid import DPI, grid_rows, lay_out
 from texgs.report.metrics_files import Record
 from texgs.report.sweep_table import digits_of, measured, natural, number, sweep_runs, variants
 from texgs.report.table import SOURCES
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import SubFigure
+    from matplotlib.figure import Figure
     from pandas import DataFrame
 
 ACROSS, WIDTH = 4, 2.6  # panels in a row, and inches of each
 HEIGHT, BAR = 2.2, 0.22  # inches of a panel over numbers, and of each bar
-PICTURE, PIXELS = 1.8, 400  # inches and pixels of a picture
+PIXELS = 400  # of a picture
 WIDE = 30.0  # a range of values is logarithmic where the last is so many times the first
 
 
@@ -36,27 +35,30 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
         records: jobs; the scenes of edits lie beside their metrics.
         name: of the sweep.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     runs = sweep_runs(records, name)
-    titles, table, pictures = different(runs), variants(runs), looks(runs)
-    series = dict(list(table.groupby("series", sort=False)))
+    titles, pictures = different(runs), looks(runs)
+    series = dict(list(variants(runs).groupby("series", sort=False)))
     names = sorted(set(runs["variant"]), key=natural)
     is_axis = all(number(variant) is not None for variant in names)
     tall = HEIGHT if is_axis else 0.6 + BAR * len(names) * len(series)
-    heights = [tall * -(-len(titles) // ACROSS) + 0.25, (PICTURE + 0.1) * len(pictures) + 0.3]
-    width = max(WIDTH * min(ACROSS, len(titles)), PICTURE * len(names) if pictures else 0)
-    heights = heights if pictures else heights[:1]
-    figure = Figure(figsize=(width, sum(heights)), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
-    parts = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)
-    draw_panels(parts[0, 0], titles, series, name, [] if is_axis else names)
-    if pictures:
-        draw_pictures(parts[1, 0], pictures, names)
-    file = io.BytesIO()
-    figure.savefig(file, format="png")
-    return Image.open(file)
+    rows = {label: [shown.get(variant) for variant in names] for label, shown in pictures.items()}
+    grids = [lay_out(grid_rows(rows, names), columns=len(names))] if rows else []
+    width = max(WIDTH * min(ACROSS, len(titles)), *(grid.get_figwidth() for grid in grids), 0)
+    figure = new_figure(width, tall * -(-len(titles) // ACROSS) + 0.25, DPI)
+    draw_panels(figure, titles, series, name, [] if is_axis else names)
+    return stacked([as_picture(each) for each in (figure, *grids)])
+
+
+def stacked(pictures: Sequence[Image.Image]) -> Image.Image:
+    """Return pictures one below the other, on white."""
+    page = Image.new(
+        "RGB", (max(each.width for each in pictures), sum(each.height for each in pictures)), "white"
+    )
+    top = 0
+    for each in pictures:
+        page.paste(each, (0, top))
+        top += each.height
+    return page
 
 
 def different(runs: DataFrame) -> list[str]:
@@ -68,7 +70,7 @@ def different(runs: DataFrame) -> list[str]:
 
 
 def draw_panels(
-    figure: SubFigure,
+    figure: Figure,
     titles: Sequence[str],
     series: Mapping[str, DataFrame],
     name: str,
@@ -148,19 +150,3 @@ def picture(path: Path) -> np.ndarray:
     scene = read_scene(path)
     cameras = orbit_path(1, POLAR, *Lens().square(PIXELS))
     return next(pictures(scene, cameras, [scene.light], torch.device("cpu")))
-
-
-def draw_pictures(
-    figure: SubFigure, pictures: Mapping[str, Mapping[str, np.ndarray]], variants: Sequence[str]
-) -> None:
-    """Draw a row of pictures for each edit, a column for each variant."""
-    panels = figure.subplots(len(pictures), len(variants), squeeze=False)
-    for row, (label, by_variant) in zip(panels, pictures.items(), strict=True):
-        box = content(list(by_variant.values()))
-        row[0].set_ylabel(words(label), fontsize=7)
-        for axes, variant in zip(row, variants, strict=True):
-            axes.set(xticks=[], yticks=[])
-            if variant in by_variant:
-                axes.imshow(by_variant[variant][box])
-    for axes, variant in zip(panels[0], variants, strict=True):
-        axes.set_title(words(variant), fontsize=8)

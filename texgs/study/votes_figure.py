@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image
 
-from texgs.core.io import write_atomic
-from texgs.core.plots import words
+from texgs.core.figures import new_figure, words, write_figure
 from texgs.report.sections import Figure, data_uri
 from texgs.study.ballots import Votes
 from texgs.study.questions import Compared, rank_name
@@ -30,17 +29,13 @@ def write_votes(path: str | Path, votes: Votes | None) -> Path:
     Returns:
         The path.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure as Page
-
     charts = compared(votes)
     heights = [AROUND + BAR * len(panels[0].votes.methods) for _, panels in charts]
-    figure = Page(figsize=(WIDTH, sum(heights)), dpi=DPI, layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(WIDTH, sum(heights), DPI)
     places = figure.subplots(len(charts), squeeze=False, height_ratios=heights)[:, 0]
     for axes, (kind, panels) in zip(places, charts, strict=True):
         draw(axes, kind, panels)
-    return write_atomic(path, lambda file: figure.savefig(file, format="png", metadata={"Software": None}))
+    return write_figure(path, figure)
 
 
 def shown(votes: Votes | None) -> Figure:

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_atomic
-from texgs.core.plots import words
+from texgs.core.figures import new_figure, words, write_figure
 from texgs.volume.transfer import TransferFunction
 
 if TYPE_CHECKING:
@@ -47,15 +46,13 @@ def plot(
     Raises:
         ArgumentError: if the histogram is no list of counts, its range is empty, or the path is not writable.
     """
-    from matplotlib.figure import Figure  # slow to import
-
     counts = np.asarray(histogram, dtype=np.float64)
     if counts.ndim != 1 or len(counts) == 0 or not minimum < maximum:
         raise ArgumentError(
             f"histogram: expected [n] counts over minimum < maximum, got {list(counts.shape)} over "
             f"[{minimum:g}, {maximum:g}]"
         )
-    figure = Figure(figsize=SIZE, dpi=100, layout="constrained")
+    figure = new_figure(*SIZE, 100)
     opacity = figure.add_subplot()
     voxels = opacity.twinx()
     opacity.set_zorder(voxels.get_zorder() + 1)
@@ -67,7 +64,7 @@ def plot(
     low, high = _extent([(minimum, maximum), *(tf.support for tf in basic.values())])
     opacity.set(xlim=(low, high), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
-    return write_atomic(path, lambda file: figure.savefig(file, format="png"))
+    return write_figure(path, figure)
 
 
 def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:

@@ -125,7 +125,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
     import torch
 
-    from texgs.core.image_grid import write_strip
+    from texgs.core.picture_grid import write_grid
     from texgs.edit.preview import overlay
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.cameras import orbit_path
@@ -143,7 +143,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     around = orbit_path(SHOWN, POLAR, *task.lens)
     pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
     titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
-    write_strip(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
+    write_grid(task.output / "edit.png", {"": [image.cpu().numpy() for image in pictures]}, titles)
 
 
 def check(settings: SegmentKeys) -> None:

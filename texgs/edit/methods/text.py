@@ -41,7 +41,7 @@ class TextKeys(InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
-    from texgs.core.image_grid import write_strip
+    from texgs.core.picture_grid import write_grid
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.fields.surfels.texels import untextured
@@ -69,7 +69,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
 
     scene = task.each_part(one)
     titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]
-    write_strip(task.output / "views.png", rows, titles)
+    write_grid(task.output / "views.png", rows, titles)
     return EditedScene(
         scene,
         f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),

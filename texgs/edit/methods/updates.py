@@ -140,10 +140,10 @@ def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float]
 
 def _write_views(path: Path, updates: dict[str, Updated]) -> None:
     """A strip of views of each model that are apart from each other, before and after."""
-    from texgs.core.image_grid import write_strip
+    from texgs.core.picture_grid import write_grid
 
     rows = {}
     for name, each in updates.items():
         rows[f"{name} before"] = [old.numpy() for old, _ in each.views]
         rows[f"{name} edited"] = [new.numpy() for _, new in each.views]
-    write_strip(path, rows, [f"view {index + 1}" for index in range(len(each.views))])
+    write_grid(path, rows, [f"view {index + 1}" for index in range(len(each.views))])

@@ -59,7 +59,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         inputs: scenes by the names that pictures have for them, and `volume` where one shows it.
         output: folder.
     """
-    from texgs.core.image_grid import write_strip
+    from texgs.core.picture_grid import write_grid
 
     studio, shown, captions = Studio(settings, inputs, settings.size), [], {}
     for grid in settings.grids:
@@ -70,7 +70,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
             title: ["" if each.psnr is None else f"{each.psnr:.1f} dB" for each in row]
             for title, row in taken.items()
         }
-        write_strip(output / f"{grid.name}.png", pixels, grid.columns, below)
+        write_grid(output / f"{grid.name}.png", pixels, grid.columns, below)
         errors = ERRORS if any(map(any, below.values())) else ""
         made_by = f"Made by: {settings.command}" if settings.command else ""
         captions[f"{grid.name}.png"] = " ".join(filter(None, (grid.caption, errors, made_by)))

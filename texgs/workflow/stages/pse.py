@@ -51,7 +51,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
         output: folder.
     """
     from texgs.core.device import torch_device
-    from texgs.core.image_grid import write_strip
+    from texgs.core.picture_grid import write_grid
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.volume.cameras import orbit_path
     from texgs.workflow.stages.volume_scene import VolumeScene
@@ -76,7 +76,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
         titles = [caption(entry) for entry in done[group]]
-        write_strip(output / f"{group}.png", rows, titles)
+        write_grid(output / f"{group}.png", rows, titles)
     end = BELOW if volume else "."
     return Outcome(PseResult(COMPARED, **done), {name: words + end for name, words in PICTURES.items()})
 
@@ -133,7 +133,7 @@ def compared(
     import torch
 
     from texgs.metrics.image import psnr, ssim
-    from texgs.report.error_map import ERROR, signed_error
+    from texgs.report.fit_figure import ERROR, signed_error
 
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}

@@ -62,7 +62,7 @@ class Studio:
 
         from texgs.core.light import Light
         from texgs.metrics.image import psnr
-        from texgs.report.error_map import ERROR, signed_error
+        from texgs.report.fit_figure import ERROR, signed_error
         from texgs.scene.changes import apply_all
 
         if not shot.show:

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from texgs.core.errors import ArgumentError
-from texgs.core.image_grid import DPI, INCHES, NOTE, content, write_strip
+from texgs.core.picture_grid import CELL, DPI, FOOT, GAP, HEAD, LEFT, content, write_grid
 
 
 def picture(rows, columns, size=(60, 80), value=0.2):
@@ -18,11 +18,11 @@ def test_a_row_for_each_name_and_a_column_for_each_title(tmp_path):
         "scene": [picture(slice(20, 30), slice(30, 40))] * 3,
         "volume": [picture(slice(20, 30), slice(30, 40))] * 3,
     }
-    path = write_strip(tmp_path / "a.png", rows, ["one", "two", "three"])
+    path = write_grid(tmp_path / "a.png", rows, ["one", "two", "three"])
     width, height = Image.open(path).size
-    assert width == round(3 * INCHES * DPI)
-    assert height == round((2 * INCHES + 0.3) * DPI)
-    again = write_strip(tmp_path / "b.png", rows, ["one", "two", "three"])
+    assert width == round((LEFT + 3 * (CELL + GAP)) * DPI)
+    assert height == round((GAP + HEAD + 2 * (CELL + GAP)) * DPI)
+    again = write_grid(tmp_path / "b.png", rows, ["one", "two", "three"])
     assert path.read_bytes() == again.read_bytes()
 
 
@@ -37,17 +37,17 @@ def test_all_show_the_square_around_what_any_shows():
 
 def test_rows_of_another_length_are_named(tmp_path):
     with pytest.raises(ArgumentError, match="scene: expected 2 pictures, got 1"):
-        write_strip(tmp_path / "a.png", {"scene": [picture(0, 0)]}, ["one", "two"])
+        write_grid(tmp_path / "a.png", {"scene": [picture(0, 0)]}, ["one", "two"])
 
 
 def test_places_may_be_empty_and_pictures_have_words_below(tmp_path):
     block = picture(slice(20, 30), slice(30, 40))
     rows, titles = {"a": [block, None], "b": [None, block]}, ["one", "two"]
-    plain = write_strip(tmp_path / "plain.png", rows, titles)
-    noted = write_strip(tmp_path / "noted.png", rows, titles, {"a": ["", ""], "b": ["", "31.2 dB"]})
+    plain = write_grid(tmp_path / "plain.png", rows, titles)
+    noted = write_grid(tmp_path / "noted.png", rows, titles, {"a": ["", ""], "b": ["", "31.2 dB"]})
     (width, height), (_, higher) = Image.open(plain).size, Image.open(noted).size
-    assert higher == round((2 * INCHES + 0.3 + NOTE) * DPI)
+    assert higher - height == round((FOOT - GAP) * DPI)
     pixels = np.asarray(Image.open(plain).convert("L"))
-    right = pixels[40 : height // 2 - 20, width // 2 + 20 :]
+    right = pixels[70 : height // 2 - 20, width // 2 + 20 :]
     assert right.min() == 255, "nothing is drawn in the empty place"
-    assert pixels[40 : height // 2 - 20, 20 : width // 2 - 20].min() < 100
+    assert pixels[70 : height // 2 - 20, 20 : width // 2 - 20].min() < 100
