@@ -247,12 +247,29 @@ def test_every_page_is_in_the_table_of_the_readme():
 
 
 @pytest.mark.docs
-def test_python_example_runs(tmp_path):
-    (example,) = [example for page in ALL for example in blocks(page, "python")]
-    assert len(example.splitlines()) <= 20
-    done = subprocess.run([sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "surfels.png").stat().st_size > 10_000
+def test_python_examples_run(project, monkeypatch):
+    """Those of the rasterizer, of a field and of a scene."""
+    monkeypatch.chdir(project)
+    monkeypatch.setenv("TEXGS_DATA", str(project))
+    code, said = run(shlex.split("texgs compose dataset=engine fit=quick"))
+    assert code == 0, said
+    examples = blocks("docs/api.md", "python")
+    assert len(examples) == 3
+    for example in examples:
+        assert len(example.splitlines()) <= 20
+        done = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    assert (project / "surfels.png").stat().st_size > 10_000
+    assert "opacity: 0.4" in (project / "edited.yaml").read_text()
+
+
+def test_what_a_user_writes_is_shown_as_it_is_tested():
+    """tests/metrics and tests/workflow run the toys as texgs's own."""
+    toys = ROOT / "tests" / "toys"
+    shown = [
+        (toys / f"{name}.py").read_text(encoding="utf-8") for name in ("fade", "brightness", "projection")
+    ]
+    assert blocks("docs/extend.md", "python") == shown
 
 
 @pytest.mark.docs
