@@ -4,7 +4,7 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, settings
 
-from texgs.core.memory import collect_rarely
+from texgs.core.process import collect_rarely
 
 FOLDER = Path(__file__).parent
 

@@ -2,7 +2,7 @@
 
 import os
 
-from texgs.core.waiting import waiting
+from texgs.core.process import waiting
 
 os.environ.update(waiting())  # before torch is imported
 

@@ -36,9 +36,9 @@ def test_memory_that_is_not_there_says_how_much_was_wanted():
     with pytest.raises(OutOfMemoryError, match=wanted), reading_as("a thing"):
         np.empty(2**56)
     wanted = r"more memory .*\(512\. PiB wanted at once, .* GiB are free\)"
-    with pytest.raises(OutOfMemoryError, match=wanted), memory.told():
+    with pytest.raises(OutOfMemoryError, match=wanted), memory.as_out_of_memory():
         np.empty(2**56)
-    with pytest.raises(OutOfMemoryError, match=r"\(\d+ bytes wanted at once"), memory.told():
+    with pytest.raises(OutOfMemoryError, match=r"\(\d+ bytes wanted at once"), memory.as_out_of_memory():
         torch.empty(2**55)
     with pytest.raises(OutOfMemoryError, match=r"f: needs \d.* GiB of memory, but .* GiB are free; go"):
         memory.require_memory(2**60, "f", "go")

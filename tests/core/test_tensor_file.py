@@ -1,14 +1,16 @@
 import json
 import math
+import tracemalloc
 
 import pytest
 import torch
+from safetensors import safe_open
+from safetensors.torch import load_file
 
 from tests.fields.surfels.samples import sample
 from tests.fields.voxels.test_voxels import ball
 from texgs.core.errors import ArgumentError
-from texgs.core.tensor_file import read_tensor_file, write_tensor_file
-from texgs.core.tensors import write_tensors
+from texgs.core.tensor_file import DTYPES, read_tensor_file, write_tensor_file, write_tensors
 from texgs.fields.surfels.texture_file import write_texture
 from texgs.fields.voxels.file import write_voxels
 from texgs.fields.voxels.model import Voxels
@@ -52,3 +54,27 @@ def test_metadata_that_is_no_json(tmp_path, write, metadata):
     with pytest.raises(ArgumentError, match="metadata cannot be written as JSON"):
         writers[write]()
     assert not path.exists()
+
+
+def test_the_library_reads_what_was_written(tmp_path):
+    tensors = {str(dtype): torch.arange(6).reshape(2, 3).to(dtype) for dtype in DTYPES}
+    tensors |= {"one": torch.tensor(3), "none": torch.empty(0, 4), "turned": torch.rand(3, 5).T}
+    path = write_tensors(tmp_path / "a.safetensors", tensors, {"about": "a test"})
+    read = load_file(path)
+    assert set(read) == set(tensors)
+    for name, x in tensors.items():
+        assert torch.equal(read[name], x)
+        assert read[name].dtype == x.dtype
+    with safe_open(path, "pt") as file:
+        assert file.metadata() == {"about": "a test"}
+    again = write_tensors(tmp_path / "b.safetensors", dict(reversed(tensors.items())), {"about": "a test"})
+    assert path.read_bytes() == again.read_bytes()
+
+
+def test_nothing_is_copied(tmp_path):
+    large = {"x": torch.rand(2_000_000)}
+    tracemalloc.start()
+    write_tensors(tmp_path / "a.safetensors", large)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 1_000_000, "of 8,000,000 bytes"

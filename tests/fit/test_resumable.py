@@ -5,7 +5,7 @@ import weakref
 
 import torch
 
-from texgs.core import curves
+from texgs.core.progress import curve_logger
 from texgs.fit import checkpoint
 from texgs.fit.checkpoint import run_to_end
 
@@ -62,7 +62,7 @@ def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):
             break
     checkpoint.save(tmp_path / "heard", first)
     told = []
-    with curves.heard(lambda values, step: told.append((step, values))):
+    with curve_logger(lambda values, step: told.append((step, values))):
         run_to_end(fits[1], tmp_path / "heard", "test")
     losses = {step: values["loss"] for step, values in told if "loss" in values}
     assert losses == dict(zip((100, 200, 210), fits[1].losses, strict=True))

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 from texgs import __version__
 from texgs.core.errors import TexgsError
-from texgs.core.memory import collect_rarely, keep_freed_memory, told
+from texgs.core.memory import as_out_of_memory
 from texgs.core.names import close
-from texgs.core.waiting import waiting
+from texgs.core.process import collect_rarely, keep_freed_memory, waiting
 from texgs.workflow.stage_table import STAGES
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
@@ -101,7 +101,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         try:
             arguments = parse(words)
-            with told():
+            with as_out_of_memory():
                 return int(arguments.run(arguments))
         finally:
             sys.stdout.flush()

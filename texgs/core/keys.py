@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from texgs.core.numbers import is_number
+from texgs.core.names import is_number
 
 LARGEST = 2**63 - 1
 

@@ -1,9 +1,5 @@
-"""How much memory this process has needed and may still have, and what happens to what it frees."""
+"""How much memory this process has needed and may still have."""
 
-import atexit
-import ctypes
-import gc
-import os
 import re
 import sys
 from collections.abc import Iterator
@@ -25,8 +21,6 @@ CONTAINERS = (  # for each version of cgroups the line that names a group, its r
 )
 MIB, GIB = 1 << 20, 1 << 30
 SMALL = 64 << 20  # bytes that are there without asking
-NEW_OBJECTS = 50_000  # before the garbage collector looks at them
-GLIBC_OPTIONS = {-1: 1 << 30, -3: 32 << 20}  # M_TRIM_THRESHOLD; M_MMAP_THRESHOLD, the most it takes
 
 
 def peak_memory() -> int:
@@ -112,7 +106,7 @@ def _gib(n_bytes: int) -> str:
 
 
 @contextmanager
-def told() -> Iterator[None]:
+def as_out_of_memory() -> Iterator[None]:
     """Turn what Python, NumPy or torch raise where memory ends into one sentence.
 
     Raises:
@@ -139,32 +133,3 @@ def is_out_of_memory(error: BaseException) -> bool:
         or type(error).__name__ == "OutOfMemoryError"
         or (isinstance(error, RuntimeError) and "can't allocate memory" in str(error))
     )
-
-
-def collect_rarely() -> None:
-    """Let the garbage collector look only where many objects are new, and not at the end of this process.
-
-    Large libraries make millions of objects that stay. By default the collector goes through them again and
-    again during imports, and once more at the end: a third of the time of a short command. For programs, not
-    for libraries to call.
-    """
-    gc.set_threshold(NEW_OBJECTS)
-    atexit.register(gc.freeze)
-
-
-def keep_freed_memory() -> bool:
-    """Let the C library keep what this process frees for its next request, instead of handing it back.
-
-    A training step asks for the same images again and again; pages that were handed back are zeroed by the
-    kernel each time, which takes as long as rendering. For programs, not for libraries to call: it holds for
-    the whole process.
-
-    Returns:
-        Whether it does; only glibc can be told.
-    """
-    os.environ.setdefault("THP_MEM_ALLOC_ENABLE", "1")  # torch: large pages, where it was not used before
-    try:
-        mallopt = ctypes.CDLL(None).mallopt
-    except (AttributeError, OSError, TypeError):
-        return False
-    return all(mallopt(option, size) for option, size in GLIBC_OPTIONS.items())

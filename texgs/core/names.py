@@ -1,10 +1,11 @@
-"""Names that come from files or from a user, before they are shown or become a part of a path."""
+"""Names and numbers from files or a user, before names are shown or become a part of a path."""
 
 from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
 from itertools import count
+from math import isfinite
 from pathlib import Path
 from unicodedata import category
 
@@ -13,6 +14,7 @@ from texgs.core.errors import ArgumentError
 SCENES = (".yaml", ".yml")  # suffixes of scene files
 POINTS = "points3d.ply"  # where fits start, in a folder of views
 SLICES = (".tif", ".tiff")  # suffixes of the files in a folder of slices
+LARGEST = 10**300  # there are whole numbers that no float can hold
 LONGEST = 100  # letters of a name
 LONGEST_PATH = 1000  # letters of a path in a file
 LONGEST_FILE = 250  # bytes of a file's name; file systems take 255, and we put a few before it
@@ -110,3 +112,10 @@ def close(word: object, known: Iterable[str]) -> str:
     """A hint at the known word that is most like the given one; empty where none is."""
     similar = difflib.get_close_matches(str(word), list(known), n=1)
     return f", did you mean {similar[0]}?" if similar else ""
+
+
+def is_number(value: object) -> bool:
+    """Return whether a value is a finite number; true and false are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return abs(value) <= LARGEST and isfinite(value)

@@ -1,7 +1,7 @@
-"""Progress of a long loop: a bar on a terminal, a plain line now and then in a log file."""
+"""Progress of a long loop: a bar on a terminal, a plain line now and then in a log file, and its curves."""
 
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from operator import length_hint
@@ -11,14 +11,16 @@ from typing import TypeVar
 T = TypeVar("T")
 
 Watch = Callable[[str, int, int | None], None]
+LogPoint = Callable[[Mapping[str, float], int], None]
 
 SECONDS_BETWEEN_LINES = 5.0
 _watch: ContextVar[Watch | None] = ContextVar("watch", default=None)
+_log: ContextVar[LogPoint | None] = ContextVar("log", default=None)
 
 
 @contextmanager
 def watched(watch: Watch) -> Iterator[None]:
-    """Tell a function about each item that a loop of this thread has done within the block.
+    """Call a function for each item that a loop of this thread has done within the block.
 
     Args:
         watch: is called with the title of the loop, the number of items done and their total, where that is
@@ -29,6 +31,32 @@ def watched(watch: Watch) -> Iterator[None]:
         yield
     finally:
         _watch.reset(before)
+
+
+@contextmanager
+def curve_logger(log: LogPoint | None) -> Iterator[None]:
+    """Call a function with the points of all curves of this thread within the block.
+
+    Args:
+        log: is called with values by names, and the step of the loop; None: nobody is. No result depends
+            on it.
+    """
+    before = _log.set(log)
+    try:
+        yield
+    finally:
+        _log.reset(before)
+
+
+def has_curve_logger() -> bool:
+    """Return whether points are wanted: else there is no need to measure for curves alone."""
+    return _log.get() is not None
+
+
+def log_point(values: Mapping[str, float], step: int) -> None:
+    """Pass the values of curves at a step to the logger, where there is one."""
+    if log := _log.get():
+        log(values, step)
 
 
 def progress(iterable: Iterable[T], total: int | None = None, *, title: str, unit: str) -> Iterator[T]:
@@ -61,7 +89,7 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
 
 
 def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterable[T]:
-    """The items, in a bar or with plain lines."""
+    """Return the items, in a bar or with plain lines."""
     if not sys.stderr.isatty():
         return _lines(iterable, total, title, unit)
     from tqdm import tqdm
@@ -97,7 +125,7 @@ def _write(line: str) -> None:
 
 
 def _state(done: int, total: int | None, unit: str, seconds: float) -> str:
-    """Count and rate, such as "40 of 92 view, 5.1 view/s"; the rate is inverted where it is below one."""
+    """Return count and rate, such as "40 of 92 view, 5.1 view/s"; a rate below one is inverted."""
     count = f"{done} of {total} {unit}" if total else f"{done} {unit}"
     if not done or seconds <= 0:
         return count
@@ -106,7 +134,7 @@ def _state(done: int, total: int | None, unit: str, seconds: float) -> str:
 
 
 def _duration(seconds: float) -> str:
-    """A time in its two largest units: "10 s", "3 min 05 s", "2 h 07 min"."""
+    """Return a time in its two largest units: "10 s", "3 min 05 s", "2 h 07 min"."""
     whole = round(max(seconds, 0))
     if whole < 60:
         return f"{whole} s"

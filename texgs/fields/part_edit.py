@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 from texgs.core.errors import ArgumentError
-from texgs.core.numbers import is_number
+from texgs.core.names import is_number
 from texgs.fields.kinds import kinds
 
 MOST = 1000.0  # of a factor: what is larger is a typing error

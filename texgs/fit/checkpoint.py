@@ -10,11 +10,10 @@ from typing import Protocol
 
 from torch import Tensor
 
-from texgs.core import curves
 from texgs.core.errors import ArgumentError
-from texgs.core.progress import progress
+from texgs.core.progress import has_curve_logger, log_point, progress
 from texgs.core.reading import reading
-from texgs.core.tensors import write_tensors
+from texgs.core.tensor_file import write_tensors
 from texgs.fit.loop import CHECKED_EVERY, require_finite
 
 NAME = "checkpoint.safetensors"
@@ -99,11 +98,11 @@ def restore(fit: Resumable, folder: Path) -> None:
 def _tell(fit: Resumable, n_told: int) -> int:
     """Tell who hears the losses from one on, with the PSNR of now at the last; return how many there are."""
     count = len(fit.losses)
-    if count > n_told and curves.is_heard():
+    if count > n_told and has_curve_logger():
         for index, loss in enumerate(fit.losses[n_told:], n_told + 1):
-            curves.point({"loss": loss}, min(index * CHECKED_EVERY, fit.iterations))
+            log_point({"loss": loss}, min(index * CHECKED_EVERY, fit.iterations))
         if (psnr := fit.psnr()) is not None:
-            curves.point({"train_view_psnr": psnr}, fit.iteration)
+            log_point({"train_view_psnr": psnr}, fit.iteration)
     return count
 
 

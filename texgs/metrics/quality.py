@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from functools import partial
 from statistics import fmean
+from typing import TypeVar
 
 import torch
 
-from texgs.core.ahead import ahead
 from texgs.core.progress import progress
 from texgs.fields.field import Field
 from texgs.metrics.image import psnr, ssim
 from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
+
+Item = TypeVar("Item")
+Read = TypeVar("Read")
 
 
 @torch.no_grad()
@@ -31,7 +35,7 @@ def evaluate(
     measured: dict[str, list[float]] = {"psnr": [], "ssim": []}
     device = model.device
     read = partial(over_white, reduce=reduce)
-    for view, planes in progress(ahead(read, views), len(views), title=title, unit="view"):
+    for view, planes in progress(read_ahead(read, views), len(views), title=title, unit="view"):
         target = planes[:3].permute(1, 2, 0).to(device)
         image = model.render(smaller(view.camera, reduce).to(device), view.light).color
         measured["psnr"].append(psnr(image, target))
@@ -42,3 +46,23 @@ def evaluate(
 def mean(measured: dict[str, list[float]]) -> dict[str, float]:
     """Mean of each metric over the views."""
     return {name: fmean(values) for name, values in measured.items() if values}
+
+
+def read_ahead(read: Callable[[Item], Read], items: Iterable[Item]) -> Iterator[tuple[Item, Read]]:
+    """Yield each item with what `read` makes of it, in order; the next one is read meanwhile.
+
+    An error of `read` is raised where its item would come.
+
+    Args:
+        read: called in one other thread, one item after the other.
+        items: iterated in the caller's thread.
+    """
+    with ThreadPoolExecutor(1) as pool:
+        before: tuple[Item, Future[Read]] | None = None
+        for item in items:
+            following = item, pool.submit(read, item)
+            if before is not None:
+                yield before[0], before[1].result()
+            before = following
+        if before is not None:
+            yield before[0], before[1].result()

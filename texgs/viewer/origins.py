@@ -16,7 +16,7 @@ from torch.nn.functional import normalize
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import read_json
-from texgs.core.numbers import is_number
+from texgs.core.names import is_number
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.messages import OF_VIEWS, View

@@ -9,7 +9,7 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json, write_json
-from texgs.core.numbers import is_number
+from texgs.core.names import is_number
 from texgs.core.reading import reading_as
 from texgs.volume.transfer import TransferFunction
 

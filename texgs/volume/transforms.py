@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.numbers import is_number
+from texgs.core.names import is_number
 
 LENS_KEYS = ("camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy")
 OPENCV_FROM_OPENGL = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # its own inverse

@@ -13,9 +13,9 @@ from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.slips import sentence
 from texgs.core.checksum import Checksums
-from texgs.core.curves import heard
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
+from texgs.core.progress import curve_logger
 from texgs.core.typed import typed
 from texgs.report.results import plain
 from texgs.workflow import result, tracked
@@ -120,7 +120,7 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
         params={**job.swept, **job.settings},
     ) as run:
         start = time.perf_counter()
-        with heard(run.log if run.id else None):
+        with curve_logger(run.log if run.id else None):
             outcome: Outcome = job.stage.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         metrics = {

@@ -1,14 +1,16 @@
 import os
+import platform
 import subprocess
 import sys
 
 import pytest
 
-from texgs.core.waiting import POLICY, waiting
+from texgs.core.memory import STATUS
+from texgs.core.process import POLICY, waiting
 
 PROGRAM = """
 import os
-from texgs.core.waiting import waiting
+from texgs.core.process import waiting
 os.environ.update(waiting())
 import torch
 """
@@ -32,3 +34,26 @@ def test_torch_hears_of_it():
     assert run.returncode == 0, run.stderr
     assert "OMP_WAIT_POLICY = 'PASSIVE'" in run.stderr
     assert "GOMP_SPINCOUNT = '1000'" in run.stderr
+
+
+@pytest.mark.skipif(not STATUS.exists(), reason="page faults are counted on Linux")
+def test_memory_that_was_freed_is_used_again_without_page_faults():
+    code = """
+import resource
+import numpy as np
+from texgs.core.process import keep_freed_memory
+if KEEP and not keep_freed_memory():
+    print(-1)
+else:
+    for _ in range(50):
+        np.ones(20_000_000 // 8), np.ones(20_000_000 // 8)
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+"""
+    faults = []
+    for keep in ("True", "False"):
+        words = [sys.executable, "-c", code.replace("KEEP", keep)]
+        faults.append(int(subprocess.run(words, capture_output=True, text=True, check=True).stdout))
+    if faults[0] < 0:
+        assert platform.libc_ver()[0] != "glibc"
+        pytest.skip("the C library is not glibc")
+    assert faults[0] < 0.5 * faults[1]
