@@ -12,7 +12,7 @@ from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.scene.frame import frame
-from texgs.viewer.modules import joined_modules
+from texgs.viewer.standalone import joined_modules
 
 START = """
 const { WebglRenderer } = modules["webgl.js"];

@@ -16,7 +16,7 @@ from tests.viewer.test_server import TOKEN, origin, page, with_page
 from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.jobs import Jobs, Stopped, Watch
-from texgs.viewer.looks import Looks, Offered, Recent
+from texgs.viewer.looks import Looks, ScratchFolders, ThrottledPreview
 from texgs.viewer.messages import Look
 from texgs.viewer.styles import Styles
 
@@ -110,9 +110,9 @@ def test_the_newest_texture_of_each_part_stays(tmp_path, monkeypatch):
     monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
     monkeypatch.setattr("texgs.viewer.looks.KEPT", 2)
     shown = {}
-    offered = Offered(shown.__setitem__, Recent(tmp_path))
+    preview = ThrottledPreview(shown.__setitem__, ScratchFolders(tmp_path))
     for part in ("TF01", *5 * ["TF02/core"]):
-        offered(part, lambda: ball(1))
+        preview(part, lambda: ball(1))
     assert [file.is_file() for file in shown.values()] == [True, True]
     assert len(list(tmp_path.rglob("*.safetensors"))) == 3, "older ones are gone"
 
@@ -192,7 +192,7 @@ def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
         reached.set()
         go_on.wait(30)
 
-    monkeypatch.setattr("texgs.viewer.looks.Offered.__call__", wait)
+    monkeypatch.setattr("texgs.viewer.looks.ThrottledPreview.__call__", wait)
 
     async def work(browser, _):
         await browser.send(**look(parts=["TF01"], style="dots"))

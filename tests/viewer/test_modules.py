@@ -5,7 +5,7 @@ from importlib.resources import files
 
 import pytest
 
-from texgs.viewer.modules import EXPORT, IMPORT, joined_modules, web_file
+from texgs.viewer.standalone import EXPORT, IMPORT, joined_modules, web_file
 
 PAGES = ("standalone.js", "main.js")
 

@@ -19,7 +19,7 @@ from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.session import Session
 from texgs.viewer.messages import Orbit, View
-from texgs.viewer.origins import GAIN, Origins, fitted, place_of
+from texgs.viewer.origins import GAIN, Origins, fitted, orbit_of
 from texgs.volume.view_set import View as Image
 from texgs.volume.view_set import write_transforms
 
@@ -109,7 +109,7 @@ def test_a_page_can_go_to_the_training_views(scene):
 
 
 def test_a_camera_that_looks_elsewhere_has_no_place_on_an_orbit():
-    assert place_of(orbit(30, 20, 3.0, 40.0, SIZE, SIZE, target=(0.3, 0, 0))) is None
+    assert orbit_of(orbit(30, 20, 3.0, 40.0, SIZE, SIZE, target=(0.3, 0, 0))) is None
 
 
 def test_transfer_functions_come_with_their_histogram(scene):

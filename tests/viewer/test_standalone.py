@@ -26,7 +26,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 from texgs.viewer import standalone
 from texgs.viewer.messages import Edit
-from texgs.viewer.modules import web_file
+from texgs.viewer.standalone import web_file
 
 HOSTILE = "</script><b>&'\""
 LEVELS = 3  # of 255, see test_webgl.py

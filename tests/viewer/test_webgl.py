@@ -18,7 +18,7 @@ from texgs.scene.frame import Mode
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.segment_file import write_segment
 from texgs.viewer.description import describe
-from texgs.viewer.packing import pack
+from texgs.viewer.standalone import pack
 
 CAMERAS = [
     orbit(30, 20, 3, 40, 96, 64),

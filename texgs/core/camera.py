@@ -50,7 +50,7 @@ class Camera:
         return torch.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], dim=-1), z
 
     def unproject(self, depth: Tensor) -> Tensor:
-        """World points [H, W, 3] that the pixel centres see at camera z [H, W], world units."""
+        """Return the world points [H, W, 3] that the pixel centres see at camera z [H, W], world units."""
         check.shape("depth", depth, "H W", H=self.height, W=self.width)
         R_cw, t_cw = self.viewmat[:3, :3], self.viewmat[:3, 3]
         return (self._rays_in_camera() * depth[..., None] - t_cw) @ R_cw
@@ -63,18 +63,18 @@ class Camera:
         return torch.stack([right, down, torch.ones_like(right)], dim=-1)
 
     def to(self, device: torch.device | str) -> Camera:
-        """The same camera with its matrices on another device."""
+        """Return the same camera with its matrices on another device."""
         return replace(self, viewmat=self.viewmat.to(device), K=self.K.to(device))
 
     def crop(self, left: int, top: int, right: int, bottom: int) -> Camera:
-        """The camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
+        """Return the camera of the pixels left <= x < right, top <= y < bottom of this one's image."""
         K = self.K.clone()
         K[0, 2] -= left
         K[1, 2] -= top
         return replace(self, K=K, width=right - left, height=bottom - top)
 
     def resized(self, longer: int) -> Camera:
-        """The camera of the same view at another resolution, the longer side having so many pixels."""
+        """Return the camera of the same view at another resolution, the longer side having so many pixels."""
         scale = longer / max(self.width, self.height)
         width, height = (max(1, round(side * scale)) for side in (self.width, self.height))
         K = self.K.clone()
@@ -84,7 +84,7 @@ class Camera:
 
 
 def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
-    """World-to-camera matrix of a camera at `position` that looks at `target`.
+    """Return World-to-camera matrix of a camera at `position` that looks at `target`.
 
     Differentiable in `position` and `target`.
 
@@ -117,7 +117,7 @@ def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tenso
 
 
 def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
-    """K [3, 3], float32: square pixels, principal point in the middle.
+    """Return K [3, 3], float32: square pixels, principal point in the middle.
 
     Args:
         fov_y: vertical field of view, degrees, above 0 and below 180.
@@ -131,7 +131,7 @@ def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
 
 
 def orbit_direction(azimuth: float, polar: float) -> Tensor:
-    """Unit vector [3], float64, from the origin to (azimuth, polar) in degrees.
+    """Return the unit vector [3], float64, from the origin to (azimuth, polar) in degrees.
 
     Cameras and lights share it: (cos az cos pol, sin pol, -sin az cos pol), so azimuth 0 is +x, -90 is +z
     and polar 90 is straight up.
@@ -149,7 +149,7 @@ def orbit(
     height: int,
     target: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> Camera:
-    """Camera on a sphere around a target that looks at the target; float32.
+    """Return the camera on a sphere around a target that looks at the target; float32.
 
     Args:
         azimuth: degrees, see `orbit_direction`.

@@ -39,7 +39,7 @@ def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
 
 
 def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str, int] | None:
-    """Sizes of the names in `spec` for a shape, or None where the shape does not fit."""
+    """Return the sizes of the names in `spec` for a shape, or None where the shape does not fit."""
     tokens = spec.split()
     if len(tokens) != len(actual):
         return None
@@ -54,7 +54,7 @@ def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str,
 
 
 def _hint(tensor: Tensor, spec: str, known: dict[str, int]) -> str:
-    """What a user most likely did: a transpose, or a missing or superfluous axis."""
+    """Return what a user most likely did: a transpose, or a missing or superfluous axis."""
     if tensor.ndim == 2 and bind(tensor.shape[::-1], spec, known) is not None:
         return "; did you transpose?"
     if (

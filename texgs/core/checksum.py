@@ -15,7 +15,7 @@ MOST = 20_000  # files in it, the latest ones
 
 
 def sha256(path: str | Path) -> str:
-    """Checksum of a file's contents as they are now.
+    """Return the checksum of a file's contents as they are now.
 
     Raises:
         ArgumentError: if it cannot be read.
@@ -33,7 +33,7 @@ def digest(text: str) -> str:
 
 
 def combined(parts: Iterable[tuple[str, str]]) -> str:
-    """One checksum of several names with their checksums, in any order."""
+    """Return one checksum of several names with their checksums, in any order."""
     return hashlib.sha256(json.dumps(sorted(parts)).encode()).hexdigest()
 
 
@@ -65,7 +65,7 @@ class Checksums:
             self._is_new = False
 
     def of(self, path: Path) -> str:
-        """Checksum of a file.
+        """Return the checksum of a file.
 
         Raises:
             ArgumentError: if it cannot be read.

@@ -8,7 +8,7 @@ from texgs.core.errors import DeviceError
 
 
 def torch_device(name: str) -> torch.device:
-    """A device of torch by its name.
+    """Return a device of torch by its name.
 
     Raises:
         DeviceError: if it is a GPU and torch sees none.

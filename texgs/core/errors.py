@@ -45,7 +45,7 @@ class FitError(TexgsError, ArithmeticError):
 
 
 def printable(text: str) -> str:
-    """A text of any origin in one line of bounded length, with control characters written out.
+    """Return a text of any origin in one line of bounded length, with control characters written out.
 
     Names in files can hold sequences that move the cursor, or letters that turn the direction of the text.
     """
@@ -64,7 +64,7 @@ def printable(text: str) -> str:
 
 
 def first_line(error: Exception) -> str:
-    """Enough of an error to recognise it, on one line."""
+    """Return enough of an error to recognise it, on one line."""
     lines = str(error).strip().splitlines()
     text = lines[0] if lines else type(error).__name__
     return text if len(text) <= 120 else f"{text[:120]}..."

@@ -5,7 +5,7 @@ from pathlib import Path
 
 
 def cache_folder() -> Path:
-    """Folder for downloads and results worth keeping: TEXGS_CACHE, else texgs in the user's cache."""
+    """Return folder for downloads and results worth keeping: TEXGS_CACHE, else texgs in the user's cache."""
     chosen = os.environ.get("TEXGS_CACHE")
     if chosen:
         return Path(chosen).expanduser()
@@ -13,6 +13,6 @@ def cache_folder() -> Path:
 
 
 def weights_folder() -> Path:
-    """Folder with weights of pretrained models: TEXGS_WEIGHTS, else weights in the cache folder."""
+    """Return folder with weights of pretrained models: TEXGS_WEIGHTS, else weights in the cache folder."""
     chosen = os.environ.get("TEXGS_WEIGHTS")
     return Path(chosen).expanduser() if chosen else cache_folder() / "weights"

@@ -57,7 +57,7 @@ def to_pillow(color: Tensor, alpha: Tensor | None = None) -> Image.Image:
 
 
 def _rounded(planes: Tensor) -> np.ndarray:
-    """Values in [0, 1] as 8 bits, those beyond clamped."""
+    """Return the values in [0, 1] as 8 bits, those beyond clamped."""
     return (planes * 255).clamp_(0, 255).round_().to(torch.uint8).numpy()
 
 
@@ -82,7 +82,7 @@ def with_eight_bits(picture: Image.Image) -> Image.Image:
 
 
 def read_rgba(path: str | Path) -> np.ndarray:
-    """The pixels of an image as stored: [H, W, 4] uint8, straight alpha; 255 in a file without alpha.
+    """Return the pixels of an image as stored: [H, W, 4] uint8, straight alpha; 255 in a file without alpha.
 
     Raises:
         ArgumentError: if the file is missing or no image.

@@ -97,7 +97,7 @@ def read_json(path: str | Path) -> Any:
 
 
 def _umask() -> int:
-    """The process's file mode mask; mkstemp ignores it and makes private files."""
+    """Return the process's file mode mask; mkstemp ignores it and makes private files."""
     with ASKING:  # there is no way but to change it for a moment
         mask = os.umask(0)
         os.umask(mask)

@@ -14,5 +14,5 @@ class Lens(NamedTuple):
     height: int = 800  # pixels
 
     def square(self, size: int) -> Lens:
-        """The same for square images."""
+        """Return the same for square images."""
         return self._replace(width=size, height=size)

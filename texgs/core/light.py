@@ -28,7 +28,7 @@ class Light:
             raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
 
     def direction(self, camera: Camera) -> Tensor:
-        """Unit vector [3], float64, from the origin to the light; for a headlight, to the camera."""
+        """Return unit vector [3], float64, from the origin to the light; for a headlight, to the camera."""
         if self.kind == "directional":
             return orbit_direction(self.azimuth, self.polar)
         position: Tensor = camera.position.double().cpu()

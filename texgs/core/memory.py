@@ -24,7 +24,7 @@ SMALL = 64 << 20  # bytes that are there without asking
 
 
 def peak_memory() -> int:
-    """Most bytes of memory that this process had resident so far.
+    """Return most bytes of memory that this process had resident so far.
 
     Linux tells it for the program that runs; elsewhere the peak may be that of the process that started it.
     """
@@ -59,7 +59,7 @@ def free_memory() -> int:
 
 
 def container_limits() -> Iterator[int]:
-    """Bytes that are left in each of the groups that this process is in, one inside of the other."""
+    """Yield bytes that are left in each of the groups that this process is in, one inside of the other."""
     try:
         groups = GROUP.read_text()
     except OSError:  # no Linux
@@ -101,7 +101,7 @@ def require_memory(n_bytes: int, what: str, advice: str) -> None:
 
 
 def _gib(n_bytes: int) -> str:
-    """A number of bytes in GiB, to three digits or a whole number."""
+    """Return a number of bytes in GiB, to three digits or a whole number."""
     return f"{n_bytes / GIB:.3g}" if n_bytes < 1000 * GIB else f"{n_bytes / GIB:.0f}"
 
 

@@ -7,7 +7,7 @@ BITS = 10  # of each coordinate of places in a box: cells of a thousandth of its
 
 
 def z_order(cells: Tensor) -> Tensor:
-    """Order of cells along a Z curve (Morton 1966); equal ones keep theirs.
+    """Return the order of cells along a Z curve (Morton 1966); equal ones keep theirs.
 
     Args:
         cells: [N, D] whole numbers of 0 or more; D times their bits have to fit into 63.
@@ -25,7 +25,7 @@ def z_order(cells: Tensor) -> Tensor:
 
 
 def z_order_of(places: Tensor) -> Tensor:
-    """Order [N] of places in space [N, D] along a Z curve through the cells of their bounding box."""
+    """Return order [N] of places in space [N, D] along a Z curve through the cells of their bounding box."""
     if not len(places):
         return places.new_zeros(0, dtype=torch.long)
     low, high = places.aminmax(dim=0)

@@ -24,7 +24,7 @@ SEPARATORS = frozenset("/\\")  # of folders, on one system or another
 
 
 def label(where: str, name: object) -> str:
-    """A name of something in a scene or a data set: short, and of letters that a terminal can show.
+    """Return a name of something in a scene or a data set: short, and of letters that a terminal can show.
 
     Args:
         where: the name comes from, for the message.
@@ -91,7 +91,7 @@ def new_part_file(where: str, folder: Path, *names: str) -> Path:
 
 
 def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> Path:
-    """The file that another file names, in its folder or elsewhere; it is only read.
+    """Return the file that another file names, in its folder or elsewhere; it is only read.
 
     Args:
         where: the path comes from, for the message.
@@ -109,7 +109,7 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
 
 
 def close(word: object, known: Iterable[str]) -> str:
-    """A hint at the known word that is most like the given one; empty where none is."""
+    """Return a hint at the known word that is most like the given one; empty where none is."""
     similar = difflib.get_close_matches(str(word), list(known), n=1)
     return f", did you mean {similar[0]}?" if similar else ""
 

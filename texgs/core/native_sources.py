@@ -25,14 +25,14 @@ TOKENS = re.compile(
 
 
 def native_digest(folder: Path) -> str:
-    """Digest of all sources below a folder; comments and layout do not count."""
+    """Return the digest of all sources below a folder; comments and layout do not count."""
     files = sorted(path for path in folder.rglob("*") if path.suffix in SUFFIXES)
     texts = [f"{path.relative_to(folder).as_posix()}\n{essence(path)}" for path in files]
     return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:LENGTH]
 
 
 def essence(path: Path) -> str:
-    """The words and signs of a file, as a compiler sees them."""
+    """Return the words and signs of a file, as a compiler sees them."""
     text = path.read_text(encoding="utf-8")
     if path.suffix == ".txt":  # of CMake
         return " ".join(re.sub(r"#[^\n]*", " ", text).split())
@@ -49,7 +49,7 @@ def library_sources(folder: Path = RASTER) -> str:
 
 
 def built_from(texgs_sources: Any) -> str:
-    """Digest of the sources that a native library was built from, by its function of that name."""
+    """Return the digest of the sources that a native library was built from, by its function of that name."""
     texgs_sources.restype = ctypes.c_char_p
     return str(texgs_sources().decode())
 

@@ -20,7 +20,7 @@ class PlainLoader(yaml.SafeLoader):  # type: ignore[misc]
     depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
-        """A node of the text."""
+        """Return a node of the text."""
         if self.check_event(yaml.AliasEvent):
             line = self.peek_event().start_mark.line + 1
             raise ArgumentError(f"expected values, got an alias (*name) in line {line}; write them out")
@@ -39,7 +39,7 @@ PlainLoader.add_implicit_resolver("tag:yaml.org,2002:float", NUMBER, list("-+.01
 
 
 def parse_yaml(text: str) -> Any:
-    """The values of a text.
+    """Return the values of a text.
 
     Raises:
         ArgumentError: if it is no YAML, or has aliases, tags, or values in one another without end.

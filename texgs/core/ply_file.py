@@ -18,7 +18,7 @@ ELEMENT = re.compile(rb"^element[ \t]+\S+[ \t]+(\d+)", re.MULTILINE)
 
 
 def read_vertices(path: str | Path) -> np.ndarray:
-    """Vertices of a PLY file as a structured array [N].
+    """Return the vertices of a PLY file as a structured array [N].
 
     Raises:
         ArgumentError: if the file is missing, damaged, no PLY file, or has no vertices.
@@ -36,14 +36,14 @@ def read_vertices(path: str | Path) -> np.ndarray:
 
 
 def is_ply(path: Path) -> bool:
-    """Whether a file begins as PLY files do."""
+    """Return whether a file begins as PLY files do."""
     with contextlib.suppress(OSError), path.open("rb") as file:
         return file.read(len(MAGIC)) == MAGIC
     return False
 
 
 def properties(path: Path) -> set[str]:
-    """Names of the properties that the header of a PLY file has.
+    """Return the names of the properties that the header of a PLY file has.
 
     Raises:
         OSError: if it cannot be read.

@@ -31,7 +31,7 @@ def require_file(path: str | Path, what: str = "a file") -> Path:
 
 
 def is_there(path: str | Path) -> bool:
-    """Whether there is a file or a folder of this name.
+    """Return whether there is a file or a folder of this name.
 
     Raises:
         ArgumentError: if that cannot be told: others may not look there, or the name is too long.
@@ -83,7 +83,7 @@ def reading_as(what: str, advice: str = ADVICE, where: str = "") -> Iterator[Non
 
 
 def reason(error: Exception) -> str:
-    """What an error of a library says, in one line."""
+    """Return what an error of a library says, in one line."""
     if isinstance(error, RecursionError):
         return "what is nested too deeply"
     if isinstance(error, KeyError):

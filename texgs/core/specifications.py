@@ -8,7 +8,7 @@ from typing import Any
 
 @cache
 def specifications(package: str, attribute: str) -> dict[str, Any]:
-    """What the modules of a package define under one name, by the names of the specifications.
+    """Return what the modules of a package define under one name, by the names of the specifications.
 
     The modules are imported, so they must stay light: what they run imports the rest when it is called.
 

@@ -95,7 +95,7 @@ def require_json(path: str | Path, description: Mapping[str, Any]) -> None:
 
 
 def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, Any], dict[str, Tensor]]:
-    """Description and tensors, bit for bit, on the CPU. Nothing in the file is executed.
+    """Return the description and tensors, bit for bit, on the CPU. Nothing in the file is executed.
 
     The description is judged before any tensor is looked at.
 
@@ -121,7 +121,7 @@ def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, A
 
 
 def short(value: object) -> str:
-    """Enough of a value to recognise it in a message."""
+    """Return enough of a value to recognise it in a message."""
     return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
 
 

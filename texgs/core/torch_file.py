@@ -16,7 +16,7 @@ OLD_PICKLES = 5  # one after the other at the start of a file of torch before 1.
 
 
 def load_torch(path: Path) -> Any:
-    """What torch.load makes of a file, on the CPU.
+    """Return what torch.load makes of a file, on the CPU.
 
     Raises:
         ValueError: if it holds more than tensors, lists, tables, numbers and text; torch raises other errors

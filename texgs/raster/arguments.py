@@ -36,7 +36,7 @@ AXES = {  # after N
 def surfel_tensors(
     geometry: dict[str, Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
 ) -> SurfelTensors:
-    """All tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities."""
+    """Return all tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities."""
     tensors = geometry | _colors(features, texture)
     if shift is not None:
         tensors["shift"] = shift

@@ -109,7 +109,7 @@ class View:
     options: Options
 
     def structures(self, surfels: SurfelTensors) -> tuple[Surfels, Camera, RenderOptions]:
-        """Surfels, camera and options as the library takes them."""
+        """Return the surfels, camera and options as the library takes them."""
         o = self.options
         scene = Surfels(
             n=len(surfels.means),
@@ -194,7 +194,7 @@ class RasterizeFunction(torch.autograd.Function):
     @staticmethod
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *grads: Tensor | None) -> tuple[Tensor | None, ...]:
-        """Gradients of the surfel tensors from those of the images."""
+        """Return the gradients of the surfel tensors from those of the images."""
         saved = ctx.saved_tensors
         names = SurfelTensors._fields
         surfels = SurfelTensors(*saved[: len(names)])

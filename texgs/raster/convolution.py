@@ -98,7 +98,7 @@ class RectifiedConvolution:
 
 
 def transformed(weight: Tensor) -> Tensor:
-    """G g G^T of each kernel g of [out, in, 3, 3], as [36, out / 16, in, 16]; filled up with zeros."""
+    """Return G g G^T of each kernel g of [out, in, 3, 3], as [36, out / 16, in, 16]; filled up with zeros."""
     outputs, inputs = weight.shape[:2]
     g = torch.tensor(TRANSFORM, dtype=torch.float64)
     padded = F.pad(weight.double(), (0, 0, 0, 0, 0, -inputs % BLOCK, 0, -outputs % BLOCK))
@@ -123,7 +123,7 @@ class _Convolve(torch.autograd.Function):
 
 
 def _call(kernel: Tensor, images: Tensor, gate: Tensor | None, bias: Tensor | None) -> Tensor:
-    """[N, out, H, W] of whole blocks of channels, rectified where there is a bias."""
+    """Return [N, out, H, W] of whole blocks of channels, rectified where there is a bias."""
     inputs, outputs = kernel.shape[2], BLOCK * kernel.shape[1]
     images = F.pad(images, (0, 0, 0, 0, 0, inputs - images.shape[1])) if images.shape[1] < inputs else images
     images = images.contiguous(memory_format=torch.channels_last)

@@ -84,7 +84,7 @@ class HashLevels:
         return FEATURES * self.levels
 
     def structure(self) -> NativeHash:
-        """The levels as the library takes them."""
+        """Return the levels as the library takes them."""
         resolution, first = (
             (c_int32 * self.levels)(*self.resolutions),
             (c_int64 * len(self.first))(*self.first),
@@ -95,7 +95,7 @@ class HashLevels:
 
 
 def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
-    """Features [n, 2 levels] at points [n, 3] of the unit cube, differentiable in the table.
+    """Return the features [n, 2 levels] at points [n, 3] of the unit cube, differentiable in the table.
 
     Trilinear between the lattice points of each level; points outside of the cube have the features of its
     faces. For a definition see `texgs.raster.reference.hash_encoding`.

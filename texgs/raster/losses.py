@@ -22,7 +22,7 @@ native.declare("texgs_bilateral_smoothness", "ppp iii pp")
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
-    """Mean structural similarity of two images with values in [0, 1].
+    """Return the mean structural similarity of two images with values in [0, 1].
 
     Gaussian window of 11 x 11 pixels with sigma 1.5, zeros outside the image, C1 = 0.01^2, C2 = 0.03^2,
     averaged over pixels and channels (Wang et al. 2004, with the window and padding of 3DGS). Windows in
@@ -66,12 +66,12 @@ def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor
 
 
 def planar(image: Tensor) -> Tensor:
-    """[H, W, C] or [H, W] as dense [C, H, W]; no copy where the memory is laid out so."""
+    """Return [H, W, C] or [H, W] as dense [C, H, W]; no copy where the memory is laid out so."""
     return (image[None] if image.ndim == 2 else image.permute(2, 0, 1)).contiguous()
 
 
 def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
-    """l1 * mean |image - target| + dssim * (1 - SSIM), checked."""
+    """Return l1 * mean |image - target| + dssim * (1 - SSIM), checked."""
     check.shape("image", image, "H W" if image.ndim == 2 else "H W C")
     if target.shape != image.shape:
         raise ShapeError(f"target: expected {list(image.shape)} as image, got {list(target.shape)}")
@@ -93,7 +93,7 @@ def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
 
 
 def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
-    """Bilateral smoothness of attribute maps: mean of alpha * exp(-g(grey)) * g(attribute).
+    """Return the bilateral smoothness of attribute maps: mean of alpha * exp(-g(grey)) * g(attribute).
 
     g = |Sobel x| + |Sobel y|, 3 x 3 and not normalised, zeros outside the image; grey is the mean of the
     guide's channels. An attribute may change where the guide does (Gao et al. 2024; the paper's L_b). Linear
@@ -133,7 +133,7 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
 
 
 def fused_loss(evaluate: Evaluate, inputs: Sequence[Tensor], constants: Sequence[Tensor]) -> Tensor:
-    """Value [] of a loss, differentiable once in `inputs`.
+    """Return the value [] of a loss, differentiable once in `inputs`.
 
     Autograd refuses a second backward pass after one of the tensors was changed.
     """

@@ -19,7 +19,7 @@ native.declare("texgs_normal_consistency", "ppppp ii ppp")
 
 
 def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
-    """Unit normals of the surface that a depth map samples.
+    """Return the unit normals of the surface that a depth map samples.
 
     The cross product of central differences of the unprojected pixels (Huang et al. 2024, section 5); it
     faces the camera. Differentiable in `depth`.

@@ -25,7 +25,7 @@ class RayPoints(NamedTuple):
 
 
 def ray_points(grid: VoxelGrid, rays: Tensor, march: March) -> RayPoints:
-    """The samples of rays [N, 6] that `texgs.raster.voxels.render_rays` would blend.
+    """Return the samples of rays [N, 6] that `texgs.raster.voxels.render_rays` would blend.
 
     They lie `march.step` spacings apart where the grid's density is above 0, and end where less light than
     `march.transmittance_min` passes it.

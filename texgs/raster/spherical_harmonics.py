@@ -19,7 +19,7 @@ native.declare("texgs_spherical_harmonics_backward", "n i ppp pp pp")
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
-    """Colour of surfels seen from a point: max(0, 0.5 + sum_k sh_k Y_k(direction)).
+    """Return the colour of surfels seen from a point: max(0, 0.5 + sum_k sh_k Y_k(direction)).
 
     Real spherical harmonics in the order and with the signs of 3DGS; the direction leads from the camera to
     the mean (Kerbl et al. 2023). Differentiable in `sh` and `means`; no gradient passes where a colour is

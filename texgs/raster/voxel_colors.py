@@ -14,7 +14,7 @@ GREY = 0.5  # colour of coefficients that are 0
 
 @torch.no_grad()
 def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
-    """A grid whose every colour c is matrix @ c + offset, wherever neither is clamped to 0.
+    """Return a grid whose every colour c is matrix @ c + offset, wherever neither is clamped to 0.
 
     Colour is 0.5 + Y00 s_0 + sum_k Y_k s_k. So the coefficients s_k become A s_k, and s_0 becomes
     A s_0 + (0.5 A 1 + b - 0.5) / Y00; ARF's own colour transfer leaves the last term as b. Voxels without a
@@ -38,5 +38,5 @@ def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
 
 @torch.no_grad()
 def drop_sh(grid: VoxelGrid) -> VoxelGrid:
-    """A grid with the zeroth harmonic alone: colours that are the same from everywhere."""
+    """Return a grid with the zeroth harmonic alone: colours that are the same from everywhere."""
     return grid.with_rows(grid.rows[:, :4])

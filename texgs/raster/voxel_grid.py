@@ -74,7 +74,7 @@ class VoxelGrid:
         return len(self.rows) - EMPTY
 
     def structure(self) -> NativeGrid:
-        """The grid as the library takes it."""
+        """Return the grid as the library takes it."""
         return NativeGrid(
             self.size,
             self.lower,
@@ -97,7 +97,7 @@ class VoxelGrid:
         )
 
     def with_rows(self, rows: Tensor) -> VoxelGrid:
-        """The same voxels with other rows, [n, 4, 16 or 32].
+        """Return the same voxels with other rows, [n, 4, 16 or 32].
 
         Raises:
             ShapeError, ArgumentError, DeviceError: if they are not as many, of another length, not float32 or
@@ -119,20 +119,20 @@ class VoxelGrid:
         return grid
 
     def to(self, device: torch.device | str) -> VoxelGrid:
-        """The same grid on another device."""
+        """Return the same grid on another device."""
         tensors: dict[str, Any] = {
             name: x.to(device) for name, x in vars(self).items() if isinstance(x, Tensor)
         }
         return replace(self, **tensors)
 
     def links(self) -> Tensor:
-        """[X, Y, Z] int32: the row of each voxel, 0 where it has none."""
+        """Return [X, Y, Z] int32: the row of each voxel, 0 where it has none."""
         bits = _unpacked(self.masks)  # [X / 4, Y / 4, Z / 4, 64]
         rows = self.first[..., None] + bits.cumsum(-1, dtype=torch.int32) - 1
         return _lattice((rows * bits).int())
 
     def points(self) -> Tensor:
-        """World positions [n - 1, 3] of the voxels that have a row, in their order."""
+        """Return the world positions [n - 1, 3] of the voxels that have a row, in their order."""
         block, bit = _unpacked(self.masks).flatten(0, 2).nonzero().unbind(1)
         _, columns, depth = self.masks.shape
         corner = torch.stack([block // (columns * depth), block // depth % columns, block % depth], dim=1)
@@ -141,7 +141,7 @@ class VoxelGrid:
 
 
 def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int = 2) -> VoxelGrid:
-    """A grid whose rows are 0: no density, and grey.
+    """Return a grid whose rows are 0: no density, and grey.
 
     Args:
         mask: [X, Y, Z] bool, voxels that have a row; sides are multiples of 4 from 8 to 1024.
@@ -179,7 +179,7 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
 
 
 def pack_rows(density: Tensor, sh: Tensor) -> Tensor:
-    """Rows [n, 4, 16 or 32] of densities [n] and coefficients [n, 1, 4 or 9, 3].
+    """Return the rows [n, 4, 16 or 32] of densities [n] and coefficients [n, 1, 4 or 9, 3].
 
     A row is quadruples (red, green, blue, extra), one a coefficient. The first extra is the density; those of
     the second, third and fourth are the ninth coefficient.
@@ -194,7 +194,7 @@ def pack_rows(density: Tensor, sh: Tensor) -> Tensor:
 
 
 def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
-    """Densities [n] and coefficients [n, 1, 4 or 9, 3] of rows: what `pack_rows` has put together."""
+    """Return densities [n] and coefficients [n, 1, 4 or 9, 3] of rows: what `pack_rows` has put together."""
     quads = rows.unflatten(1, (-1, 4))  # [n, K / 4, 4]
     sh = quads[:, :, :3]
     if quads.shape[1] == 8:
@@ -203,7 +203,7 @@ def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None) -> Tensor:
-    """Trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one.
+    """Return the trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one.
 
     Args:
         grid: any.
@@ -218,7 +218,7 @@ def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None)
 
 
 def _interpolated(grid: VoxelGrid, links: Tensor, points: Tensor) -> Tensor:
-    """The same for some points, with the rows of all voxels [X, Y, Z]."""
+    """Return the same for some points, with the rows of all voxels [X, Y, Z]."""
     at = (points - points.new_tensor(grid.lower)) / grid.spacing
     cell = at.floor().int()
     size = cell.new_tensor(grid.size)
@@ -235,17 +235,17 @@ def _interpolated(grid: VoxelGrid, links: Tensor, points: Tensor) -> Tensor:
 
 
 def _blocks(lattice: Tensor) -> Tensor:
-    """[X, Y, Z] as [X / 4, Y / 4, Z / 4, 64]."""
+    """Return [X, Y, Z] as [X / 4, Y / 4, Z / 4, 64]."""
     x, y, z = (side // 4 for side in lattice.shape)
     return lattice.reshape(x, 4, y, 4, z, 4).permute(0, 2, 4, 1, 3, 5).reshape(x, y, z, 64)
 
 
 def _lattice(blocks: Tensor) -> Tensor:
-    """[X / 4, Y / 4, Z / 4, 64] as [X, Y, Z]."""
+    """Return [X / 4, Y / 4, Z / 4, 64] as [X, Y, Z]."""
     x, y, z = blocks.shape[:3]
     return blocks.reshape(x, y, z, 4, 4, 4).permute(0, 3, 1, 4, 2, 5).reshape(4 * x, 4 * y, 4 * z)
 
 
 def _unpacked(masks: Tensor) -> Tensor:
-    """The bits of int64 masks [...], [..., 64] bool."""
+    """Return the bits of int64 masks [...], [..., 64] bool."""
     return (masks[..., None] >> torch.arange(64, device=masks.device) & 1).bool()

@@ -47,7 +47,7 @@ class March:
     transmittance_min: float = 1e-3  # a ray ends with the sample that leaves less
 
     def structure(self, rays: Tensor) -> NativeMarch:
-        """The march along rays [N, 6] as the library takes it."""
+        """Return the march along rays [N, 6] as the library takes it."""
         return NativeMarch(
             len(rays), native.address(rays), self.background, self.step, self.transmittance_min
         )
@@ -133,7 +133,7 @@ class Samples:
 
 
 def _gradient(name: str, gradient: Tensor, spec: str, rays: Tensor) -> Tensor:
-    """A dense gradient of what rays brought back, checked."""
+    """Return a dense gradient of what rays brought back, checked."""
     check.shape(name, gradient, spec, N=len(rays))
     check.floating(name, gradient)
     check.same_device(**{"rays": rays, name: gradient})

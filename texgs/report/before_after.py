@@ -59,7 +59,7 @@ def write_before_and_after(
 def pictures(
     scene: Scene, cameras: Sequence[Camera], lights: Sequence[Light], device: torch.device
 ) -> Iterator[np.ndarray]:
-    """Frames [H, W, 3], uint8, as they are rendered."""
+    """Yield frames [H, W, 3], uint8, as they are rendered."""
     composition = scene.open(device)
     for camera, light in zip(cameras, lights, strict=True):
         yield frame(composition, camera, light, scene.edits, background=scene.background)

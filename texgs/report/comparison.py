@@ -59,7 +59,7 @@ def write_comparison(
 
 
 def lines(recipes: Sequence[str]) -> list[Sequence[str]]:
-    """Recipes in as few lines as there is room for beside a view, about as many in each."""
+    """Return the recipes in as few lines as there is room for beside a view, about as many in each."""
     count = ceil(len(recipes) / (COLUMNS - 1))
     size = ceil(len(recipes) / count)
     return [recipes[first : first + size] for first in range(0, len(recipes), size)]

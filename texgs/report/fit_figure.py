@@ -77,7 +77,7 @@ def draw_visible(path: str | Path, rows: list[Row], visible: Tensor, title: str)
 
 
 def compare(models: Mapping[str, Field | None], view: View, reduce: int) -> tuple[list[Cell], Tensor]:
-    """Cells of one view, and where it or one of its renderings shows something, [H, W]."""
+    """Return the cells of one view, and where it or one of its renderings shows something, [H, W]."""
     planes = over_white(view, reduce)
     truth, visible = planes[:3].permute(1, 2, 0), planes[3] > VISIBLE
     height, width = visible.shape
@@ -101,7 +101,7 @@ def signed_error(image: Tensor, target: Tensor) -> Tensor:
 
 
 def maps(model: Field, view: View, reduce: int) -> list[Cell]:
-    """Cells of depth and alpha in one view; of surfels also normals and material."""
+    """Return the cells of depth and alpha in one view; of surfels also normals and material."""
     camera = smaller(view.camera, reduce).to(model.device)
     has_normals = isinstance(model, Surfels)
     image = model.render(camera, view.light, outputs=("normal", "depth") if has_normals else ("depth",))
@@ -131,7 +131,7 @@ def maps(model: Field, view: View, reduce: int) -> list[Cell]:
 
 
 def map_cell(title: str, values: Tensor, alpha: Tensor) -> Cell:
-    """Values [H, W] as colours over white, from the lowest percent of them to the highest."""
+    """Return the values [H, W] as colours over white, from the lowest percent of them to the highest."""
     seen = values[alpha > 0.1].numpy()
     low, high = np.percentile(seen, (1, 99)) if seen.size else (0.0, 1.0)
     scale = Scale(float(low), float(high) if high > low else float(low) + 1)
@@ -152,5 +152,5 @@ def frame(visible: Tensor) -> tuple[slice, slice]:
 
 
 def crop(cell: Cell, box: tuple[slice, slice]) -> Cell:
-    """The part of a cell's picture in a box."""
+    """Return the part of a cell's picture in a box."""
     return cell if cell.pixels is None else replace(cell, pixels=cell.pixels[box])

@@ -11,12 +11,12 @@ from texgs.report.published import (
     ALIKE,
     DATA,
     LABEL,
-    beside,
     cells,
     grouped,
     in_order,
     is_alike,
     paper,
+    paper_columns,
     rank,
     side_by_side,
     volumes,
@@ -101,7 +101,7 @@ def fitting(records: Iterable[Record[Any]]) -> Table:
     ours = grouped(data_frame(phase_rows(records), names), (DATA, LABEL, "phase"), titles)
     rows = side_by_side(ours, published("fitting", {"phase": "phase"}, PHASES), keys, titles)
     labels = [Column(DATA), Column(LABEL), Column("phase"), SCENES]
-    return Table(ALIKE, [*labels, *PHASES.values(), *beside(PHASES.values())], rows)
+    return Table(ALIKE, [*labels, *PHASES.values(), *paper_columns(PHASES.values())], rows)
 
 
 def fits(records: Iterable[Record[Any]]) -> Table:
@@ -162,7 +162,7 @@ def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
     ours = grouped(data_frame(rows, names), (DATA, LABEL, variant), titles)
     table = side_by_side(ours, published(sweep, {heading: variant}, RUNS), (DATA, variant), titles)
     labels = [Column(DATA), Column(LABEL), Column(variant), SCENES]
-    return Table(ALIKE, [*labels, *RUNS.values(), *beside(RUNS.values())], table)
+    return Table(ALIKE, [*labels, *RUNS.values(), *paper_columns(RUNS.values())], table)
 
 
 def is_variant(end: Record[FitResult], sweep: str, number: int) -> bool:
@@ -187,7 +187,7 @@ def model_size(records: Iterable[Record[Any]]) -> Table:
     ours["alike"] = [alike and scenes.get(dataset) == count for dataset, count, alike in counts]
     table = side_by_side(ours, theirs, (DATA,), titles)
     labels = [Column(DATA), Column(LABEL), SCENES]
-    return Table(ALIKE, [*labels, *SIZES.values(), *beside(SIZES.values())], table)
+    return Table(ALIKE, [*labels, *SIZES.values(), *paper_columns(SIZES.values())], table)
 
 
 def meshes(records: Iterable[Record[Any]]) -> Table:

@@ -27,7 +27,7 @@ class LeftOut:
 
 
 def read_left_out(path: str | Path | None) -> list[LeftOut]:
-    """What a file says was left out; nothing without a file.
+    """Return what a file says was left out; nothing without a file.
 
     Raises:
         ArgumentError: if the file is no list of entries with `what`, `why` and `places`.
@@ -44,7 +44,7 @@ def read_left_out(path: str | Path | None) -> list[LeftOut]:
 
 
 def others(paths: Sequence[Path]) -> list[LeftOut]:
-    """The entry for metrics files of other versions of texgs; none where there are none."""
+    """Return the entry for metrics files of other versions of texgs; none where there are none."""
     if not paths:
         return []
     what = f"{len(paths)} metrics files" if len(paths) > 1 else "1 metrics file"
@@ -53,6 +53,6 @@ def others(paths: Sequence[Path]) -> list[LeftOut]:
 
 
 def note(left_out: Iterable[LeftOut], places: Collection[str]) -> str:
-    """What of a table is left out, in words; empty where all is there."""
+    """Return what of a table is left out, in words; empty where all is there."""
     entries = [str(entry) for entry in left_out if set(entry.places) & set(places)]
     return " ".join(["Left out:", *entries]) if entries else ""

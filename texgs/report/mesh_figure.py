@@ -59,14 +59,14 @@ def write_mesh_figure(
 
 
 def lit(points: Points, camera: Camera) -> Tensor:
-    """Grey [N, 3] of points under a light at the camera."""
+    """Return the grey [N, 3] of points under a light at the camera."""
     to_camera = camera.position.to(points.places) - points.places
     cosine = (points.normals * to_camera).sum(1) / to_camera.norm(dim=1)
     return (CLAY * (AMBIENT + (1 - AMBIENT) * cosine.clamp_min(0)))[:, None].expand(-1, 3)
 
 
 def drawn(points: Points, mesh: Mesh, colors: Tensor, camera: Camera) -> Render:
-    """Points of a mesh over white, each as an opaque disc that reaches to its neighbours."""
+    """Return the points of a mesh over white, each as an opaque disc that reaches to its neighbours."""
     a, b, c = torch.from_numpy(mesh.corners).unbind(1)
     area = torch.linalg.cross(b - a, c - a).norm(dim=1).sum() / 2
     spacing = float((area / len(points.places)).sqrt())
@@ -82,7 +82,7 @@ def drawn(points: Points, mesh: Mesh, colors: Tensor, camera: Camera) -> Render:
 
 
 def facing(normals: Tensor) -> Tensor:
-    """Rotations [N, 4] wxyz of discs whose normal is +- the given one [N, 3]."""
+    """Return the rotations [N, 4] wxyz of discs whose normal is +- the given one [N, 3]."""
     up = torch.where(normals[:, 2:] < 0, -normals, normals)
     x, y, z = up.unbind(1)
     return torch.stack([1 + z, -y, x, torch.zeros_like(z)], dim=1)

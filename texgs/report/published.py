@@ -138,7 +138,7 @@ def grouped(
     return data_frame(merged, None if merged else [*rows.columns, "basic scenes"])
 
 
-def beside(columns: Iterable[Column]) -> list[Column]:
+def paper_columns(columns: Iterable[Column]) -> list[Column]:
     """Return columns of the paper's numbers beside ours."""
     return [Column(f"{column.title} (paper)", column.digits, UNPUBLISHED) for column in columns]
 

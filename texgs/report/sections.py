@@ -85,7 +85,7 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
 
 
 def page(record: Record[Any], folder: Path) -> dict[str, str]:
-    """The page of a scene, or the way to it, where a job has made one."""
+    """Return the page of a scene, or the way to it, where a job has made one."""
     file = record.path.with_name("scene.html")
     if not isinstance(record.result, PageResult) or not file.is_file():
         return {}
@@ -95,7 +95,7 @@ def page(record: Record[Any], folder: Path) -> dict[str, str]:
 
 
 def section_of(record: Record[Any], picture: str) -> str:
-    """The section of a picture, which a job has made; `picture` is the name of its file."""
+    """Return the section of a picture, which a job has made; `picture` is the name of its file."""
     result = record.result
     if isinstance(result, EditResult):
         is_part = any("/" in name for name in result.followed)
@@ -106,19 +106,19 @@ def section_of(record: Record[Any], picture: str) -> str:
 
 
 def label(record: Record[Any]) -> str:
-    """Basic TF, fit and edit of a job, as far as it is of one."""
+    """Return the basic TF, fit and edit of a job, as far as it is of one."""
     edit = edit_of(record)
     return " ".join(filter(None, (record.tf, record.label, edit)))
 
 
 def edit_of(record: Record[Any]) -> str:
-    """The edit of a job that has made a scene or its page, if it is of one."""
+    """Return the edit of a job that has made a scene or its page, if it is of one."""
     edit = record.result.edit if isinstance(record.result, EditResult | PageResult) else ""
     return "" if edit == NO_METHOD else edit
 
 
 def command(record: Record[Any]) -> str:
-    """The command that makes the pictures of a job, but for what its run overrode.
+    """Return the command that makes the pictures of a job, but for what its run overrode.
 
     It is empty for galleries, whose words tell it.
     """
@@ -141,7 +141,7 @@ def command(record: Record[Any]) -> str:
 
 
 def data_uri(picture: Image.Image) -> str:
-    """A picture as text for the attribute of a tag, compressed to about an eighth of its PNG."""
+    """Return a picture as text for the attribute of a tag, compressed to about an eighth of its PNG."""
     file = io.BytesIO()
     picture.convert("RGBA").save(file, format="WEBP", quality=QUALITY, method=EFFORT)
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode()}"

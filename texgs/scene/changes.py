@@ -11,7 +11,7 @@ import yaml
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.light import HEADLIGHT
 from texgs.core.plain_yaml import parse_yaml
-from texgs.scene.parts import entry_of, place_of
+from texgs.scene.parts import entry_of, key_path
 from texgs.scene.scene import WHITE
 from texgs.scene.scene_file import SEGMENT_KEYS, known, light_of
 from texgs.scene.session import Session
@@ -50,7 +50,7 @@ def _apply(session: Session, word: str) -> None:
 def _change_part(session: Session, part: str, key: str, text: str) -> None:
     """Change one value of a part; an empty text takes it back."""
     entry_of(session.scene, part)
-    known({key: text}, SEGMENT_KEYS, place_of(part))
+    known({key: text}, SEGMENT_KEYS, key_path(part))
     if key == "texture":
         session.set_texture(part, _file(text) if text else None)
     elif key == "file":

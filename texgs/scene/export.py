@@ -19,7 +19,7 @@ from texgs.raster.spherical_harmonics import Y00
 
 
 def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:
-    """The visible surfels of a scene as one model of stage surfels, whatever light shone on them.
+    """Return the visible surfels of a scene as one model of stage surfels, whatever light shone on them.
 
     Args:
         parts: of a `Composition`.
@@ -72,7 +72,7 @@ def fill(vertices: np.ndarray, places: Tensor, colors: Tensor) -> None:
 
 
 def _surfels(part: Part, edits: Sequence[PartEdit]) -> dict[str, Tensor]:
-    """Raw parameters of a part's visible surfels."""
+    """Return the raw parameters of a part's visible surfels."""
     p = part.model.parameters
     colors = part.colored(edits).double()
     if "texels" in p:

@@ -43,7 +43,7 @@ def frame(
     mode: Mode = "shaded",
     background: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> np.ndarray:
-    """One frame [H, W, 3], uint8.
+    """Return one frame [H, W, 3], uint8.
 
     Normals (world) are (n + 1) / 2, depth is black at the nearest and light grey at the farthest point in the
     frame, both over the background; alpha is white where opaque; texels are around grey; discs are surfels of
@@ -78,7 +78,7 @@ def frame(
 
 
 def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:
-    """Colours [H, W, 3] of a mode."""
+    """Return the colours [H, W, 3] of a mode."""
     alpha = render.alpha[..., None]
     if mode == "alpha":
         return alpha.expand(-1, -1, 3)
@@ -92,7 +92,7 @@ def pixels(render: Render, mode: Mode, background: Tensor) -> Tensor:
 
 
 def relative_depth(render: Render) -> Tensor:
-    """Mean depth [H, W], 0 at the nearest and 1 at the farthest point that is not faint."""
+    """Return the mean depth [H, W], 0 at the nearest and 1 at the farthest point that is not faint."""
     depth = render.depth
     seen = depth[render.alpha > 0.5]  # type: ignore[index]
     if not len(seen):

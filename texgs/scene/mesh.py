@@ -30,12 +30,12 @@ CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and
 
 
 def points(view: DepthView) -> Tensor:
-    """Where the surface is that the pixels of a view show [P, 3], world units."""
+    """Return where the surface is that the pixels of a view show [P, 3], world units."""
     return view.camera.unproject(view.depth)[view.depth > 0]
 
 
 def lattice_of(low: Tensor, high: Tensor, voxel: float) -> Lattice:
-    """A lattice of voxels that holds the box from `low` to `high` [3]."""
+    """Return a lattice of voxels that holds the box from `low` to `high` [3]."""
     x, y, z = (int(n) for n in ((high - low) / (BLOCK * voxel)).ceil().long() + 1)
     what = f"a mesh of {BLOCK * x} x {BLOCK * y} x {BLOCK * z} voxels"
     require_memory(5 * 4 * x * y * z * BLOCK**3, what, "choose a larger voxel")
@@ -51,7 +51,7 @@ def fuse_view(lattice: Lattice, view: DepthView) -> None:
 
 
 def zero_surface(lattice: Lattice) -> Mesh:
-    """Where the distance is 0, in cells all of whose corners were seen."""
+    """Return where the distance is 0, in cells all of whose corners were seen."""
     values = -lattice.distance.numpy()  # inside is positive
     mesh = isosurface(values, 0.0, (lattice.spacing,) * 3, tuple(lattice.lower.tolist()))
     seen = (lattice.views > LEAST_VIEWS).float()
@@ -62,7 +62,7 @@ def zero_surface(lattice: Lattice) -> Mesh:
 
 
 def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
-    """Colours [V, 3] of places [V, 3] on edges of the lattice, uint8."""
+    """Return the colours [V, 3] of places [V, 3] on edges of the lattice, uint8."""
     last = BLOCK * torch.tensor(lattice.blocks) - 1
     grid = (torch.from_numpy(places) - lattice.lower) / lattice.spacing / last * 2 - 1
     volume = lattice.color[None].permute(0, 4, 1, 2, 3)
@@ -71,7 +71,7 @@ def colors_at(lattice: Lattice, places: np.ndarray) -> np.ndarray:
 
 
 def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: float) -> Mesh:
-    """The surface that views of a scene see, with colours, but for small specks.
+    """Return the surface that views of a scene see, with colours, but for small specks.
 
     What lets more than half of the light through has no surface.
 
@@ -114,7 +114,7 @@ def depth_view(render: Render, camera: Camera) -> DepthView:
 
 
 def largest_clusters(mesh: Mesh) -> Mesh:
-    """A mesh without specks: its largest connected parts, as 2DGS keeps them."""
+    """Return a mesh without specks: its largest connected parts, as 2DGS keeps them."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
@@ -127,7 +127,7 @@ def largest_clusters(mesh: Mesh) -> Mesh:
 
 
 def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
-    """The triangles that stay [F] bool, and the vertices that they need."""
+    """Return the triangles that stay [F] bool, and the vertices that they need."""
     used, triangles = np.unique(mesh.triangles[kept], return_inverse=True)
     return Mesh(mesh.vertices[used], triangles.reshape(-1, 3).astype(np.int32))
 

@@ -13,13 +13,13 @@ Entry = SceneModel | SceneSegment
 
 
 def part_names(scene: Scene) -> list[str]:
-    """All parts: models, and segments of these."""
+    """Return all parts: models, and segments of these."""
     segments = [f"{model}/{name}" for model, entry in scene.models.items() for name in entry.segments]
     return [*scene.models, *segments]
 
 
 def split(scene: Scene, part: str) -> tuple[str, str | None]:
-    """Model and segment of a part; the segment may be a new one.
+    """Return the model and segment of a part; the segment may be a new one.
 
     Names of models may have the mark between the two, those of segments have none.
 
@@ -36,7 +36,7 @@ def split(scene: Scene, part: str) -> tuple[str, str | None]:
 
 
 def entry_of(scene: Scene, part: str) -> Entry:
-    """The model or segment of a name.
+    """Return the model or segment of a name.
 
     Raises:
         ArgumentError: if there is none.
@@ -53,7 +53,7 @@ def entry_of(scene: Scene, part: str) -> Entry:
 
 
 def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
-    """The scene with another model or segment of a name; None removes a segment.
+    """Return the scene with another model or segment of a name; None removes a segment.
 
     Raises:
         ArgumentError: if there is no such model, or no segment to remove.
@@ -71,7 +71,7 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
 
 
 def with_textures(scene: Scene, files: Mapping[str, Path | None], own_colors: bool = False) -> Scene:
-    """The scene with other texture files for some of its parts.
+    """Return the scene with other texture files for some of its parts.
 
     Args:
         scene: to change.
@@ -88,8 +88,8 @@ def with_textures(scene: Scene, files: Mapping[str, Path | None], own_colors: bo
     return scene
 
 
-def place_of(part: str) -> str:
-    """Where a part stands in a scene file."""
+def key_path(part: str) -> str:
+    """Return where a part stands in a scene file."""
     model, slash, segment = part.rpartition("/")
     return f"models.{model}.segments.{segment}" if slash else f"models.{part}"
 

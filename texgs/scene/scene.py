@@ -54,7 +54,7 @@ class SceneModel:
         return paths
 
     def open(self) -> tuple[Field, list[Tensor]]:
-        """The field, of surfels with the texels of all variants, and the masks [N] of its segments.
+        """Return the field, of surfels with the texels of all variants, and the masks [N] of its segments.
 
         Raises:
             ArgumentError, ShapeError: naming the file.
@@ -65,7 +65,7 @@ class SceneModel:
         return fitted, []
 
     def surfels(self, fitted: Field | None = None) -> tuple[Surfels, list[Tensor]]:
-        """The same, for what only surfels can.
+        """Return the same, for what only surfels can.
 
         Args:
             fitted: what the file holds, where that is known.

@@ -43,7 +43,7 @@ def read_scene(path: str | Path) -> Scene:
 
 
 def read_values(path: Path) -> Any:
-    """The plain values of a YAML file."""
+    """Return the plain values of a YAML file."""
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; texgs compose writes one")
     with reading(path, "a scene in YAML", "correct it"):
@@ -56,7 +56,7 @@ def read_values(path: Path) -> Any:
 
 
 def scene_of(values: Any, folder: Path) -> Scene:
-    """The scene that the plain values of a scene file describe.
+    """Return the scene that the plain values of a scene file describe.
 
     Args:
         values: as `read_values` returns them.
@@ -97,7 +97,7 @@ def write_scene(path: str | Path, scene: Scene) -> Path:
 
 
 def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) -> dict[str, Any]:
-    """File, texture and what is edited, as a scene file has them."""
+    """Return the file, texture and what is edited, as a scene file has them."""
     unedited = asdict(PartEdit())
     changed = {key: value for key, value in asdict(entry.edit).items() if value != unedited[key]}
     if "palette" in changed:
@@ -130,7 +130,7 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
 
 
 def light_of(value: Any) -> Light:
-    """The light that a value of a scene file stands for.
+    """Return the light that a value of a scene file stands for.
 
     Raises:
         ArgumentError: if it stands for none.

@@ -42,7 +42,7 @@ def write_segment(
 
 
 def read_segment(path: str | Path, model: Surfels) -> Tensor:
-    """The mask [N] bool of a segment, on the model's device."""
+    """Return the mask [N] bool of a segment, on the model's device."""
     tensors = _read(Path(path))
     mask, anchors, expected = tensors["mask"], tensors["anchors"], _anchors(model)
     # A model without surfels has no places; segments of it are empty, and refused when they are written.
@@ -58,7 +58,7 @@ def read_segment(path: str | Path, model: Surfels) -> Tensor:
 
 
 def _anchors(model: Surfels) -> Tensor:
-    """Means [A, 3] of surfels spread over the list."""
+    """Return the means [A, 3] of surfels spread over the list."""
     means = model.parameters["means"].detach().cpu()
     return means[torch.linspace(0, max(len(means) - 1, 0), min(ANCHORS, len(means))).long()].contiguous()
 

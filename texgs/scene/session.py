@@ -21,7 +21,7 @@ from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.scene.frame import Mode, frame
-from texgs.scene.parts import entry_of, place_of, replaced, require_new, split, with_textures
+from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
 from texgs.scene.scene import WHITE, Scene, SceneSegment
 from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
@@ -47,7 +47,7 @@ class Session:
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
-        """A session that begins with a scene file; its models are read when a frame needs them.
+        """Return a session that begins with a scene file; its models are read when a frame needs them.
 
         Raises:
             ArgumentError: if it is no scene file.
@@ -79,13 +79,13 @@ class Session:
                 field cannot show it.
         """
         entry = entry_of(self.scene, part)
-        known({key: value}, EDITS, place_of(part))
+        known({key: value}, EDITS, key_path(part))
         kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
         try:
             require_possible(PartEdit(**{key: value}), kind.name)
             edit = replace(entry.edit, **{key: value})
         except ArgumentError as error:
-            raise ArgumentError(f"{place_of(part)}.{error}") from error
+            raise ArgumentError(f"{key_path(part)}.{error}") from error
         self._push(replaced(self.scene, part, replace(entry, edit=edit)))
 
     def reset(self, part: str, key: str) -> None:
@@ -147,7 +147,7 @@ class Session:
         """
         model, name = split(self.scene, part)
         entry = self.scene.models[model]
-        require_name(name, place_of(part))
+        require_name(name, key_path(part))
         before = entry.segments.get(str(name), SceneSegment(file, entry.edit, entry.texture))
         self._push_read(replaced(self.scene, part, replace(before, file=file)), {model})
 
@@ -201,7 +201,7 @@ class Session:
         if segment is None:
             raise ArgumentError(f"expected a segment to rename, got the model {part}")
         entry_of(self.scene, part)
-        require_name(name, place_of(part))
+        require_name(name, key_path(part))
         if name == segment:
             return
         require_new(self.scene, f"{model}/{name}")
@@ -240,7 +240,7 @@ class Session:
         return self._composition_of(self.scene)
 
     def frame(self, camera: Camera, mode: Mode = "shaded", scene: Scene | None = None) -> np.ndarray:
-        """One frame [H, W, 3], uint8; see `texgs.scene.frame.frame`.
+        """Return one frame [H, W, 3], uint8; see `texgs.scene.frame.frame`.
 
         Changes may be made in one thread while another one renders the scene that it was given.
 
@@ -287,12 +287,12 @@ class Session:
 
 
 def files_of(scene: Scene) -> list[Path | None]:
-    """All that a scene reads; None stands for the textures that parts were fitted with."""
+    """Return all that a scene reads; None stands for the textures that parts were fitted with."""
     return [file for entry in scene.models.values() for file in entry.files]
 
 
 def state_of(file: Path | None) -> tuple[object, ...]:
-    """What is another where a file was written again, or is gone."""
+    """Return what is another where a file was written again, or is gone."""
     if file is None or not file.exists():
         return (file,)
     status = file.stat()

@@ -21,7 +21,7 @@ TASKS = {  # what was asked for, by what methods follow
 
 
 def ballot_page(study: str, questions: Sequence[Question], films: Sequence[bytes], size: int) -> str:
-    """The page as HTML.
+    """Return the page as HTML.
 
     Args:
         study: its digest, which ballots carry.
@@ -47,7 +47,7 @@ def ballot_page(study: str, questions: Sequence[Question], films: Sequence[bytes
 
 
 def entry(number: int, question: Question, film: bytes) -> dict[str, Any]:
-    """What the template reads of a question."""
+    """Return what the template reads of a question."""
     count = len(question.options)
     words = list(dict.fromkeys(question.followed.values())) if question.follows == "instruction" else []
     places = [dict(zip(("column", "row"), cell(index, count + 1), strict=True)) for index in range(count + 1)]
@@ -67,7 +67,7 @@ def entry(number: int, question: Question, film: bytes) -> dict[str, Any]:
 
 
 def picture_uri(path: str) -> str:
-    """A picture, made small, for the attribute of a tag; nothing but its pixels."""
+    """Return a picture, made small, for the attribute of a tag; nothing but its pixels."""
     file = io.BytesIO()
     with open_picture(path) as picture:
         small = picture.convert("RGB")
@@ -77,10 +77,10 @@ def picture_uri(path: str) -> str:
 
 
 def policy_hash(text: str) -> str:
-    """How a Content-Security-Policy names a style or a script that it allows."""
+    """Return how a Content-Security-Policy names a style or a script that it allows."""
     return f"sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
 def text_of(name: str) -> str:
-    """A file beside this one."""
+    """Return a file beside this one."""
     return files("texgs.study").joinpath(name).read_text(encoding="utf-8")

@@ -50,7 +50,7 @@ def read_votes(study: Study, paths: Iterable[str | Path]) -> Votes:
 
 
 def votes_beside(key: str | Path) -> Votes | None:
-    """The ballots in the folder `votes` beside the key of a study; None without any.
+    """Return the ballots in the folder `votes` beside the key of a study; None without any.
 
     Raises:
         ArgumentError: as `read_votes` and `read_key`.
@@ -91,7 +91,7 @@ def read_ballot(study: Study, path: Path) -> Ballot:
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
-    """The lines of a ballot by column, at least one."""
+    """Return the lines of a ballot by column, at least one."""
     with reading(path, WHAT, ADVICE):
         if path.stat().st_size > LARGEST:
             raise ArgumentError(f"{path}: expected {WHAT} of at most {LARGEST} bytes; is it another file?")
@@ -103,7 +103,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 
 
 def ranks_of(where: str, question: Question, given: Mapping[str, str]) -> list[int]:
-    """The rank of each option of a question."""
+    """Return the rank of each option of a question."""
     for letter in given:
         if letter not in tuple(question.letters):
             raise ArgumentError(

@@ -25,7 +25,7 @@ CRF = 23  # of H.264: half the bytes of a film that is looked at alone, so that 
 
 
 def cell(index: int, count: int) -> tuple[int, int]:
-    """Column and row of a scene among so many, in a picture about as wide as high."""
+    """Return the column and row of a scene among so many, in a picture about as wide as high."""
     columns = ceil(sqrt(count))
     return index % columns, index // columns
 
@@ -68,13 +68,13 @@ def extent(picture: np.ndarray) -> float:
 
 
 def filled(lens: Lens, share: float) -> Lens:
-    """The lens whose picture shows only that share of its width and height, with a margin."""
+    """Return the lens whose picture shows only that share of its width and height, with a margin."""
     slope = tan(radians(lens.fov_y / 2)) * min(1.0, MARGIN * share)
     return lens._replace(fov_y=2 * degrees(atan(slope)))
 
 
 def mosaic(pictures: Sequence[np.ndarray]) -> np.ndarray:
-    """Pictures [H, W, 3] of one size in their cells; cells without one are white."""
+    """Return the pictures [H, W, 3] of one size in their cells; cells without one are white."""
     height, width = pictures[0].shape[:2]
     places = [cell(index, len(pictures)) for index in range(len(pictures))]
     columns, rows = (1 + max(place) for place in zip(*places, strict=True))

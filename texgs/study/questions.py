@@ -75,7 +75,7 @@ class Study:
 
 
 def questions_of(records: Iterable[Record[Any]], edits: Sequence[str], seed: int) -> list[Question]:
-    """All questions that edited scenes give, those by pictures first, with options in random order.
+    """Return all questions that edited scenes give, those by pictures first, with options in random order.
 
     Args:
         records: of all jobs.
@@ -115,7 +115,7 @@ def questions_of(records: Iterable[Record[Any]], edits: Sequence[str], seed: int
 def question_of(
     looks: Sequence[Record[EditResult]], records: Sequence[Record[Any]], order: random.Random
 ) -> Question:
-    """The question that compares some scenes."""
+    """Return the question that compares some scenes."""
     first = looks[0]
     if len(looks) > len(LETTERS):
         raise ArgumentError(
@@ -138,7 +138,7 @@ def question_of(
 
 
 def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) -> Path:
-    """The scene before the edits: of the fits that are closest to their test views."""
+    """Return the scene before the edits: of the fits that are closest to their test views."""
     scenes = {
         fit_of(record): record.path.with_name("scene.yaml")
         for record in of(SceneResult, records)
@@ -158,7 +158,7 @@ def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) ->
 
 
 def fit_of(record: Record[Any]) -> str:
-    """The folder of a job's fit, see `texgs.workflow.places`: variants of an edit have the same."""
+    """Return the folder of a job's fit, see `texgs.workflow.places`: variants of an edit have the same."""
     return record.path.parents[2 if isinstance(record.result, EditResult) else 1].name
 
 

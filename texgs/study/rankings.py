@@ -37,13 +37,13 @@ class Rankings:
         return self.counts @ np.arange(1, len(self.methods) + 1) / self.number
 
     def sorted(self, methods: Sequence[Compared]) -> Rankings:
-        """The same votes with the methods in another order."""
+        """Return the same votes with the methods in another order."""
         order = [self.methods.index(method) for method in methods]
         return Rankings(methods, self.counts[order], None if self.ranks is None else self.ranks[:, order])
 
 
 def together(several: Sequence[Rankings]) -> Rankings:
-    """All votes of rankings of the same methods in the same order."""
+    """Return all votes of rankings of the same methods in the same order."""
     known = [each.ranks for each in several if each.ranks is not None]
     ranks = np.concatenate(known) if len(known) == len(several) else None
     return Rankings(several[0].methods, np.sum([each.counts for each in several], axis=0), ranks)
@@ -60,7 +60,7 @@ class Share:
 
 
 def firsts(votes: Rankings) -> list[Share]:
-    """The share of first ranks of each method."""
+    """Return the share of first ranks of each method."""
     from scipy.stats import binomtest  # slow to import
 
     shares = []

@@ -76,7 +76,7 @@ def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
 
 
 def counted(votes: Votes) -> dict[str, list[Panel]]:
-    """The votes of each question, by what methods follow there."""
+    """Return the votes of each question, by what methods follow there."""
     panels: dict[str, list[Panel]] = defaultdict(list)
     for place, question in enumerate(votes.study.questions):
         methods = [option.compared for option in question.options]
@@ -103,7 +103,7 @@ def published() -> dict[str, list[Panel]]:
 
 
 def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
-    """Questions with the same methods together."""
+    """Return the questions with the same methods together."""
     groups: dict[tuple[object, ...], list[Panel]] = defaultdict(list)
     for panel in panels:
         groups[tuple(panel.votes.methods)].append(panel)
@@ -111,7 +111,7 @@ def alike(panels: Iterable[Panel]) -> list[list[Panel]]:
 
 
 def total(panels: Iterable[Panel]) -> Rankings:
-    """The votes on questions that compare the same methods."""
+    """Return the votes on questions that compare the same methods."""
     return together([panel.votes for panel in panels])
 
 
@@ -150,7 +150,7 @@ def method_rows(votes: Rankings) -> list[dict[str, Any]]:
 
 
 def caption(votes: Votes | None) -> str:
-    """What the columns are, and whose votes these are."""
+    """Return what the columns are, and whose votes these are."""
     whose = (
         f"Study {votes.study.study}, {len(votes.ballots)} ballots." if votes else "No votes but the paper's."
     )

@@ -67,5 +67,5 @@ def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
 
 
 def name_of(method: Compared) -> str:
-    """What a bar is called."""
+    """Return what a bar is called."""
     return method.method if method.edit == THE_PAPER else f"{method.edit}\n{method.recipe}"

@@ -31,7 +31,7 @@ MARGIN = 1.1  # of the first view around the bounds
 def describe(
     name: str, scene: Scene, composed: Composed, bounds: tuple[list[float], float] | None = None
 ) -> dict[str, Any]:
-    """A scene as a page needs it.
+    """Return a scene as a page needs it.
 
     Args:
         name: of the scene, to show.
@@ -65,7 +65,7 @@ def describe(
 def describe_model(
     name: str, entry: SceneModel, kind: str, palette: tuple[float, ...], can: list[str]
 ) -> dict[str, Any]:
-    """A model and its segments."""
+    """Return a model and its segments."""
     segments = [{"name": key, "edit": asdict(segment.edit)} for key, segment in entry.segments.items()]
     return {
         "name": name,
@@ -83,12 +83,12 @@ def abilities(keys: list[str], has_palette: bool) -> list[str]:
 
 
 def describe_light(light: Light) -> dict[str, float] | None:
-    """Angles of a directional light, degrees; None for the headlight."""
+    """Return the angles of a directional light, degrees; None for the headlight."""
     return None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar}
 
 
 def modes_of(kind: Kind) -> list[str]:
-    """What frames of a kind of field can show."""
+    """Return what frames of a kind of field can show."""
     needs = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
     needs |= dict.fromkeys(MATERIAL, "relight")
     return [mode for mode in get_args(Mode) if mode not in needs or needs[mode] in kind.can]
@@ -102,7 +102,7 @@ def has_palette(composed: Composed) -> list[bool]:
 
 
 def bounds_of(composed: Composed) -> tuple[list[float], float]:
-    """Centre [3] and radius of a ball that holds nearly all primitives, world units.
+    """Return the centre [3] and radius of a ball that holds nearly all primitives, world units.
 
     Fields without means have the bounds that the paper's cameras see: volumes are centred and scaled alike.
     """
@@ -116,7 +116,7 @@ def bounds_of(composed: Composed) -> tuple[list[float], float]:
 
 
 def means_of(composed: Composed) -> Tensor | None:
-    """Means [N, 3] of all primitives, where they have some."""
+    """Return the means [N, 3] of all primitives, where they have some."""
     if isinstance(composed, Composition):
         return torch.cat([part.model.parameters["means"] for part in composed.parts])
     if isinstance(composed, JoinedGaussians):

@@ -39,7 +39,7 @@ class Downloads:
         self._folder = TemporaryDirectory(prefix="texgs-files-")
 
     async def write(self, scene: Scene, asked: Export, name: str, watch: Watch) -> Path:
-        """The file.
+        """Return the file.
 
         Args:
             scene: as it is shown.
@@ -50,7 +50,7 @@ class Downloads:
         return await self._jobs.run(partial(self._write, scene, asked, name), watch)
 
     def file(self, name: str) -> Path | None:
-        """A file that was written, if there is one of this name."""
+        """Return a file that was written, if there is one of this name."""
         return next((path for path in Path(self._folder.name).iterdir() if path.name == name), None)
 
     def close(self) -> None:
@@ -69,14 +69,14 @@ class Downloads:
         return export_file.export_scene(path, scene, export_file.Export(asked.kind))
 
     def _turntable(self, scene: Scene, view: View) -> Iterator[np.ndarray]:
-        """Frames of a turn around what the camera looks at, from where it is."""
+        """Yield frames of a turn around what the camera looks at, from where it is."""
         for index in progress(range(FRAMES), title="turntable", unit="frame"):
             place = replace(view.camera, azimuth=view.camera.azimuth + 360 * index / FRAMES)
             yield self._frames.pixels(replace(view, camera=place), scene)
 
 
 def exports_of(kind: Kind) -> list[str]:
-    """What scenes of a kind of field can be written as."""
+    """Return what scenes of a kind of field can be written as."""
     return [*FILMS, *(export for export in kind.exports if export not in export_file.OF_MODELS)]
 
 

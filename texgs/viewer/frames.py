@@ -34,7 +34,7 @@ class Pace:
     part: float = 1.0  # of the sides of a frame
 
     def scale(self, moving: bool) -> float:
-        """Part of the sides of a frame to render."""
+        """Return the part of the sides of a frame to render."""
         return self.part if moving else 1.0
 
     def took(self, seconds: float, scale: float) -> None:
@@ -61,17 +61,17 @@ class Frames:
         self._thread = ThreadPoolExecutor(1, "render", torch.set_num_threads, (threads,))
 
     async def frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
-        """A header and a JPEG picture, see `packed`."""
+        """Return a header and a JPEG picture, see `packed`."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._frame, view, scene, pace)
 
     async def still(self, view: View, scene: Scene) -> bytes:
-        """A PNG file with the pixels that `texgs render` writes."""
+        """Return a PNG file with the pixels that `texgs render` writes."""
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._still, view, scene)
 
     def pixels(self, view: View, scene: Scene, scale: float = 1.0) -> np.ndarray:
-        """What a view shows [H, W, 3], uint8, with sides of this part of the pixels."""
+        """Return what a view shows [H, W, 3], uint8, with sides of this part of the pixels."""
         if view.mode == "truth" or view.mode == "difference":
             return self._origins.frame(view, scene, scale)
         return self._session.frame(view.camera.camera(scale), view.mode, scene)
@@ -94,7 +94,7 @@ class Frames:
 
 
 def packed(view: View, pixels: np.ndarray, seconds: float) -> bytes:
-    """Length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture.
+    """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture.
 
     Args:
         view: that the frame answers.

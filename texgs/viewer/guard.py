@@ -64,7 +64,7 @@ def guard(token: str, host: str) -> Middleware:
 
 
 def is_own_host(header: str, host: str, names: Collection[str]) -> bool:
-    """Whether a Host header names this machine. The port may be another one, that of a tunnel.
+    """Return whether a Host header names this machine. The port may be another one, that of a tunnel.
 
     A server on the loopback interface has its names only. Another one has addresses, which no foreign site
     can have as its name, and `names`: the one that it was given, and the machine's.
@@ -90,12 +90,12 @@ def is_own_origin(origin: str | None, header: str, required: bool) -> bool:
 
 
 def is_socket(request: web.Request) -> bool:
-    """Whether a request opens a WebSocket."""
+    """Return whether a request opens a WebSocket."""
     return request.headers.get("Upgrade", "").lower() == "websocket"
 
 
 def hostname(address: str) -> str | None:
-    """Lower-case name in an address; None where there is none."""
+    """Return Lower-case name in an address; None where there is none."""
     try:
         return urlsplit(address).hostname
     except ValueError:
@@ -103,7 +103,7 @@ def hostname(address: str) -> str | None:
 
 
 def is_address(name: str) -> bool:
-    """Whether a name is an IP address."""
+    """Return whether a name is an IP address."""
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -112,17 +112,14 @@ def is_address(name: str) -> bool:
 
 
 def is_loopback(name: str) -> bool:
-    """Whether a name is one of this machine alone."""
+    """Return whether a name is one of this machine alone."""
     return name.lower() == "localhost" or (is_address(name) and ipaddress.ip_address(name).is_loopback)
 
 
 def kept_token(path: Path) -> str:
-    """The user's token; a new one where the file has none, or others may have read it.
+    """Return the user's token; a new one where the file has none, or others may have read it.
 
     It is kept, so that open pages find a server that was started again.
-
-    Raises:
-        ArgumentError: if the file cannot be written.
     """
     try:
         is_private = os.name != "posix" or not path.stat().st_mode & 0o077

@@ -41,7 +41,7 @@ class Jobs:
         self._thread = ThreadPoolExecutor(1, "job", torch.set_num_threads, (half,))
 
     async def run(self, work: Callable[[], T], watch: Watch) -> T:
-        """What the work returns.
+        """Return what the work returns.
 
         Args:
             work: to do in the thread.

@@ -42,11 +42,11 @@ FULL = ("default", "patches")  # recipes for pictures
 GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
 
 
-class Around(Task[Any]):
+class OrbitTask(Task[Any]):
     """An edit that learns from new views around the scene, under its light: training views are not needed."""
 
     def training_views(self, model: str) -> Sequence[View]:
-        """Cameras on a sphere; there are no images."""
+        """Return the cameras on a sphere; there are no images."""
         return [View(camera, Path(), self.scene.light) for camera in icosphere_of(VIEWS, LENS)]
 
 
@@ -62,10 +62,10 @@ class Looks:
     def __init__(self, jobs: Jobs, styles: Styles, device: torch.device | str = "cpu") -> None:
         self._jobs, self._styles, self._device = jobs, styles, torch.device(device)
         self._folder = TemporaryDirectory(prefix="texgs-looks-")
-        self._recent = Recent(Path(self._folder.name))
+        self._scratch = ScratchFolders(Path(self._folder.name))
 
     def edit_of(self, asked: Look) -> Any:
-        """The edit, as conf/edit has it, with a recipe whose weights are on this machine."""
+        """Return the edit, as conf/edit has it, with a recipe whose weights are on this machine."""
         if bool(asked.style) == bool(asked.instruction):
             raise ArgumentError("look: expected a picture or an instruction, got both or none")
         if asked.style:
@@ -101,7 +101,7 @@ class Looks:
 
     def preview_folder(self, page: int, parts: Sequence[str]) -> Path:
         """A new folder for a preview; removed when a page has many of the same parts, and in the end."""
-        return self._recent.new(f"preview-{page}-{digest(repr(parts))}")
+        return self._scratch.new(f"preview-{page}-{digest(repr(parts))}")
 
     def close(self) -> None:
         """Remove what was not kept."""
@@ -116,8 +116,8 @@ class Looks:
 
     def _make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
         method = method_of(edit)
-        settings, offered = method.of(edit), Offered(show, self._recent)
-        task = Around(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=offered)
+        settings, preview = method.of(edit), ThrottledPreview(show, self._scratch)
+        task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=preview)
         is_alone = not output.parent.exists()
         try:
             output.mkdir(parents=True)
@@ -135,7 +135,7 @@ class Looks:
             raise
 
 
-class Recent:
+class ScratchFolders:
     """Folders with files that frames may be reading: when there are many of a kind, the oldest is removed.
 
     Args:
@@ -146,13 +146,13 @@ class Recent:
         self._parent, self._counts = parent, Counter[str]()
 
     def new(self, kind: str) -> Path:
-        """A place for a folder."""
+        """Return a place for a folder."""
         self._counts[kind] += 1
         rmtree(self._parent / kind / f"{self._counts[kind] - KEPT}", ignore_errors=True)
         return self._parent / kind / f"{self._counts[kind]}"
 
 
-class Offered:
+class ThrottledPreview:
     """Parts on their way, of which some are written and shown.
 
     Args:
@@ -160,7 +160,7 @@ class Offered:
         folders: for these files.
     """
 
-    def __init__(self, show: Callable[[str, Path], None], folders: Recent) -> None:
+    def __init__(self, show: Callable[[str, Path], None], folders: ScratchFolders) -> None:
         self._show, self._folders, self._latest = show, folders, monotonic()
 
     def __call__(self, part: str, model: Callable[[], Surfels]) -> None:
@@ -173,5 +173,5 @@ class Offered:
 
 
 def has_weights(edit: Any) -> bool:
-    """Whether all that an edit needs is on this machine."""
+    """Return whether all that an edit needs is on this machine."""
     return all(map(available, method_of(edit).weights(method_of(edit).of(edit))))

@@ -27,7 +27,7 @@ class Opened:
 
 
 def open_scene(path: Path, folder: Path | None = None) -> Opened:
-    """The scene of a path.
+    """Return the scene of a path.
 
     A scene that a job wrote is saved under another name in the current folder: jobs do not replace a folder
     that holds files of others.
@@ -35,9 +35,6 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
     Args:
         path: scene.yaml, a folder with one of these in it or below, or a model file.
         folder: for saving; by default that of the scene or the model, or the current one.
-
-    Raises:
-        ArgumentError: if there is no scene, several, or a damaged one.
     """
     if path.is_dir():
         path = only_scene(path)
@@ -53,7 +50,7 @@ def open_scene(path: Path, folder: Path | None = None) -> Opened:
 
 
 def only_scene(folder: Path) -> Path:
-    """The scene file in a folder or below."""
+    """Return the scene file in a folder or below."""
     files = sorted(folder.rglob(SCENE))
     if len(files) != 1:
         some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])
@@ -64,5 +61,5 @@ def only_scene(folder: Path) -> Path:
 
 
 def title_of(path: Path) -> str:
-    """Enough of a path to know the scene by."""
+    """Return enough of a path to know the scene by."""
     return "/".join(path.resolve().parts[-4:])

@@ -31,7 +31,7 @@ GAIN = 4.0  # of differences, so that they are seen
 SAME = 1e-3  # by which elements of two cameras may differ
 
 
-def beside(file: Path, name: str) -> Path | None:
+def find_upwards(file: Path, name: str) -> Path | None:
     """The nearest file of this name that goes with a model: relative to its folder or one of those above."""
     folders = file.resolve().parents[:NEAR]
     return next((folder / name for folder in folders if (folder / name).is_file()), None)
@@ -59,7 +59,7 @@ class Origin:
         return {"model": self.name, "opacity": tf["opacity"], "color": color}
 
     def nearest(self, camera: Camera) -> Image:
-        """The view whose camera looks at the origin from nearly the same side."""
+        """Return the view whose camera looks at the origin from nearly the same side."""
         side = normalize(camera.position, dim=0)
         return max(self.images, key=lambda each: float(side @ normalize(each.camera.position, dim=0)))
 
@@ -75,7 +75,7 @@ class Origins:
     def __init__(self, scene: Scene, session: Session) -> None:
         self._session = session
         self._origins = {each.name: each for each in origins_of(scene)}
-        volumes = (beside(entry.file, VOLUME) for entry in scene.models.values())
+        volumes = (find_upwards(entry.file, VOLUME) for entry in scene.models.values())
         self._volume = next(filter(None, volumes), None)
 
     @property
@@ -84,7 +84,7 @@ class Origins:
         return list(OF_VIEWS) if self._origins else []
 
     def frame(self, view: View, scene: Scene, scale: float) -> np.ndarray:
-        """The training view that is nearest to a camera, or by how much the scene differs from it.
+        """Return the training view that is nearest to a camera, or by how much the scene differs from it.
 
         Args:
             view: in one of the modes of views; its camera chooses.
@@ -113,7 +113,7 @@ class Origins:
         """Training views as a page goes to them, those that look at the origin with +y up."""
         origin = next(iter(self._origins.values()), None)
         images = [] if origin is None else origin.images
-        places = [(index, place_of(image.camera)) for index, image in enumerate(images)]
+        places = [(index, orbit_of(image.camera)) for index, image in enumerate(images)]
         return [{"name": f"view {index}", **place} for index, place in places if place]
 
     @cached_property
@@ -131,7 +131,7 @@ class Origins:
 
 
 def summary_of(file: Path) -> dict[str, Any]:
-    """What a volume.json says; nothing where it is damaged, which is said in the log."""
+    """Return what a volume.json says; nothing where it is damaged, which is said in the log."""
     try:
         summary = read_json(file)
     except TexgsError as error:
@@ -141,10 +141,10 @@ def summary_of(file: Path) -> dict[str, Any]:
 
 
 def origins_of(scene: Scene) -> list[Origin]:
-    """What is there of the models of a scene; what is damaged is said in the log."""
+    """Return what is there of the models of a scene; what is damaged is said in the log."""
     whole = []
     for name, entry in scene.models.items():
-        if file := beside(entry.file, VIEWS):
+        if file := find_upwards(entry.file, VIEWS):
             origin = Origin(name, file)
             try:
                 whole.append((origin, origin.images, origin.transfer)[0])
@@ -154,14 +154,14 @@ def origins_of(scene: Scene) -> list[Origin]:
 
 
 def is_table(values: object, columns: int) -> bool:
-    """Whether plain values are rows of so many numbers, at least one."""
+    """Return whether plain values are rows of so many numbers, at least one."""
     if not isinstance(values, list) or not values:
         return False
     return all(isinstance(row, list) and len(row) == columns and all(map(is_number, row)) for row in values)
 
 
 def over(image: Image, background: tuple[float, float, float]) -> np.ndarray:
-    """The pixels [H, W, 3] of a view over a background, uint8."""
+    """Return the pixels [H, W, 3] of a view over a background, uint8."""
     pixels = image.load().numpy().astype(np.float32)
     alpha = pixels[..., 3:] / 255
     return (alpha * pixels[..., :3] + (1 - alpha) * 255 * np.array(background)).round().astype(np.uint8)
@@ -179,8 +179,8 @@ def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
     return framed
 
 
-def place_of(camera: Camera) -> dict[str, Any] | None:
-    """Where a camera on an orbit around the origin stands; None if it looks elsewhere."""
+def orbit_of(camera: Camera) -> dict[str, Any] | None:
+    """Return where a camera on an orbit around the origin stands; None if it looks elsewhere."""
     x, y, z = camera.position.tolist()
     distance = (x * x + y * y + z * z) ** 0.5
     if not distance:

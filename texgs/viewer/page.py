@@ -116,7 +116,7 @@ class Page:
             await self._send_frame(view)
 
     def shown(self, view: View) -> Scene:
-        """What a view shows on this page."""
+        """Return what a view shows on this page."""
         return self._edits.shown(view, self._trial)
 
     def _tell_newest(self, message: dict[str, Any]) -> None:

@@ -36,7 +36,7 @@ class Requests:
         self._edits, self._frames, self._work, self._shown = edits, frames, work, shown
 
     def routes(self, token: str) -> list[web.RouteDef]:
-        """What is answered, below the token."""
+        """Return what is answered, below the token."""
         return [
             web.get(f"/{token}/", self.page),
             web.get(f"/{token}/still.png", self.still),
@@ -47,11 +47,11 @@ class Requests:
         ]
 
     async def page(self, request: web.Request) -> web.StreamResponse:
-        """The page itself."""
+        """Return the page itself."""
         return web.FileResponse(WEB / "page.html")
 
     async def module(self, request: web.Request) -> web.StreamResponse:
-        """A module or a style sheet of the page, by its name in a list of those that there are."""
+        """Return a module or a style sheet of the page, by its name in a list of those that there are."""
         files = {path.name: path for path in WEB.iterdir() if path.suffix in SERVED}
         path = files.get(request.match_info["name"])
         if path is None:
@@ -59,7 +59,7 @@ class Requests:
         return web.FileResponse(path)
 
     async def still(self, request: web.Request) -> web.StreamResponse:
-        """A PNG file of the view in the query on its page, as `texgs render` writes it."""
+        """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
         try:
             view = parse(request.query.get("view", ""), VIEWS)
             png = await self._frames.still(view, self._shown(view, request.query.get("page", "")))
@@ -72,7 +72,7 @@ class Requests:
         )
 
     async def style(self, request: web.Request) -> web.StreamResponse:
-        """A small view of a picture that texgs paints."""
+        """Return a small view of a picture that texgs paints."""
         try:
             picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
         except TexgsError as error:
@@ -89,7 +89,7 @@ class Requests:
         return web.Response(text=name)
 
     async def file(self, request: web.Request) -> web.StreamResponse:
-        """A file that was written for a page."""
+        """Return a file that was written for a page."""
         path = self._work.downloads.file(request.match_info["name"])
         if path is None:
             raise web.HTTPNotFound

@@ -49,11 +49,11 @@ class Segmenter:
         self._opened: tuple[list[object], Surfels] | None = None  # states of its files
 
     async def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
-        """The mask of a view as a message with a PNG picture, which is transparent elsewhere."""
+        """Return the mask of a view as a message with a PNG picture, which is transparent elsewhere."""
         return await self._jobs.run(partial(self._mask, scene, asked), Watch())
 
     async def lift(self, scene: Scene, asked: Segment, watch: Watch) -> Lifted:
-        """Surfels that masks of many views agree on.
+        """Return the surfels that masks of many views agree on.
 
         Args:
             scene: whose light is in all views.
@@ -63,7 +63,7 @@ class Segmenter:
         return await self._jobs.run(partial(self._lift, scene, asked), watch)
 
     def facts(self, asked: Segment) -> dict[str, Any]:
-        """What a segment comes from, for its file."""
+        """Return what a segment comes from, for its file."""
         name = "" if self._masks is None else self._masks.name
         points = {
             key: [[x, y] for x, y, is_on in asked.points if is_on == sign]
@@ -89,7 +89,7 @@ class Segmenter:
         return Clicks(clicked.camera.camera().to(self._device), points, positive)
 
     def _model(self, scene: Scene, name: str) -> Surfels:
-        """A model with its textures, kept for the next click."""
+        """Return a model with its textures, kept for the next click."""
         entry_of(scene, name)
         model = scene.models[split(scene, name)[0]]
         states: list[object] = [state_of(file) for file in model.files]
@@ -98,7 +98,7 @@ class Segmenter:
         return self._opened[1]
 
     def _mask_model(self) -> MaskModel:
-        """MobileSAM where its weights are, else GrabCut, which has none."""
+        """Return MobileSAM where its weights are, else GrabCut, which has none."""
         for choice in CHOICES if self._masks is None else ():
             try:
                 self._masks = mask_model(choice, self._device)
@@ -110,7 +110,7 @@ class Segmenter:
 
 
 def alone(scene: Scene, name: str) -> Scene:
-    """The scene with one of its models, as it is clicked on: with its textures and no other edit."""
+    """Return the scene with one of its models, as it is clicked on: with its textures and no other edit."""
     entry_of(scene, name)
     models = {}
     for each, entry in scene.models.items():
@@ -121,7 +121,7 @@ def alone(scene: Scene, name: str) -> Scene:
 
 
 def picture_of(mask: Tensor) -> str:
-    """A mask [H, W] bool as the address of a PNG picture."""
+    """Return a mask [H, W] bool as the address of a PNG picture."""
     pixels = np.zeros((*mask.shape, 4), dtype=np.uint8)
     pixels[mask.cpu().numpy()] = COLOR
     file = io.BytesIO()

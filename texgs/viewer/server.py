@@ -78,7 +78,7 @@ class Server:
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
 
     def application(self, token: str, host: str = "127.0.0.1") -> web.Application:
-        """The application to serve.
+        """Return the application to serve.
 
         Args:
             token: first part of every path.
@@ -94,7 +94,7 @@ class Server:
     # ---- Pages ----------------------------------------------------------------
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
-        """One page: what it asks for is done until it is gone."""
+        """Return one page: what it asks for is done until it is gone."""
         socket = web.WebSocketResponse(
             max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
@@ -180,18 +180,18 @@ class Server:
         page.tell(f"Saved as {path}", level="info")
 
     def _shown(self, view: View, number: str) -> Scene:
-        """What a view shows on the page of a number; on none, what all pages share."""
+        """Return what a view shows on the page of a number; on none, what all pages share."""
         page = next((page for page in self._pages if str(page.number) == number), None)
         return self.edits.shown(view) if page is None else page.shown(view)
 
     def scene_message(self) -> dict[str, Any]:
-        """What changes of the scene, and its history, for all pages."""
+        """Return what changes of the scene, and its history, for all pages."""
         scene = self._describe(self.edits.scene)
         changing = {key: scene[key] for key in ("name", "background", "light", "models")}
         return {"type": "scene", "scene": changing, **self.edits.state()}
 
     def greeting(self) -> dict[str, Any]:
-        """The same, for a page that knows nothing yet, with what does not change."""
+        """Return the same, for a page that knows nothing yet, with what does not change."""
         whole = self._describe(self.edits.scene)
         whole["views"] += self._origins.places
         whole["modes"] += self._origins.modes

@@ -43,14 +43,11 @@ class SharedEdits:
         return self._session.scene
 
     def shown(self, view: View, trial: Mapping[str, Path | None] | None = None) -> Scene:
-        """What a view shows.
+        """Return what a view shows.
 
         Args:
             view: of the scene, as it was opened, or of one model alone.
             trial: textures that parts have in the scene as it is now, as far as there are such parts.
-
-        Raises:
-            ArgumentError: if there is no such model.
         """
         if view.only:
             return alone(self.scene, view.only)
@@ -66,7 +63,7 @@ class SharedEdits:
         return self.scene == self._saved
 
     def state(self) -> dict[str, Any]:
-        """What pages show of the history, JSON."""
+        """Return what pages show of the history, JSON."""
         return {
             "past": self._session.past,
             "future": self._session.future,
@@ -77,11 +74,7 @@ class SharedEdits:
         }
 
     def edit(self, edit: Edit, author: int) -> None:
-        """Make a change; edits with the same number by the same author are one step.
-
-        Raises:
-            ArgumentError: naming what cannot be changed so; the scene is then as it was.
-        """
+        """Make a change; edits with the same number by the same author are one step."""
         step = (author, edit.step, edit.part, edit.key) if edit.step else None
         goes_on = step is not None and step == self._latest and self._session.undo()
         try:
@@ -94,30 +87,18 @@ class SharedEdits:
         self._latest = step
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
-        """Write the file of a new segment, and add it.
-
-        Raises:
-            ArgumentError: if it is there already, or other segments have all of its surfels.
-        """
+        """Write the file of a new segment, and add it."""
         file = new_part_file("segment", self._folder, Path(self.name).stem, part)
         self._session.make_segment(part, mask, file, facts)
         self._step(f"{part} new")
 
     def give_textures(self, textures: Mapping[str, Path | None], look: str) -> None:
-        """Give parts the textures of a new look, and back the palettes that these were made for.
-
-        Raises:
-            ArgumentError, ShapeError: if there is no such part any more, or a texture is none of it.
-        """
+        """Give parts the textures of a new look, and back the palettes that these were made for."""
         self._session.set_textures(textures, own_colors=True)
         self._step(f"{', '.join(textures)} {look}")
 
     def rename_segment(self, part: str, name: str) -> None:
-        """Give a segment another name.
-
-        Raises:
-            ArgumentError: if there is no such segment, or it cannot have the name.
-        """
+        """Give a segment another name."""
         before = self.scene
         self._session.rename_segment(part, name)
         if self.scene is before:
@@ -125,11 +106,7 @@ class SharedEdits:
         self._step(f"{part} renamed to {name}")
 
     def remove_segment(self, part: str) -> None:
-        """Give the surfels of a segment back to its model; its file stays.
-
-        Raises:
-            ArgumentError: if there is no such segment.
-        """
+        """Give the surfels of a segment back to its model; its file stays."""
         self._session.remove_segment(part)
         self._step(f"{part} removed")
 
@@ -144,30 +121,18 @@ class SharedEdits:
         self._session.redo()
 
     def path_of(self, name: str) -> Path:
-        """The scene file of a name in the folder for saving.
-
-        Raises:
-            ArgumentError: if it is no plain name of a scene file.
-        """
+        """Return the scene file of a name in the folder for saving."""
         if Path(file_name("save as", name)).suffix not in SCENES:
             raise ArgumentError(f"save as: expected a name that ends in .yaml, got {name}")
         return self._folder / name
 
     def would_replace(self, name: str) -> bool:
-        """Whether saving replaces a file that is neither the opened one nor was saved before, or has changed.
-
-        Raises:
-            ArgumentError: as `path_of`.
-        """
+        """Return whether saving replaces a file that is neither opened nor saved here, or has changed."""
         path = self.path_of(name)
         return path.exists() and self._own.get(path.resolve()) != state_of(path.resolve())
 
     def save(self, name: str) -> Path:
-        """Write the scene file in one step.
-
-        Raises:
-            ArgumentError: as `path_of`, or if it cannot be written.
-        """
+        """Write the scene file in one step."""
         path, scene = self.path_of(name), self.scene
         write_scene(path, scene)
         self.name, self._title, self._saved = name, title_of(path), scene
@@ -179,7 +144,7 @@ class SharedEdits:
         self._latest = None
 
     def new_folder(self, kind: str) -> Path:
-        """A folder for the files of a new look that is not there yet."""
+        """Return a folder for the files of a new look that is not there yet."""
         stem = Path(self.name).stem
         folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())

@@ -3,30 +3,36 @@
 from __future__ import annotations
 
 import json
+import re
+import zlib
 from base64 import b64encode
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from hashlib import sha256
 from importlib.resources import files
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from PIL import Image
+from torch import Tensor
 
 from texgs import __version__
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
+from texgs.fields.surfels.compact import STEP, compact_tensors
 from texgs.fields.surfels.composition import Composition
 from texgs.scene.frame import frame
 from texgs.scene.scene import Scene
 from texgs.viewer.description import describe
-from texgs.viewer.modules import joined_modules, web_file
-from texgs.viewer.packing import pack
 
 LARGEST = 256 * 2**20  # bytes; browsers hold a text of twice as many
+MOST_STEPS = 2**15 - 1  # of a texel, on a graphics card
 POSTER = 512  # pixels of either side
 QUALITY = 80  # of the poster, a JPEG
+IMPORT = re.compile(r'^import (\{[^}]*\}) from "\./([\w-]+\.js)";$', re.MULTILINE)
+EXPORT = re.compile(r"^export ((?:async )?(?:function|class|const) (\w+))", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -47,10 +53,6 @@ def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
         path: target, .html.
         scene: of surfels.
         name: of the scene, its title.
-
-    Raises:
-        ArgumentError, ShapeError: if a model is missing, damaged or not one of surfels with shading, the page
-            would be too large for a browser, or the file cannot be written.
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
@@ -70,7 +72,7 @@ def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
 
 
 def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
-    """The page as text.
+    """Return the page as text.
 
     Nothing but its own script and style may run in it, and it may load nothing: names of a scene are text.
 
@@ -103,7 +105,7 @@ def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
 
 
 def poster(scene: Scene, composed: Composition, view: dict[str, Any], fov_y: float) -> bytes:
-    """A view of a scene, see `describe`, as JPEG."""
+    """Return a view of a scene, see `describe`, as JPEG."""
     place = (view["azimuth"], view["polar"], view["distance"], fov_y, POSTER, POSTER)
     camera = orbit(*place, target=view["target"])
     shown = frame(composed, camera, scene.light, scene.edits, background=scene.background)
@@ -113,5 +115,71 @@ def poster(scene: Scene, composed: Composition, view: dict[str, Any], fov_y: flo
 
 
 def digest(text: str) -> str:
-    """What a content security policy knows a script or a style by."""
+    """Return what a content security policy knows a script or a style by."""
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
+
+
+def pack(path: Path, composition: Composition) -> str:
+    """The tensors of all models, named NUMBER.PARAMETER, and `labels` [N] of surfels that segments have.
+
+    The same scene gives the same text. Browsers unpack zlib by themselves, but not xz.
+
+    Args:
+        path: of the page, for messages.
+        composition: of the scene.
+    """
+    from safetensors.numpy import save
+
+    tensors: dict[str, np.ndarray] = {}
+    for number, part in enumerate(composition.parts):
+        model = part.model.to("cpu")
+        if "texels" in model.parameters:
+            require_range(path, model.parameters["texels"])
+        own = compact_tensors(path, model)
+        if part.labels is not None:
+            own["labels"] = part.labels.cpu().numpy().astype(np.uint8 if part.segments < 256 else np.int32)
+        tensors |= {f"{number}.{name}": values for name, values in own.items()}
+    optics = [asdict(part.model.shading) for part in composition.parts]
+    facts = {"models": optics, "low_pass": composition.options.low_pass, "step": STEP}
+    # One entry: safetensors writes several in any order.
+    return b64encode(zlib.compress(save(tensors, {"optics": json.dumps(facts)}), 9)).decode()
+
+
+def require_range(path: Path, texels: Tensor) -> None:
+    """Require texels [T, 3] that 16 bits hold."""
+    largest = float(texels.abs().max()) if len(texels) else 0.0
+    if largest > MOST_STEPS * STEP:
+        raise ArgumentError(
+            f"{path}: texels: expected at most {MOST_STEPS * STEP:g}, got {largest:g}; fit the texture again"
+        )
+
+
+def web_file(name: str) -> str:
+    """Return the text of a file of texgs/viewer/web."""
+    return files("texgs.viewer").joinpath("web", name).read_text(encoding="utf-8")
+
+
+def joined_modules(*entries: str) -> str:
+    """Return the modules and all that they import, each once and behind what it imports.
+
+    Each becomes a function with its own names, which returns what the module exports into `modules`. That
+    does for modules that import by name, from the same folder, and whose exports are declarations.
+
+    Args:
+        entries: names of files.
+    """
+    texts: dict[str, str] = {}
+
+    def add(name: str) -> None:
+        if name in texts:
+            return
+        text = web_file(name)
+        for _, imported in IMPORT.findall(text):
+            add(imported)
+        exports = ", ".join(exported for _, exported in EXPORT.findall(text))
+        body = EXPORT.sub(r"\1", IMPORT.sub(r'const \1 = modules["\2"];', text)).strip()
+        texts[name] = f'modules["{name}"] = (() => {{\n{body}\nreturn {{ {exports} }};\n}})();'
+
+    for entry in entries:
+        add(entry)
+    return "\n\n".join(["const modules = {};", *texts.values()]) + "\n"

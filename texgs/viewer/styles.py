@@ -54,7 +54,7 @@ class Styles:
         return known
 
     def source(self, name: str) -> str:
-        """What `edit.image.style` is for a picture."""
+        """Return what `edit.image.style` is for a picture."""
         if name not in PICTURES and name not in self._files:
             raise ArgumentError(f"style: expected one of {', '.join(PICTURES)}, or a file; got {name!r:.100}")
         return str(self._files.get(name, name))
@@ -66,7 +66,7 @@ class Styles:
 
 @lru_cache
 def thumbnail(name: str) -> bytes:
-    """A small view of a picture that texgs paints, as JPEG."""
+    """Return a small view of a picture that texgs paints, as JPEG."""
     pixels = picture(name, 4 * THUMBNAIL).permute(1, 2, 0).numpy()
     file = io.BytesIO()
     shown = Image.fromarray((255 * pixels).round().astype(np.uint8)).resize((THUMBNAIL, THUMBNAIL))

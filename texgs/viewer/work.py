@@ -162,5 +162,5 @@ class Work:
 
 
 def textures_of(scene: Scene, parts: Sequence[str]) -> dict[str, Path | None]:
-    """Texture files of parts of a scene."""
+    """Return the texture files of parts of a scene."""
     return {part: entry_of(scene, part).texture for part in parts}

@@ -31,13 +31,13 @@ def depth_order(depth: Tensor, opacities: Tensor, options: Options) -> Tensor:
 
 
 def alpha_of(opacity: Tensor, rho: Tensor, options: Options) -> Tensor:
-    """Alpha [P, M] at squared distances rho [P, M] in standard deviations; 0 below alpha_min."""
+    """Return the alpha [P, M] at squared distances rho [P, M] in standard deviations; 0 below alpha_min."""
     alpha = (opacity * torch.exp(-rho / 2)).clamp(max=ALPHA_MAX)
     return torch.where(alpha >= options.alpha_min, alpha, 0.0)
 
 
 def largest_rho(opacity: Tensor, options: Options) -> Tensor:
-    """The rho [M] at which alpha falls to alpha_min."""
+    """Return the rho [M] at which alpha falls to alpha_min."""
     return 2 * torch.log(opacity / options.alpha_min).clamp(min=0)
 
 

@@ -65,7 +65,7 @@ def area(covariance: Tensor) -> Tensor:
 
 
 def derivative(mean: Tensor, K: Tensor, size: tuple[int, int]) -> Tensor:
-    """Derivative [N, 2, 3] of the pixel by the camera point, at points [N, 3].
+    """Return the derivative [N, 2, 3] of the pixel by the camera point, at points [N, 3].
 
     Far outside of the view it grows without bound; there it is taken at the edge of a field of view that is
     wider by MARGIN, as in 3DGS.

@@ -12,7 +12,7 @@ WORD = 1 << 32
 
 
 def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
-    """Features [n, 2 levels] at points [n, 3]; see `texgs.raster.hash_encoding.encode`."""
+    """Return the features [n, 2 levels] at points [n, 3]; see `texgs.raster.hash_encoding.encode`."""
     features = []
     for resolution, start, end in zip(levels.resolutions, levels.first, levels.first[1:], strict=False):
         place = resolution * points.clamp(0, 1)
@@ -26,7 +26,7 @@ def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
 
 
 def row(point: Tensor, resolution: int, rows: int) -> Tensor:
-    """Rows [n] of lattice points [n, 3] among those of a level (Mueller et al. 2022, eq. 4)."""
+    """Return the rows [n] of lattice points [n, 3] among those of a level (Mueller et al. 2022, eq. 4)."""
     x, y, z = point.unbind(1)
     if (resolution + 1) ** 3 <= rows:
         return x + (resolution + 1) * (y + (resolution + 1) * z)

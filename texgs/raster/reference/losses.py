@@ -10,7 +10,7 @@ WINDOW = 11  # pixels each way, weighted by a Gaussian of standard deviation 1.5
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
-    """Mean structural similarity of [H, W, C] images; see `texgs.raster.losses`."""
+    """Return the mean structural similarity of [H, W, C] images; see `texgs.raster.losses`."""
     from kornia.metrics import ssim as similarities
 
     x, y = (pad(each.permute(2, 0, 1)[None], (WINDOW // 2,) * 4) for each in (image, target))
@@ -18,12 +18,12 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
 
 
 def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor:
-    """(1 - lambda) mean |image - target| + lambda (1 - SSIM) of [H, W, C] images."""
+    """Return (1 - lambda) mean |image - target| + lambda (1 - SSIM) of [H, W, C] images."""
     return (1 - lambda_dssim) * (image - target).abs().mean() + lambda_dssim * (1 - ssim(image, target))
 
 
 def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
-    """World normals [H, W, 3] of a depth map [H, W]; see `texgs.raster.normals`."""
+    """Return the world normals [H, W, 3] of a depth map [H, W]; see `texgs.raster.normals`."""
     height, width = depth.shape
     y, x = torch.meshgrid(
         torch.arange(height, dtype=depth.dtype, device=depth.device) + 0.5,
@@ -41,20 +41,20 @@ def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
 
 
 def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
-    """Mean over pixels of 1 - alpha * normal . depth_to_normal(depth), alpha without gradient."""
+    """Return the mean over pixels of 1 - alpha * normal . depth_to_normal(depth), alpha without gradient."""
     agreement = (normal * depth_to_normal(depth, viewmat, K)).sum(-1)  # [H, W]
     return (1 - alpha.detach() * agreement).mean()
 
 
 def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
-    """Mean of alpha * exp(-g(grey)) * g(attribute); see `texgs.raster.losses`."""
+    """Return the mean of alpha * exp(-g(grey)) * g(attribute); see `texgs.raster.losses`."""
     channels = attribute[None] if attribute.ndim == 2 else attribute.permute(2, 0, 1)  # [C, H, W]
     weight = alpha * torch.exp(-edges(guide.mean(-1)[None]))  # [1, H, W]
     return (weight * edges(channels)).mean()
 
 
 def edges(planes: Tensor) -> Tensor:
-    """|Sobel x| + |Sobel y| of [C, H, W], zeros outside the image."""
+    """Return |Sobel x| + |Sobel y| of [C, H, W], zeros outside the image."""
     from kornia.filters import spatial_gradient
 
     gradient = spatial_gradient(pad(planes[None], (1, 1, 1, 1)), normalized=False)[0]  # [C, 2, H + 2, W + 2]

@@ -123,12 +123,12 @@ def splat(
 
 
 def kind_of(scales: Tensor) -> ModuleType:
-    """The module that defines what is drawn: `project`, `intersect` and `visible_radii`."""
+    """Return the module that defines what is drawn: `project`, `intersect` and `visible_radii`."""
     return gaussians if are_gaussians(scales) else surfels
 
 
 def pixel_centres(width: int, height: int, like: Tensor) -> Tensor:
-    """Pixel centres [H W, 2] as (x, y), row by row."""
+    """Return the pixel centres [H W, 2] as (x, y), row by row."""
     x = torch.arange(width, dtype=like.dtype, device=like.device) + 0.5
     y = torch.arange(height, dtype=like.dtype, device=like.device) + 0.5
     return torch.cartesian_prod(y, x).flip(1)
@@ -148,7 +148,7 @@ def blend(
     features: Tensor | None,
     texture: Texture | None,
 ) -> Tensor:
-    """Sum over fragments [P, C] of weight times colour, without the background."""
+    """Return the sum over fragments [P, C] of weight times colour, without the background."""
     if features is None and texture is None:
         raise ArgumentError("rasterize: expected features, a texture or both, got neither")
     colors = []
@@ -160,7 +160,7 @@ def blend(
 
 
 def texture_color(texture: Texture, index: Tensor, fragments: Fragments) -> Tensor:
-    """Colour [P, M, 3] of each fragment: base + gain * bilinear(texel), the edge texel replicated."""
+    """Return colour [P, M, 3] of each fragment: base + gain * bilinear(texel), the edge texel replicated."""
     sizes, offsets = texture.sizes[index].long(), texture.offsets[index]
     corners, fractions = [], []
     for axis, coordinate in enumerate((fragments.u, fragments.v)):
@@ -181,14 +181,14 @@ def texture_color(texture: Texture, index: Tensor, fragments: Fragments) -> Tens
 
 
 def expected_depth(weights: Tensor, depth: Tensor) -> Tensor:
-    """Mean camera z [P] of the fragments by weight; 0 where nothing is seen."""
+    """Return the mean camera z [P] of the fragments by weight; 0 where nothing is seen."""
     alpha = weights.sum(1)
     seen = alpha > 0
     return torch.where(seen, (weights * depth).sum(1) / torch.where(seen, alpha, 1.0), 0.0)
 
 
 def median_depth(weights: Tensor, light: Tensor, depth: Tensor) -> Tensor:
-    """Camera z [P] of the last fragment that more than half of the light reaches; 0 where none is."""
+    """Return camera z [P] of the last fragment that more than half of the light reaches; 0 where none is."""
     candidates = (weights > 0) & (light > 0.5)  # [P, M]
     position = torch.arange(1, depth.shape[1] + 1, device=depth.device)
     last = torch.cat([position.new_zeros(len(depth), 1), candidates * position], 1).amax(1)  # 0: none
@@ -204,7 +204,7 @@ def distortion(weights: Tensor, depth: Tensor, options: Options) -> Tensor:
 
 
 def statistics(weights: Tensor, radii: Tensor, index: Tensor, n: int) -> Statistics:
-    """Contribution of each of n primitives, from weights [P, M] and radii [M] of those at `index`."""
+    """Return contribution of each of n primitives, from weights [P, M] and radii [M] of those at `index`."""
     weights = weights.detach()
     # the padding serves images without pixels
     highest = torch.nn.functional.pad(weights, (0, 0, 0, 1)).amax(0)
@@ -213,5 +213,5 @@ def statistics(weights: Tensor, radii: Tensor, index: Tensor, n: int) -> Statist
 
 
 def scatter(values: Tensor, index: Tensor, n: int) -> Tensor:
-    """Values of what was kept at their places among all n; 0 elsewhere."""
+    """Return the values of what was kept at their places among all n; 0 elsewhere."""
     return values.new_zeros(n, *values.shape[1:]).index_copy(0, index, values)

@@ -25,7 +25,7 @@ def blinn_phong_texture(
     *,
     facing: bool = False,
 ) -> tuple[Tensor, Tensor]:
-    """Base [N, 3] and gain [N] of shaded surfels; see `texgs.raster.shading`."""
+    """Return the base [N, 3] and gain [N] of shaded surfels; see `texgs.raster.shading`."""
     n = quats_to_matrices(quats)[:, :, 2]  # [N, 3]
     v = normalize(camera_position - means, dim=-1)
     l = v if light is None else normalize(light, dim=-1).expand_as(v)  # noqa: E741 (the paper's letter)
@@ -42,18 +42,18 @@ def blinn_phong_texture(
 
 
 def blinn_phong(*arguments: Any, facing: bool = False) -> Tensor:
-    """Shaded colours [N, 3]; the arguments are those of `blinn_phong_texture`."""
+    """Return the shaded colours [N, 3]; the arguments are those of `blinn_phong_texture`."""
     return blinn_phong_texture(*arguments, facing=facing)[0]
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
-    """Colours [N, 3] of sh [N, K, 3] seen from a point; see `texgs.raster.spherical_harmonics`."""
+    """Return the colours [N, 3] of sh [N, K, 3] seen from a point; see `texgs.raster.spherical_harmonics`."""
     basis = harmonics(normalize(means - camera_position, dim=-1))[:, : sh.shape[1]]  # [N, K]
     return torch.einsum("nk,nkc->nc", basis, sh).add(0.5).clamp_min(0)
 
 
 def harmonics(direction: Tensor) -> Tensor:
-    """The 16 real spherical harmonics of degree 0 to 3 at unit directions [N, 3], [N, 16].
+    """Return the 16 real spherical harmonics of degree 0 to 3 at unit directions [N, 3], [N, 16].
 
     Polynomials of the direction times normalisation factors; every odd order has the sign -1, as in 3DGS.
     """

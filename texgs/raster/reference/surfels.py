@@ -64,7 +64,7 @@ def project(
 
 
 def box(homography: Tensor, rho: Tensor | float) -> tuple[Tensor, Tensor, Tensor]:
-    """Bounding box on screen of the disc u^2 + v^2 <= rho.
+    """Return the bounding box on screen of the disc u^2 + v^2 <= rho.
 
     Returns:
         Middle [M, 2], that of the projected mean where the disc reaches behind the camera; squared half

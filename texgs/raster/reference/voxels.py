@@ -64,7 +64,7 @@ def crossing(origin: Tensor, direction: Tensor, high: Tensor, step: float) -> tu
 
 
 def interpolate(lattice: Tensor, points: Tensor) -> Tensor:
-    """Trilinear values [N, S, C] of [X, Y, Z, C] at lattice coordinates [N, S, 3]."""
+    """Return the trilinear values [N, S, C] of [X, Y, Z, C] at lattice coordinates [N, S, 3]."""
     high = points.new_tensor(lattice.shape[:3]) - 1
     places = (2 * points / high - 1).flip(-1)[None, :, :, None]  # grid_sample wants z, y, x for [X, Y, Z]
     volume = lattice.permute(3, 0, 1, 2)[None]

@@ -11,8 +11,8 @@ from texgs.core.progress import progress
 from texgs.report.results import GalleryResult, Shown
 from texgs.workflow.inputs import has_scene, is_first_recipe
 from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stages.gallery_cells import GalleryCell, GalleryRenderer, RenderedCell
 from texgs.workflow.stages.settings import OfScene
-from texgs.workflow.stages.shots import Shot, Studio, Taken
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig
@@ -28,7 +28,7 @@ class Row:
     """Places side by side."""
 
     title: str
-    pictures: list[Shot]
+    pictures: list[GalleryCell]
 
 
 @dataclass
@@ -61,9 +61,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.picture_grid import write_grid
 
-    studio, shown, captions = Studio(settings, inputs, settings.size), [], {}
+    renderer, shown, captions = GalleryRenderer(settings, inputs, settings.size), [], {}
     for grid in settings.grids:
-        taken = pictures(grid, studio, f"{settings.dataset}: {grid.name}")
+        taken = pictures(grid, renderer, f"{settings.dataset}: {grid.name}")
         shown += entries(grid, taken)
         pixels = {title: [each.pixels for each in row] for title, row in taken.items()}
         below = {
@@ -77,18 +77,18 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(GalleryResult(settings.section, shown), captions)
 
 
-def pictures(grid: Grid, studio: Studio, title: str) -> dict[str, list[Taken]]:
+def pictures(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, list[RenderedCell]]:
     """Return the pictures of each row by its title; those of one scene are taken together."""
-    places = [(row.title, column, shot) for row in grid.rows for column, shot in enumerate(row.pictures)]
+    places = [(row.title, column, cell) for row in grid.rows for column, cell in enumerate(row.pictures)]
     places.sort(key=lambda place: place[2].scene)
     taken = {
-        (row, column): studio.take(shot)
-        for row, column, shot in progress(places, title=title, unit="picture")
+        (row, column): renderer.render(cell)
+        for row, column, cell in progress(places, title=title, unit="picture")
     }
     return {row.title: [taken[row.title, column] for column in range(len(row.pictures))] for row in grid.rows}
 
 
-def entries(grid: Grid, taken: Mapping[str, list[Taken]]) -> list[Shown]:
+def entries(grid: Grid, taken: Mapping[str, list[RenderedCell]]) -> list[Shown]:
     """Return what is shown, in words and numbers."""
     return [
         Shown(grid.name, row, column, each.psnr)

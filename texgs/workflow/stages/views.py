@@ -141,8 +141,8 @@ def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Pat
 
     from texgs.core.light import Light
     from texgs.volume.cameras import orbit_path
+    from texgs.volume.contact_sheet import write_animation
     from texgs.volume.render import render_views
-    from texgs.volume.sheet import write_animation
     from texgs.volume.view_set import View
 
     scale = min(1.0, TURNTABLE / max(views.width, views.height))

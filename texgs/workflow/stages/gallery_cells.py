@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class Shot:
+class GalleryCell:
     """What the configuration says of one picture, see `texgs.config.gallery`."""
 
     scene: str  # its name among the inputs
@@ -31,14 +31,14 @@ class Shot:
 
 
 @dataclass(frozen=True, eq=False)
-class Taken:
+class RenderedCell:
     """A picture, or nothing."""
 
     pixels: np.ndarray | None = None  # [H, W, 3] in [0, 1]
     psnr: float | None = None  # against the volume, where the picture shows the difference, dB
 
 
-class Studio:
+class GalleryRenderer:
     """Takes pictures. A scene stays open until one of another is taken.
 
     Args:
@@ -56,7 +56,7 @@ class Studio:
         self._volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
         self._open: tuple[str, Session] | None = None
 
-    def take(self, shot: Shot) -> Taken:
+    def render(self, cell: GalleryCell) -> RenderedCell:
         """Return one picture."""
         import torch
 
@@ -65,22 +65,22 @@ class Studio:
         from texgs.report.fit_figure import ERROR, signed_error
         from texgs.scene.changes import apply_all
 
-        if not shot.show:
-            return Taken()
-        session = self._session(shot.scene)
+        if not cell.show:
+            return RenderedCell()
+        session = self._session(cell.scene)
         try:
-            apply_all(session, shot.changes)
-            if shot.light:
-                session.set_light(Light("directional", *shot.light))
-            scene = self._frame(session, shot) if shot.show != "volume" else None
-            volume = self._volume_frame(session, shot) if shot.show != "scene" else None
+            apply_all(session, cell.changes)
+            if cell.light:
+                session.set_light(Light("directional", *cell.light))
+            scene = self._frame(session, cell) if cell.show != "volume" else None
+            volume = self._volume_frame(session, cell) if cell.show != "scene" else None
         finally:
             while session.undo():
                 pass
         if scene is None or volume is None:
-            return Taken(volume if scene is None else scene)
+            return RenderedCell(volume if scene is None else scene)
         image, truth = torch.from_numpy(scene), torch.from_numpy(volume)
-        return Taken(ERROR(signed_error(image, truth)).numpy(), psnr(image, truth))
+        return RenderedCell(ERROR(signed_error(image, truth)).numpy(), psnr(image, truth))
 
     def _session(self, name: str) -> Session:
         from texgs.scene.scene_file import read_scene
@@ -90,31 +90,31 @@ class Studio:
             self._open = (name, Session(read_scene(self._inputs[name]), self._device))
         return self._open[1]
 
-    def _frame(self, session: Session, shot: Shot) -> np.ndarray:
-        return self._cut(session.frame(self._camera(shot)), shot).astype("float32") / 255
+    def _frame(self, session: Session, cell: GalleryCell) -> np.ndarray:
+        return self._cut(session.frame(self._camera(cell)), cell).astype("float32") / 255
 
-    def _volume_frame(self, session: Session, shot: Shot) -> np.ndarray:
+    def _volume_frame(self, session: Session, cell: GalleryCell) -> np.ndarray:
         import numpy as np
 
         assert self._volume is not None, "an input where a place shows it"
         scene = session.scene
-        rgba = self._volume.render(self._camera(shot), scene, session.composition.palettes)
+        rgba = self._volume.render(self._camera(cell), scene, session.composition.palettes)
         color = rgba[..., :3] + (1 - rgba[..., 3:]) * np.asarray(scene.background, dtype="float32")
-        return self._cut(color.clip(0, 1), shot)
+        return self._cut(color.clip(0, 1), cell)
 
-    def _camera(self, shot: Shot) -> Camera:
+    def _camera(self, cell: GalleryCell) -> Camera:
         """Return the camera of the whole view."""
         from texgs.core.camera import orbit
 
-        size = shot.pixels or round(self._size / (shot.box[2] if shot.box else 1))
-        azimuth, polar = shot.view
-        return orbit(azimuth, polar, self._lens.radius, shot.fov_y or self._lens.fov_y, size, size)
+        size = cell.pixels or round(self._size / (cell.box[2] if cell.box else 1))
+        azimuth, polar = cell.view
+        return orbit(azimuth, polar, self._lens.radius, cell.fov_y or self._lens.fov_y, size, size)
 
-    def _cut(self, image: np.ndarray, shot: Shot) -> np.ndarray:
+    def _cut(self, image: np.ndarray, cell: GalleryCell) -> np.ndarray:
         """Return the part of a view that is shown, as large as a picture, each pixel that of its place."""
         import numpy as np
 
-        left, top, side = shot.box or (0, 0, 1)
+        left, top, side = cell.box or (0, 0, 1)
         across = (np.arange(self._size) + 0.5) / self._size * side * len(image)
         rows, columns = ((across + start * len(image)).astype(int) for start in (top, left))
         return image[rows[:, None], columns]

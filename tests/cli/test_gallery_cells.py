@@ -18,17 +18,17 @@ from texgs.scene.session import Session
 from texgs.volume.generate import sphere
 from texgs.volume.prepare import prepare
 from texgs.volume.slabs import ArraySource
+from texgs.workflow.stages.gallery_cells import GalleryCell, GalleryRenderer
 from texgs.workflow.stages.settings import FitLabel, OfScene
-from texgs.workflow.stages.shots import Shot, Studio
 
 SIZE = 48
 VIEW = [20.0, 10.0]
 
 
 @pytest.fixture(scope="module")
-def studio(tmp_path_factory):
+def renderer(tmp_path_factory):
     """Two balls for the basic TFs of a sphere, and its volume."""
-    folder = tmp_path_factory.mktemp("studio")
+    folder = tmp_path_factory.mktemp("renderer")
     models = {
         name: SceneModel(write_model(folder / f"{name}.safetensors", ball(seed)))
         for seed, name in enumerate(("low", "high"), start=1)
@@ -41,61 +41,63 @@ def studio(tmp_path_factory):
     basic = {"low": BasicTF(**LOW), "high": BasicTF(**HIGH)}
     fit = FitLabel("quick", "surfels", 0, "none", "", "cpu", False)
     settings = OfScene("gallery", "sphere", "", "fraction", basic, views, fit)
-    return Studio(settings, {"quick/none": scene, "volume": folder / "volume.nrrd"}, SIZE)
+    return GalleryRenderer(settings, {"quick/none": scene, "volume": folder / "volume.nrrd"}, SIZE)
 
 
-def shot(show="scene", **changed):
+def cell(show="scene", **changed):
     nothing = {"view": VIEW, "fov_y": None, "box": [], "pixels": None, "light": [], "changes": []}
-    return Shot(**{"scene": "quick/none", "show": show, **nothing, **changed})
+    return GalleryCell(**{"scene": "quick/none", "show": show, **nothing, **changed})
 
 
-def test_a_picture_is_a_frame_of_the_changed_scene(studio):
-    session = Session.open(studio._inputs["quick/none"])
+def test_a_picture_is_a_frame_of_the_changed_scene(renderer):
+    session = Session.open(renderer._inputs["quick/none"])
     session.set("low", "opacity", 0.5)
     session.set_light(Light("directional", -30.0, 40.0))
     expected = session.frame(orbit(*VIEW, 4.0311, 20.0, SIZE, SIZE))
-    plain = studio.take(shot()).pixels
-    changed = studio.take(shot(fov_y=20.0, light=[-30.0, 40.0], changes=["low.opacity=0.5"])).pixels
+    plain = renderer.render(cell()).pixels
+    changed = renderer.render(cell(fov_y=20.0, light=[-30.0, 40.0], changes=["low.opacity=0.5"])).pixels
     np.testing.assert_array_equal(np.round(changed * 255), expected)
-    np.testing.assert_array_equal(studio.take(shot()).pixels, plain, "changes are taken back")
+    np.testing.assert_array_equal(renderer.render(cell()).pixels, plain, "changes are taken back")
     assert np.abs(changed - plain).max() > 0.1
 
 
 @pytest.mark.parametrize("show", ["scene", "volume"])
-def test_a_box_is_cut_out_of_a_larger_view(studio, show):
-    box = studio.take(shot(show, box=[0.25, 0.5, 0.25])).pixels
+def test_a_box_is_cut_out_of_a_larger_view(renderer, show):
+    box = renderer.render(cell(show, box=[0.25, 0.5, 0.25])).pixels
     assert box.shape == (SIZE, SIZE, 3)
-    studio._size *= 4
-    whole = studio.take(shot(show)).pixels
-    studio._size //= 4
+    renderer._size *= 4
+    whole = renderer.render(cell(show)).pixels
+    renderer._size //= 4
     np.testing.assert_array_equal(box, whole[2 * SIZE : 3 * SIZE, SIZE : 2 * SIZE])
 
 
-def test_pixels_of_a_view_are_enlarged(studio):
-    half = studio.take(shot(pixels=SIZE // 2)).pixels
-    small = studio.take(shot(box=[0.0, 0.5, 0.5], pixels=SIZE // 2)).pixels
+def test_pixels_of_a_view_are_enlarged(renderer):
+    half = renderer.render(cell(pixels=SIZE // 2)).pixels
+    small = renderer.render(cell(box=[0.0, 0.5, 0.5], pixels=SIZE // 2)).pixels
     np.testing.assert_array_equal(half, half[::2, ::2].repeat(2, 0).repeat(2, 1))
     np.testing.assert_array_equal(small, half[SIZE // 2 :: 2, : SIZE // 2 : 2].repeat(4, 0).repeat(4, 1))
-    assert np.abs(half - studio.take(shot()).pixels).max() > 0
+    assert np.abs(half - renderer.render(cell()).pixels).max() > 0
 
 
-def test_an_error_is_that_of_the_worst_channel_with_its_psnr(studio):
+def test_an_error_is_that_of_the_worst_channel_with_its_psnr(renderer):
     words = {"light": [-30.0, 40.0], "changes": ["high.palette=0.2,0.9,0.3"]}
-    scene, volume = (studio.take(shot(show, **words)).pixels.astype(float) for show in ("scene", "volume"))
-    error = studio.take(shot("error", **words))
+    scene, volume = (
+        renderer.render(cell(show, **words)).pixels.astype(float) for show in ("scene", "volume")
+    )
+    error = renderer.render(cell("error", **words))
     assert error.psnr == pytest.approx(-10 * np.log10(((scene - volume) ** 2).mean()), abs=1e-3)
     signed = np.take_along_axis(scene - volume, np.abs(scene - volume).argmax(2)[..., None], 2)[..., 0]
     red, blue = error.pixels[..., 0] - error.pixels[..., 2], np.abs(signed) > 0.02
     assert np.array_equal(np.sign(red[blue]), np.sign(signed[blue])), "red is too bright"
-    assert studio.take(shot("volume", **words)).psnr is None
+    assert renderer.render(cell("volume", **words)).psnr is None
 
 
-def test_a_place_may_be_empty(studio):
-    assert studio.take(shot("")).pixels is None
+def test_a_place_may_be_empty(renderer):
+    assert renderer.render(cell("")).pixels is None
 
 
-def test_a_change_that_cannot_be_made_is_named_and_leaves_nothing(studio):
-    before = studio.take(shot()).pixels
+def test_a_change_that_cannot_be_made_is_named_and_leaves_nothing(renderer):
+    before = renderer.render(cell()).pixels
     with pytest.raises(ArgumentError, match=r"low.opacity=-1: models.low.opacity: expected a factor from 0"):
-        studio.take(shot(changes=["high.visible=false", "low.opacity=-1"]))
-    np.testing.assert_array_equal(studio.take(shot()).pixels, before)
+        renderer.render(cell(changes=["high.visible=false", "low.opacity=-1"]))
+    np.testing.assert_array_equal(renderer.render(cell()).pixels, before)

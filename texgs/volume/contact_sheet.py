@@ -14,7 +14,7 @@ ROWS = 2  # of a contact sheet, at most
 GUTTER = 6  # pixels between its pictures
 
 
-def write_sheet(
+def write_contact_sheet(
     path: str | Path,
     pictures: Sequence[Image.Image],
     columns: int = 6,
