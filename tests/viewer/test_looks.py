@@ -10,9 +10,9 @@ import pytest
 from PIL import Image
 
 from tests.fields.surfels.test_composition import ball
+from tests.viewer.pages import TOKEN, on_page, origin, page, with_page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
-from tests.viewer.test_server import TOKEN, origin, page, with_page
 from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.jobs import Jobs, Stopped, Watch
@@ -94,16 +94,13 @@ def test_a_look_is_one_step_and_written_beside_the_scene(scene_file):
     assert models["TF02"].texture is None
 
 
-def test_textures_on_their_way_are_shown(scene_file, monkeypatch):
+@on_page
+async def test_textures_on_their_way_are_shown(browser, client, monkeypatch):
     monkeypatch.setattr("texgs.viewer.looks.BETWEEN", 0.0)
-
-    async def work(browser, client):
-        await browser.send(**look(parts=["TF02"], style="dots"))
-        assert (await browser.next("trial"))["parts"] == ["TF02"]
-        await ended(browser)
-        assert client.server_side.edits.state()["past"] == ["TF02 dots"]
-
-    with_page(scene_file, work)
+    await browser.send(**look(parts=["TF02"], style="dots"))
+    assert (await browser.next("trial"))["parts"] == ["TF02"]
+    await ended(browser)
+    assert client.server_side.edits.state()["past"] == ["TF02 dots"]
 
 
 def test_the_newest_texture_of_each_part_stays(tmp_path, monkeypatch):
@@ -134,35 +131,32 @@ def test_a_look_that_fails_leaves_folders_that_were_there(scene_file, tmp_path):
     looks.close(), styles.close(), jobs.close()
 
 
-def test_a_picture_of_the_user_is_taken_in(scene_file, tmp_path):
+@on_page
+async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
     Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)).save(
         tmp_path / "noise.png"
     )
-
-    async def work(browser, client):
-        path, headers = f"/{TOKEN}/styles", origin(client)
-        content = (tmp_path / "noise.png").read_bytes()
-        async with client.post(path, params={"name": "noise.png"}, data=content, headers=headers) as answer:
-            name = await answer.text()
-        assert name == "1 noise.png"
-        await browser.send(**look(style=name, preview=True))
-        assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
-        for bad, message in (("../x.png", "expected a name that a file can have"), ("x.png", "x.png: ")):
-            async with client.post(path, params={"name": bad}, data=b"no", headers=headers) as answer:
-                assert answer.status == 400
-                text = await answer.text()
-                assert message in text
-                assert str(tmp_path) not in text
-        async with client.post(path, params={"name": "a.png"}, data=content) as answer:
-            assert answer.status == 403
-        async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
-            assert answer.status == 413
-        async with client.get(f"{path}/dots.jpg") as answer:
-            assert answer.content_type == "image/jpeg"
-        async with client.get(f"{path}/other.jpg") as answer:
-            assert answer.status == 404
-
-    with_page(scene_file, work)
+    path, headers = f"/{TOKEN}/styles", origin(client)
+    content = (tmp_path / "noise.png").read_bytes()
+    async with client.post(path, params={"name": "noise.png"}, data=content, headers=headers) as answer:
+        name = await answer.text()
+    assert name == "1 noise.png"
+    await browser.send(**look(style=name, preview=True))
+    assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
+    for bad, message in (("../x.png", "expected a name that a file can have"), ("x.png", "x.png: ")):
+        async with client.post(path, params={"name": bad}, data=b"no", headers=headers) as answer:
+            assert answer.status == 400
+            text = await answer.text()
+            assert message in text
+            assert str(tmp_path) not in text
+    async with client.post(path, params={"name": "a.png"}, data=content) as answer:
+        assert answer.status == 403
+    async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
+        assert answer.status == 413
+    async with client.get(f"{path}/dots.jpg") as answer:
+        assert answer.content_type == "image/jpeg"
+    async with client.get(f"{path}/other.jpg") as answer:
+        assert answer.status == 404
 
 
 @pytest.mark.parametrize(
@@ -177,12 +171,10 @@ def test_a_picture_of_the_user_is_taken_in(scene_file, tmp_path):
         ({"style": "dots", "parts": "TF01"}, "parts: expected a valid array"),
     ],
 )
-def test_what_cannot_be_is_told_before_a_job_begins(scene_file, values, message):
-    async def work(browser, _):
-        await browser.send(**look(**values))
-        assert message in (await browser.next("notice"))["text"]
-
-    with_page(scene_file, work)
+@on_page
+async def test_what_cannot_be_is_told_before_a_job_begins(browser, values, message):
+    await browser.send(**look(**values))
+    assert message in (await browser.next("notice"))["text"]
 
 
 def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
@@ -210,37 +202,32 @@ def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
     assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
 
 
-def test_a_look_has_its_own_colours(scene_file):
+@on_page
+async def test_a_look_has_its_own_colours(browser, client):
     """A palette that was chosen before belongs to other texels: it goes back in the step of the look."""
-
-    async def work(browser, client):
-        edits = client.server_side.edits
-        await browser.send(type="edit", part="TF01", key="palette", value=[0.1, 0.9, 0.1])
-        tinted = await picture(browser)
-        await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
-        await ended(browser)
-        assert edits.scene.models["TF01"].edit.palette is None
-        assert edits.state()["past"] == ["TF01 palette #1ae61a", "TF01 turn it into gold"]
-        await browser.send(type="undo")
-        assert (await picture(browser) == tinted).all()
-        assert edits.scene.models["TF01"].edit.palette == (0.1, 0.9, 0.1)
-
-    with_page(scene_file, work)
+    edits = client.server_side.edits
+    await browser.send(type="edit", part="TF01", key="palette", value=[0.1, 0.9, 0.1])
+    tinted = await picture(browser)
+    await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
+    await ended(browser)
+    assert edits.scene.models["TF01"].edit.palette is None
+    assert edits.state()["past"] == ["TF01 palette #1ae61a", "TF01 turn it into gold"]
+    await browser.send(type="undo")
+    assert (await picture(browser) == tinted).all()
+    assert edits.scene.models["TF01"].edit.palette == (0.1, 0.9, 0.1)
 
 
-def test_words_of_a_page_are_no_references_to_anything(scene_file, monkeypatch):
+@on_page
+async def test_words_of_a_page_are_no_references_to_anything(browser, monkeypatch):
     monkeypatch.setenv("SECRET", "a secret of the server")
-
-    async def work(browser, client):
-        await browser.send(**look(instruction="${oc.env:SECRET}"))
-        said = (await browser.next("notice"))["text"]
-        assert "${oc.env:SECRET}" in said
-        assert "secret of" not in said
-
-    with_page(scene_file, work)
+    await browser.send(**look(instruction="${oc.env:SECRET}"))
+    said = (await browser.next("notice"))["text"]
+    assert "${oc.env:SECRET}" in said
+    assert "secret of" not in said
 
 
-def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(scene_file, monkeypatch):
+@on_page
+async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, monkeypatch):
     reached, go_on, run = threading.Event(), threading.Event(), Looks._make
 
     def slow(*words):
@@ -250,50 +237,39 @@ def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(scene_file, monkeyp
         return result
 
     monkeypatch.setattr(Looks, "_make", slow)
-
-    async def work(browser, client):
-        before = await picture(browser)
-        await browser.send(**look(style="glass", preview=True))
-        await asyncio.to_thread(reached.wait, 30)
-        await browser.send(type="cancel")
-        assert (await browser.next("trial"))["parts"] == []
-        go_on.set()
-        assert "It was cancelled" in (await browser.next("notice"))["text"]
-        await ended(browser)
-        assert (await picture(browser) == before).all()
-
-    with_page(scene_file, work)
+    before = await picture(browser)
+    await browser.send(**look(style="glass", preview=True))
+    await asyncio.to_thread(reached.wait, 30)
+    await browser.send(type="cancel")
+    assert (await browser.next("trial"))["parts"] == []
+    go_on.set()
+    assert "It was cancelled" in (await browser.next("notice"))["text"]
+    await ended(browser)
+    assert (await picture(browser) == before).all()
 
 
-def test_only_a_segment_gets_another_name(scene_file):
-    async def work(browser, client):
-        await browser.send(type="rename", part="TF01", name="x")
-        assert "expected a segment to rename, got the model TF01" in (await browser.next("notice"))["text"]
-
-    with_page(scene_file, work)
+@on_page
+async def test_only_a_segment_gets_another_name(browser):
+    await browser.send(type="rename", part="TF01", name="x")
+    assert "expected a segment to rename, got the model TF01" in (await browser.next("notice"))["text"]
 
 
-def test_many_previews_of_one_part_leave_that_of_another(scene_file, monkeypatch):
+@on_page
+async def test_many_previews_of_one_part_leave_that_of_another(browser, client, monkeypatch):
     monkeypatch.setattr("texgs.viewer.looks.KEPT", 1)
-
-    async def work(browser, client):
-        for part in ("TF01", "TF02", "TF02"):
-            await browser.send(**look(parts=[part], style="glass", preview=True))
-            await ended(browser)
-        (own,) = client.server_side._pages
-        assert all(texture.is_file() for texture in own._trial.values())
-        assert sorted(own._trial) == ["TF01", "TF02"]
-
-    with_page(scene_file, work)
+    for part in ("TF01", "TF02", "TF02"):
+        await browser.send(**look(parts=[part], style="glass", preview=True))
+        await ended(browser)
+    (own,) = client.server_side._pages
+    assert all(texture.is_file() for texture in own._trial.values())
+    assert sorted(own._trial) == ["TF01", "TF02"]
 
 
-def test_a_folder_that_cannot_be_written_is_a_sentence(scene_file):
-    async def work(browser, client):
-        client.server_side.edits.new_folder = lambda kind: scene_file / kind
-        await browser.send(**look(style="glass"))
+@on_page
+async def test_a_folder_that_cannot_be_written_is_a_sentence(browser, client, scene_file):
+    client.server_side.edits.new_folder = lambda kind: scene_file / kind
+    await browser.send(**look(style="glass"))
+    notice = await browser.next("notice")
+    while notice["level"] == "info":
         notice = await browser.next("notice")
-        while notice["level"] == "info":
-            notice = await browser.next("notice")
-        assert "cannot be written (Not a directory); start texgs view with another --folder" in notice["text"]
-
-    with_page(scene_file, work)
+    assert "cannot be written (Not a directory); start texgs view with another --folder" in notice["text"]

@@ -12,7 +12,7 @@ import torch
 from PIL import Image
 
 from tests.edit.lift_scenes import two_balls
-from tests.viewer.test_server import page, served
+from tests.viewer.pages import on_page, with_page
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import lift
 from texgs.fields.part_edit import PartEdit
@@ -39,11 +39,10 @@ def small(monkeypatch):
 
 
 @pytest.fixture
-def balls(tmp_path):
-    """A scene of one model, a red and a blue ball, and which surfels are red."""
-    model, numbers = two_balls()
-    file = write_model(tmp_path / "balls.safetensors", model)
-    return write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)})), numbers == 0
+def scene_file(tmp_path):
+    """A scene of one model, a red and a blue ball."""
+    file = write_model(tmp_path / "balls.safetensors", two_balls()[0])
+    return write_scene(tmp_path / "scene.yaml", Scene({"balls": SceneModel(file)}))
 
 
 def at(place):
@@ -58,65 +57,47 @@ def clicked(*points):
     }
 
 
-def with_page(scene_file, work):
-    async def run():
-        async with served(scene_file) as client, page(client) as browser:
-            await browser.next("scene")
-            await work(browser)
-
-    asyncio.run(run())
-
-
 async def ended(browser):
     """The notices of a job, until it has ended."""
     while (await browser.next("job"))["done"] is not None:
         pass
 
 
-def test_clicks_show_their_mask(balls):
-    scene_file, _ = balls
+@on_page
+async def test_clicks_show_their_mask(browser):
+    await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
+    message = await browser.next("mask")
+    assert (message["id"], message["by"]) == (3, "GrabCut")
+    png = base64.b64decode(message["picture"].removeprefix("data:image/png;base64,"))
+    mask = np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0
+    rows, columns = mask.nonzero()
+    assert mask.shape == (120, 120)
+    middle, (x, y) = (columns.mean(), rows.mean()), at(RED)
+    assert abs(middle[0] - x) < 2
+    assert abs(middle[1] - y) < 2
+    radius = 0.25 * 120 / (2 * 4 * np.tan(np.radians(11)))  # pixels
+    assert mask.sum() == pytest.approx(np.pi * radius**2, rel=0.15)  # its surfels reach beyond its outline
 
-    async def work(browser):
+
+@on_page
+async def test_clicks_see_a_model_that_was_written_again(browser, scene_file):
+
+    async def covered():
         await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
-        message = await browser.next("mask")
-        assert (message["id"], message["by"]) == (3, "GrabCut")
-        png = base64.b64decode(message["picture"].removeprefix("data:image/png;base64,"))
-        mask = np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0
-        rows, columns = mask.nonzero()
-        assert mask.shape == (120, 120)
-        middle, (x, y) = (columns.mean(), rows.mean()), at(RED)
-        assert abs(middle[0] - x) < 2
-        assert abs(middle[1] - y) < 2
-        radius = 0.25 * 120 / (2 * 4 * np.tan(np.radians(11)))  # pixels
-        assert mask.sum() == pytest.approx(
-            np.pi * radius**2, rel=0.15
-        )  # its surfels reach beyond its outline
+        png = base64.b64decode((await browser.next("mask"))["picture"].split(",")[1])
+        return int((np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0).sum())
 
-    with_page(scene_file, work)
+    before = await covered()
+    model = two_balls()[0]
+    smaller = {**model.parameters, "means": model.parameters["means"] * 0.9}
+    write_model(scene_file.with_name("balls.safetensors"), Surfels(smaller, model.shading))
+    assert await covered() != before
 
 
-def test_clicks_see_a_model_that_was_written_again(balls):
-    scene_file, _ = balls
+def test_clicks_make_a_segment_that_is_edited_undone_and_saved(scene_file):
+    red = two_balls()[1] == 0
 
-    async def work(browser):
-        async def covered():
-            await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
-            png = base64.b64decode((await browser.next("mask"))["picture"].split(",")[1])
-            return int((np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0).sum())
-
-        before = await covered()
-        model = two_balls()[0]
-        smaller = {**model.parameters, "means": model.parameters["means"] * 0.9}
-        write_model(scene_file.with_name("balls.safetensors"), Surfels(smaller, model.shading))
-        assert await covered() != before
-
-    with_page(scene_file, work)
-
-
-def test_clicks_make_a_segment_that_is_edited_undone_and_saved(balls):
-    scene_file, red = balls
-
-    async def work(browser):
+    async def work(browser, client):
         await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
         await ended(browser)
         await browser.send(type="edit", part="balls/red", key="opacity", value=0.5)
@@ -144,11 +125,10 @@ def test_clicks_make_a_segment_that_is_edited_undone_and_saved(balls):
     assert bool(mask[red].all())
 
 
-def test_a_segment_replaces_no_file(balls):
-    scene_file, _ = balls
+def test_a_segment_replaces_no_file(scene_file):
     (taken := scene_file.parent / "scene-balls-red.safetensors").write_bytes(b"mine")
 
-    async def work(browser):
+    async def work(browser, client):
         await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
         await ended(browser)
 
@@ -167,13 +147,11 @@ def test_a_segment_replaces_no_file(balls):
         ("balls/red", [], "points: Tuple should have at least 1 item"),
     ],
 )
-def test_clicks_that_select_nothing_are_told(balls, part, points, message):
-    async def work(browser):
-        await browser.send(type="segment", part=part, **clicked(*points))
-        assert message in (await browser.next("notice"))["text"]
-        assert (await browser.next("scene"))["past"] == []
-
-    with_page(balls[0], work)
+@on_page
+async def test_clicks_that_select_nothing_are_told(browser, part, points, message):
+    await browser.send(type="segment", part=part, **clicked(*points))
+    assert message in (await browser.next("notice"))["text"]
+    assert (await browser.next("scene"))["past"] == []
 
 
 class Waiting(GrabCut):
@@ -190,11 +168,11 @@ class Waiting(GrabCut):
         return super().__call__(image, points, positive)
 
 
-def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(balls, monkeypatch):
+def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(scene_file, monkeypatch):
     masks = Waiting()
     monkeypatch.setattr("texgs.viewer.segments.mask_model", lambda name, device: masks)
 
-    async def work(browser):
+    async def work(browser, client):
         await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
         await asyncio.to_thread(masks.reached.wait, 30)
         await browser.send(type="segment", part="balls/other", **clicked((RED, True)))
@@ -210,13 +188,13 @@ def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(balls, monkeypatc
         assert "it was cancelled" in (await browser.next("notice"))["text"]
         await ended(browser)
 
-    with_page(balls[0], work)
+    with_page(scene_file, work)
     assert masks.calls == 2
-    assert not list(balls[0].parent.glob("scene-*"))
+    assert not list(scene_file.parent.glob("scene-*"))
 
 
-def test_a_model_alone_has_no_edits(balls):
-    scene = read_scene(balls[0])
+def test_a_model_alone_has_no_edits(scene_file):
+    scene = read_scene(scene_file)
     models = {**scene.models, "other": SceneModel(scene.models["balls"].file, PartEdit(opacity=0.2))}
     shown = alone(Scene(models), "other")
     assert shown.models["other"].edit == PartEdit()

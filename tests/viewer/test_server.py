@@ -1,85 +1,18 @@
 """The viewer's server: who may talk to it, what it answers, what pages share."""
 
 import asyncio
-import io
 import json
-import struct
-from contextlib import asynccontextmanager
 
 import numpy as np
 import pytest
 from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
-from aiohttp.test_utils import TestClient, TestServer
 from PIL import Image
 
+from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page, served, with_page
 from tests.viewer.test_messages import CAMERA, VIEW
 from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
 from texgs.viewer import guard
-from texgs.viewer.opening import open_scene
-from texgs.viewer.server import Server
-
-TOKEN = "t" * 43
-WAIT = 30  # seconds, on a busy machine
-
-
-class Browser:
-    """A page as the server sees it."""
-
-    def __init__(self, socket):
-        self.socket = socket
-
-    async def send(self, **message):
-        await self.socket.send_str(json.dumps(message))
-
-    async def next(self, kind):
-        """The next message of a kind; a frame is its header and its picture."""
-        while True:
-            message = await asyncio.wait_for(self.socket.receive(), WAIT)
-            if message.type == WSMsgType.BINARY:
-                (length,) = struct.unpack_from("<I", message.data)
-                if kind == "frame":
-                    picture = Image.open(io.BytesIO(message.data[4 + length :]))
-                    return json.loads(message.data[4 : 4 + length]), np.asarray(picture).astype(int)
-                continue
-            assert message.type == WSMsgType.TEXT, message
-            values = json.loads(message.data)
-            if values["type"] == kind:
-                return values
-
-
-@asynccontextmanager
-async def served(scene_file):
-    server = Server(open_scene(scene_file))
-    client = TestClient(TestServer(server.application(TOKEN)))
-    await client.start_server()
-    client.server_side = server
-    try:
-        yield client
-    finally:
-        await client.close()
-
-
-def origin(client):
-    return {"Origin": f"http://{client.host}:{client.port}"}
-
-
-@asynccontextmanager
-async def page(client):
-    async with client.ws_connect(f"/{TOKEN}/socket", headers=origin(client)) as socket:
-        yield Browser(socket)
-
-
-def with_page(scene_file, work):
-    """Run work(browser, client) with a page that has got its scene."""
-
-    async def run():
-        async with served(scene_file) as client, page(client) as browser:
-            await browser.next("scene")
-            await work(browser, client)
-
-    asyncio.run(run())
-
 
 # ---- Who may talk to it -----------------------------------------------------
 
@@ -173,71 +106,60 @@ def test_a_token_is_kept_where_only_its_owner_reads_it(tmp_path):
 # ---- Frames -----------------------------------------------------------------
 
 
-def test_frames_are_those_of_the_renderer(scene_file, tmp_path):
+@on_page
+async def test_frames_are_those_of_the_renderer(browser, client, scene_file, tmp_path):
     words = ["--width", "64", "--height", "48", "--radius", "3", "--fov", "40", "--mode", "normal"]
     assert main(["render", str(scene_file), "--output", str(tmp_path / "a.png"), *words]) == 0
     expected = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
-
-    async def work(browser, client):
-        await browser.send(**{**VIEW, "moving": False})
-        header, shown = await browser.next("frame")
-        assert header["id"] == 7
-        assert np.abs(shown - expected).mean() < 2  # of JPEG at quality 95
-        query = {"view": json.dumps({"camera": CAMERA, "mode": "normal"})}
-        async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
-            assert await answer.read() == (tmp_path / "a.png").read_bytes()
-
-    with_page(scene_file, work)
+    await browser.send(**{**VIEW, "moving": False})
+    header, shown = await browser.next("frame")
+    assert header["id"] == 7
+    assert np.abs(shown - expected).mean() < 2  # of JPEG at quality 95
+    query = {"view": json.dumps({"camera": CAMERA, "mode": "normal"})}
+    async with client.get(f"/{TOKEN}/still.png", params=query) as answer:
+        assert await answer.read() == (tmp_path / "a.png").read_bytes()
 
 
-def test_a_still_without_a_view_says_so(scene_file):
-    async def work(browser, client):
-        for query, message in (("", "JSON"), ("[]", "expected keys with values"), ("{}", "camera")):
-            async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
-                assert answer.status == 400
-                assert message in await answer.text()
-
-    with_page(scene_file, work)
+@on_page
+async def test_a_still_without_a_view_says_so(browser, client):
+    for query, message in (("", "JSON"), ("[]", "expected keys with values"), ("{}", "camera")):
+        async with client.get(f"/{TOKEN}/still.png", params={"view": query}) as answer:
+            assert answer.status == 400
+            assert message in await answer.text()
 
 
-def test_the_newest_camera_wins(scene_file):
-    async def work(browser, client):
-        for number in range(200):
-            await browser.send(**{**VIEW, "id": number})
-        shown = []
-        while not shown or shown[-1] != 199:
-            shown.append((await browser.next("frame"))[0]["id"])
-        assert shown == sorted(shown)
-        assert len(shown) < 100, "most cameras were old when their turn came"
-
-    with_page(scene_file, work)
+@on_page
+async def test_the_newest_camera_wins(browser, client):
+    for number in range(200):
+        await browser.send(**{**VIEW, "id": number})
+    shown = []
+    while not shown or shown[-1] != 199:
+        shown.append((await browser.next("frame"))[0]["id"])
+    assert shown == sorted(shown)
+    assert len(shown) < 100, "most cameras were old when their turn came"
 
 
-def test_frames_of_a_moving_camera_are_smaller_where_they_are_slow(scene_file, monkeypatch):
-    async def work(browser, client):
-        sizes = []
-        for slow, moving in ((1e-9, False), (1e-9, True), (1e-9, False), (1e9, True), (1e9, True)):
-            monkeypatch.setattr("texgs.viewer.frames.SLOW", slow)
-            await browser.send(**{**VIEW, "moving": moving})
-            sizes.append((await browser.next("frame"))[1].shape[:2])
-        assert sizes == [(48, 64), (16, 21), (48, 64), (16, 21), (48, 64)]
-
-    with_page(scene_file, work)
+@on_page
+async def test_frames_of_a_moving_camera_are_smaller_where_they_are_slow(browser, client, monkeypatch):
+    sizes = []
+    for slow, moving in ((1e-9, False), (1e-9, True), (1e-9, False), (1e9, True), (1e9, True)):
+        monkeypatch.setattr("texgs.viewer.frames.SLOW", slow)
+        await browser.send(**{**VIEW, "moving": moving})
+        sizes.append((await browser.next("frame"))[1].shape[:2])
+    assert sizes == [(48, 64), (16, 21), (48, 64), (16, 21), (48, 64)]
 
 
-def test_an_error_of_a_frame_is_a_notice(scene_file):
-    async def work(browser, client):
-        (model := scene_file.parent / "TF01.safetensors").rename(scene_file.parent / "away")
-        await browser.send(**VIEW)
-        notice = await browser.next("notice")
-        assert notice["level"] == "error"
-        assert notice["frame"] == 7
-        assert str(model) in notice["text"]
-        (scene_file.parent / "away").rename(model)
-        await browser.send(**VIEW)
-        assert (await browser.next("frame"))[0]["id"] == 7
-
-    with_page(scene_file, work)
+@on_page
+async def test_an_error_of_a_frame_is_a_notice(browser, client, scene_file):
+    (model := scene_file.parent / "TF01.safetensors").rename(scene_file.parent / "away")
+    await browser.send(**VIEW)
+    notice = await browser.next("notice")
+    assert notice["level"] == "error"
+    assert notice["frame"] == 7
+    assert str(model) in notice["text"]
+    (scene_file.parent / "away").rename(model)
+    await browser.send(**VIEW)
+    assert (await browser.next("frame"))[0]["id"] == 7
 
 
 # ---- Edits ------------------------------------------------------------------
@@ -270,22 +192,20 @@ def test_pages_share_edits_and_their_history(scene_file):
     asyncio.run(run())
 
 
-def test_edits_of_one_movement_are_one_step(scene_file):
-    async def work(browser, client):
-        for value in (0.9, 0.5, -1, 0.2):
-            await browser.send(type="edit", part="TF01", key="opacity", value=value, step=1)
-        await browser.send(type="edit", part="TF01", key="opacity", value=0.1, step=2)
-        while len((news := await browser.next("scene"))["past"]) < 2:
-            pass
-        assert news["scene"]["models"][0]["edit"]["opacity"] == 0.1
-        await browser.send(type="undo")
-        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
-        await browser.send(type="undo")
-        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 1
-        await browser.send(type="redo")
-        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
-
-    with_page(scene_file, work)
+@on_page
+async def test_edits_of_one_movement_are_one_step(browser, client):
+    for value in (0.9, 0.5, -1, 0.2):
+        await browser.send(type="edit", part="TF01", key="opacity", value=value, step=1)
+    await browser.send(type="edit", part="TF01", key="opacity", value=0.1, step=2)
+    while len((news := await browser.next("scene"))["past"]) < 2:
+        pass
+    assert news["scene"]["models"][0]["edit"]["opacity"] == 0.1
+    await browser.send(type="undo")
+    assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
+    await browser.send(type="undo")
+    assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 1
+    await browser.send(type="redo")
+    assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
 
 
 @pytest.mark.parametrize(
@@ -303,13 +223,11 @@ def test_edits_of_one_movement_are_one_step(scene_file):
         ({"part": "", "key": "models", "value": 1}, "the scene: no such key 'models'"),
     ],
 )
-def test_edits_that_cannot_be_made_are_notices(scene_file, edit, message):
-    async def work(browser, client):
-        await browser.send(type="edit", **edit)
-        assert message in (await browser.next("notice"))["text"]
-        assert (await browser.next("scene"))["past"] == []
-
-    with_page(scene_file, work)
+@on_page
+async def test_edits_that_cannot_be_made_are_notices(browser, client, edit, message):
+    await browser.send(type="edit", **edit)
+    assert message in (await browser.next("notice"))["text"]
+    assert (await browser.next("scene"))["past"] == []
 
 
 def test_scenes_are_saved_in_their_folder_only(scene_file):
@@ -352,17 +270,15 @@ def test_other_files_are_replaced_after_a_question_only(scene_file, monkeypatch)
     assert read_scene(scene_file).models["TF02"].edit.visible
 
 
-def test_a_file_that_others_have_written_since_is_replaced_after_a_question_only(scene_file):
-    async def work(browser, client):
-        await browser.send(type="edit", part="TF02", key="visible", value=False)
-        await browser.send(type="save", name="scene.yaml")
-        assert (await browser.next("notice"))["level"] == "info"
-        assert main(["edit", str(scene_file), "TF01.opacity=0.25", "--output", str(scene_file)]) == 0
-        await browser.send(type="save", name="scene.yaml")
-        assert (await browser.next("notice"))["level"] == "question"
-        assert read_scene(scene_file).models["TF01"].edit.opacity == 0.25
-
-    with_page(scene_file, work)
+@on_page
+async def test_a_file_that_others_have_written_is_replaced_after_a_question_only(browser, client, scene_file):
+    await browser.send(type="edit", part="TF02", key="visible", value=False)
+    await browser.send(type="save", name="scene.yaml")
+    assert (await browser.next("notice"))["level"] == "info"
+    assert main(["edit", str(scene_file), "TF01.opacity=0.25", "--output", str(scene_file)]) == 0
+    await browser.send(type="save", name="scene.yaml")
+    assert (await browser.next("notice"))["level"] == "question"
+    assert read_scene(scene_file).models["TF01"].edit.opacity == 0.25
 
 
 def test_a_thousand_malformed_messages(scene_file, caplog):
@@ -387,28 +303,23 @@ def test_a_thousand_malformed_messages(scene_file, caplog):
     assert "Traceback" not in caplog.text
 
 
-def test_messages_have_a_limit(scene_file):
-    async def work(browser, client):
-        await browser.socket.send_str("x" * 100_000)
-        while (message := await asyncio.wait_for(browser.socket.receive(), WAIT)).type == WSMsgType.TEXT:
-            pass
-        assert message.type == WSMsgType.CLOSE
-        async with page(client) as again:
-            await again.next("scene")
-
-    with_page(scene_file, work)
+@on_page
+async def test_messages_have_a_limit(browser, client):
+    await browser.socket.send_str("x" * 100_000)
+    while (message := await asyncio.wait_for(browser.socket.receive(), WAIT)).type == WSMsgType.TEXT:
+        pass
+    assert message.type == WSMsgType.CLOSE
+    async with page(client) as again:
+        await again.next("scene")
 
 
-def test_there_are_so_many_pages_at_most(scene_file, monkeypatch):
+@on_page
+async def test_there_are_so_many_pages_at_most(browser, client, monkeypatch):
     monkeypatch.setattr("texgs.viewer.server.MOST_PAGES", 1)
-
-    async def work(browser, client):
-        async with page(client) as other:
-            message = await asyncio.wait_for(other.socket.receive(), WAIT)
-            assert (message.type, message.data) == (WSMsgType.CLOSE, WSCloseCode.TRY_AGAIN_LATER)
-            assert message.extra.startswith("1 pages of this scene are open")
-        async with page(client) as other:
-            assert (await asyncio.wait_for(other.socket.receive(), WAIT)).type == WSMsgType.CLOSE
-        assert browser.socket.closed is False
-
-    with_page(scene_file, work)
+    async with page(client) as other:
+        message = await asyncio.wait_for(other.socket.receive(), WAIT)
+        assert (message.type, message.data) == (WSMsgType.CLOSE, WSCloseCode.TRY_AGAIN_LATER)
+        assert message.extra.startswith("1 pages of this scene are open")
+    async with page(client) as other:
+        assert (await asyncio.wait_for(other.socket.receive(), WAIT)).type == WSMsgType.CLOSE
+    assert browser.socket.closed is False

@@ -1,0 +1,98 @@
+"""Pages as the server of the viewer sees them, for tests."""
+
+import asyncio
+import inspect
+import io
+import json
+import struct
+from contextlib import asynccontextmanager
+from functools import wraps
+
+import numpy as np
+from aiohttp import WSMsgType
+from aiohttp.test_utils import TestClient, TestServer
+from PIL import Image
+
+from texgs.viewer.opening import open_scene
+from texgs.viewer.server import Server
+
+TOKEN = "t" * 43
+WAIT = 30  # seconds, on a busy machine
+
+
+class Browser:
+    """A page as the server sees it."""
+
+    def __init__(self, socket):
+        self.socket = socket
+
+    async def send(self, **message):
+        await self.socket.send_str(json.dumps(message))
+
+    async def next(self, kind):
+        """The next message of a kind; a frame is its header and its picture."""
+        while True:
+            message = await asyncio.wait_for(self.socket.receive(), WAIT)
+            if message.type == WSMsgType.BINARY:
+                (length,) = struct.unpack_from("<I", message.data)
+                if kind == "frame":
+                    picture = Image.open(io.BytesIO(message.data[4 + length :]))
+                    return json.loads(message.data[4 : 4 + length]), np.asarray(picture).astype(int)
+                continue
+            assert message.type == WSMsgType.TEXT, message
+            values = json.loads(message.data)
+            if values["type"] == kind:
+                return values
+
+
+@asynccontextmanager
+async def served(scene_file):
+    server = Server(open_scene(scene_file))
+    client = TestClient(TestServer(server.application(TOKEN)))
+    await client.start_server()
+    client.server_side = server
+    try:
+        yield client
+    finally:
+        await client.close()
+
+
+def origin(client):
+    return {"Origin": f"http://{client.host}:{client.port}"}
+
+
+@asynccontextmanager
+async def page(client):
+    async with client.ws_connect(f"/{TOKEN}/socket", headers=origin(client)) as socket:
+        yield Browser(socket)
+
+
+def with_page(scene_file, work):
+    """Run work(browser, client) with a page that has got its scene."""
+
+    async def run():
+        async with served(scene_file) as client, page(client) as browser:
+            await browser.next("scene")
+            await work(browser, client)
+
+    asyncio.run(run())
+
+
+def on_page(test):
+    """Make an asynchronous test one of a page that has got its scene: of `browser`, `client` and fixtures."""
+    names = inspect.signature(test).parameters
+    fixtures = {"scene_file": None, **names}
+    kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
+
+    @wraps(test)
+    def run(**given):
+        async def work(browser, client):
+            known = {**given, "browser": browser, "client": client}
+            await test(**{name: known[name] for name in names})
+
+        with_page(given["scene_file"], work)
+
+    run.__signature__ = inspect.Signature(
+        [inspect.Parameter(name, kind) for name in fixtures if name not in ("browser", "client")]
+    )
+    return run
