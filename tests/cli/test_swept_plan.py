@@ -7,8 +7,8 @@ from types import SimpleNamespace
 import pytest
 
 from texgs.core.errors import ConfigError
-from texgs.workflow.parents import WHOLE, owner
 from texgs.workflow.plan import made, make, note_results, words_of
+from texgs.workflow.tracked import WHOLE, owner
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
 

@@ -13,7 +13,7 @@ import pytest
 
 from texgs.core.io import write_json
 from texgs.workflow.tracking import begin, process_tags
-from texgs.workflow.tracking.dead import HOST, PROCESS, is_alive
+from texgs.workflow.tracking.record import HOST, PROCESS, is_alive
 
 pytestmark = pytest.mark.subprocess
 

@@ -132,7 +132,7 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
         }
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
-        tracked.tell(run, job, metrics)
+        tracked.log_result(run, job, metrics)
 
 
 def _typed(kind: type[T], job: Job) -> T:

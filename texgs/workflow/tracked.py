@@ -1,25 +1,30 @@
-"""What the tracking store is told of a job: its name, tags, parameters, numbers and curves."""
+"""What MLflow is told: a run for each job, inside of one for the workflow or for a sweep of it."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.schema import NO_SWEEP
+from texgs.core.checksum import digest
+from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result
 from texgs.workflow import tracking as track
+from texgs.workflow.product import key_of
 from texgs.workflow.provenance import edit, git_revision, recipe, seed, user
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job
+    from texgs.workflow.plan import Plan
 
 RUNS = "TEXGS_RUNS"  # environment variable: the file that says which run each job is inside of
+WHOLE = ""  # the run of the workflow among those of its sweeps
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class Tracking:
 
 
 def of_workflow(output: Path) -> tuple[Tracking, dict[str, str]]:
-    """Where the workflow wants the job of a folder recorded, and what tells its variant from others."""
+    """Return where the workflow wants the job of a folder recorded, and the values of its variant."""
     uri, experiment = os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs")
     runs: dict[str, Any]
     try:
@@ -44,7 +49,7 @@ def of_workflow(output: Path) -> tuple[Tracking, dict[str, str]]:
 
 
 def name(job: Job) -> str:
-    """Name of the run of a job: data set, basic TF, recipe with variant and seeds, edit and stage.
+    """Return the name of a job's run: data set, basic TF, recipe with variant and seeds, edit and stage.
 
     Jobs before a fit, which know of no variant, have the values that tell theirs from others.
     """
@@ -55,7 +60,7 @@ def name(job: Job) -> str:
 
 
 def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str, str]:
-    """What runs are found and compared by."""
+    """Return what runs are found and compared by."""
     facts: dict[str, Any] = {
         **{key: job.settings[key] for key in ("stage", "dataset", "tf") if key in job.settings},
         **recipe(job.settings),
@@ -75,7 +80,7 @@ def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str,
     }
 
 
-def tell(run: track.Run, job: Job, metrics: Mapping[str, Any]) -> None:
+def log_result(run: track.Run, job: Job, metrics: Mapping[str, Any]) -> None:
     """Record the numbers, curves and pictures of a job, and the path and checksum of what others read."""
     run.log({name: metrics[name] for name in ("seconds", "peak_memory_mib")} | scalars(metrics["numbers"]))
     for step, values in curves(metrics["numbers"]):
@@ -103,7 +108,7 @@ def curves(numbers: Mapping[str, Any]) -> Iterator[tuple[int, dict[str, float]]]
 
 
 def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
-    """The entries that are single numbers, also those of tables and of rows with titles in them."""
+    """Return the entries that are single numbers, also those of tables and of rows with titles in them."""
     single: dict[str, float] = {}
     for key, value in numbers.items():
         if isinstance(value, int | float):
@@ -116,7 +121,7 @@ def scalars(numbers: Mapping[str, Any]) -> dict[str, float]:
 
 
 def rows(key: str, listed: list[dict[str, Any]]) -> dict[str, float]:
-    """The numbers of rows with names, such as `pse_psnr/other colours`, and the mean of each column.
+    """Return the numbers of rows with names, such as `pse_psnr/other colours`, and the mean of each column.
 
     All texts of a row together are its name.
     """
@@ -131,3 +136,54 @@ def rows(key: str, listed: list[dict[str, Any]]) -> dict[str, float]:
         if values:
             single[f"{key}_{column}"] = fmean(values.values())
     return single
+
+
+def runs_file(results: str) -> str:
+    """Return the file that tells jobs which run they are inside of, and their swept values."""
+    return f"{results}/.conf/runs.json"
+
+
+def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, track.Run]:
+    """Begin the runs of a workflow and of its sweeps, by name, and write the file that jobs read.
+
+    The same command in the same place goes on with the runs that it had.
+    """
+    place = Path(plan.results).absolute().as_posix()
+    key = digest("\n".join([place, *words]))
+    common = {"mlflow.user": user(), "git.sha": git_revision(), "output": place}
+
+    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> track.Run:
+        given: dict[str, Any] = {"name": title, "tags": {**common, **tags}, "params": params}
+        return track.begin(plan.tracking, experiment=plan.experiment, key=f"{key} {name}", **given)
+
+    groups = " ".join(word for word in words if "." not in key_of(word))
+    values = {key_of(word): word.partition("=")[2] for word in words}
+    runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow"}, values)}
+    for name in filter(None, plan.sweeps):
+        keys = {key for folder in plan.sweeps[name] for key in plan.jobs[folder]["swept"]}
+        tags = {"stage": "sweep", "sweep": name, track.PARENT: str(runs[WHOLE].id)}
+        runs[name] = run(name, f"sweep {name}", tags, {"keys": ", ".join(sorted(keys))})
+    if plan.tracking is not None:
+        jobs = plan.jobs.items()
+        told = {x: {"parent": runs[owner(plan, x)].id, "swept": job["swept"]} for x, job in jobs}
+        write_json(runs_file(plan.results), told)
+    return runs
+
+
+def end_runs(runs: Mapping[str, track.Run], status: str, plan: Plan, made: Iterable[str]) -> None:
+    """End the runs of a workflow, with the tables and the report among the files that it has made."""
+    files = [Path(file) for file in sorted(made) if Path(file).is_file()]
+    tables, report = Path(plan.results, "tables"), Path(plan.results, "report.html")
+    for name, run in reversed([*runs.items()]):
+        for file in files:
+            if file.parent == tables and (name == WHOLE or file.stem == f"sweep-{name}"):
+                run.artifact(file, tables.name)
+            elif file == report and name == WHOLE:
+                run.artifact(file)
+        run.end(status)
+
+
+def owner(plan: Plan, folder: str) -> str:
+    """Return the sweep that a job is of; that of the whole where it is of several, or of none."""
+    names = [name for name, folders in plan.sweeps.items() if folder in folders]
+    return names[0] if len(names) == 1 else WHOLE

@@ -13,7 +13,7 @@ from texgs.core.memory import collect_rarely
 from texgs.core.waiting import waiting
 from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
-from texgs.workflow import last_words, parents
+from texgs.workflow import last_words, tracked
 from texgs.workflow.code import code_digest
 from texgs.workflow.plan import note_written, planned, words_of
 from texgs.workflow.stage_table import RULES
@@ -125,7 +125,7 @@ def begin():
         jobs = [job for job in workflow.dag.needrun_jobs() if job.rule.name in RULES]
         if workflow.local_exec and len(jobs) > 1:
             FORK_SERVER = fork_server.start(ENVIRONMENT)
-        PARENTS = parents.begin(PLAN, WORDS)
+        PARENTS = tracked.begin_runs(PLAN, WORDS)
     except TexgsError as error:
         print(f"texgs: {error}", file=sys.stderr)
         sys.exit(2)
@@ -136,7 +136,7 @@ def finish(status):
     made = {str(file) for each in workflow.dag.jobs for file in each.output}
     if status == "FINISHED":
         note_written(RESULTS, made)
-    parents.end(PARENTS, status, PLAN, made)
+    tracked.end_runs(PARENTS, status, PLAN, made)
     return made
 
 
@@ -147,7 +147,7 @@ if PLAN.tracking is not None:
     ENVIRONMENT |= {
         "TEXGS_TRACKING": PLAN.tracking,
         "TEXGS_EXPERIMENT": PLAN.experiment,
-        "TEXGS_RUNS": parents.runs_file(RESULTS),
+        "TEXGS_RUNS": tracked.runs_file(RESULTS),
     }
 CLIENT = fork_client.__file__
 SETTING = " ".join(f"{name}={shlex.quote(value)}" for name, value in ENVIRONMENT.items())

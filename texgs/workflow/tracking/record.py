@@ -1,9 +1,11 @@
-"""Runs: what a job, the workflow or a sweep reports about itself."""
+"""Runs in MLflow: of a job, the workflow or a sweep; those of killed processes are ended by the next one."""
 
 from __future__ import annotations
 
 import json
 import logging
+import os
+import platform
 import re
 import sys
 import time
@@ -13,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
-from texgs.workflow.tracking.dead import close_dead, process_tags
 from texgs.workflow.tracking.store import cause, connect, public, reason, translated
 
 if TYPE_CHECKING:
@@ -21,73 +22,62 @@ if TYPE_CHECKING:
 
 PARENT = "mlflow.parentRunId"  # tag of a run inside of another one
 KEY = "texgs.parent"  # tag by which a run is found again
+HOST, PROCESS, METRICS = (
+    "texgs.host",
+    "texgs.process",
+    "texgs.metrics",
+)  # tags of its process
 LONGEST_NAME = 250
 
 logger = logging.getLogger("texgs")
 
 
 class Run:
-    """A run that is not recorded: tracking is off.
+    """A run, whose errors it never raises: results are files, and outlive their tracking.
 
     Attributes:
-        id: the run's identifier in the store; None here.
+        id: the run's identifier in the store; None where tracking is off.
         trouble: why the run is incomplete, where it is; final when it has ended.
     """
 
-    id: str | None = None
-    trouble: str | None = None
+    def __init__(self, client: MlflowClient | None = None, id: str | None = None, store: str = "") -> None:
+        self.id = id
+        self.trouble: str | None = None
+        self._client: Any = client
+        self._store = store
+        self._sent: list[Callable[[], object]] = []  # each waits for what was sent, raises what went wrong
 
     def log(self, metrics: Mapping[str, float], step: int | None = None) -> None:
         """Record values, at a step of the job's loop where it has one. MLflow sends them within seconds."""
+        if self._client is not None:
+            from mlflow.entities import Metric
+
+            now, items = round(time.time() * 1000), metrics.items()
+            self._send(metrics=[Metric(allowed_name(key), float(x), now, step or 0) for key, x in items])
 
     def tag(self, tags: Mapping[str, str]) -> None:
         """Record tags that were not known when the run began."""
+        if self._client is not None:
+            from mlflow.entities import RunTag
+
+            self._send(tags=[RunTag(allowed_name(key), str(value)) for key, value in tags.items()])
 
     def artifact(self, path: str | Path, folder: str | None = None) -> None:
         """Record a copy of a file or folder, in a folder of the run where one is given."""
-
-    def end(self, status: str, error: Exception | None = None) -> None:
-        """End the run: FINISHED, FAILED with the error, or KILLED. `run` does this by itself."""
-
-
-class _Recorded(Run):
-    """A run in a store, whose errors it never raises: results are files, and outlive their tracking."""
-
-    id: str
-
-    def __init__(self, client: MlflowClient, id: str, store: str) -> None:
-        self.id = id
-        self._client, self._store = client, store
-        self._sent: list[
-            Callable[[], object]
-        ] = []  # each waits for what was sent, and raises what went wrong
-
-    def log(self, metrics: Mapping[str, float], step: int | None = None) -> None:
-        from mlflow.entities import Metric
-
-        now = round(time.time() * 1000)
-        self._send(
-            metrics=[Metric(allowed_name(key), float(x), now, step or 0) for key, x in metrics.items()]
-        )
-
-    def tag(self, tags: Mapping[str, str]) -> None:
-        from mlflow.entities import RunTag
-
-        self._send(tags=[RunTag(allowed_name(key), str(value)) for key, value in tags.items()])
-
-    def artifact(self, path: str | Path, folder: str | None = None) -> None:
+        if self._client is None or self.trouble is not None:
+            return  # each file would wait for a store that is away
         if not Path(path).exists():
             raise ArgumentError(f"{path}: no such file to record in the tracking store")
-        if self.trouble is None:  # else each file would wait for a store that is away
-            self._attempt(lambda: self._client.log_artifact(self.id, str(path), folder))
+        self._attempt(lambda: self._client.log_artifact(self.id, str(path), folder))
 
     def end(self, status: str, error: Exception | None = None) -> None:
-        """Wait for what MLflow still sends, and close the run; where that fails, say so in one warning."""
+        """Wait for what MLflow still sends, and end the run: FINISHED, FAILED with the error, or KILLED."""
+        if self._client is None:
+            return
         if error is not None:
             self.tag({"error": f"{type(error).__name__}: {reason(error)}"})
-        self._attempt(lambda: self._client.set_terminated(self.id, status))
-        for wait in self._sent:
-            self._attempt(wait)
+        for call in (lambda: self._client.set_terminated(self.id, status), *self._sent):
+            self._attempt(call)
         if self.trouble is not None:
             logger.warning(
                 "tracking: run %s in %s is incomplete (%s); the results of the job are not affected",
@@ -120,7 +110,7 @@ def begin(
     params: Mapping[str, object],
     key: str | None = None,
 ) -> Run:
-    """Begin a run of an experiment, which `Run.end` ends; the first one closes those of killed processes.
+    """Begin a run of an experiment, which `Run.end` ends; the first one ends those of killed processes.
 
     Args:
         uri: `sqlite:///PATH` for a local file, made where there is none, with the files of runs in
@@ -136,7 +126,7 @@ def begin(
     client, experiment_id = connect(uri, experiment)
     with translated(uri):
         if PARENT not in tags:
-            close_dead(client)
+            end_killed(client)
         own = {allowed_name(x): str(value) for x, value in {**process_tags(), **tags}.items()}
         known = client.search_runs([experiment_id], f"tags.`{KEY}` = '{key}'", max_results=1) if key else []
         if known:
@@ -145,8 +135,12 @@ def begin(
             for each, value in own.items():
                 client.set_tag(id, each, value)
         else:
-            id = _create(client, experiment_id, name, own | ({KEY: key} if key else {}), params)
-    return _Recorded(client, id, public(uri))
+            from mlflow.entities import Param
+
+            own |= {KEY: key} if key else {}
+            id = str(client.create_run(experiment_id, tags=own, run_name=name).info.run_id)
+            client.log_batch(id, params=[Param(each, text) for each, text in flatten(params).items()])
+    return Run(client, id, public(uri))
 
 
 @contextmanager
@@ -168,21 +162,6 @@ def run(
         recorded.end("KILLED")
         raise
     recorded.end("FINISHED")
-
-
-def _create(
-    client: MlflowClient,
-    experiment_id: str,
-    name: str,
-    tags: Mapping[str, str],
-    params: Mapping[str, object],
-) -> str:
-    """Make a run with all that is known of it at the start; its identifier."""
-    from mlflow.entities import Param
-
-    id = str(client.create_run(experiment_id, tags=dict(tags), run_name=name).info.run_id)
-    client.log_batch(id, params=[Param(key, value) for key, value in flatten(params).items()])
-    return id
 
 
 def flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, str]:
@@ -207,3 +186,44 @@ def allowed_name(text: str) -> str:
     allowed = re.sub(r"[^\w./: -]", "_", text)
     parts = [part for part in allowed.split("/") if part not in ("", ".", "..")]
     return "/".join(parts)[:LONGEST_NAME].rstrip("/") or "_"
+
+
+def process_tags(metrics: Path | None = None) -> dict[str, str]:
+    """Return tags that say which process a run is of, and where the metrics of its job will be."""
+    import psutil
+
+    own = {HOST: platform.node(), PROCESS: f"{os.getpid()} {psutil.Process().create_time()}"}
+    return own if metrics is None else {**own, METRICS: str(metrics.absolute())}
+
+
+def end_killed(client: MlflowClient) -> None:
+    """End the runs of this machine whose process is gone: MLflow leaves them RUNNING for ever.
+
+    A run whose metrics are in place is FINISHED: its process was killed after its work. Others are KILLED.
+    """
+    words = f"attributes.status = 'RUNNING' AND tags.`{HOST}` = '{platform.node()}'"
+    experiments = [experiment.experiment_id for experiment in client.search_experiments()]
+    for each in client.search_runs(experiments, words):
+        id, tags = each.info.run_id, each.data.tags
+        if is_alive(tags.get(PROCESS, "")) or client.get_run(id).info.status != "RUNNING":
+            continue  # it may have ended since the search
+        client.set_terminated(id, "FINISHED" if is_recorded(id, tags.get(METRICS, "")) else "KILLED")
+
+
+def is_alive(process: str) -> bool:
+    """Return whether the process of a tag still runs, and is not another one with its number."""
+    import psutil
+
+    number, _, started = process.partition(" ")
+    try:
+        return str(psutil.Process(int(number)).create_time()) == started
+    except (psutil.NoSuchProcess, ValueError):
+        return False
+
+
+def is_recorded(id: str, metrics: str) -> bool:
+    """Return whether the metrics of a run's job are in place and name this run."""
+    try:
+        return bool(json.loads(Path(metrics).read_text()).get("run") == id)
+    except (OSError, ValueError, AttributeError):
+        return False

@@ -1,14 +1,13 @@
-"""Connections to a tracking store: one SQLite file, made once however many jobs open it, or a server."""
+"""Stores of MLflow: one SQLite file, made once however many jobs open it, or a server."""
 
 from __future__ import annotations
 
 import logging
 import os
 import re
-import sqlite3
 import sys
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,7 +28,7 @@ SETTINGS = {
 }
 CHATTERING = ("alembic", "mlflow", "urllib3.connectionpool")
 ARTIFACTS = "mlartifacts"  # folder beside the file
-LONGEST_REASON = 200
+LONGEST_REASON = 240
 
 
 class TrackingError(TexgsError, RuntimeError):
@@ -64,7 +63,7 @@ def connect(uri: str, experiment: str) -> tuple[MlflowClient, str]:
         with FileLock(database.with_name(f".{database.name}.lock")):
             _prepare(database)
             client = mlflow.MlflowClient(tracking_uri=_address(database))
-            return client, _experiment_id(client, experiment, _artifacts(database))
+            return client, _experiment_id(client, experiment, database.with_name(ARTIFACTS).as_uri())
 
 
 def path_of(uri: str) -> Path:
@@ -84,62 +83,26 @@ def _address(database: Path) -> str:
     return f"sqlite:///{os.path.relpath(path) if '?' in path else path}"
 
 
-def _artifacts(database: Path) -> str:
-    """Return the address of the folder for files of runs; the quotes of a path are escaped in it."""
-    return database.with_name(ARTIFACTS).as_uri()
-
-
 def _prepare(database: Path) -> None:
-    """Make a store, or bring an older one to the schema of this MLflow; a copy of that is kept beside it."""
-    import mlflow
+    """Make a store where there is none, beside its place: a killed process leaves no half of one."""
     import sqlalchemy
-    from alembic.migration import MigrationContext
-    from alembic.script import ScriptDirectory
-
-    if not database.exists() or not database.stat().st_size:
-        _make(database)
-        return
-    engine = sqlalchemy.create_engine(_address(database))
-    with closing(engine.connect()) as connection:
-        revision = MigrationContext.configure(connection).get_current_revision()
-    engine.dispose()
-    if revision is None:
-        raise TrackingError(
-            f"{database}: expected a store of MLflow, got another database or half of one; "
-            "choose another file"
-        )
-    migrations = Path(mlflow.__file__).parent / "store" / "db_migrations"
-    if revision != ScriptDirectory(str(migrations)).get_current_head():
-        _upgrade(database, revision)
-
-
-def _make(database: Path) -> None:
-    """Let MLflow make its tables, in a file beside the place: a killed process leaves no half of a store."""
     from mlflow.store.tracking.sqlalchemy_store import SqlAlchemyStore
 
+    if database.exists() and database.stat().st_size:
+        engine = sqlalchemy.create_engine(_address(database))
+        tables = sqlalchemy.inspect(engine).get_table_names()
+        engine.dispose()
+        if "alembic_version" not in tables:
+            raise TrackingError(
+                f"{database}: expected a store of MLflow, got another database; choose another file"
+            )
+        return
     fresh = database.with_name(f".{database.name}.new")
     for left in database.parent.glob(f"{fresh.name}*"):
         left.unlink()
     # Not by a client: that puts the working directory into its SQL, which breaks at quotes.
-    SqlAlchemyStore(_address(fresh), _artifacts(database)).engine.dispose()
+    SqlAlchemyStore(_address(fresh), database.with_name(ARTIFACTS).as_uri()).engine.dispose()
     fresh.replace(database)
-
-
-def _upgrade(database: Path, revision: str) -> None:
-    """Run `mlflow db upgrade` on a store of another MLflow."""
-    from alembic.util import CommandError
-    from mlflow.db import upgrade
-
-    copy = database.with_name(f"{database.name}.{revision}")
-    with closing(sqlite3.connect(database)) as old, closing(sqlite3.connect(copy)) as new:
-        old.backup(new)
-    try:
-        upgrade.main([_address(database)], standalone_mode=False)
-    except CommandError as error:
-        raise TrackingError(
-            f"{database}: MLflow cannot upgrade this store ({reason(error)}); "
-            "install the MLflow that wrote it, or choose another file"
-        ) from error
 
 
 def _experiment_id(client: MlflowClient, name: str, location: str | None) -> str:
@@ -152,20 +115,19 @@ def _experiment_id(client: MlflowClient, name: str, location: str | None) -> str
             f"experiment {name!r} was deleted from the tracking store; bring it back with "
             f"`mlflow experiments restore --experiment-id {experiment.experiment_id}`, or choose another name"
         )
-    if experiment is not None and location and experiment.artifact_location != location:
+    if experiment is not None and location in (None, experiment.artifact_location):
+        return str(experiment.experiment_id)
+    if experiment is not None:
         # The store was moved: MLflow keeps absolute addresses, and would go on to write to the old place.
-        client.rename_experiment(
-            experiment.experiment_id, f"{name} {experiment.experiment_id}, before it was moved"
-        )
-        experiment = None
-    if experiment is None:
-        try:
-            return str(client.create_experiment(name, artifact_location=location))
-        except MlflowException:
-            experiment = client.get_experiment_by_name(name)
-            if experiment is None:  # else another process was faster, on a server
-                raise
-    return str(experiment.experiment_id)
+        before = f"{name} {experiment.experiment_id}, before it was moved"
+        client.rename_experiment(experiment.experiment_id, before)
+    try:
+        return str(client.create_experiment(name, artifact_location=location))
+    except MlflowException:
+        experiment = client.get_experiment_by_name(name)
+        if experiment is None:  # else another process was faster, on a server
+            raise
+        return str(experiment.experiment_id)
 
 
 @contextmanager
