@@ -47,5 +47,5 @@ onerror:
     finish("FAILED")
     # When the process ends, because Snakemake has more to print; it goes back to another folder before that.
     atexit.register(
-        last_words.tell, [Path(log).absolute() for job in workflow.scheduler.failed for log in job.log]
+        tell_last_words, [Path(log).absolute() for job in workflow.scheduler.failed for log in job.log]
     )

@@ -1,15 +1,14 @@
 import subprocess
 
-from texgs.cli import probes
-from texgs.cli.doctor import examine, show
+from texgs.cli import doctor
+from texgs.cli.doctor import Finding, examine, show
 from texgs.cli.main import main
-from texgs.cli.probes import Finding
 
 
 def test_report_has_a_line_per_probe_and_all_is_well_here(capsys):
     assert main(["doctor"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == len(probes.PROBES)
+    assert len(lines) == len(doctor.PROBES)
     assert {line.split()[0] for line in lines} <= {"ok", "warning", "missing"}
 
 
@@ -35,7 +34,7 @@ def test_a_broken_probe_does_not_stop_the_others():
 def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
     died = subprocess.CompletedProcess([], returncode=-11, stdout="", stderr="")
     monkeypatch.setattr(subprocess, "run", lambda *_args, **_kwargs: died)
-    finding = probes.opengl()
+    finding = doctor.opengl()
     assert finding.state == "missing"
     assert finding.found == "the probe died of signal 11"
     assert "libegl1" in finding.advice
@@ -45,7 +44,7 @@ def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
     file = tmp_path / "file"
     file.touch()
     monkeypatch.setenv("TEXGS_CACHE", str(file / "cache"))
-    finding = probes.cache()
+    finding = doctor.cache()
     assert finding.state == "missing"
     assert "TEXGS_CACHE" in finding.advice
 
@@ -53,32 +52,32 @@ def test_a_cache_that_cannot_be_written_is_named(monkeypatch, tmp_path):
 def test_weights_are_listed(monkeypatch, tmp_path):
     for name in ("TEXGS_WEIGHTS", "TEXGS_CACHE", "TORCH_HOME", "HF_HOME"):
         monkeypatch.setenv(name, str(tmp_path))
-    finding = probes.weights()
+    finding = doctor.weights()
     assert (finding.state, finding.found[:14]) == ("missing", "none of vgg16,")
     folder = tmp_path / "clip-vit-base-patch32"
     folder.mkdir()
     for name in ("config.json", "model.safetensors"):
         (folder / name).touch()
-    assert probes.weights().state == "missing", "without its tokenizer it is of no use"
+    assert doctor.weights().state == "missing", "without its tokenizer it is of no use"
     (folder / "vocab.json").touch()
-    finding = probes.weights()
+    finding = doctor.weights()
     assert finding.state == "ok"
     assert finding.found.startswith("clip-vit-base-patch32; not vgg16, ")
     (tmp_path / "mobile_sam.pt").touch()
-    finding = probes.weights()
+    finding = doctor.weights()
     assert finding.state == "warning"
     assert "expected the weights of mobile_sam with checksum" in finding.found
 
 
 def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
     monkeypatch.setattr("texgs.config.project.ROOT", tmp_path)
-    finding = probes.configuration()
+    finding = examine(doctor.configuration)
     assert (finding.state, finding.is_required) == ("missing", True)
     assert "no configuration there" in finding.found
     monkeypatch.setattr(
         "importlib.metadata.requires", lambda name: ["no-such-package>=1", "torch>=99", "x; extra=='y'"]
     )
-    finding = probes.packages()
+    finding = doctor.packages()
     assert (finding.state, finding.is_required) == ("missing", True)
     assert finding.found.startswith("no no-such-package, torch 2.")
 
@@ -86,4 +85,4 @@ def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
 def test_the_configurations_of_a_project_are_named(monkeypatch, tmp_path):
     (tmp_path / "conf").mkdir()
     monkeypatch.chdir(tmp_path)
-    assert probes.configuration().found.startswith(f"{tmp_path / 'conf'} and ")
+    assert doctor.configuration().found.startswith(f"{tmp_path / 'conf'} and ")

@@ -4,7 +4,7 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
-from texgs.workflow.edit_checks import check_edit, require_base
+from texgs.workflow.checks import check_edit, require_base
 
 
 @pytest.mark.parametrize("edit", ["none", "style", "glass", "text", "gold", "crimson", "lobe"])

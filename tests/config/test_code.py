@@ -4,7 +4,7 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.workflow import code
-from texgs.workflow.sources import CACHE, Sources, WithoutWords
+from texgs.workflow.code import CACHE, Sources, WithoutWords
 from texgs.workflow.stage_table import STAGES
 
 

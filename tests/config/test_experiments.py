@@ -11,8 +11,7 @@ from texgs.config.project import ROOT, folders
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.workflow.experiments import LeftOut, selected
 from texgs.workflow.locate import tf_names
-from texgs.workflow.places import fit_folder
-from texgs.workflow.stage import for_tf
+from texgs.workflow.stage import fit_folder, for_tf
 from texgs.workflow.stage_table import STAGES
 
 

@@ -7,8 +7,7 @@ from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.edit.pictures import PICTURES
 from texgs.models.filters.vocabulary import understand
-from texgs.workflow.looks import captions, looks_of
-from texgs.workflow.stages.edit import edit_settings, edited_scene
+from texgs.workflow.stages.edit import captions, edit_settings, edited_scene, looks_of
 
 
 def test_an_edit_follows_its_own_picture_unless_it_asks_for_looks():

@@ -4,9 +4,8 @@ from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.workflow.inputs import scene_before
-from texgs.workflow.places import edit_folder, fit_folder
 from texgs.workflow.product import as_sweep
-from texgs.workflow.stage import for_tf
+from texgs.workflow.stage import edit_folder, fit_folder, for_tf
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import variants
 from texgs.workflow.variants import swept

@@ -12,13 +12,14 @@ import re
 import shlex
 import signal
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import FrameType
 
 from texgs.core.errors import ArgumentError
 
+INTERRUPTED = ": interrupted; "  # of `texgs.cli.main`: the end of a run says so by itself
 # Hydra's words: key=value, +key=value to add a key, ~key to take one away. Paths of targets have a slash.
 WORD = re.compile(r"(\+{0,2}[A-Za-z_][\w.@-]*=.*|~[A-Za-z_][\w.@-]*(=.*)?)", re.DOTALL)
 
@@ -112,3 +113,19 @@ def overrides(words: Sequence[str], config: Sequence[str]) -> list[str]:
         raise ArgumentError('--config overrides="...": give its words to texgs run itself')
     text = yaml.safe_dump(shlex.join(words), default_style='"', allow_unicode=True, width=10**9)
     return [f"overrides= {text.strip()} "]  # in spaces: snakemake strips quotes from the ends
+
+
+def tell_last_words(logs: Iterable[Path]) -> None:
+    """Print the last line of each log on stderr, but of jobs that were interrupted; the same one once."""
+    for line in dict.fromkeys(filter(None, map(last_line, logs))):
+        print(line, file=sys.stderr)
+
+
+def last_line(log: Path) -> str:
+    """Return the last line with text of a log; empty where there is none, or the job was interrupted."""
+    try:
+        lines = log.read_text(encoding="utf-8", errors="replace").split("\n")
+    except OSError:
+        return ""
+    line = next((line for line in reversed(lines) if line.strip()), "")
+    return "" if INTERRUPTED in line else line

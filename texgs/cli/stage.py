@@ -57,8 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
             "results=FOLDER says where results go"
         )
     from texgs.config.compose import compose
-    from texgs.workflow.edit_checks import require_base
-    from texgs.workflow.fit_checks import require_fit
+    from texgs.workflow.checks import require_base, require_edit, require_fit, require_fits
     from texgs.workflow.locate import tf_names
     from texgs.workflow.stage_table import STAGES
     from texgs.workflow.stages.tf import check_basic_tfs
@@ -77,35 +76,6 @@ def run(arguments: argparse.Namespace) -> int:
     for each in chosen:
         ensure(stage, each, known, force=arguments.force)
     return 0
-
-
-def require_fits(words: tuple[str, ...]) -> None:
-    """Require several recipes, each without mistakes."""
-    from texgs.config.compose import compose
-    from texgs.core.errors import ConfigError
-    from texgs.workflow.fit_checks import check_fit
-
-    recipes = compose(words).fits
-    if len(recipes) < 2:
-        raise ConfigError("fits: expected several recipes to compare, such as fits=[quick,demo]")
-    for recipe in recipes:
-        check_fit(compose((*words, f"fit={recipe}")))
-
-
-def require_edit(stage: Stage, config: DictConfig) -> None:
-    """Require that the edit of a configuration is one for this stage, without mistakes."""
-    from texgs.core.errors import ConfigError
-    from texgs.edit.method import methods
-    from texgs.workflow.edit_checks import check_edit
-
-    own = [name for name, method in methods().items() if method.stage == stage.name]
-    expected = own or [name for name, method in methods().items() if method.is_look]
-    if config.edit.method not in expected:
-        raise ConfigError(
-            f"edit.method: expected {' or '.join(expected)}, got {config.edit.method} "
-            f"(edit={config.edit.name}); choose another edit of conf/edit"
-        )
-    check_edit(config)
 
 
 def fetch_weights(config: DictConfig) -> None:

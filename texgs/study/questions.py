@@ -158,7 +158,7 @@ def original_of(dataset: str, fits: set[str], records: Sequence[Record[Any]]) ->
 
 
 def fit_of(record: Record[Any]) -> str:
-    """Return the folder of a job's fit, see `texgs.workflow.places`: variants of an edit have the same."""
+    """Return the folder of a job's fit, see `texgs.workflow.stage`: variants of an edit have the same."""
     return record.path.parents[2 if isinstance(record.result, EditResult) else 1].name
 
 

@@ -56,7 +56,7 @@ def missing_weights(configs: Iterable[DictConfig]) -> list[str]:
     edited = [config for config in configs if config.edit.method != NO_METHOD]
     if not edited:
         return []
-    from texgs.workflow.edit_checks import check_edit  # not at the top: most runs have no edits
+    from texgs.workflow.checks import check_edit  # not at the top: most runs have no edits
     from texgs.workflow.weights import missing
 
     for config in edited:

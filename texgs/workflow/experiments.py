@@ -17,7 +17,7 @@ from texgs.core.errors import ConfigError
 from texgs.core.names import close
 from texgs.edit.method import method_of
 from texgs.workflow.edits import edits
-from texgs.workflow.places import edit_folder
+from texgs.workflow.stage import edit_folder
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import variants
 from texgs.workflow.variants import changes, is_of_edits

@@ -84,7 +84,7 @@ def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
         ConfigError, ArgumentError: for what would stop the run, as `texgs.workflow.plan.add_jobs`.
     """
     from texgs.core.checksum import Checksums
-    from texgs.workflow.fit_checks import check_fit
+    from texgs.workflow.checks import check_fit
     from texgs.workflow.job import Job
     from texgs.workflow.plan import made
     from texgs.workflow.stage_table import jobs

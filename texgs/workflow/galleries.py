@@ -16,7 +16,7 @@ from texgs.core.errors import ConfigError
 from texgs.edit.method import method_of
 from texgs.workflow.gallery_scenes import check_changes, fit_of, takers
 from texgs.workflow.inputs import prepared_volume, scene_settings, sibling
-from texgs.workflow.places import edit_folder, fit_folder, made
+from texgs.workflow.stage import edit_folder, fit_folder, made
 
 FRONT, SIDE = [-90.0, 20.0], [0.0, 20.0]  # azimuth and polar angle of cameras, degrees
 NUMBERS = {"view": 2, "light": 2, "box": 3}

@@ -12,8 +12,7 @@ from texgs.core.errors import ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD
 from texgs.fit.kinds import fit_specs
 from texgs.workflow.locate import tf_names, views_folder
-from texgs.workflow.places import edit_folder, folder_of, made
-from texgs.workflow.stage import plain
+from texgs.workflow.stage import edit_folder, folder_of, made, plain
 
 if TYPE_CHECKING:
     from omegaconf import DictConfig

@@ -171,7 +171,7 @@ def gpu_uses(configs: Iterable[DictConfig]) -> list[str]:
 
 def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
     """What the wildcards of rules stand for in these configurations."""
-    from texgs.workflow.places import edit_folder, fit_folder
+    from texgs.workflow.stage import edit_folder, fit_folder
 
     values = {
         "dataset": {each.dataset.name for each in configs},
@@ -189,7 +189,7 @@ def add_jobs(
 ) -> list[str]:
     """Add the jobs of some configurations to those by folder, and what is missing for some; their folders."""
     from texgs.workflow import stage_table as stages
-    from texgs.workflow.fit_checks import check_fit
+    from texgs.workflow.checks import check_fit
     from texgs.workflow.job import Job
     from texgs.workflow.stages.tf import check_basic_tfs
 

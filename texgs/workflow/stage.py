@@ -102,8 +102,6 @@ class Stage:
 
     def output(self, config: DictConfig) -> Path:
         """Return the folder of the job's files."""
-        from texgs.workflow.places import folder_of  # not at the top: it asks for the rules of all stages
-
         return folder_of(self.rule.name, config, phase=self.name)
 
     def code(self, settings: Mapping[str, Any]) -> str:
@@ -173,3 +171,43 @@ def for_tf(config: DictConfig, name: str) -> DictConfig:
     from texgs.config.compose import changed  # not at the top: it loads Hydra
 
     return changed(config, tf=name)
+
+
+def folder_of(rule: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:
+    """Return the folder of a job's files; `tf`: of another basic TF than `config.tf`."""
+    from texgs.workflow.stage_table import RULES  # not at the top: stages import this module
+
+    return Path(config.results) / RULES[rule].folder.format(
+        dataset=config.dataset.name,
+        tf=tf or config.tf,
+        views=config.views.name,
+        fit=fit_folder(config),
+        phase=phase,
+        edit=edit_folder(config),
+        gallery=config.gallery.name,
+    )
+
+
+def made(rule: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:
+    """Return the file of a job that other jobs ask for."""
+    from texgs.workflow.stage_table import RULES
+
+    return folder_of(rule, config, phase, tf) / RULES[rule].files[0]
+
+
+def fit_folder(config: DictConfig) -> str:
+    """Return the name of a fit's folder: the recipe, the variant of a sweep, and a seed other than 0."""
+    from texgs.workflow.variants import fit_variant  # not at the top: it loads Hydra
+
+    return _folder(config.fit.name, fit_variant(config), config.fit.seed)
+
+
+def edit_folder(config: DictConfig, name: str = "") -> str:
+    """Return that of an edit in the same way; `name`: of another edit than that of `config`."""
+    from texgs.workflow.variants import edit_variant
+
+    return _folder(name or config.edit.name, edit_variant(config), config.edit.seed)
+
+
+def _folder(name: str, variant: str, seed: int) -> str:
+    return "-".join(filter(None, (name, variant, f"s{seed}" if seed else "")))

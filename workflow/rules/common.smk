@@ -7,13 +7,14 @@ import sys
 from pathlib import Path
 
 from texgs.cli import fork_client
+from texgs.cli.run import tell_last_words
 from texgs.core.errors import TexgsError
 from texgs.core.folders import cache_folder
 from texgs.core.memory import collect_rarely
 from texgs.core.waiting import waiting
 from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
-from texgs.workflow import last_words, tracked
+from texgs.workflow import tracked
 from texgs.workflow.code import code_digest
 from texgs.workflow.plan import note_written, planned, words_of
 from texgs.workflow.stage_table import RULES
@@ -22,6 +23,7 @@ collect_rarely()
 
 # A mistake of the user ends here in one sentence, before any job.
 try:
+    CACHE = (cache_folder() / "volumes").as_posix()
     WORDS = words_of(config)
     PLAN, MISSING = planned(WORDS, is_job=not workflow.is_main_process)
 except TexgsError as error:
@@ -39,7 +41,7 @@ if workflow.is_main_process and (warning := PLAN.warning()):
     print(f"texgs: {warning}", file=sys.stderr)
 
 PARENTS = {}  # tracked runs that hold those of jobs
-RESULTS, CACHE = PLAN.results, (cache_folder() / "volumes").as_posix()
+RESULTS = PLAN.results
 TARGETS = dict.fromkeys(each.target for each in RULES.values() if each.target)
 TABLES = specs(PLAN.swept())
 STUDY = Path(RESULTS, "study")  # its ballots never change, and more of them make another table

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from texgs.report.results import ComparisonResult
 from texgs.workflow.inputs import is_first_recipe, is_fit, is_swept, last_phase, view_set, with_recipe
-from texgs.workflow.places import made
-from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stage import Outcome, Rule, Stage, made
 from texgs.workflow.stages.figure import shown_views
 from texgs.workflow.stages.settings import OfTF
 

@@ -19,7 +19,6 @@ from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
 from texgs.workflow.inputs import fit_label, lens, models_of_scene, scene_before, view_set
 from texgs.workflow.locate import tf_names
-from texgs.workflow.looks import captions, looks_of
 from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
 
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
 
     from texgs.edit.task import Task
 
+CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
 FALLEN = "How the loss of the edit fell, term by term."
 POINTS = 100  # of a curve of losses at most
 SHOWN = "Before and after the edit; what can be relit, under another light too."
@@ -162,6 +162,38 @@ def files_of_scene(scene: Path) -> dict[str, Path]:
                 files[f"of_scene.{len(files)}"] = path
             named.append(value)
     return files
+
+
+def looks_of(config: DictConfig) -> dict[str, str]:
+    """What each model of a scene follows; empty where all follow what the edit itself says."""
+    edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
+    if not edit.looks:
+        return {}
+    follows, names = method_of(edit).follows, tf_names(config)
+    if not follows:
+        raise ConfigError(
+            f"edit.looks: expected a method that follows a picture or an instruction, got {edit.method}"
+        )
+    for name in names:
+        if name not in table:
+            raise ConfigError(
+                f"dataset.looks of {dataset}: expected a look for each of {', '.join(names)}, got none for "
+                f"{name}; add one, or set edit.looks=false"
+            )
+    return {name: table[name][follows] for name in names}
+
+
+def captions(config: DictConfig) -> dict[str, str]:
+    """Return both captions of an edit: its own, or those of all basic scenes together."""
+    edit, table = config.edit, config.dataset.looks
+    names = list(looks_of(config))
+    if not names:
+        return {name: edit[name] for name in ("source_caption", "target_caption")}
+    after = CAPTIONS[method_of(edit).follows]
+    return {
+        "source_caption": " and ".join(table[name].caption for name in names),
+        "target_caption": " and ".join(table[name][after] for name in names),
+    }
 
 
 RULE = Rule(

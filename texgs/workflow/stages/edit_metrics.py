@@ -11,8 +11,7 @@ from texgs.edit.method import method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditMeasures
 from texgs.workflow.inputs import view_settings, with_recipe
-from texgs.workflow.places import made
-from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
+from texgs.workflow.stage import EVERY, Outcome, Rule, Stage, made
 from texgs.workflow.stages.edit import Settings as EditSettings
 from texgs.workflow.stages.edit import edit_settings, edited_scene
 

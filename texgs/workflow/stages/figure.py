@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.fit.kinds import fit_specs
 from texgs.report.results import Result
 from texgs.workflow.inputs import fit_label, is_fit, view_set
-from texgs.workflow.places import made
-from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stage import Outcome, Rule, Stage, made
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
 from texgs.workflow.inputs import fit_label, is_fit, is_swept, models_of_scene
-from texgs.workflow.places import made
-from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stage import Outcome, Rule, Stage, made
 from texgs.workflow.stages.settings import FitLabel, OfDataset
 
 if TYPE_CHECKING:

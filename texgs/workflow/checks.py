@@ -1,0 +1,116 @@
+"""Mistakes in the choice of a fit or an edit, told before any job runs and any earlier result goes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from texgs.config.compose import compose
+from texgs.config.project import members
+from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.typed import typed
+from texgs.edit.method import NO_METHOD, method_of, methods
+from texgs.fields.kinds import kinds, require
+from texgs.fields.surfels.material import require_material
+from texgs.fit.kinds import fit_specs
+from texgs.workflow.edits import lineage
+from texgs.workflow.inputs import scene_before
+from texgs.workflow.stage import Stage
+from texgs.workflow.stages.edit import looks_of
+
+if TYPE_CHECKING:
+    from omegaconf import DictConfig
+
+
+def check_fit(config: DictConfig) -> None:
+    """Require settings of the fit that fit each other, and a device that its field is fitted on.
+
+    Raises:
+        ConfigError: if it is fitted on others.
+        ArgumentError: naming the key that is not as it should be.
+    """
+    fit, kind = config.fit, fit_specs()[config.fit.field]
+    if config.device.name not in kind.devices:
+        raise ConfigError(
+            f"device: expected {' or '.join(sorted(kind.devices))} for fit={fit.name}, "
+            f"which fits {fit.field}, got {config.device.name}; choose another device or fit"
+        )
+    if kind.settings is None:
+        require_material(fit.first_material, fit.material_range)
+    else:
+        kind.check(typed(kind.settings, fit[kind.name]))
+
+
+def require_fit(stage: Stage, config: DictConfig) -> None:
+    """Require a fit that a stage can work on; stages before the fits work with any.
+
+    Raises:
+        ConfigError: if its field goes through other phases, has no surface, or is not fitted on the device.
+        ArgumentError: if settings of the fit do not fit each other.
+    """
+    if "{fit}" not in stage.rule.folder:
+        return
+    fit, kind = config.fit, fit_specs()[config.fit.field]
+    if stage.place == "phase" and stage.name not in kind.phases:
+        owner = next(other.name for other in fit_specs().values() if stage.name in other.phases)
+        raise ConfigError(
+            f"fit.field: texgs {stage.name} fits {owner}, but fit={fit.name} has field {kind.name}; "
+            f"run texgs {kind.phases[-1]} or choose another fit"
+        )
+    if stage.place == "mesh" and not kinds()[fit.field].depth:
+        able = " or ".join(other.name for other in kinds().values() if other.depth)
+        raise ConfigError(
+            f"fit.field: texgs mesh expects a fit of {able}, but fit={fit.name} has field {kind.name}; "
+            "choose another fit"
+        )
+    check_fit(config)
+
+
+def require_fits(words: tuple[str, ...]) -> None:
+    """Require several recipes, each without mistakes."""
+    recipes = compose(words).fits
+    if len(recipes) < 2:
+        raise ConfigError("fits: expected several recipes to compare, such as fits=[quick,demo]")
+    for recipe in recipes:
+        check_fit(compose((*words, f"fit={recipe}")))
+
+
+def require_edit(stage: Stage, config: DictConfig) -> None:
+    """Require that the edit of a configuration is one for this stage, without mistakes."""
+    own = [name for name, method in methods().items() if method.stage == stage.name]
+    expected = own or [name for name, method in methods().items() if method.is_look]
+    if config.edit.method not in expected:
+        raise ConfigError(
+            f"edit.method: expected {' or '.join(expected)}, got {config.edit.method} "
+            f"(edit={config.edit.name}); choose another edit of conf/edit"
+        )
+    check_edit(config)
+
+
+def require_base(words: tuple[str, ...]) -> None:
+    """Require of an edit by hand that what it starts from is there, and has the parts that it changes.
+
+    Raises:
+        ConfigError, MissingDataError: naming what is not.
+    """
+    config = compose(words)
+    if config.edit.base in members("edit") and scene_before(config).is_file():
+        return  # it may have been made with other words than those of conf/edit: the parts it has count
+    chain = lineage(words)
+    if config.edit.base is not None and not scene_before(config).is_file():
+        name, before = chain[-2]
+        verb = method_of(compose(before).edit).stage
+        raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} edit={name} first")
+
+
+def check_edit(config: DictConfig) -> None:
+    """Require of an edit all that can be told without its scene and without weights.
+
+    Raises:
+        ArgumentError: naming what is not as it should be.
+    """
+    if config.edit.method != NO_METHOD:
+        method = method_of(config.edit)
+        require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
+        for look in looks_of(config).values() or [None]:
+            method.check(method.of(config.edit, look))
+        method.check_fit(method.of(config.edit), config.fit)
