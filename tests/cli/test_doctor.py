@@ -86,3 +86,15 @@ def test_the_configurations_of_a_project_are_named(monkeypatch, tmp_path):
     (tmp_path / "conf").mkdir()
     monkeypatch.chdir(tmp_path)
     assert doctor.configuration().found.startswith(f"{tmp_path / 'conf'} and ")
+
+
+def test_a_user_without_a_home_is_told_what_to_set(monkeypatch):
+    def none():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("TEXGS_CACHE", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr("pathlib.Path.home", none)
+    finding = examine(doctor.cache)
+    assert finding.found == "HOME: expected the home folder of this user, got none"
+    assert finding.advice.startswith("set TEXGS_CACHE")

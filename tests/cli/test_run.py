@@ -100,6 +100,22 @@ def test_exit_codes(tmp_path, words, code, message):
 
 
 @pytest.mark.workflow
+@pytest.mark.parametrize(
+    ("place", "home"), [(".snakemake", ""), ("results/turbulence", ""), ("home", "home")]
+)
+def test_a_place_that_cannot_be_used_is_one_sentence(tmp_path, place, home):
+    """As where it is read-only, which root may write to all the same."""
+    (tmp_path / place).parent.mkdir(exist_ok=True)
+    (tmp_path / place).touch()
+    environment = {**os.environ, **({"HOME": str(tmp_path / home), "XDG_CACHE_HOME": ""} if home else {})}
+    done = texgs(tmp_path, "run", "--cores", "1", "tracking=none", *TINY.split(), "volumes", env=environment)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert place in done.stderr.splitlines()[-1]
+    assert "the run cannot work there (" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.workflow
 def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     long = "views.train.frequency=3 views.width=300 views.height=300 views.step=0.1"
     words = ["run", "--cores", "1", "tracking=none", *TINY.split(), *long.split(), "sheets"]

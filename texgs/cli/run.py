@@ -12,7 +12,9 @@ import re
 import shlex
 import signal
 import sys
-from collections.abc import Iterable, Sequence
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from types import FrameType
@@ -53,9 +55,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def snakemake(words: Sequence[str]) -> bool:
-    """Run the workflow of texgs in this process; whether it ended well."""
-    from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
-
+    """Run the workflow of texgs in this process; return whether it ended well."""
+    try:
+        from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
+    except RuntimeError as error:  # it looks for its own configuration in the user's home
+        raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
     given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
     require_pairs([word for word in words if word in given.targets])
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
@@ -69,7 +73,33 @@ def snakemake(words: Sequence[str]) -> bool:
     options.config = [*(options.config or ()), *overrides(chosen, options.config or ())]
     if options.cores is None and options.jobs is None:
         options.cores = parse_cores("all")
-    return bool(args_to_api(options, parser))
+    with file_errors():
+        return bool(args_to_api(options, parser))
+
+
+@contextmanager
+def file_errors() -> Iterator[None]:
+    """Raise one sentence for a place that snakemake cannot use, which it would print with a traceback."""
+    from snakemake.api import SnakemakeApi
+
+    troubles, printed = list[OSError](), SnakemakeApi.print_exception
+
+    def note(api: SnakemakeApi, error: Exception) -> None:
+        if isinstance(error, OSError) and error.strerror:
+            troubles.append(error)
+        else:
+            printed(api, error)
+
+    SnakemakeApi.print_exception = note
+    try:
+        yield
+    finally:
+        SnakemakeApi.print_exception = printed
+    for error in troubles:
+        place = error.filename or f"{tempfile.gettempdir()}, the temporary folder"
+        raise ArgumentError(
+            f"{place}: the run cannot work there ({error.strerror}); make room, or choose another folder"
+        ) from error
 
 
 def require_pairs(words: Sequence[str]) -> None:
