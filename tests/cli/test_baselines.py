@@ -1,19 +1,17 @@
 """Baselines of the paper on small fits of their own fields, from the volume to the measures of the edit."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from PIL import Image
 
-from tests.cli.test_fit_gaussians import TINY
-from texgs.cli.main import main
+from tests.cli.conftest import GAUSSIANS, SPHERE
 from texgs.scene.scene_file import read_scene
 
-COMMON = [word for word in TINY if not word.startswith(("fit=", "fit."))]
-GAUSSIANS = [word for word in TINY if word.startswith(("fit=", "fit."))]
+pytestmark = pytest.mark.stages
+
 VOXELS = [
     "fit=plenoxels_quick",
     "fit.voxels.stages=[{side: 16, steps: 30}, {side: 32, steps: 40}]",
@@ -45,28 +43,19 @@ BASELINES = {  # fit and settings by edit
 
 
 @pytest.fixture(scope="module", params=list(BASELINES))
-def edited(request, tmp_path_factory):
-    """The folder of an edit without weights, and its method."""
+def edited(request, at, gaussians):
+    """The folder of an edit without weights, and its method; fits are shared."""
     edit, (fit, values) = request.param, BASELINES[request.param]
     method = edit.removesuffix("_frozen")
-    words = [*COMMON, *fit, f"edit={edit}", *(f"edit.{method}.{value}" for value in values)]
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp(method)
-        patch.chdir(folder)
-        patch.setenv("TEXGS_WEIGHTS", str(folder / "none"))
-        patch.setenv("TORCH_HOME", str(folder / "none"))
-        patch.setattr("texgs.report.before_after.TURN", 4)  # frames of palette fields take long
-        assert main([f"edit_{method}", *words]) == 0
-        assert main(["edit_metrics", *words]) == 0
-        (scene,) = Path("results/sphere/scene").iterdir()
-        yield folder / scene / "edits" / edit, method
+    words = [*SPHERE, *fit, f"edit={edit}", *(f"edit.{method}.{value}" for value in values)]
+    results = at(gaussians.parent, [f"edit_{method}", *words], ["edit_metrics", *words])
+    return results / "sphere" / "scene" / fit[0].removeprefix("fit=") / "edits" / edit, method
 
 
 def numbers(folder):
     return json.loads((folder / "metrics.json").read_text())["numbers"]
 
 
-@pytest.mark.stages
 def test_geometry_is_kept_and_colours_are_not(edited):
     folder, method = edited
     before, after = (
@@ -84,7 +73,6 @@ def test_geometry_is_kept_and_colours_are_not(edited):
     assert numbers(folder)["method"] == method
 
 
-@pytest.mark.stages
 def test_it_is_shown_and_measured(edited):
     folder, method = edited
     pictures = {"stylerf": ["style-TF01-1.png", "style-TF01-2.png"], "arf": ["style.png"]}.get(method, [])
@@ -96,67 +84,3 @@ def test_it_is_shown_and_measured(edited):
     measured = numbers(folder.parents[1] / "edit_metrics" / folder.name)
     assert measured["geometry_kept"] is (method != "dge")
     assert measured["frame_mean_ms"] > 0
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["edit_arf", "fit=quick", "edit=arf"], "edit arf: expected a fit of voxels, got one of surfels"),
-        (
-            ["edit_stylesplat", "fit=plenoxels_quick", "edit=stylesplat"],
-            "edit stylesplat: expected a fit of gaussians, got one of voxels",
-        ),
-        (
-            ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.nnfm=0"],
-            "edit.arf.nnfm, edit.arf.patches: expected a weight above 0 for one of them, got 0 for both",
-        ),
-        (
-            ["edit_stylerf", "fit=quick", "edit=stylerf"],
-            "edit stylerf: expected a fit of palette, got one of surfels",
-        ),
-        (
-            ["edit_stylerf", "fit=stylerf_quick", "edit=stylerf", "edit.stylerf.styles=[dots,none.png]"],
-            "edit.stylerf.styles: expected the file of a picture, or one of strokes",
-        ),
-        (
-            ["edit_stylerf", "fit=stylerf_quick", "edit=stylerf", "edit.stylerf.styles=[dots,glass]"],
-            "edit.stylerf.styles: expected one for each of 1 palette colours of fit=stylerf_quick, got 2; or",
-        ),
-        (
-            ["edit_arf", "fit=plenoxels_quick", "edit=arf", "edit.arf.style=none.png"],
-            "edit.arf.style: expected the file of a picture, or one of strokes",
-        ),
-        (["edit_dge", "fit=quick", "edit=dge"], "edit dge: expected a fit of gaussians, got one of surfels"),
-        (
-            ["edit_dge", "fit=gaussians_quick", "edit=dge_quick", "edit.dge.instruction=make it odd"],
-            "instruction: expected",
-        ),
-        (
-            ["edit_in2n", "fit=plenoxels_quick", "edit=in2n_quick", "edit.in2n.noise=[0.9,0.1]"],
-            "edit.in2n.noise: expected two shares from 0 to 1, the smaller one first, got [0.9, 0.1]",
-        ),
-        (
-            [
-                "edit_igs2gs",
-                "fit=gaussians_quick",
-                "edit=igs2gs_quick",
-                "edit.igs2gs.l1=0",
-                "edit.igs2gs.dssim=0",
-            ],
-            "edit.igs2gs.l1, dssim, lpips: expected a weight above 0 for one of them, got 0 for all",
-        ),
-        (
-            ["edit_igs2gs", "fit=gaussians_quick", "edit=igs2gs_quick", "edit.looks=true"],
-            "dataset.looks of sphere: expected a look for each of TF01, got none for TF01; add one",
-        ),
-        (
-            ["edit_segment", "fit=quick", "edit=lobe", "edit.segment.model=TF01", "edit.looks=true"],
-            "edit.looks: expected a method that follows a picture or an instruction, got segment",
-        ),
-    ],
-)
-def test_what_cannot_be_is_one_sentence(tmp_path, monkeypatch, capsys, words, message):
-    monkeypatch.chdir(tmp_path)
-    assert main([*words, "dataset=sphere", "tracking=none"]) == 2
-    assert message in capsys.readouterr().err.splitlines()[-1]
-    assert not list(tmp_path.iterdir())

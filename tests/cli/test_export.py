@@ -118,11 +118,6 @@ def test_a_mesh(scene, model, tmp_path, kind):
         (["--to", "x.texgs", "--kind", "mesh"], "--to: expected a file that ends in .ply, got x.texgs"),
         (["--to", "x.texgs"], "--kind compact: expected a model file, got"),
         (["--to", "x.ply", "--kind", "release"], "--kind release: expected a model file, got"),
-        (
-            ["--to", "x.ply", "--kind", "mesh", "--views", "13"],
-            "--views: expected 12, 42, 92, 162 or another",
-        ),
-        (["--to", "x.ply", "--kind", "points", "--opacity", "1"], "expected surfels with an opacity of 1 at"),
     ],
 )
 def test_a_mistake_writes_nothing(scene, tmp_path, monkeypatch, capsys, words, message):

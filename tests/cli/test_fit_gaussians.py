@@ -4,6 +4,7 @@ import json
 
 import pytest
 
+from tests.cli.conftest import GAUSSIANS, SPHERE, copied
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
@@ -12,37 +13,9 @@ from texgs.fields.gaussians.composition import JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene_file import read_scene
 
-TINY = [
-    "dataset=sphere",
-    "dataset.volume.size=32",
-    "views=small",
-    "views.width=48",
-    "views.height=48",
-    "views.train.frequency=1",
-    "views.test.count=3",
-    "views.turntable=2",
-    "views.radius=2.5",
-    "tracking=none",
-    "fit=gaussians_quick",
-    "fit.gaussians.seeds={kind: hull, count: 400}",
-    "fit.gaussians.iterations=150",
-    "fit.gaussians.sh_every=10",
-    "fit.gaussians.densify.stop=0",
-]
 
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """Results with a scene of one fit; tests work beside them."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("finished")
-        patch.chdir(folder)
-        assert main(["compose", *TINY]) == 0
-    return folder / "results"
-
-
-def test_a_fit_has_a_model_and_numbers_and_leaves_no_checkpoint(results):
-    folder = results / "sphere" / "TF01" / "gaussians_quick" / "gaussians"
+def test_a_fit_has_a_model_and_numbers_and_leaves_no_checkpoint(gaussians):
+    folder = gaussians / "sphere" / "TF01" / "gaussians_quick" / "gaussians"
     numbers = json.loads((folder / "metrics.json").read_text())["numbers"]
     assert numbers["psnr"] > 25
     assert numbers["sizes"]["total_mib"] * 2**20 == pytest.approx(400 * 248)
@@ -55,8 +28,8 @@ def test_a_fit_has_a_model_and_numbers_and_leaves_no_checkpoint(results):
     ]
 
 
-def test_a_scene_opens_and_fades(results, tmp_path):
-    path = results / "sphere" / "scene" / "gaussians_quick" / "compose" / "scene.yaml"
+def test_a_scene_opens_and_fades(gaussians, tmp_path):
+    path = gaussians / "sphere" / "scene" / "gaussians_quick" / "compose" / "scene.yaml"
     whole = read_scene(path)
     composed = whole.open()
     assert isinstance(composed, JoinedGaussians)
@@ -73,11 +46,11 @@ def test_a_scene_opens_and_fades(results, tmp_path):
         composed.render(camera, edits=[PartEdit(palette=(1, 0, 0))])
 
 
-def test_two_recipes_side_by_side_are_fitted_first(results, monkeypatch):
-    monkeypatch.chdir(results.parent)
+def test_two_recipes_side_by_side_are_fitted_first(gaussians, tmp_path, monkeypatch):
+    monkeypatch.chdir(copied(gaussians, tmp_path))
     few = ["fits=[gaussians_quick,demo]", "fit.shading.iterations=10"]
-    assert main(["comparison", *TINY, *few]) == 0
-    folder = results / "sphere" / "TF01"
+    assert main(["comparison", *SPHERE, *GAUSSIANS, *few]) == 0
+    folder = tmp_path / "results" / "sphere" / "TF01"
     compared = folder / "comparison" / "looks"
     numbers = json.loads((compared / "metrics.json").read_text())["numbers"]
     assert numbers == {
@@ -86,10 +59,3 @@ def test_two_recipes_side_by_side_are_fitted_first(results, monkeypatch):
     }
     assert (compared / "comparison.png").stat().st_size > 1000
     assert (folder / "demo" / "texture" / "model.safetensors").exists()
-
-
-def test_seeds_that_need_a_volume_are_one_sentence(results, monkeypatch, capsys):
-    monkeypatch.chdir(results.parent)
-    words = ["fit.gaussians.seeds.kind=voxels", "fit.name=other"]
-    assert main(["gaussians", *TINY, *words]) == 2
-    assert "seeds.kind: expected no voxels, which are for surfels alone" in capsys.readouterr().err

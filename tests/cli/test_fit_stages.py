@@ -8,44 +8,17 @@ from pathlib import Path
 import pytest
 import torch
 
+from tests.cli.conftest import TINY, copied
 from texgs.cli.main import main
 from texgs.core.morton import z_order_of
 from texgs.fields.surfels.model_file import read_model
 from texgs.volume.view_set import read_views
 
-TINY = [
-    "dataset=sphere",
-    "dataset.volume.size=32",
-    "views=small",
-    "views.width=48",
-    "views.height=48",
-    "views.train.frequency=1",
-    "views.test.count=3",
-    "views.turntable=2",
-    "views.radius=2.5",
-    "tracking=none",
-    "fit=demo",
-    "fit.seeds.count=400",
-    "fit.shading.iterations=150",
-    "fit.shading.densify.stop=0",
-]
-
-
-@pytest.fixture(scope="module")
-def finished(tmp_path_factory):
-    """Results with all three phases; tests work on copies of what they need of them."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("finished")
-        patch.chdir(folder)
-        assert main(["texture", *TINY]) == 0
-    return folder / "results"
-
 
 @pytest.fixture
-def fitted(finished, tmp_path, monkeypatch):
+def fitted(fitted_sphere, tmp_path, monkeypatch):
     """The folder of the phases in a copy of finished results."""
-    monkeypatch.chdir(tmp_path)
-    shutil.copytree(finished, tmp_path / "results", symlinks=True)
+    monkeypatch.chdir(copied(fitted_sphere, tmp_path))
     return tmp_path / "results" / "sphere" / "TF01" / "demo"
 
 
@@ -75,8 +48,8 @@ def numbers(folder, phase):
     return json.loads((folder / phase / "metrics.json").read_text())["numbers"]
 
 
-def test_texture_makes_what_it_needs_first(folder):
-    assert main(["texture", *TINY]) == 0
+def test_texture_makes_what_it_needs_first(fitted_sphere):
+    folder = fitted_sphere / "sphere" / "TF01" / "demo"
     models = {
         phase: read_model(folder / phase / "model.safetensors") for phase in ("surfels", "shading", "texture")
     }
@@ -91,8 +64,8 @@ def test_texture_makes_what_it_needs_first(folder):
     assert shading["losses"][-1] < 0.1
 
 
-def test_surfels_lie_along_a_curve_with_all_that_is_theirs(finished):
-    folder = finished / "sphere" / "TF01" / "demo"
+def test_surfels_lie_along_a_curve_with_all_that_is_theirs(fitted_sphere):
+    folder = fitted_sphere / "sphere" / "TF01" / "demo"
     for phase in ("surfels", "shading", "texture"):
         means = read_model(folder / phase / "model.safetensors").parameters["means"]
         assert z_order_of(means).equal(torch.arange(400)), phase

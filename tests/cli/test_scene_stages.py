@@ -6,23 +6,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from tests.cli.test_fit_stages import TINY
+from tests.cli.conftest import TURBULENCE
 from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
 
-WORDS = [word for word in TINY if not word.startswith(("dataset=", "fit.shading.iterations"))]
-WORDS = ["dataset=turbulence", "fit.shading.iterations=60", *WORDS]
-
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory):
-    """All three stages, which fit two models first."""
-    with pytest.MonkeyPatch.context() as patch:
-        folder = tmp_path_factory.mktemp("scene")
-        patch.chdir(folder)
-        assert main(["pse", *WORDS]) == 0
-        assert main(["timing", *WORDS]) == 0
-        yield folder / "results" / "turbulence" / "scene" / "demo"
+def results(at, scene_of_two):
+    """The scene, edited by numbers and timed."""
+    at(scene_of_two.parent, ["pse", *TURBULENCE], ["timing", *TURBULENCE])
+    return scene_of_two / "turbulence" / "scene" / "demo"
 
 
 def numbers(results, stage):

@@ -184,14 +184,6 @@ def test_a_job_of_the_workflow(folder, capsys):
     assert "--input, --output: expected only with --settings" in capsys.readouterr().err
 
 
-def test_a_folder_of_others_is_left_alone(folder, capsys):
-    (folder / "volume").mkdir(parents=True)
-    (folder / "volume" / "thesis.tex").touch()
-    assert main(["volume", *TINY]) == 2
-    assert "expected an empty folder or one of texgs" in capsys.readouterr().err
-    assert (folder / "volume" / "thesis.tex").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [

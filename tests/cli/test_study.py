@@ -132,7 +132,6 @@ def test_the_seed_decides_the_order_and_the_id_is_that_of_the_clips(results, tmp
         (["--edits", "gold"], "--edits: expected some of arf_quick, dge_quick, .*, got gold"),
         (["--edits", "arf_quick"], r"got only one of each \(engine arf_quick\); run edits of other methods"),
         (["--size", "8"], "--size: expected 64 to 1024 pixels, got 8"),
-        (["--size", "64", "--frames", "0"], "count: expected at least 1 camera, got 0"),
     ],
 )
 def test_a_study_that_cannot_be_made_leaves_nothing(results, tmp_path, capsys, words, message):
@@ -156,7 +155,4 @@ def test_votes_that_cannot_be_counted_leave_no_table(results, capsys):
     assert main(["study", *SMALL, "--edits", *EDITS]) == 0
     assert main(["votes"]) == 2
     assert "votes: no ballots in results/study/votes; put the files there" in capsys.readouterr().err
-    vote(results / "study", "aa", dict.fromkeys(EDITS, 1))
-    assert main(["votes"]) == 2
-    assert re.search("question 1: expected each rank from 1 to 3 once, got A 1, B 1", capsys.readouterr().err)
     assert not (results / "tables").exists()

@@ -24,14 +24,6 @@ def project(tmp_path_factory):
     return project
 
 
-@pytest.fixture
-def fresh(project, tmp_path):
-    """The sources again, unedited; results of the first run."""
-    copy = Project(tmp_path)
-    shutil.copytree(project.work, copy.work, dirs_exist_ok=True, symlinks=True)
-    return copy
-
-
 def test_results_are_complete(project):
     results = project.work / "results" / "turbulence"
     assert sorted(path.name for path in results.glob("[!.]*")) == ["TF01", "TF02", "transfer", "volume"]
@@ -46,10 +38,6 @@ def test_results_are_complete(project):
     )
     assert (project.work / "results" / "logs" / "turbulence" / "TF01" / "views.log").stat().st_size > 0
     assert half_written(project.work) == []
-
-
-def test_a_second_run_does_nothing(project):
-    assert project.planned() == []
 
 
 def test_a_changed_tf_reruns_only_its_views(project):
@@ -70,16 +58,6 @@ def test_results_of_other_settings_are_named_before_they_are_replaced(project):
 def test_tracking_and_profiles_rerun_nothing(project):
     profile = project.sources / "workflow" / "profiles" / "local"
     assert project.planned("--workflow-profile", str(profile), config=("tracking=mlflow",)) == []
-
-
-def test_a_comment_reruns_nothing_and_a_line_its_stages(fresh):
-    fresh.edit("texgs/volume/render.py", "def render_views(", "# a comment\ndef render_views(")
-    fresh.edit("texgs/volume/render.py", "Render many views", "Render some views")
-    assert fresh.planned() == []
-    fresh.edit("texgs/volume/render.py", "1e3 * seconds", "2e3 * seconds")
-    assert fresh.planned() == ["sheet TF01", "sheet TF02", "views TF01", "views TF02"]
-    fresh.edit("texgs/volume/prepare.py", "target = Path(target)", "target = Path(str(target))")
-    assert "volume" in fresh.planned()
 
 
 def test_a_gallery_of_a_sweep_is_one_job(project):
