@@ -1,5 +1,6 @@
 """Jobs of sweeps: which ones there are, what they share, and what tells them apart."""
 
+import json
 from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
@@ -7,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from texgs.core.errors import ConfigError
+from texgs.workflow import plan
 from texgs.workflow.plan import made, make, note_results, words_of
 from texgs.workflow.tracked import WHOLE, owner
 
@@ -115,3 +117,13 @@ def test_results_may_be_written_with_a_slash_at_the_end(planned):
     assert plan.results == "out"
     assert all(folder.startswith("out/") for folder in plan.jobs)
     assert all(job["settings"].startswith("out/.conf/") for job in plan.jobs.values())
+
+
+@pytest.mark.parametrize("value", [None, [], "x", {}, {"jobs": 3}])
+def test_a_damaged_plan_is_made_again_by_the_job_that_reads_it(tmp_path, monkeypatch, value):
+    monkeypatch.chdir(tmp_path)
+    words = words_of(FITS)
+    expected, _ = plan.planned(words, is_job=False)
+    (file,) = (tmp_path / ".snakemake" / "texgs").glob("plan-*.json")
+    file.write_text(json.dumps({**json.loads(file.read_text()), "value": value}))
+    assert plan.planned(words, is_job=True)[0] == expected

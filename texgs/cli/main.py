@@ -17,8 +17,9 @@ from texgs.core.process import collect_rarely, keep_freed_memory, waiting
 from texgs.workflow.stage_table import STAGES
 
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
-# Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`;
-# the verbs of stages share the module texgs.cli.stage.
+# Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
+# Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
+SHARED = {"votes": "study", "download": "weights"}
 STAGE_VERBS = {stage.name: stage.help for stage in STAGES.values()}
 VERBS = {
     "init": "start a folder with configurations of your own",
@@ -49,11 +50,13 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"texgs {__version__}")
     verbs = top.add_subparsers(dest="verb", metavar="VERB", required=True)
     for name, summary in VERBS.items():
-        module = importlib.import_module(f"texgs.cli.{'stage' if name in STAGE_VERBS else name}")
-        about = f"{summary[0].upper()}{summary[1:]}." if name in STAGE_VERBS else module.__doc__
+        home = "stage" if name in STAGE_VERBS else SHARED.get(name, name)
+        module = importlib.import_module(f"texgs.cli.{home}")
+        about = module.__doc__ if name == home else f"{summary[0].upper()}{summary[1:]}."
         verb = verbs.add_parser(name, help=summary, description=about, conflict_handler="resolve")
-        module.add_arguments(verb)
-        verb.set_defaults(run=module.run, refuse=verb.error)
+        add, run = (f"add_{name}_arguments", f"run_{name}") if name in SHARED else ("add_arguments", "run")
+        getattr(module, add)(verb)
+        verb.set_defaults(run=getattr(module, run), refuse=verb.error)
     return top
 
 

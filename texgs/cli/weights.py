@@ -1,8 +1,9 @@
-"""List pretrained weights with where they are, and download those that are named."""
+"""Download files: pretrained weights by their names, which are listed, or any file by its address."""
 
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,4 +26,19 @@ def run(arguments: argparse.Namespace) -> int:
     for name, entry in CATALOGUE.items():
         place = find(name) or f"not here; {entry.source}"
         print(f"{name:24} {entry.megabytes:6.0f} MB  {place}")
+    return 0
+
+
+def add_download_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where from, what, and where to."""
+    parser.add_argument("url", help="http or https address")
+    parser.add_argument("--sha256", required=True, help="checksum of the file, hexadecimal")
+    parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="where it goes")
+
+
+def run_download(arguments: argparse.Namespace) -> int:
+    """Download it."""
+    from texgs.volume.download import download
+
+    download(arguments.url, arguments.sha256, arguments.output)
     return 0

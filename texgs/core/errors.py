@@ -1,7 +1,7 @@
 """Errors a user can do something about. Each message is one sentence: what, where, got, what to do."""
 
-LONGEST = 2000  # letters of a message; a damaged file can be quoted at any length
-END = 400  # letters that are kept at the end, where it says what to do
+LONGEST = 600  # letters of a message; a damaged file can be quoted at any length
+END = 250  # letters that are kept at the end, where it says what to do
 
 
 class TexgsError(Exception):

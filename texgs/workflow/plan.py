@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -119,7 +120,8 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     data = os.environ.get("TEXGS_DATA", "")
     key = digest("\n".join([*words, data, fingerprint(ROOT / "texgs", *folders())]))
     if is_job and (kept := recall(path, key)):
-        return Plan(**kept), []
+        with suppress(TypeError):  # of a damaged file, it is made again
+            return Plan(**kept), []
     plan, missing = make(words)
     keep(path, key, asdict(plan))
     return plan, missing

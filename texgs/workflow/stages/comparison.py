@@ -28,11 +28,8 @@ class Settings(OfTF):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write comparison.png.
 
-    Args:
-        settings: of the job.
-        inputs: the models of the last phases by the names of the recipes, and `views`, the
-            transforms_train.json; without test views training views are shown.
-        output: folder.
+    It reads the models of the last phases by the names of the recipes, and `views`, the
+    transforms_train.json; without test views training views are shown.
     """
     from texgs.fields.files import open_field
     from texgs.report.comparison import write_comparison

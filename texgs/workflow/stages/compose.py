@@ -26,10 +26,7 @@ class Settings(OfDataset):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write scene.yaml, in which nothing is edited, and scene.png.
 
-    Args:
-        settings: of the job.
-        inputs: model.safetensors of each basic TF, by its name.
-        output: folder.
+    It reads model.safetensors of each basic TF, by its name.
     """
     from texgs.core.camera import orbit
     from texgs.core.device import torch_device

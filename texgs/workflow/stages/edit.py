@@ -49,10 +49,7 @@ class Settings(OfDataset):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write scene.yaml, edit.png, what the method writes, and turntable.mp4 where the scene looks different.
 
-    Args:
-        settings: of the job.
-        inputs: `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
-        output: folder.
+    It reads `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
     """
     from texgs.core.device import torch_device
     from texgs.edit.task import Task

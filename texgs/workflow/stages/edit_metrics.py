@@ -34,10 +34,7 @@ class Settings(EditSettings):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
-    Args:
-        settings: of the job.
-        inputs: `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
-        output: folder.
+    It reads `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
     """
     from texgs.core.device import torch_device
     from texgs.metrics.metric import MeasuredScene, values_of

@@ -45,11 +45,8 @@ class Settings(OfTF):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write figure.png.
 
-    Args:
-        settings: of the job.
-        inputs: the models of all phases by their names, and `views`, the transforms_train.json; without test
-            views training views are shown.
-        output: folder.
+    It reads the models of all phases by their names, and `views`, the transforms_train.json; without test
+    views training views are shown.
     """
     from texgs.fields.files import open_field
     from texgs.fields.surfels.model import Surfels

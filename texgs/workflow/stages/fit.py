@@ -30,10 +30,7 @@ class Settings(OfTF):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors.
 
-    Args:
-        settings: of the job.
-        inputs: `views`, the transforms_train.json.
-        output: folder.
+    It reads `views`, the transforms_train.json.
     """
     from texgs.core.device import torch_device
     from texgs.fit import checkpoint

@@ -54,10 +54,7 @@ class Settings(OfScene):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write a PNG for each grid.
 
-    Args:
-        settings: of the job.
-        inputs: scenes by the names that pictures have for them, and `volume` where one shows it.
-        output: folder.
+    It reads scenes by the names that pictures have for them, and `volume` where one shows it.
     """
     from texgs.core.picture_grid import write_grid
 

@@ -47,10 +47,7 @@ class Settings(OfTF):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write mesh.ply, reference.ply and mesh.png.
 
-    Args:
-        settings: of the job.
-        inputs: `model`, of the last phase of a fit; `views`, the transforms_train.json; `volume`.
-        output: folder.
+    It reads `model`, of the last phase of a fit; `views`, the transforms_train.json; `volume`.
     """
     from texgs.core.device import torch_device
     from texgs.fields.files import open_field

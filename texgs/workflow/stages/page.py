@@ -34,10 +34,7 @@ class Settings(OfDataset):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write scene.html and poster.jpg.
 
-    Args:
-        settings: of the job.
-        inputs: `scene`, the scene.yaml.
-        output: folder.
+    It reads `scene`, the scene.yaml.
     """
     from texgs.scene.scene_file import read_scene
     from texgs.viewer.standalone import write_page

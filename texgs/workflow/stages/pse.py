@@ -45,10 +45,7 @@ class Step:
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write a scene file for each edit, pse.png and relight.png.
 
-    Args:
-        settings: of the job.
-        inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
-        output: folder.
+    It reads `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
     """
     from texgs.core.device import torch_device
     from texgs.core.picture_grid import write_grid

@@ -40,10 +40,7 @@ class Settings(OfTF):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors.
 
-    Args:
-        settings: of the job.
-        inputs: `model`, of the stage before, and `views`, the transforms_train.json.
-        output: folder.
+    It reads `model`, of the stage before, and `views`, the transforms_train.json.
     """
     from texgs.core.device import torch_device
     from texgs.fields.harmonics import base_color

@@ -20,10 +20,7 @@ CAPTION = "Views that the model was fitted to, and test views."
 def work(settings: OfTF, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write sheet.png from up to twelve training views.
 
-    Args:
-        settings: of the job.
-        inputs: `views`, the transforms_train.json of the folder of views.
-        output: folder.
+    It reads `views`, the transforms_train.json of the folder of views.
     """
     from PIL.Image import fromarray
 

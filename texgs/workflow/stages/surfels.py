@@ -40,10 +40,7 @@ class Settings(OfTF):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write model.safetensors; a recipe without iterations here only seeds.
 
-    Args:
-        settings: of the job.
-        inputs: `views`, the transforms_train.json; for seeds in voxels also `volume`, the volume.nrrd.
-        output: folder.
+    It reads `views`, the transforms_train.json; for seeds in voxels also `volume`, the volume.nrrd.
     """
     import torch
 

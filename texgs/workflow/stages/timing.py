@@ -17,10 +17,7 @@ VOLUME_FRAMES = 12  # spread over the path: they take long
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Measure; nothing but the numbers is written.
 
-    Args:
-        settings: of the job.
-        inputs: `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
-        output: folder.
+    It reads `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
     """
     import torch
 

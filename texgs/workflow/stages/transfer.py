@@ -35,10 +35,7 @@ class Settings(OfDataset):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write transfer.png, the histogram with the basic TFs over it, and each TF for ParaView.
 
-    Args:
-        settings: of the job.
-        inputs: `volume`, the volume.nrrd; volume.json is beside it.
-        output: folder.
+    It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
     import numpy as np
 

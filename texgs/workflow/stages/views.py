@@ -53,10 +53,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     Views that are in the folder already, from an interrupted run of the same job, are kept, and so are
     their times.
 
-    Args:
-        settings: of the job.
-        inputs: `volume`, the volume.nrrd; volume.json is beside it.
-        output: folder.
+    It reads `volume`, the volume.nrrd; volume.json is beside it.
     """
     from texgs.volume.caster import Caster
     from texgs.volume.nrrd_file import open_grid

@@ -33,10 +33,7 @@ class Settings(OfDataset):
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write volume.nrrd, which ParaView opens too, and volume.json: lattice, range and histogram.
 
-    Args:
-        settings: of the job.
-        inputs: `source`, the volume's file, where it is not generated.
-        output: folder.
+    It reads `source`, the volume's file, where it is not generated.
     """
     from texgs.volume.prepare import prepare
 
