@@ -1,5 +1,6 @@
 import subprocess
 import sys
+from dataclasses import FrozenInstanceError
 from itertools import product
 
 import pytest
@@ -48,8 +49,8 @@ def test_interpolations_are_resolved():
     [
         ("views.widht=3", "views.widht: no such key, did you mean views.width?"),
         ("+views.foo=1", "views.foo: no such key"),
-        ("views.width=abc", "views.width: value 'abc' of type 'str' could not be converted to Integer"),
-        ("views.width=1.5", "views.width: value '1.5' of type 'float' could not be converted to Integer"),
+        ("views.width=abc", "views.width: expected an integer, got 'abc'"),
+        ("views.width=1.5", "views.width: expected an integer, got 1.5"),
         ("views.width=0", "views.width: expected at least 1, got 0"),
         ("views.step=0", "views.step: expected more than 0, got 0"),
         ("views.fov_y=180", "views.fov_y: expected less than 180, got 180"),
@@ -86,9 +87,7 @@ def test_views_have_no_volume_that_meshes_are_compared_with():
 
 
 def test_the_composition_cannot_be_changed():
-    from omegaconf.errors import ReadonlyConfigError
-
-    with pytest.raises(ReadonlyConfigError):
+    with pytest.raises(FrozenInstanceError):
         compose().views.width = 3
 
 

@@ -5,9 +5,7 @@ import itertools
 
 import pytest
 
-from texgs.config.compose import ALONE, compose, configuration
-from texgs.config.composition import composition
-from texgs.config.project import ROOT, folders
+from texgs.config.project import ROOT
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.workflow.experiments import LeftOut, selected
 from texgs.workflow.locate import tf_names
@@ -31,21 +29,6 @@ def data_sets(*words, lacking=nothing):
 def without(*names):
     """What lacks some data sets."""
     return lambda config: [f"{config.dataset.name} is not there"] if config.dataset.name in names else []
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
-        ("dataset=engine", "fit=quick", "edit=glass"),
-        ("experiment=paper_text_quick", "dataset=jets", "edit=dge_quick", "fit=gaussians_quick"),
-        ("experiment=demo", "edit=none", "fit.seed=3", "views.width=99"),
-        ("fit=paper", "fit.texture.texels=5000", "edit=style", "edit.image.style=dots", "dataset=wood"),
-    ],
-)
-def test_groups_composed_alone_are_those_of_one_composition(words):
-    whole = configuration(composition(words, folders()))
-    assert compose(words) == whole
-    assert all(compose(words)[group] == whole[group] for group in ALONE)
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
+from pathlib import Path
+
 import pytest
-from omegaconf import OmegaConf
+import yaml
 
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
@@ -43,7 +45,7 @@ def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
     settings = STAGES["views"].settings(config)
     path = settings_file(settings, "results")
     assert settings_file(settings, "results") == path
-    assert OmegaConf.to_container(OmegaConf.load(path)) == settings
+    assert yaml.safe_load(Path(path).read_text()) == settings
     assert settings_digest(settings) in path
 
 

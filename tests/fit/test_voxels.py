@@ -10,7 +10,6 @@ from tests.real_data import real_data
 from texgs.config.compose import compose
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, FitError
-from texgs.core.typed import typed
 from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
 from texgs.fit import checkpoint
 from texgs.fit.checkpoint import run_to_end
@@ -213,7 +212,7 @@ def test_schedules():
     assert rate.at(50, 100) == pytest.approx(10.0)
     assert rate.at(100, 100) == pytest.approx(1.0)
     # The published schedule: log-linear over 250,000 steps, with a ramp of 15,000.
-    whole = typed(VoxelKeys, compose(("fit=plenoxels",)).fit.voxels)
+    whole = compose(("fit=plenoxels",)).fit.voxels
     assert whole.steps == 128_000
     half = 125_000, whole.steps
     assert whole.density.at(*half) == pytest.approx(30 * (0.05 / 30) ** 0.5, rel=1e-3)

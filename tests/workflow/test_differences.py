@@ -1,11 +1,13 @@
 """Where recipes are not as in the paper: its values are ones that their keys can have, and make no rows."""
 
+from dataclasses import asdict
+
 import pytest
-from omegaconf import OmegaConf
+import yaml
 
 from tests.report.written import rows
 from texgs.config.compose import compose
-from texgs.config.describe import keys
+from texgs.config.describe import keys, value_at
 from texgs.core.errors import ConfigError
 from texgs.edit.method import methods
 from texgs.workflow.differences import ALL, compared, differences, published, text
@@ -33,7 +35,7 @@ def test_keys_are_there_and_can_have_the_papers_values(claim):
         assert rest[1] in numbers
     else:
         assert claim.key in {key.name for key in keys()}
-        assert text(OmegaConf.select(compose((override(claim),)), claim.key)) == text(claim.paper)
+        assert text(value_at(compose((override(claim),)), claim.key)) == text(claim.paper)
     assert claim.where
     assert claim.of is None or claim.of in {other.key for other in published().keys}
 
@@ -48,10 +50,10 @@ def test_values_of_the_paper_make_no_rows_and_others_do(tmp_path, monkeypatch):
     config = compose(("fit=quick", *(override(c) for c in published().keys if c.key.startswith("fit."))))
     folder = tmp_path / "conf" / "fit"
     folder.mkdir(parents=True)
-    OmegaConf.save(OmegaConf.merge(config.fit, {"name": "mine"}), folder / "mine.yaml")
-    OmegaConf.save(
-        OmegaConf.merge(config.fit, {"name": "other", "texture": {"rate": 0.5}}), folder / "other.yaml"
-    )
+    mine = {**asdict(config.fit), "name": "mine"}
+    other = {**mine, "name": "other", "texture": {**mine["texture"], "rate": 0.5}}
+    for recipe in (mine, other):
+        (folder / f"{recipe['name']}.yaml").write_text(yaml.safe_dump(recipe))
     monkeypatch.chdir(tmp_path)
     assert told(["mine"]) == []
     assert told(["mine", "other"]) == [("fit.texture.rate", "0.025", "0.5", "other")]

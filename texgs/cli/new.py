@@ -7,7 +7,7 @@ import math
 import re
 import sys
 import tempfile
-from collections.abc import Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.io import write_bytes
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.volume.transfer import TransferFunction
 
 
@@ -65,7 +64,8 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration(name, arguments.file, arguments.overrides)
     ensure(STAGES["volume"], config)
     basic = basic_tfs(config, arguments.tf, arguments.count)
-    config.dataset.basic_tfs = {key: BasicTF([*tf.opacity], [*tf.color]) for key, tf in basic.items()}
+    listed = {key: BasicTF([*map(list, tf.opacity)], [*map(list, tf.color)]) for key, tf in basic.items()}
+    config = replace(config, dataset=replace(config.dataset, basic_tfs=listed))
     ensure(STAGES["transfer"], config)
     text = document(config, ["file", *changed(arguments.overrides)])
     check_document(text, config)
@@ -78,15 +78,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def changed(overrides: list[str]) -> list[str]:
     """Names of the keys that were given."""
-    return [word.partition("=")[0].lstrip("+") for word in overrides]
+    return [word.partition("=")[0].lstrip("+").split(".")[0] for word in overrides]
 
 
-def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
+def configuration(name: str, file: Path, overrides: list[str]) -> Config:
     """The configuration as it will be with the new data set, but without basic TFs and tracking."""
-    from omegaconf import OmegaConf
-
     from texgs.config.compose import compose
-    from texgs.config.dataset import Dataset
+    from texgs.config.dataset import Dataset, Volume
 
     path = str(file.absolute())
     if "${" in path:
@@ -95,17 +93,13 @@ def configuration(name: str, file: Path, overrides: list[str]) -> DictConfig:
         raise ArgumentError(f"{path!r}: expected a path in UTF-8; rename it")
     words = [f"dataset.volume.{word}" for word in overrides]
     blank = "dataset.volume.generator=null"
-    config = compose(("tracking=none", blank, *words)).copy()
-    OmegaConf.set_readonly(config, False)
-    given = {key: config.dataset.volume[key] for key in {name.split(".")[0] for name in changed(overrides)}}
-    fresh = OmegaConf.merge(
-        OmegaConf.structured(Dataset(name=name)), {"title": name, "volume": {**given, "file": path}}
-    )
-    config.dataset = fresh
-    return config
+    config = compose(("tracking=none", blank, *words))
+    given = {key: getattr(config.dataset.volume, key) for key in changed(overrides)}
+    dataset = Dataset(name=name, title=name, volume=Volume(**{**given, "file": path}))
+    return replace(config, dataset=dataset)
 
 
-def basic_tfs(config: DictConfig, files: list[Path] | None, count: int | None) -> dict[str, TransferFunction]:
+def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> dict[str, TransferFunction]:
     """TFs from files, or suggested from the volume's histogram."""
     import numpy as np
 
@@ -150,7 +144,7 @@ def rounded(tf: TransferFunction, low: float, high: float) -> TransferFunction:
     return TransferFunction(short(tf.opacity), short(tf.color))
 
 
-def document(config: DictConfig, keys: list[str]) -> str:
+def document(config: Config, keys: list[str]) -> str:
     """The YAML of a data set, a line per list of points.
 
     Args:
@@ -158,7 +152,6 @@ def document(config: DictConfig, keys: list[str]) -> str:
         keys: of its volume that are written.
     """
     import yaml
-    from omegaconf import OmegaConf
 
     class Dumper(yaml.SafeDumper):
         """Lists on one line each."""
@@ -166,7 +159,7 @@ def document(config: DictConfig, keys: list[str]) -> str:
     Dumper.add_representer(
         list, lambda dumper, items: dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=True)
     )
-    dataset: Mapping[str, Any] = OmegaConf.to_container(config.dataset, resolve=True)  # type: ignore[assignment]
+    dataset = asdict(config.dataset)
     written = {
         "name": dataset["name"],
         "title": dataset["title"],
@@ -177,10 +170,8 @@ def document(config: DictConfig, keys: list[str]) -> str:
     return note + yaml.dump(written, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=10**6)
 
 
-def check_document(text: str, config: DictConfig) -> None:
+def check_document(text: str, config: Config) -> None:
     """Require that the configuration reads a document as the data set that it was written for."""
-    from omegaconf import OmegaConf
-
     from texgs.config.compose import compose
     from texgs.core.errors import ConfigError
     from texgs.workflow.stages.tf import check_basic_tfs
@@ -190,8 +181,7 @@ def check_document(text: str, config: DictConfig) -> None:
         write_bytes(Path(folder, "dataset", f"{name}.yaml"), text.encode())
         read = compose((f"dataset={name}",), first=Path(folder)).dataset
     check_basic_tfs(read)
-    before, after = (OmegaConf.to_container(each, resolve=True) for each in (config.dataset, read))
-    if before != after:
+    if read != config.dataset:
         raise ConfigError(
-            f"{name}: expected to read {before} from the new file, got {after}; nothing was written"
+            f"{name}: expected to read {config.dataset} from the new file, got {read}; nothing was written"
         )

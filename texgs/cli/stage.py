@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.workflow.stage import Stage
 
 
@@ -78,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def fetch_weights(config: DictConfig) -> None:
+def fetch_weights(config: Config) -> None:
     """Download the weights that an edit works with, where they are not on this machine."""
     from texgs.models.weights import locate
     from texgs.workflow.weights import needed
@@ -87,17 +86,17 @@ def fetch_weights(config: DictConfig) -> None:
         locate(name)
 
 
-def fetch_volume(config: DictConfig) -> None:
+def fetch_volume(config: Config) -> None:
     """Download the volume's file, where it is not on this machine."""
     from texgs.volume.download import download
     from texgs.workflow.locate import cached_volume, source_file
 
     volume, path = config.dataset.volume, source_file(config)
     if path is not None and volume.url and path == cached_volume(volume) and not path.exists():
-        download(volume.url, volume.sha256, path)
+        download(volume.url, str(volume.sha256), path)
 
 
-def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, DictConfig]]:
+def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, Config]]:
     """Return the jobs that can make what a stage reads, by their folders."""
     from texgs.config.compose import compose
     from texgs.edit.method import NO_METHOD
@@ -112,8 +111,8 @@ def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, DictConfig]]:
 
 def ensure(
     stage: Stage,
-    config: DictConfig,
-    known: dict[Path, tuple[Stage, DictConfig]] | None = None,
+    config: Config,
+    known: dict[Path, tuple[Stage, Config]] | None = None,
     *,
     force: bool = False,
 ) -> None:
@@ -148,8 +147,7 @@ def ensure(
 
 def run_settings(arguments: argparse.Namespace) -> int:
     """Run one job from the file of its settings."""
-    from omegaconf import OmegaConf
-    from yaml import YAMLError
+    import yaml
 
     from texgs.workflow.job import Job, execute
     from texgs.workflow.stage_table import STAGES
@@ -158,8 +156,8 @@ def run_settings(arguments: argparse.Namespace) -> int:
     if arguments.overrides or arguments.force or arguments.output is None:
         raise ArgumentError("a job: expected --settings and --output, no KEY=VALUE or --force; see --help")
     try:
-        settings = OmegaConf.to_container(OmegaConf.load(arguments.settings))
-    except (OSError, YAMLError) as error:
+        settings = yaml.load(arguments.settings.read_bytes(), yaml.CSafeLoader)
+    except (OSError, yaml.YAMLError) as error:
         raise ArgumentError(f"{arguments.settings}: expected the settings of a job ({error})") from error
     if not isinstance(settings, dict) or settings.get("stage") != arguments.verb:
         raise ArgumentError(

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from texgs.core.keys import key
+from texgs.core.keys import REQUIRED, key
 
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Volume:
     """Where the scalar field of a data set comes from: a generator, or a file that is there or downloaded."""
 
@@ -37,7 +37,7 @@ class Volume:
     nan_value: float | None = key(None, "replaces NaN; without it NaN is an error")
 
 
-@dataclass
+@dataclass(frozen=True)
 class BasicTF:
     """A basic transfer function: piecewise linear opacity and colour over one range of values."""
 
@@ -46,7 +46,7 @@ class BasicTF:
     color: list[Any] = key([], "points [value, r, g, b], linear, 0 to 1")
 
 
-@dataclass
+@dataclass(frozen=True)
 class LookKeys:
     """What the edits of a whole experiment make of a basic scene."""
 
@@ -57,11 +57,11 @@ class LookKeys:
     instructed: str = key("a sculpture of gold", "the same after an edit by the instruction")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Dataset:
     """A volume with its basic transfer functions, or a folder of views."""
 
-    name: str = key("???", "name, also of the folder under results/")
+    name: str = key(REQUIRED, "name, also of the folder under results/")
     title: str = key("${.name}", "name in tables")
     source: str = key("", "who made the data, and its licence")
     stand_in: str = key("", "what the data stand in for, where the real ones are not public")

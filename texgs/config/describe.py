@@ -8,8 +8,6 @@ from functools import cache
 from types import UnionType
 from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
-
 from texgs.config.schema import Config
 from texgs.core.keys import Bounds
 
@@ -33,13 +31,24 @@ def keys() -> tuple[Key, ...]:
     return tuple(_walk(Config, ""))
 
 
-def describe(config: DictConfig) -> str:
+def describe(config: Config) -> str:
     """A table of all keys: name, value, type, unit, meaning.
 
     Args:
         config: whose values are shown as defaults.
     """
     return "\n".join(f"  {entry.name}={_value(entry, config)}\n      {_meaning(entry)}" for entry in keys())
+
+
+def value_at(config: Config, name: str) -> Any:
+    """Return the value of a key, through tables, lists and tables of any names."""
+    value: Any = config
+    for part in name.split("."):
+        if isinstance(value, list):
+            value = value[int(part)]
+        else:
+            value = value[part] if isinstance(value, dict) else getattr(value, part)
+    return value
 
 
 def _walk(table: type, prefix: str) -> Iterator[Key]:
@@ -79,9 +88,9 @@ def _type(hint: Any) -> str:
     )
 
 
-def _value(entry: Key, config: DictConfig) -> str:
+def _value(entry: Key, config: Config) -> str:
     """The value in a configuration; of keys that come any number of times the schema's default."""
-    value = entry.default if "*" in entry.name else OmegaConf.select(config, entry.name)
+    value = entry.default if "*" in entry.name else value_at(config, entry.name)
     return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
 
 

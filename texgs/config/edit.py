@@ -13,7 +13,9 @@ def _with_methods() -> Any:
     tables = [
         (method.name, method.settings, key(method.settings, method.summary)) for method in methods().values()
     ]
-    return make_dataclass("Edit", tables, bases=(EditKeys,), namespace={"__doc__": EditKeys.__doc__})
+    return make_dataclass(
+        "Edit", tables, bases=(EditKeys,), frozen=True, namespace={"__doc__": EditKeys.__doc__}
+    )
 
 
 Edit = _with_methods()

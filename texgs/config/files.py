@@ -8,12 +8,8 @@ from typing import Any
 import yaml
 from omegaconf import OmegaConf
 
-from texgs.config.composition import schema
-from texgs.config.describe import keys
 from texgs.config.project import folders
 from texgs.config.schema import Config
-
-KINDS = {yaml.MappingNode: "keys with values", yaml.SequenceNode: "a list", yaml.ScalarNode: "a single value"}
 
 
 def files() -> Iterator[Path]:
@@ -33,13 +29,12 @@ def place(path: Path | None, key: str) -> str:
 
 
 def origin(key: str, value: Any) -> str:
-    """The file and line that a wrong value is from, in front of a sentence; empty for an override."""
+    """Return the file and line that a wrong value is from, in front of a sentence; empty for an override."""
     group, *below = key.split(".")
     for path in files():
         node = node_at(path, below if package(path) == [group] else [group, *below])
-        for leaf in leaves(node) if node else ():
-            if str(yaml.safe_load(yaml.serialize(leaf))) == str(value):
-                return f"{shown(path)}:{leaf.start_mark.line + 1}: "
+        if node is not None and str(yaml.safe_load(yaml.serialize(node))) == str(value):
+            return f"{shown(path)}:{node.start_mark.line + 1}: "
     return ""
 
 
@@ -49,13 +44,15 @@ def shown(path: Path) -> str:
 
 
 def slip(path: Path) -> str | None:
-    """What is wrong with a file that cannot be read or does not have the shape of the schema; else None."""
+    """What is wrong with a file that cannot be read else None."""
     data = path.read_bytes()
     try:
         text = data.decode()
         root = yaml.compose(text, yaml.SafeLoader)
-        if fault := misfit(root, package(path)):
-            return f"{shown(path)}:{fault}"
+        if root is not None and not isinstance(root, yaml.MappingNode):
+            kind = "a list" if isinstance(root, yaml.SequenceNode) else "a single value"
+            key = ".".join(package(path)) or "configuration"
+            return f"{shown(path)}:1: {key}: expected keys with values, got {kind}"
         OmegaConf.create(text)
     except UnicodeDecodeError as error:
         line = data[: error.start].count(b"\n") + 1
@@ -98,14 +95,6 @@ def children(node: yaml.Node) -> list[tuple[str, yaml.Node]]:
     return [(str(index), value) for index, value in enumerate(items)]
 
 
-def leaves(node: yaml.Node) -> Iterator[yaml.Node]:
-    """The single values in a part of a document."""
-    if isinstance(node, yaml.ScalarNode):
-        yield node
-    for _, child in children(node):
-        yield from leaves(child)
-
-
 def node_at(path: Path, parts: list[str]) -> yaml.Node | None:
     """The part of a file below some keys; None where it has none, or cannot be read."""
     try:
@@ -118,33 +107,6 @@ def node_at(path: Path, parts: list[str]) -> yaml.Node | None:
     for part in parts:
         node = dict(children(node)).get(part) if node else None
     return node
-
-
-def misfit(node: yaml.Node | None, parts: list[str]) -> str | None:
-    """The first part of a document that has not the kind that the schema wants, after its line."""
-    expected = expected_kind(parts)
-    if node is None or expected is None or node.tag == "tag:yaml.org,2002:null":
-        return None
-    if not isinstance(node, expected):
-        name = ".".join(parts) or "configuration"
-        return f"{node.start_mark.line + 1}: {name}: expected {KINDS[expected]}, got {KINDS[type(node)]}"
-    faults = (misfit(value, [*parts, key]) for key, value in children(node) if key != "defaults")
-    return next((text for text in faults if text), None)
-
-
-def expected_kind(parts: list[str]) -> type[yaml.Node] | None:
-    """What the schema has below some keys: keys, a list, or (None) a value of any kind."""
-    below = [entry.name.split(".") for entry in keys()]
-    for at, part in enumerate(parts):
-        below = [names for names in below if len(names) > at and names[at] in ("*", part)]
-    if not below or any(len(names) == len(parts) for names in below):
-        return None
-    if all(names[len(parts)] == "*" for names in below):
-        default = OmegaConf.select(schema(), ".".join(parts))
-        if default is None:  # below an entry of a list, of which the schema has none
-            return None
-        return yaml.SequenceNode if OmegaConf.is_list(default) else yaml.MappingNode
-    return yaml.MappingNode
 
 
 def lines(error: Exception) -> list[str]:

@@ -8,7 +8,7 @@ from texgs.fit.kinds import fit_specs
 from texgs.fit.settings import Material, Phase, Seeds, TextureKeys
 
 
-@dataclass
+@dataclass(frozen=True)
 class FitKeys:
     """A recipe. The keys of other fields than surfels stand in tables of their own."""
 
@@ -37,7 +37,9 @@ def _with_kinds() -> Any:
     """Make the keys of fits of surfels, and a table of keys for each other kind of field."""
     others = [kind for kind in fit_specs().values() if kind.settings is not None]
     tables = [(kind.name, kind.settings, key(kind.settings, kind.summary)) for kind in others]
-    return make_dataclass("Fit", tables, bases=(FitKeys,), namespace={"__doc__": FitKeys.__doc__})
+    return make_dataclass(
+        "Fit", tables, bases=(FitKeys,), frozen=True, namespace={"__doc__": FitKeys.__doc__}
+    )
 
 
 Fit = _with_kinds()

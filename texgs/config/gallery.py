@@ -8,7 +8,7 @@ SECTIONS = ("pse", "relight", "image", "text", "parts", "ablations", "more")  # 
 AS_FITTED = "none"  # the edit of a scene that nothing has edited
 
 
-@dataclass
+@dataclass(frozen=True)
 class ShotKeys:
     """What the pictures of a row or of a column have in common; where both say something, the column counts.
 
@@ -43,7 +43,7 @@ class ShotKeys:
     changes: list[str] = key([], "of the scene, in the words of texgs edit, such as TF01.opacity=0.4")
 
 
-@dataclass
+@dataclass(frozen=True)
 class GridKeys:
     """One picture file: rows and columns of pictures."""
 
@@ -53,7 +53,7 @@ class GridKeys:
     columns: list[ShotKeys] = field(default_factory=list, metadata={"help": "from the left"})
 
 
-@dataclass
+@dataclass(frozen=True)
 class GalleryKeys:
     """What a data set's scenes are shown in; by default all new looks of the experiment."""
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from texgs.core.keys import key
 
 
-@dataclass
+@dataclass(frozen=True)
 class MeshKeys:
     """Surfaces of fits beside those of their volumes."""
 

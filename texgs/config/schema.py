@@ -1,12 +1,10 @@
 """The typed schema of conf/: every key with its type, default, unit and meaning.
 
-Hydra merges the YAML files into these classes, so an unknown key or a value of the wrong type is an error
+Files of conf/ become instances of these classes, so an unknown key or a value of the wrong type is an error
 that names the key; `texgs views --help` prints this file.
 """
 
 from dataclasses import dataclass, field
-
-from omegaconf import II
 
 from texgs.config.dataset import Dataset
 from texgs.config.edit import Edit
@@ -20,7 +18,7 @@ from texgs.models.catalogue import CLIP_BACKBONES
 NO_SWEEP = "none"  # name of the sweep without variants
 
 
-@dataclass
+@dataclass(frozen=True)
 class Tracking:
     """Where runs are recorded."""
 
@@ -28,7 +26,7 @@ class Tracking:
     experiment: str = key("texgs", "MLflow experiment")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Device:
     """What the work runs on."""
 
@@ -40,7 +38,7 @@ class Device:
     )
 
 
-@dataclass
+@dataclass(frozen=True)
 class Metric:
     """What edited scenes are measured with, besides what needs no weights."""
 
@@ -52,7 +50,7 @@ class Metric:
     views: int = key(12, "of the test path, for style distance, consistency and LPIPS", least=2)
 
 
-@dataclass
+@dataclass(frozen=True)
 class PageKeys:
     """Scenes of surfels as pages for a browser."""
 
@@ -60,7 +58,7 @@ class PageKeys:
     embedded: float = key(4.0, "largest page that the report holds; it leads to others", "MiB", least=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Sweep:
     """Variants of an experiment, each with its own overrides, side by side in one table."""
 
@@ -76,7 +74,7 @@ class Sweep:
     edits: list[str] = key([], "that are made of each variant; default those of the experiment")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Config:
     """Everything."""
 
@@ -108,5 +106,5 @@ class Config:
     variant: str = key("", "which of the sweep this is, in the folder of its fits")
     tracking: Tracking = key(Tracking, "where runs are recorded")
     device: Device = key(Device, "what the work runs on")
-    data_folder: str = key(II("oc.env:TEXGS_DATA,data"), "folder of data files; or set TEXGS_DATA")
+    data_folder: str = key("data", "folder of data files; or set TEXGS_DATA")
     results: str = key("results", "folder of all results")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import yaml
 from hydra.errors import HydraException, MissingConfigException, OverrideParseException
-from omegaconf.errors import OmegaConfBaseException
 
 from texgs.config.describe import keys
 from texgs.config.files import files, lines, place, shortened, slip
@@ -25,10 +24,6 @@ def sentence(error: Exception) -> str:
             f"{shortened(error.override)}: expected key=value, with quotes around a value that has commas, "
             "spaces or ="
         )
-    if several := re.search(
-        r"(?:argument|parameters) '([^']+=.*)'(?: requires --multirun)?$", lines(error)[0]
-    ):
-        return several_values(several[1])
     if isinstance(error, TypeError) or "group override" in str(error):
         return "a group: expected the name of a file of conf/, such as dataset=engine, got something else"
     file = file_of(error)
@@ -52,17 +47,6 @@ def told(error: Exception) -> str:
     return shortened(f"{name}: {text[0].lower()}{text[1:]}" if name else text)
 
 
-def several_values(word: str) -> str:
-    """What to say about a key with several values."""
-    key, _, values = word.partition("=")
-    is_list = "." in key and "(" not in values  # names of groups are no lists
-    brackets = f", as in '{key}=[{values}]'" if is_list else ""
-    return (
-        f"{word}: expected one value, got several; a list stands in brackets{brackets}, "
-        f"a text with a comma in quotes, and for a sweep there is texgs run {word}"
-    )
-
-
 def full_key(error: Exception) -> str:
     """The key that OmegaConf names."""
     named = (line.partition(":")[2].strip() for line in lines(error) if line.startswith("full_key:"))
@@ -84,5 +68,5 @@ def file_of(error: Exception) -> Path | None:
     if named := re.search(r"\b[Ii]n '([^']+)'", str(error)):
         candidates = (folder / f"{named[1]}.yaml" for folder in folders() if named[1] != "config")
         return next((path for path in candidates if path.is_file()), None)
-    is_told = str(error) and (full_key(error) or isinstance(error, HydraException | OmegaConfBaseException))
+    is_told = str(error) and isinstance(error, HydraException)
     return None if is_told else next((path for path in files() if slip(path)), None)

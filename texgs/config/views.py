@@ -8,7 +8,7 @@ from texgs.core.lens import Lens
 LENS = Lens()
 
 
-@dataclass
+@dataclass(frozen=True)
 class CameraPath:
     """Where cameras stand around the volume."""
 
@@ -18,7 +18,7 @@ class CameraPath:
     polar: float = key(15.0, "angle of an orbit above the horizon", "degrees", least=-90, most=90)
 
 
-@dataclass
+@dataclass(frozen=True)
 class LightKeys:
     """A light: at the camera, or from a direction given as for cameras on the test path."""
 
@@ -27,7 +27,7 @@ class LightKeys:
     polar: float = key(0.0, "of a directional light", "degrees")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Shading:
     """Factors of the Blinn-Phong model; white light."""
 
@@ -37,7 +37,7 @@ class Shading:
     shininess: float = key(20.0, "exponent beta", least=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class ViewKeys:
     """Training and test views of a volume."""
 

@@ -7,6 +7,7 @@ from typing import Any
 from texgs.core.names import is_number
 
 LARGEST = 2**63 - 1
+REQUIRED = "???"  # the default of a key that has none, in Hydra's words
 
 
 @dataclass(frozen=True)

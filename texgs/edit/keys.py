@@ -2,15 +2,15 @@
 
 from dataclasses import dataclass
 
-from texgs.core.keys import key
+from texgs.core.keys import REQUIRED, key
 from texgs.edit.method import NO_METHOD, methods
 
 
-@dataclass
+@dataclass(frozen=True)
 class EditKeys:
     """One edit of a scene. It may start from the result of another one."""
 
-    name: str = key("???", "name, also of its folder; that of its file in conf/edit")
+    name: str = key(REQUIRED, "name, also of its folder; that of its file in conf/edit")
     method: str = key(NO_METHOD, "how the scene is edited", choices=(NO_METHOD, *methods()))
     base: str | None = key(
         None, "edit whose scene this starts from, or a scene.yaml file; default the scene as fitted"

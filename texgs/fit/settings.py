@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from texgs.core.keys import key
 
 
-@dataclass
+@dataclass(frozen=True)
 class CommonRates:
     """Learning rates of Adam at the start of a phase, of surfels and of 3D Gaussians."""
 
@@ -19,7 +19,7 @@ class CommonRates:
     final: float = key(0.05, "the other rates at the end, relative to the start", least=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Rates(CommonRates):
     """Learning rates of Adam at the start of a phase."""
 
@@ -27,7 +27,7 @@ class Rates(CommonRates):
     material: float = key(0.02, "rate of raw ambient, diffuse, specular and shininess", least=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Losses:
     """Weights of the losses."""
 
@@ -41,7 +41,7 @@ class Losses:
     )
 
 
-@dataclass
+@dataclass(frozen=True)
 class Densify:
     """Adaptive density control."""
 
@@ -58,7 +58,7 @@ class Densify:
     reset_every: int = key(0, "iterations between opacity resets; 0: never", least=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Phase:
     """One run of the loop."""
 
@@ -74,7 +74,7 @@ class Phase:
 SEEDS = ("auto", "points", "visible", "voxels", "hull", "random")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Seeds:
     """Where surfels or Gaussians start."""
 
@@ -90,7 +90,7 @@ class Seeds:
     )
 
 
-@dataclass
+@dataclass(frozen=True)
 class Material:
     """Blinn-Phong factors that the shading phase starts with."""
 
@@ -100,7 +100,7 @@ class Material:
     shininess: float = key(20.0, "shininess, the exponent beta", least=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class TextureKeys:
     """Texels: how many, and how they are found."""
 

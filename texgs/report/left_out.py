@@ -6,11 +6,9 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from omegaconf.errors import OmegaConfBaseException
-
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.core.typed import typed
+from texgs.core.typed import ValueMismatch, typed
 
 
 @dataclass(frozen=True)
@@ -39,7 +37,7 @@ def read_left_out(path: str | Path | None) -> list[LeftOut]:
         raise ArgumentError(f"{path}: expected a list of what was left out, got {type(entries).__name__}")
     try:
         return [typed(LeftOut, entry) for entry in entries]
-    except (OmegaConfBaseException, TypeError, ValueError) as error:
+    except ValueMismatch as error:
         raise ArgumentError(f"{path}: expected entries with what, why and places, got others") from error
 
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from omegaconf.errors import OmegaConfBaseException, ValidationError
-
 from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
+from texgs.core.typed import MissingKey, UnknownKey, ValueMismatch
 from texgs.fit.kinds import fit_specs
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result, result_of
@@ -123,13 +122,12 @@ def _record(path: Path) -> Record[Any]:
         if isinstance(result, EditMeasures):
             _check_values(path, result.values)
         stage, dataset = facts["stage"], facts["dataset"]
-    except ValidationError as error:
-        what = str(error).splitlines()[0]
-        raise ArgumentError(f"{path}: numbers.{error.full_key}: {what}; run the job again") from error
-    except (KeyError, OmegaConfBaseException) as error:
+    except (KeyError, UnknownKey, MissingKey) as error:
         raise OtherVersionError(
             f"{path}: expected the metrics of this version of texgs, got others; run the job again"
         ) from error
+    except ValueMismatch as error:
+        raise ArgumentError(f"{path}: numbers.{error}; run the job again") from error
     variant, seed = facts.get("variant", ""), facts.get("seed") or 0
     fit = (label(facts), facts.get("field", ""), variant, facts.get("sweep", ""), seed)
     return Record(path, stage, dataset, facts.get("tf"), *fit, facts.get("stand_in", ""), result, facts)

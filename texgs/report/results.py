@@ -29,7 +29,7 @@ class Result:
         """Return the result that `plain` made these numbers of.
 
         Raises:
-            OmegaConfBaseException: for a key that is unknown or missing, or a value of another type.
+            ValueMismatch: for a key that is unknown or missing, or a value of another type.
         """
         return typed(cls, numbers)
 

@@ -13,12 +13,11 @@ from texgs.core.errors import MissingDataError
 from texgs.core.io import write_atomic
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.workflow.experiments import LeftOut
 
 
-def lacking(config: DictConfig) -> list[str]:
+def lacking(config: Config) -> list[str]:
     """What is not on this machine of what a configuration needs, data and weights, a sentence for each."""
     from texgs.workflow import stage_table as stages
     from texgs.workflow.weights import missing  # not at the top: most runs have no need of it
@@ -49,7 +48,7 @@ def left_out(entries: Mapping[LeftOut, Iterable[str]], results: str) -> str:
     return path.as_posix()
 
 
-def missing_weights(configs: Iterable[DictConfig]) -> list[str]:
+def missing_weights(configs: Iterable[Config]) -> list[str]:
     """What edits need and this machine has not; mistakes in edits are told first."""
     from texgs.edit.method import NO_METHOD
 

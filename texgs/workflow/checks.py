@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError, MissingDataError
-from texgs.core.typed import typed
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import kinds, require
 from texgs.fields.surfels.material import require_material
@@ -18,10 +17,10 @@ from texgs.workflow.stage import Stage
 from texgs.workflow.stages.edit import looks_of
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 
-def check_fit(config: DictConfig) -> None:
+def check_fit(config: Config) -> None:
     """Require settings of the fit that fit each other, and a device that its field is fitted on.
 
     Raises:
@@ -35,12 +34,12 @@ def check_fit(config: DictConfig) -> None:
             f"which fits {fit.field}, got {config.device.name}; choose another device or fit"
         )
     if kind.settings is None:
-        require_material(fit.first_material, fit.material_range)
+        require_material(vars(fit.first_material), fit.material_range)
     else:
-        kind.check(typed(kind.settings, fit[kind.name]))
+        kind.check(getattr(fit, kind.name))
 
 
-def require_fit(stage: Stage, config: DictConfig) -> None:
+def require_fit(stage: Stage, config: Config) -> None:
     """Require a fit that a stage can work on; stages before the fits work with any.
 
     Raises:
@@ -74,7 +73,7 @@ def require_fits(words: tuple[str, ...]) -> None:
         check_fit(compose((*words, f"fit={recipe}")))
 
 
-def require_edit(stage: Stage, config: DictConfig) -> None:
+def require_edit(stage: Stage, config: Config) -> None:
     """Require that the edit of a configuration is one for this stage, without mistakes."""
     own = [name for name, method in methods().items() if method.stage == stage.name]
     expected = own or [name for name, method in methods().items() if method.is_look]
@@ -102,7 +101,7 @@ def require_base(words: tuple[str, ...]) -> None:
         raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} edit={name} first")
 
 
-def check_edit(config: DictConfig) -> None:
+def check_edit(config: Config) -> None:
     """Require of an edit all that can be told without its scene and without weights.
 
     Raises:

@@ -9,9 +9,8 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-from omegaconf import OmegaConf
-
 from texgs.config.compose import compose
+from texgs.config.describe import value_at
 from texgs.config.project import members
 from texgs.core.plain_yaml import parse_yaml
 from texgs.core.typed import typed
@@ -148,7 +147,7 @@ def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
 
     def value(key: str) -> Any:
         _, is_number, number = key.partition(".recipe.")
-        return numbers[number] if is_number else OmegaConf.select(config, key)
+        return numbers[number] if is_number else value_at(config, key)
 
     for claim in published().keys:
         if claim.key.startswith(prefix) and (claim.of is None or value(claim.of)):

@@ -7,8 +7,6 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
-from omegaconf import DictConfig
-
 from texgs.config.compose import compose
 from texgs.config.dataset import Dataset
 from texgs.config.project import members
@@ -40,12 +38,12 @@ class LeftOut:
 class Selection:
     """The configurations of a run."""
 
-    lacking: Callable[[DictConfig], Sequence[str]]  # what is not here of what a configuration needs
+    lacking: Callable[[Config], Sequence[str]]  # what is not here of what a configuration needs
     skips: bool  # whether what lacks something is left out
-    by_sweep: dict[str, list[DictConfig]] = field(default_factory=lambda: defaultdict(list))  # "": of none
+    by_sweep: dict[str, list[Config]] = field(default_factory=lambda: defaultdict(list))  # "": of none
     left_out: dict[LeftOut, dict[str, None]] = field(default_factory=dict)  # with the places of its jobs
 
-    def takes(self, config: DictConfig, what: str) -> bool:
+    def takes(self, config: Config, what: str) -> bool:
         """Whether a configuration is run; what is left out is noted."""
         reasons = self.lacking(config) if self.skips else ()
         for why in reasons:
@@ -73,9 +71,9 @@ class Selection:
                 own = f"edits=[{','.join(left)}]", "gallery.grids=[]"
             listed += [compose((*each, *own, "edit=none")), *edited]
 
-    def edited(self, words: Words, several: bool) -> tuple[list[DictConfig], list[str]]:
+    def edited(self, words: Words, several: bool) -> tuple[list[Config], list[str]]:
         """The edits of a data set that are possible and lack nothing, and what `edits` has left of them."""
-        made: dict[str, DictConfig] = {}
+        made: dict[str, Config] = {}
         gone: set[str] = set()
         for config in map(compose, edits(words)):
             name, base = config.edit.name, config.edit.base
@@ -86,7 +84,7 @@ class Selection:
         return list(made.values()), [name for name in compose(words).edits if name not in gone]
 
 
-def selected(words: Words, lacking: Callable[[DictConfig], Sequence[str]]) -> Selection:
+def selected(words: Words, lacking: Callable[[Config], Sequence[str]]) -> Selection:
     """The configurations that some words describe.
 
     Words of the form dataset.NAME.KEY=VALUE hold for one data set of the run. A data set that the words name
@@ -143,7 +141,7 @@ def joined(aimed: Mapping[str, Sequence[str]], later: Mapping[str, Sequence[str]
     return {name: (*aimed.get(name, ()), *later.get(name, ())) for name in {*aimed, *later}}
 
 
-def parts(words: Words, base: DictConfig) -> list[Words]:
+def parts(words: Words, base: Config) -> list[Words]:
     """The words of each experiment of a union, or the words as they are."""
     if not base.experiments:
         return [words]
@@ -169,17 +167,17 @@ def parts(words: Words, base: DictConfig) -> list[Words]:
     return made
 
 
-def require_union(union: DictConfig, plain: DictConfig) -> None:
+def require_union(union: Config, plain: Config) -> None:
     """Require of an experiment of experiments that it says nothing else: it would hold for none of them."""
     for key in (each.name for each in fields(Config)):
-        if key not in OF_A_UNION and union[key] != plain[key]:
+        if key not in OF_A_UNION and getattr(union, key) != getattr(plain, key):
             raise ConfigError(
                 f"{key}: an experiment with `experiments` sets {', '.join(OF_A_UNION)} alone; put {key} "
                 "into the experiments that it names"
             )
 
 
-def sweeps(words: Words, base: DictConfig) -> dict[str, str]:
+def sweeps(words: Words, base: Config) -> dict[str, str]:
     """The data sets of the sweeps beside an experiment, by the names of the sweeps.
 
     Where the words name data sets and no sweeps, those of other data sets are not run.
@@ -190,7 +188,7 @@ def sweeps(words: Words, base: DictConfig) -> dict[str, str]:
     return {sweep: name for sweep, name in base.sweeps.items() if name in wanted}
 
 
-def skips(words: Words, base: DictConfig) -> bool:
+def skips(words: Words, base: Config) -> bool:
     """Whether what is missing is left out; a data set that the words name is not, unless they say so."""
     is_asked_for = any(word.startswith("missing=") for word in words)
     return bool(base.missing == "skip" and (is_asked_for or not named(words)))

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import MissingDataError
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.workflow.experiments import Selection
     from texgs.workflow.job import Job
 
@@ -77,7 +76,7 @@ def forecast(words: tuple[str, ...]) -> Forecast:
     return Forecast(selection, to_do, done, seconds)
 
 
-def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
+def planned_jobs(selection: Selection) -> Iterator[tuple[Job, Config]]:
     """The jobs that a run goes through, with their configurations; not those whose files are not there.
 
     Raises:
@@ -92,7 +91,7 @@ def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
 
     checksums = Checksums.load()
     by_folder: dict[str, Job] = {}
-    configs: dict[str, DictConfig] = {}
+    configs: dict[str, Config] = {}
     sweeps: dict[str, list[str]] = defaultdict(list)
     for sweep, config in ((name, each) for name, some in selection.by_sweep.items() for each in some):
         check_basic_tfs(config.dataset)
@@ -109,7 +108,7 @@ def planned_jobs(selection: Selection) -> Iterator[tuple[Job, DictConfig]]:
     yield from ((job, configs[folder]) for folder, job in by_folder.items() if folder in run)
 
 
-def work_of(job: Job, config: DictConfig) -> tuple[float, int]:
+def work_of(job: Job, config: Config) -> tuple[float, int]:
     """Megapixels of a view of a job, and its iterations."""
     pixels = config.views.width * config.views.height / config.fit.reduce**2
     return pixels / 1e6, iterations(job.settings)
@@ -183,12 +182,12 @@ def duration(seconds: float) -> str:
     return f"{seconds / 3600:.0f} hours" if seconds < 48 * 3600 else f"{seconds / 86400:.0f} days"
 
 
-def source(config: DictConfig) -> str:
+def source(config: Config) -> str:
     """Where the data of a data set come from."""
     volume = config.dataset.volume
     if config.dataset.views_folder is not None:
         return str(Path(config.data_folder, config.dataset.views_folder))
     if volume.generator is not None:
         return f"generated: {volume.generator}"
-    path = Path(config.data_folder, volume.file)
+    path = Path(config.data_folder, volume.file or "")
     return str(path) if path.exists() else f"to be downloaded from {volume.url}"

@@ -3,15 +3,13 @@
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
-from functools import lru_cache
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
-from omegaconf import DictConfig, OmegaConf
-
-from texgs.config.compose import Same, compose
-from texgs.config.gallery import AS_FITTED, GalleryKeys, GridKeys, ShotKeys
+from texgs.config.compose import compose
+from texgs.config.gallery import AS_FITTED, GridKeys, ShotKeys
 from texgs.config.project import members
+from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.edit.method import method_of
 from texgs.workflow.gallery_scenes import check_changes, fit_of, takers
@@ -31,7 +29,7 @@ class Place:
     file: Path
 
 
-def gallery_settings(config: DictConfig) -> dict[str, Any]:
+def gallery_settings(config: Config) -> dict[str, Any]:
     """What the stage reads: the pictures of all places, and what it takes to show the volume."""
     size, name = config.gallery.size, config.gallery.name
     command = f"texgs run experiment={name}" if name in members("experiment") else ""
@@ -47,7 +45,7 @@ def gallery_settings(config: DictConfig) -> dict[str, Any]:
     return {**scene_settings(config), **given}
 
 
-def gallery_inputs(config: DictConfig) -> dict[str, Path]:
+def gallery_inputs(config: Config) -> dict[str, Path]:
     """The scenes of all places, and the volume where one is shown."""
     places = [place for _, rows in places_of(config) for row in rows for place in row if place.shot.show]
     scenes = {place.scene: place.file for place in places}
@@ -62,19 +60,9 @@ def picture(place: Place) -> dict[str, Any]:
     return {"scene": place.scene, **{name: values[name] for name in read}}
 
 
-def places_of(config: DictConfig) -> list[tuple[GridKeys, list[list[Place]]]]:
-    """The grids of a gallery, each with the places of its rows; rows and columns without any are left out.
-
-    Cached, because a large one takes a second, and its inputs and its settings need them.
-    """
-    return _places_of(Same(config))
-
-
-@lru_cache(maxsize=256)
-def _places_of(same: Same) -> list[tuple[GridKeys, list[list[Place]]]]:
-    config = same.config
-    gallery = cast(GalleryKeys, OmegaConf.to_object(config.gallery))
-    grids = gallery.grids or [all_looks(config)]
+def places_of(config: Config) -> list[tuple[GridKeys, list[list[Place]]]]:
+    """The grids of a gallery, each with the places of its rows; rows and columns without any are left out."""
+    grids = config.gallery.grids or [all_looks(config)]
     names = [grid.name for grid in grids]
     for name in names:
         if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) or names.count(name) > 1:
@@ -82,7 +70,7 @@ def _places_of(same: Same) -> list[tuple[GridKeys, list[list[Place]]]]:
     return [filled(config, grid) for grid in grids]
 
 
-def filled(config: DictConfig, grid: GridKeys) -> tuple[GridKeys, list[list[Place]]]:
+def filled(config: Config, grid: GridKeys) -> tuple[GridKeys, list[list[Place]]]:
     """A grid with its places."""
     where = f"gallery.grids.{grid.name}"
     titles = [row.title for row in grid.rows]
@@ -114,7 +102,7 @@ def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
     return ShotKeys(**{**said, "show": show, "edit": edit, "view": view, "changes": changes})
 
 
-def place_of(config: DictConfig, shot: ShotKeys, where: str) -> Place:
+def place_of(config: Config, shot: ShotKeys, where: str) -> Place:
     """A place with the file of its scene."""
     for name, count in NUMBERS.items():
         given = getattr(shot, name)
@@ -135,7 +123,7 @@ def is_inside(box: Sequence[float]) -> bool:
     return min(left, top) >= 0 < side and max(left, top) + side <= 1 + 1e-9
 
 
-def all_looks(config: DictConfig) -> GridKeys:
+def all_looks(config: Config) -> GridKeys:
     """The scene as fitted and all scenes of the experiment with a new look, in two views."""
     if not config.edits:
         raise ConfigError("edits: expected some to show, such as edits=[glass,gold], got none")

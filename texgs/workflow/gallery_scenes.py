@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from texgs.config.check import is_scene_file
-from texgs.config.compose import changed, compose
+from texgs.config.compose import compose
 from texgs.config.gallery import AS_FITTED, ShotKeys
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
@@ -16,12 +17,13 @@ from texgs.workflow.locate import tf_names
 from texgs.workflow.variants import changes as swept
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
+    from texgs.edit.keys import EditKeys
 
 ANYWHERE = ("background", "light")  # changes of the whole scene
 
 
-def fit_of(config: DictConfig, shot: ShotKeys, where: str) -> DictConfig:
+def fit_of(config: Config, shot: ShotKeys, where: str) -> Config:
     """The configuration of the fit whose scene is shown."""
     of_fit = with_fit(config, recipe_of(config, shot, where))
     variants = list(swept(config))
@@ -30,16 +32,16 @@ def fit_of(config: DictConfig, shot: ShotKeys, where: str) -> DictConfig:
         hint = close(shot.variant or "", variants)
         raise ConfigError(f"{where}.variant: expected {expected}, got {shot.variant or 'none'}{hint}")
     if shot.variant:
-        of_fit = changed(of_fit, variant=shot.variant)
+        of_fit = replace(of_fit, variant=shot.variant)
     return of_fit
 
 
-def with_fit(config: DictConfig, name: str) -> DictConfig:
+def with_fit(config: Config, name: str) -> Config:
     """The configuration with one of the recipes of an experiment, or with its only one."""
     return with_recipe(config, name) if config.fits else config
 
 
-def recipe_of(config: DictConfig, shot: ShotKeys, where: str) -> str:
+def recipe_of(config: Config, shot: ShotKeys, where: str) -> str:
     """The recipe whose scene is shown."""
     recipes = list(config.fits) or [config.fit.name]
     if shot.fit is not None and shot.fit not in recipes:
@@ -54,7 +56,7 @@ def recipe_of(config: DictConfig, shot: ShotKeys, where: str) -> str:
     return shot.fit or able[0]
 
 
-def takers(config: DictConfig, edit: str, where: str) -> list[str]:
+def takers(config: Config, edit: str, where: str) -> list[str]:
     """The recipes of the experiment that an edit works on."""
     recipes = list(config.fits) or [config.fit.name]
     if edit == AS_FITTED:
@@ -67,19 +69,19 @@ def takers(config: DictConfig, edit: str, where: str) -> list[str]:
     return [name for name in recipes if method.takes(field_of(config, name))]
 
 
-def field_of(config: DictConfig, name: str) -> str:
+def field_of(config: Config, name: str) -> str:
     """The kind of field that one of the recipes of an experiment fits."""
     return str(compose((f"fit={name}",)).fit.field if config.fits else config.fit.field)
 
 
-def ancestry(name: str) -> list[DictConfig]:
+def ancestry(name: str) -> list[EditKeys]:
     """An edit and those that it starts from, the first one first."""
     edit = compose((f"edit={name}",)).edit
     is_first = edit.base is None or is_scene_file(edit.base) or edit.base not in members("edit")
     return [edit] if is_first else [*ancestry(edit.base), edit]
 
 
-def check_changes(config: DictConfig, shot: ShotKeys, where: str) -> None:
+def check_changes(config: Config, shot: ShotKeys, where: str) -> None:
     """Require of changes that the parts are there which they change."""
     models = tf_names(config)
     parts = list(models)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import lru_cache
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,81 +15,81 @@ from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 
-def is_fit(config: DictConfig) -> bool:
+def is_fit(config: Config) -> bool:
     """Return whether a configuration is of views and fits, not of an edit."""
     return bool(config.edit.method == NO_METHOD)
 
 
-def is_fit_of(kind: str) -> Callable[[DictConfig], bool]:
+def is_fit_of(kind: str) -> Callable[[Config], bool]:
     """Return whether a configuration is of fits of a kind of field, as a function."""
     return lambda config: is_fit(config) and config.fit.field == kind
 
 
-def has_volume(config: DictConfig) -> bool:
+def has_volume(config: Config) -> bool:
     """Return whether the data set starts from a volume, not from views."""
     return is_fit(config) and config.dataset.views_folder is None
 
 
-def has_scene(config: DictConfig) -> bool:
+def has_scene(config: Config) -> bool:
     """Return whether the configuration is of all basic TFs."""
     return is_fit(config) and config.tf is None
 
 
-def is_swept(config: DictConfig) -> bool:
+def is_swept(config: Config) -> bool:
     """Return whether the configuration is of a sweep."""
     from texgs.workflow.variants import changes  # not at the top: it loads Hydra
 
     return bool(changes(config))
 
 
-def is_first_recipe(config: DictConfig) -> bool:
+def is_first_recipe(config: Config) -> bool:
     """Return whether the fit is the first one of the experiment's, whose configuration stands for all."""
     return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
 
 
-def prepared_volume(config: DictConfig) -> dict[str, Path]:
+def prepared_volume(config: Config) -> dict[str, Path]:
     """Return what stage `volume` writes."""
     return {"volume": made("volume", config)}
 
 
-def view_set(config: DictConfig, tf: str | None = None) -> dict[str, Path]:
+def view_set(config: Config, tf: str | None = None) -> dict[str, Path]:
     """Return the views: those that stage `views` renders, or those that the data set consists of."""
     given = views_folder(config, tf)
     return {"views": made("views", config, tf=tf) if given is None else given / "transforms_train.json"}
 
 
-def model_of(stage: str) -> Callable[[DictConfig], dict[str, Path]]:
+def model_of(stage: str) -> Callable[[Config], dict[str, Path]]:
     """Return the model that a stage of the fit writes, and the views, as a function."""
     return lambda config: {"model": made("phase", config, stage), **view_set(config)}
 
 
-def all_models(config: DictConfig) -> dict[str, Path]:
+def all_models(config: Config) -> dict[str, Path]:
     """Return the models of all basic TFs after the last phase, by name."""
     if config.tf is not None:
         raise ConfigError(f"tf: a scene has all basic TFs of its data set; leave out tf={config.tf}")
     return {name: made("phase", config, last_phase(config), name) for name in tf_names(config)}
 
 
-def last_phase(config: DictConfig) -> str:
+def last_phase(config: Config) -> str:
     """Return the phase of a fit that makes what scenes are composed of."""
     return str(fit_specs()[config.fit.field].phases[-1])
 
 
-def scene_and_volume(config: DictConfig) -> dict[str, Path]:
+def scene_and_volume(config: Config) -> dict[str, Path]:
     """Return the scene with its models, and the prepared volume where there is one."""
     scene = {"scene": made("compose", config), **models_of_scene(config)}
     return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
 
 
-def models_of_scene(config: DictConfig) -> dict[str, Path]:
+def models_of_scene(config: Config) -> dict[str, Path]:
     """Return the models that a scene names, as inputs beside it."""
     return {f"model.{name}": path for name, path in all_models(config).items()}
 
 
-def scene_settings(config: DictConfig) -> dict[str, Any]:
+def scene_settings(config: Config) -> dict[str, Any]:
     """Return what stages read that compare a scene with its volume."""
     basic = {} if config.dataset.views_folder is not None else config.dataset.basic_tfs
     return {
@@ -100,12 +100,12 @@ def scene_settings(config: DictConfig) -> dict[str, Any]:
     }
 
 
-def lens(config: DictConfig) -> dict[str, float]:
+def lens(config: Config) -> dict[str, float]:
     """Return distance and field of view of the views, which pictures of scenes share."""
     return {"radius": config.views.radius, "fov_y": config.views.fov_y}
 
 
-def fit_label(config: DictConfig, later: Sequence[str] = ()) -> dict[str, Any]:
+def fit_label(config: Config, later: Sequence[str] = ()) -> dict[str, Any]:
     """Return which fit this is, and what it runs on. One that variants of a sweep share is of none of them.
 
     Args:
@@ -129,7 +129,7 @@ def fit_label(config: DictConfig, later: Sequence[str] = ()) -> dict[str, Any]:
     }
 
 
-def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[DictConfig], dict[str, Any]]:
+def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[Config], dict[str, Any]]:
     """Return what a stage of the fit reads, as a function: what holds for all, and its own parts.
 
     Args:
@@ -144,39 +144,34 @@ def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[DictConfig], dic
     }
 
 
-def is_changed(fit: DictConfig, later: Sequence[str] = ()) -> bool:
+def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
     """Return whether a recipe is not that of the file with its name, but for its seed and for some keys."""
     from texgs.config.compose import compose
 
     if fit.name not in members("fit"):
         return True
     file = compose((f"fit={fit.name}",)).fit
-    if fit is file:
-        return False
-    return any(fit[key] != file[key] for key in file if key not in ("seed", *later))
+    return any(
+        getattr(fit, key.name) != getattr(file, key.name)
+        for key in fields(file)
+        if key.name not in ("seed", *later)
+    )
 
 
-def view_settings(config: DictConfig) -> dict[str, Any]:
+def view_settings(config: Config) -> dict[str, Any]:
     """Return how views are rendered, without the name of their folder."""
     return {name: value for name, value in plain(config.views).items() if name != "name"}
 
 
-def with_recipe(config: DictConfig, name: str) -> DictConfig:
+def with_recipe(config: Config, name: str) -> Config:
     """Return the configuration with another recipe's name and field: what decides where its models are."""
-    from texgs.config.compose import Same
-
-    return _with_recipe(Same(config), name)
-
-
-@lru_cache(maxsize=1024)
-def _with_recipe(same: Any, name: str) -> DictConfig:
-    from texgs.config.compose import changed, compose
+    from texgs.config.compose import compose
 
     recipe = compose((f"fit={name}",)).fit
-    return changed(same.config, fit=changed(same.config.fit, name=recipe.name, field=recipe.field))
+    return replace(config, fit=replace(config.fit, name=recipe.name, field=recipe.field))
 
 
-def scene_before(config: DictConfig) -> Path:
+def scene_before(config: Config) -> Path:
     """Return the scene.yaml that an edit starts from."""
     from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
 
@@ -190,6 +185,6 @@ def scene_before(config: DictConfig) -> Path:
     return Path(base)
 
 
-def sibling(config: DictConfig, name: str) -> Path:
+def sibling(config: Config, name: str) -> Path:
     """Return the scene.yaml that another edit of the same fit writes."""
     return folder_of("edit", config).with_name(edit_folder(config, name)) / made("edit", config).name

@@ -8,15 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from omegaconf import DictConfig
-from omegaconf.errors import OmegaConfBaseException
-
-from texgs.config.slips import sentence
+from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
 from texgs.core.progress import curve_logger
-from texgs.core.typed import typed
+from texgs.core.typed import ValueMismatch, typed
 from texgs.report.results import plain
 from texgs.workflow import result, tracked
 from texgs.workflow import tracking as track
@@ -41,7 +38,7 @@ class Job:
     swept: Mapping[str, str] = field(default_factory=dict, compare=False)  # see workflow/variants.py
 
     @classmethod
-    def of(cls, stage: Stage, config: DictConfig, checksums: Checksums) -> Job:
+    def of(cls, stage: Stage, config: Config, checksums: Checksums) -> Job:
         """The job that a configuration describes; its settings name the weights that it works with.
 
         Raises:
@@ -139,5 +136,5 @@ def _typed(kind: type[T], job: Job) -> T:
     """A job's settings as the dataclass of its stage."""
     try:
         return typed(kind, job.settings)
-    except OmegaConfBaseException as error:
-        raise ArgumentError(f"settings of a {job.stage.name} job: {sentence(error)}") from error
+    except ValueMismatch as error:
+        raise ArgumentError(f"settings of a {job.stage.name} job: {error}") from error

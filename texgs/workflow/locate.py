@@ -5,17 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.dataset import Volume
+from texgs.config.dataset import BasicTF, Volume
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.folders import cache_folder
 from texgs.core.names import file_name
 from texgs.core.reading import is_there
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 
-def source_file(config: DictConfig) -> Path | None:
+def source_file(config: Config) -> Path | None:
     """The volume's file, or folder of slices; None if it is generated.
 
     A file that can be downloaded may be still to come.
@@ -60,7 +60,7 @@ def cached_volume(volume: Volume) -> Path:
     return cache_folder() / "volumes" / checksum[:12] / name
 
 
-def views_folder(config: DictConfig, tf: str | None = None) -> Path | None:
+def views_folder(config: Config, tf: str | None = None) -> Path | None:
     """Folder of the views that a data set without volume starts from; None for one with a volume.
 
     By default that of `config.tf`.
@@ -77,7 +77,7 @@ def views_folder(config: DictConfig, tf: str | None = None) -> Path | None:
     return folder
 
 
-def basic_tf(config: DictConfig) -> DictConfig:
+def basic_tf(config: Config) -> BasicTF:
     """The basic TF that `config.tf` names."""
     known = config.dataset.basic_tfs
     if config.tf not in known:
@@ -88,7 +88,7 @@ def basic_tf(config: DictConfig) -> DictConfig:
     return known[config.tf]
 
 
-def tf_names(config: DictConfig) -> list[str]:
+def tf_names(config: Config) -> list[str]:
     """The basic TFs to work on: the one chosen, else all of the data set; those of views are its subfolders.
 
     Raises:

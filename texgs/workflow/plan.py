@@ -24,8 +24,7 @@ from texgs.workflow.stage import LONG_AGO
 from texgs.workflow.stage_table import RULES, STAGES
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.core.checksum import Checksums
     from texgs.workflow.job import Job
     from texgs.workflow.stage import Rule
@@ -164,14 +163,14 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
 
 
-def gpu_uses(configs: Iterable[DictConfig]) -> list[str]:
+def gpu_uses(configs: Iterable[Config]) -> list[str]:
     """Return what GPUs are for in some configurations: views, fits or both."""
     uses = {"views" if each.views.mapper == "gpu" else "" for each in configs}
     uses |= {"fit" if each.device.name == "cuda" else "" for each in configs}
     return sorted(filter(None, uses))
 
 
-def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
+def wildcards(configs: Sequence[Config]) -> dict[str, list[str]]:
     """What the wildcards of rules stand for in these configurations."""
     from texgs.workflow.stage import edit_folder, fit_folder
 
@@ -187,7 +186,7 @@ def wildcards(configs: Sequence[DictConfig]) -> dict[str, list[str]]:
 
 
 def add_jobs(
-    configs: Iterable[DictConfig], checksums: Checksums, jobs: dict[str, Job], missing: list[str]
+    configs: Iterable[Config], checksums: Checksums, jobs: dict[str, Job], missing: list[str]
 ) -> list[str]:
     """Add the jobs of some configurations to those by folder, and what is missing for some; their folders."""
     from texgs.workflow import stage_table as stages
@@ -298,10 +297,10 @@ def note_results(jobs: Iterable[Job], settings: Iterable[str]) -> None:
         note_result(file, f"{', '.join(outputs)}: not whole, or of another job" if outputs else None)
 
 
-def downloads(configs: Iterable[DictConfig]) -> dict[str, tuple[str, str]]:
+def downloads(configs: Iterable[Config]) -> dict[str, tuple[str, str]]:
     """Address and checksum of the volumes that are not in the data folder, by the files they go to."""
     from texgs.workflow.locate import cached_volume
 
     volumes = [(config.data_folder, config.dataset.volume) for config in configs]
-    absent = [each for folder, each in volumes if each.url and not Path(folder, each.file).exists()]
-    return {cached_volume(each).as_posix(): (each.url, each.sha256) for each in absent}
+    absent = [each for folder, each in volumes if each.url and not Path(folder, each.file or "").exists()]
+    return {cached_volume(each).as_posix(): (str(each.url), str(each.sha256)) for each in absent}

@@ -9,10 +9,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
+
+import yaml
 
 from texgs.core.checksum import digest
 from texgs.core.io import write_atomic
@@ -23,7 +25,7 @@ from texgs.report.results import Result
 from texgs.workflow.code import code_digest
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 LONG_AGO = 946684800  # the year 2000, in seconds
 EVERY = 1024  # threads, of which a job gets as many as there are
@@ -67,10 +69,10 @@ class Stage:
     help: str  # what it does, in `texgs --help`
     rule: Rule
     schema: type[Any]  # dataclass of its settings
-    select: Callable[[DictConfig], dict[str, Any]]  # the part of the configuration that is its settings
-    inputs: Callable[[DictConfig], dict[str, Path]]  # the files it reads, by name
+    select: Callable[[Config], dict[str, Any]]  # the part of the configuration that is its settings
+    inputs: Callable[[Config], dict[str, Path]]  # the files it reads, by name
     work: Callable[[Any, dict[str, Path], Path], Outcome]  # its job: from settings and inputs to a folder
-    applies: Callable[[DictConfig], bool] = lambda config: True  # whether a data set or edit goes through it
+    applies: Callable[[Config], bool] = lambda config: True  # whether a data set or edit goes through it
     fits: str = ""  # module of the kind of field that it fits
 
     @property
@@ -88,7 +90,7 @@ class Stage:
         """Whether there is a job for each basic TF, not for the whole data set."""
         return self.rule.is_per_tf
 
-    def settings(self, config: DictConfig) -> dict[str, Any]:
+    def settings(self, config: Config) -> dict[str, Any]:
         """Return what a job reads, as plain lists and dicts.
 
         Raises:
@@ -100,7 +102,7 @@ class Stage:
             selected["tf"] = config.tf
         return cast(dict[str, Any], plain(selected))
 
-    def output(self, config: DictConfig) -> Path:
+    def output(self, config: Config) -> Path:
         """Return the folder of the job's files."""
         return folder_of(self.rule.name, config, phase=self.name)
 
@@ -151,29 +153,23 @@ def settings_digest(settings: dict[str, Any]) -> str:
 
 def plain(value: Any) -> Any:
     """Return a value of a configuration, or tables and lists of them, as plain dicts and lists."""
-    from omegaconf import OmegaConf  # not at the top: the list of verbs needs stages, and none of this
-
-    if OmegaConf.is_config(value):
-        return OmegaConf.to_container(value, resolve=True)
+    if is_dataclass(value):
+        return {each.name: plain(getattr(value, each.name)) for each in fields(value)}
     if isinstance(value, Mapping):
         return {str(name): plain(each) for name, each in value.items()}
     return [plain(each) for each in value] if isinstance(value, list | tuple) else value
 
 
 def _yaml(settings: dict[str, Any]) -> str:
-    from omegaconf import OmegaConf
-
-    return OmegaConf.to_yaml(OmegaConf.create(settings), sort_keys=True)
+    return yaml.dump(settings, Dumper=yaml.CSafeDumper, allow_unicode=True)
 
 
-def for_tf(config: DictConfig, name: str) -> DictConfig:
+def for_tf(config: Config, name: str) -> Config:
     """Return the same configuration for one basic TF."""
-    from texgs.config.compose import changed  # not at the top: it loads Hydra
-
-    return changed(config, tf=name)
+    return replace(config, tf=name)
 
 
-def folder_of(rule: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:
+def folder_of(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
     """Return the folder of a job's files; `tf`: of another basic TF than `config.tf`."""
     from texgs.workflow.stage_table import RULES  # not at the top: stages import this module
 
@@ -188,21 +184,21 @@ def folder_of(rule: str, config: DictConfig, phase: str = "", tf: str | None = N
     )
 
 
-def made(rule: str, config: DictConfig, phase: str = "", tf: str | None = None) -> Path:
+def made(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
     """Return the file of a job that other jobs ask for."""
     from texgs.workflow.stage_table import RULES
 
     return folder_of(rule, config, phase, tf) / RULES[rule].files[0]
 
 
-def fit_folder(config: DictConfig) -> str:
+def fit_folder(config: Config) -> str:
     """Return the name of a fit's folder: the recipe, the variant of a sweep, and a seed other than 0."""
     from texgs.workflow.variants import fit_variant  # not at the top: it loads Hydra
 
     return _folder(config.fit.name, fit_variant(config), config.fit.seed)
 
 
-def edit_folder(config: DictConfig, name: str = "") -> str:
+def edit_folder(config: Config, name: str = "") -> str:
     """Return that of an edit in the same way; `name`: of another edit than that of `config`."""
     from texgs.workflow.variants import edit_variant
 

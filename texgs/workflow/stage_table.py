@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from texgs.workflow.stage import Rule, Stage, for_tf
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 PACKAGE = "texgs.workflow.stages"
 
@@ -31,7 +31,7 @@ STAGES: dict[str, Stage] = {
 RULES: dict[str, Rule] = {stage.rule.name: stage.rule for stage in STAGES.values()}
 
 
-def jobs(config: DictConfig) -> list[tuple[Stage, DictConfig]]:
+def jobs(config: Config) -> list[tuple[Stage, Config]]:
     """Return the stages that a configuration goes through, each with its own configuration of one job.
 
     Raises:

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import fields
 from itertools import product
 
-from omegaconf import DictConfig, OmegaConf
-
 from texgs.config.compose import compose
+from texgs.config.describe import value_at
+from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD
@@ -46,7 +46,7 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-def own_views(config: DictConfig, name: str) -> tuple[str, ...]:
+def own_views(config: Config, name: str) -> tuple[str, ...]:
     """The word that gives a variant a folder for its views, where it changes them and names none."""
     own = own_name(config, name, ("views",))
     is_named = "views.name" in map(key_of, changes(config)[name])
@@ -68,10 +68,10 @@ def check_variant(name: str, listed: Sequence[str]) -> None:
             raise ConfigError(f"sweep.variants.{name}: got {change}, whose values go to {ELSEWHERE[key]}")
 
 
-def check_seeds(config: DictConfig) -> None:
+def check_seeds(config: Config) -> None:
     """Require seeds, each once, and none that would not count."""
     for key, listed in SEEDS.items():
-        seeds, own = list(config.sweep[listed]), OmegaConf.select(config, key)
+        seeds, own = getattr(config.sweep, listed), value_at(config, key)
         if not seeds:
             raise ConfigError(f"sweep.{listed}: expected at least one, got none")
         if repeated := [seed for seed in seeds if seeds.count(seed) > 1]:
@@ -80,7 +80,7 @@ def check_seeds(config: DictConfig) -> None:
             raise ConfigError(f"{key}: expected seeds of a sweep in sweep.{listed}, got {key}={own}")
 
 
-def edits_of_sweep(config: DictConfig) -> tuple[str, ...]:
+def edits_of_sweep(config: Config) -> tuple[str, ...]:
     """The word with the edits of the sweep, where the experiment has none of its own."""
     if config.edits or config.edit.method != NO_METHOD:
         return ()

@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 
-from omegaconf import DictConfig, OmegaConf
-
-from texgs.config.schema import NO_SWEEP
+from texgs.config.describe import value_at
+from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError
 from texgs.workflow.product import ONLY_SEEDS, SEEDS, combinations, key_of, label
 
@@ -12,7 +11,7 @@ OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
 OF_EDITS = "edit"
 
 
-def changes(config: DictConfig) -> Mapping[str, tuple[str, ...]]:
+def changes(config: Config) -> Mapping[str, tuple[str, ...]]:
     """The overrides of each variant of the sweep, by name; none without a sweep."""
     sweep = config.sweep
     if sweep.over and sweep.variants:
@@ -24,14 +23,14 @@ def changes(config: DictConfig) -> Mapping[str, tuple[str, ...]]:
         if given:
             raise ConfigError("sweep.name: expected a name for the table of the variants, got none")
         return {}
-    if not given and all(len(sweep[listed]) < 2 for listed in SEEDS.values()):
+    if not given and all(len(getattr(sweep, listed)) < 2 for listed in SEEDS.values()):
         raise ConfigError(
             f"sweep {sweep.name}: expected variants, keys to sweep over or several seeds, got none of them"
         )
     return given or {ONLY_SEEDS: ()}
 
 
-def is_of_edits(config: DictConfig) -> bool:
+def is_of_edits(config: Config) -> bool:
     """Whether the variants of the sweep have edits that differ."""
     variants = changes(config)
     named = any(changes_edits(change) for listed in variants.values() for change in listed)
@@ -43,14 +42,14 @@ def changes_edits(change: str) -> bool:
     return group_of(change) == OF_EDITS
 
 
-def fit_variant(config: DictConfig) -> str:
+def fit_variant(config: Config) -> str:
     """What the variant is called by its fits; empty for fits that all variants of edits share."""
     if not is_of_edits(config):
         return str(config.variant)
     return own_name(config, config.variant, OF_FITS)
 
 
-def own_name(config: DictConfig, variant: str, groups: Sequence[str]) -> str:
+def own_name(config: Config, variant: str, groups: Sequence[str]) -> str:
     """Name of what the overrides of some groups make of a variant; empty where it has none of these.
 
     In a sweep over keys it is that of their values, so that all variants with the same ones share it.
@@ -61,19 +60,19 @@ def own_name(config: DictConfig, variant: str, groups: Sequence[str]) -> str:
     return "-".join(label(change.partition("=")[2]) for change in own)
 
 
-def edit_variant(config: DictConfig) -> str:
+def edit_variant(config: Config) -> str:
     """The variant that an edit is of; empty where all variants have the same edits, of different fits."""
     return str(config.variant) if is_of_edits(config) else ""
 
 
-def swept(config: DictConfig) -> dict[str, str]:
+def swept(config: Config) -> dict[str, str]:
     """What makes a configuration another one than the rest of its sweep: values as text, by their keys."""
     listed = changes(config).get(config.variant, ())
     texts = {key_of(change): change.partition("=")[2] for change in listed}
-    values = {key: OmegaConf.select(config, key) if "." in key else text for key, text in texts.items()}
+    values = {key: value_at(config, key) if "." in key else text for key, text in texts.items()}
     for key, seeds in SEEDS.items():
-        if len(config.sweep[seeds]) > 1:
-            values[key] = OmegaConf.select(config, key)
+        if len(getattr(config.sweep, seeds)) > 1:
+            values[key] = value_at(config, key)
     return {key: str(value) for key, value in values.items()}
 
 

@@ -10,14 +10,13 @@ from texgs.core.errors import MissingDataError
 from texgs.edit.method import NO_METHOD, method_of
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.workflow.stage import Stage
 
 SHOWN = 12  # digits of checksums in settings
 
 
-def needed(config: DictConfig) -> Mapping[str, str]:
+def needed(config: Config) -> Mapping[str, str]:
     """Names of the weights that the edit of a configuration needs, each with the word that does without."""
     if config.edit.method == NO_METHOD:
         return {}
@@ -26,7 +25,7 @@ def needed(config: DictConfig) -> Mapping[str, str]:
     return {name: word and f"edit.{method.name}.{word}" for name, word in words.items()}
 
 
-def weights_of(stage: Stage, config: DictConfig, checksums: Checksums) -> dict[str, str | None] | None:
+def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, str | None] | None:
     """Checksums of all weights that a stage may work with, None for those that are not on this machine.
 
     They are part of a job's settings: when weights arrive or change, what used them is made again.
@@ -66,7 +65,7 @@ def require_same(recorded: Mapping[str, str | None]) -> None:
             )
 
 
-def missing(config: DictConfig) -> list[str]:
+def missing(config: Config) -> list[str]:
     """What is said of weights that an edit needs and this machine has not; nothing is downloaded."""
     from texgs.models.weights import available
 

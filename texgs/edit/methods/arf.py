@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from texgs.volume.view_set import View
 
 
-@dataclass
+@dataclass(frozen=True)
 class ArfKeys(FeatureKeys):
     """How colours of voxels take on a style."""
 

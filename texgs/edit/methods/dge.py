@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from texgs.volume.images import Images
 
 
-@dataclass
+@dataclass(frozen=True)
 class DgeKeys(UpdateKeys):
     """How Gaussians follow: rounds, in each of which some views are edited together and learned from."""
 

@@ -23,7 +23,7 @@ def rates(zeroth: float, means_final: float) -> CommonRates:
     return CommonRates(1.6e-4, 0.001, 0.005, 0.05, zeroth, zeroth / 20, means_final, 1.0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class Igs2gsKeys(UpdateKeys):
     """How Gaussians follow: all views are edited one after the other, then learned from for a while."""
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 KEYS = "edit.image"  # where its keys stand
 
 
-@dataclass
+@dataclass(frozen=True)
 class ImageKeys(StyleKeys):
     """How texels take on a style."""
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from texgs.volume.images import Images
 
 
-@dataclass
+@dataclass(frozen=True)
 class In2nKeys(UpdateKeys):
     """How a grid follows: one view is edited at a time, and patches of all views are learned from."""
 

@@ -16,7 +16,7 @@ SHOWN = 6  # edited views in the picture of them
 PICTURE = {"views.png": "Views before and after they were edited as the instruction says."}
 
 
-@dataclass
+@dataclass(frozen=True)
 class InstructionKeys:
     """What to do, and what edits the views. The scales are those of TexGS-VolVis."""
 

@@ -27,7 +27,7 @@ POLAR = 20.0  # of these views, degrees
 DIMMED = 0.15  # opacity of what is not in the segment, in its picture
 
 
-@dataclass
+@dataclass(frozen=True)
 class SegmentKeys:
     """Where is clicked, and how masks become surfels."""
 

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from texgs.scene.scene import Scene
 
 
-@dataclass
+@dataclass(frozen=True)
 class StyleKeys:
     """The picture, and the object of it that counts."""
 
@@ -31,7 +31,7 @@ class StyleKeys:
     masks: str = key("mobile_sam", "what finds that object; grabcut needs no weights", choices=MASKS)
 
 
-@dataclass
+@dataclass(frozen=True)
 class FeatureKeys(StyleKeys):
     """How views that learn the style are compared with it."""
 

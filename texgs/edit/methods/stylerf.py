@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 STYLES = "edit.stylerf.styles"
 
 
-@dataclass
+@dataclass(frozen=True)
 class StyleRfKeys(FeatureKeys):
     """How palette colours take on styles."""
 

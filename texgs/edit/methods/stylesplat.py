@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from texgs.volume.view_set import View
 
 
-@dataclass
+@dataclass(frozen=True)
 class StyleSplatKeys(FeatureKeys):
     """How colours of 3D Gaussians take on a style."""
 

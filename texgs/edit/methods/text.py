@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from texgs.volume.view_set import View
 
 
-@dataclass
+@dataclass(frozen=True)
 class TextKeys(InstructionKeys):
     """What to do, what edits the views, and how texels follow."""
 

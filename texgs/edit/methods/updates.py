@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from texgs.volume.view_set import View
 
 
-@dataclass
+@dataclass(frozen=True)
 class UpdateKeys(InstructionKeys):
     """How a field follows views that are edited again and again."""
 

@@ -11,7 +11,7 @@ from texgs.fit.kinds import FitSpec, FitTask, Fitted
 from texgs.fit.settings import CommonRates, Densify, Losses, Phase, Rates, Seeds
 
 
-@dataclass
+@dataclass(frozen=True)
 class GaussianKeys:
     """Keys of a fit of 3D Gaussians."""
 

@@ -15,7 +15,7 @@ def _voxels() -> VoxelKeys:
     return VoxelKeys(stages=[GridStage(64, 60), GridStage(128, 150), GridStage(256, 100)], degree=0)
 
 
-@dataclass
+@dataclass(frozen=True)
 class HashKeys:
     """Lattices of the hash grids, over the box around the object."""
 
@@ -25,7 +25,7 @@ class HashKeys:
     finest: int = key(512, "size of the last lattice", "cells along each side", least=1, most=(1 << 20) - 1)
 
 
-@dataclass
+@dataclass(frozen=True)
 class PaletteKeys:
     """How networks are fitted. The defaults are meant for two cores of a CPU and some minutes."""
 

@@ -12,7 +12,7 @@ from texgs.fields.kinds.voxels import FIELD
 from texgs.fit.kinds import FitSpec, FitTask, Fitted
 
 
-@dataclass
+@dataclass(frozen=True)
 class GridStage:
     """Part of a fit at one resolution."""
 
@@ -23,7 +23,7 @@ class GridStage:
     total_variation: bool = key(True, "total variation is held down")
 
 
-@dataclass
+@dataclass(frozen=True)
 class Decay:
     """A rate that falls log-linearly over the fit, after a sine ramp that starts at a hundredth."""
 
@@ -43,7 +43,7 @@ def _stages() -> list[GridStage]:
     return [GridStage(64, 60), GridStage(128, 300), GridStage(256, 800)]
 
 
-@dataclass
+@dataclass(frozen=True)
 class VoxelKeys:
     """How a grid is fitted. The defaults are meant for two cores of a CPU and a minute."""
 

@@ -13,7 +13,7 @@ from texgs.workflow.stages.figure import shown_views
 from texgs.workflow.stages.settings import OfTF
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 SHOWN = "Test views, the fit of each recipe with its PSNR, and below it its error."
 
@@ -47,14 +47,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(ComparisonResult(list(models), list(shown)), {"comparison.png": SHOWN})
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the last models of all recipes of the experiment, by recipe, and the views."""
     fits = [with_recipe(config, name) for name in config.fits]
     models = {each.fit.name: made("phase", each, last_phase(each)) for each in fits}
     return {**models, **view_set(config)}
 
 
-def applies(config: DictConfig) -> bool:
+def applies(config: Config) -> bool:
     """Return whether this is the first of several recipes: its configuration stands for all of them."""
     return is_fit(config) and len(config.fits) > 1 and not is_swept(config) and is_first_recipe(config)
 

@@ -23,8 +23,7 @@ from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.edit.task import Task
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
@@ -115,7 +114,7 @@ def followed(task: Task[Any]) -> dict[str, str]:
     return {name: method.followed(task.settings_for(name.split("/")[0])) for name in parts}
 
 
-def edit_settings(config: DictConfig) -> dict[str, Any]:
+def edit_settings(config: Config) -> dict[str, Any]:
     """Return what jobs of edits read: what all edits have, and the keys of this one's method."""
     keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
     edit = {name: getattr(config.edit, name) for name in keys} | captions(config)
@@ -124,7 +123,7 @@ def edit_settings(config: DictConfig) -> dict[str, Any]:
     return {"edit": edit, "fit": label, **given}
 
 
-def edited_scene(config: DictConfig) -> dict[str, Path]:
+def edited_scene(config: Config) -> dict[str, Path]:
     """Return the scene that an edit starts from, its models, their training views, and files of styles."""
     from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
 
@@ -161,7 +160,7 @@ def files_of_scene(scene: Path) -> dict[str, Path]:
     return files
 
 
-def looks_of(config: DictConfig) -> dict[str, str]:
+def looks_of(config: Config) -> dict[str, str]:
     """What each model of a scene follows; empty where all follow what the edit itself says."""
     edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
     if not edit.looks:
@@ -177,19 +176,19 @@ def looks_of(config: DictConfig) -> dict[str, str]:
                 f"dataset.looks of {dataset}: expected a look for each of {', '.join(names)}, got none for "
                 f"{name}; add one, or set edit.looks=false"
             )
-    return {name: table[name][follows] for name in names}
+    return {name: getattr(table[name], follows) for name in names}
 
 
-def captions(config: DictConfig) -> dict[str, str]:
+def captions(config: Config) -> dict[str, str]:
     """Return both captions of an edit: its own, or those of all basic scenes together."""
     edit, table = config.edit, config.dataset.looks
     names = list(looks_of(config))
     if not names:
-        return {name: edit[name] for name in ("source_caption", "target_caption")}
+        return {name: getattr(edit, name) for name in ("source_caption", "target_caption")}
     after = CAPTIONS[method_of(edit).follows]
     return {
         "source_caption": " and ".join(table[name].caption for name in names),
-        "target_caption": " and ".join(table[name][after] for name in names),
+        "target_caption": " and ".join(getattr(table[name], after) for name in names),
     }
 
 

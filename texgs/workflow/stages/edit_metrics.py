@@ -16,8 +16,7 @@ from texgs.workflow.stages.edit import Settings as EditSettings
 from texgs.workflow.stages.edit import edit_settings, edited_scene
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.metrics.metric import StyledModel
     from texgs.scene.scene import Scene
 
@@ -79,13 +78,13 @@ def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledMode
     return styles
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     measures = {"compared": config.metric.views, "clip": config.metric.clip}
     return {**edit_settings(config), **measures, "views": view_settings(config)}
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the scene as edited and as fitted, what says where its surfaces are, and the views of all TFs.
 
     Where the experiment has several recipes, surfaces are those of its first, for all edits alike.
@@ -95,7 +94,7 @@ def inputs(config: DictConfig) -> dict[str, Path]:
     return {**edited_scene(config), **scenes, "geometry": made("compose", first)}
 
 
-def applies(config: DictConfig) -> bool:
+def applies(config: Config) -> bool:
     """Return whether the configuration is of an edit that makes the scene look different."""
     method = methods().get(config.edit.method)
     return config.tf is None and method is not None and method.is_look

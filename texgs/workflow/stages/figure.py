@@ -13,8 +13,7 @@ from texgs.workflow.stage import Outcome, Rule, Stage, made
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.volume.view_set import View, ViewSet
 
 SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
@@ -82,13 +81,13 @@ def is_fitted(phase: str, fit: ShownFit) -> bool:
     return phase != "surfels" or fit.surfels_iterations > 0
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     shown = {"reduce": config.fit.reduce, "surfels_iterations": config.fit.surfels.iterations}
     return {"fit": {**fit_label(config)["fit"], **shown}}
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the models that the phases of the fit write, and the views."""
     phases = fit_specs()[config.fit.field].phases
     return {**{name: made("phase", config, name) for name in phases}, **view_set(config)}

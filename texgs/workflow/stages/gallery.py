@@ -15,7 +15,7 @@ from texgs.workflow.stages.gallery_cells import GalleryCell, GalleryRenderer, Re
 from texgs.workflow.stages.settings import OfScene
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 ERRORS = (
     "Errors are those of the worst channel, four times enlarged, red where the scene is too bright and blue "
@@ -95,21 +95,21 @@ def entries(grid: Grid, taken: Mapping[str, list[RenderedCell]]) -> list[Shown]:
     ]
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads: the pictures of all places, and what it takes to show the volume."""
     from texgs.workflow.galleries import gallery_settings  # not at the top: it loads Hydra
 
     return gallery_settings(config)
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the scenes of all places, and the volume where one is shown."""
     from texgs.workflow.galleries import gallery_inputs
 
     return gallery_inputs(config)
 
 
-def applies(config: DictConfig) -> bool:
+def applies(config: Config) -> bool:
     """Return whether this is the first of the recipes and variants of an experiment with scenes to show."""
     from texgs.workflow.variants import changes
 

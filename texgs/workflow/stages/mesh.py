@@ -21,8 +21,7 @@ from texgs.workflow.stages.settings import Distance, OfTF, Recipe
 from texgs.workflow.stages.tf import in_data_values
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.core.camera import Camera
     from texgs.fields.field import Field
     from texgs.raster import Render
@@ -111,7 +110,7 @@ def shown_by(field: Field) -> Callable[[Camera], Render]:
     return lambda camera: field.render(camera, background=black, outputs=(output,))
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     return {
         **recipe()(config),
@@ -122,7 +121,7 @@ def select(config: DictConfig) -> dict[str, Any]:
     }
 
 
-def applies(config: DictConfig) -> bool:
+def applies(config: Config) -> bool:
     """Return whether a mesh is made of the fit of a basic TF."""
     return has_volume(config) and config.tf in config.mesh.tfs and bool(kinds()[config.fit.field].depth)
 

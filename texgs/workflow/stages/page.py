@@ -16,7 +16,7 @@ from texgs.workflow.stage import Outcome, Rule, Stage, made
 from texgs.workflow.stages.settings import FitLabel, OfDataset
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 SHOWN = "The scene: open it to turn it, to move its light, and to change colours and opacities."
 
@@ -48,18 +48,18 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(result, {"poster.jpg": SHOWN})
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     look = {"look": config.edit.name, "look_seed": config.edit.seed}
     return {**look, "embedded": config.page.embedded, **fit_label(config)}
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the scene of an edit, or the one as fitted, with its models."""
     return {"scene": made("compose" if is_fit(config) else "edit", config), **models_of_scene(config)}
 
 
-def applies(config: DictConfig) -> bool:
+def applies(config: Config) -> bool:
     """Return whether the scene or its new look becomes a page: of sweeps only the numbers are of interest."""
     is_shown = is_fit(config) or methods()[config.edit.method].is_look
     able = "html" in kinds()[config.fit.field].exports

@@ -14,7 +14,7 @@ from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, run_phase
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 HARMONICS = ("sh", "sh_rest")
 LATER = ("texture",)  # keys of a recipe that later stages read
@@ -78,7 +78,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     return Outcome(result)
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     shared = recipe("material_range", "materials", "first_material", later=LATER)(config)
     return {**shared, "phase": config.fit.shading}

@@ -14,7 +14,7 @@ from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, run_phase
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
+    from texgs.config.schema import Config
 
 LATER = ("materials", "first_material", "shading", "texture")  # keys of a recipe that later stages read
 
@@ -81,13 +81,13 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     )
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     shared = recipe("low_pass", "facing", "material_range", "seeds", later=LATER)(config)
     return {**shared, "phase": config.fit.surfels}
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the views, and the volume where surfels start in its voxels."""
     from_voxels = config.fit.seeds.kind == "voxels" and config.dataset.views_folder is None
     return {**view_set(config), **(prepared_volume(config) if from_voxels else {})}

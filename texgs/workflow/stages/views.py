@@ -24,8 +24,7 @@ from texgs.workflow.stages.settings import OfTF
 from texgs.workflow.stages.tf import in_data_values
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.core.camera import Camera
     from texgs.volume.appearance import Appearance
     from texgs.volume.caster import Caster
@@ -206,7 +205,7 @@ def result_of(shots: Mapping[Any, list[View]], times: Times, coverages: list[flo
     )
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return what the stage reads."""
     points = {"tf_values": config.dataset.tf_values, "points": basic_tf(config)}
     return {**points, "views": view_settings(config)}

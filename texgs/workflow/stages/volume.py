@@ -18,8 +18,7 @@ from texgs.workflow.stage import Outcome, Rule, Stage, plain
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
-    from omegaconf import DictConfig
-
+    from texgs.config.schema import Config
     from texgs.volume.slabs import Source
 
 
@@ -89,12 +88,12 @@ def source(volume: Volume, path: Path) -> Source:
     return open_source(path, series=volume.series, **said)
 
 
-def select(config: DictConfig) -> dict[str, Any]:
+def select(config: Config) -> dict[str, Any]:
     """Return the volume's keys, but for how to obtain its file."""
     return {"volume": {key: x for key, x in plain(config.dataset.volume).items() if key != "obtain"}}
 
 
-def inputs(config: DictConfig) -> dict[str, Path]:
+def inputs(config: Config) -> dict[str, Path]:
     """Return the volume's file, where there is one."""
     path = source_file(config)
     return {} if path is None else {"source": path}
