@@ -19,10 +19,12 @@ from statistics import median
 from typing import NamedTuple
 
 from benchmarks.command import call
+from texgs.core.checksum import Checksums
 from texgs.core.io import read_json
 from texgs.workflow.absent import lacking
 from texgs.workflow.experiments import selected
-from texgs.workflow.forecast import PROBE, Speed, planned_jobs, probe, speeds, work_of
+from texgs.workflow.forecast import PROBE, Speed, probe, speeds, work_of
+from texgs.workflow.graph import graph
 from texgs.workflow.product import as_sweep
 from texgs.workflow.result import METRICS
 
@@ -62,10 +64,11 @@ def samples(runs: Sequence[str]) -> dict[str, list[Sample]]:
     """Jobs of runs that are done, by stage."""
     by_stage: dict[str, list[Sample]] = defaultdict(list)
     for words in runs:
-        for job, config in planned_jobs(selected(as_sweep(tuple(shlex.split(words))), lacking)):
+        planned = graph(selected(as_sweep(tuple(shlex.split(words))), lacking).by_sweep, Checksums.load())
+        for folder, job in planned.run.items():
             metrics = job.output / METRICS
             if metrics.exists():
-                work = work_of(job, config)
+                work = work_of(job, planned.configs[folder])
                 by_stage[job.stage.name].append(Sample(*work, read_json(metrics)["seconds"]))
     return by_stage
 

@@ -9,6 +9,7 @@ from texgs.core.checksum import Checksums
 from texgs.core.io import write_json
 from texgs.workflow import result
 from texgs.workflow.earlier import earlier
+from texgs.workflow.graph import Graph
 
 VIEWS, FIT, EDIT = (
     Path("results/engine", name) for name in ("TF01/views", "TF01/quick/texture", "edits/gold")
@@ -41,7 +42,7 @@ def results(tmp_path, monkeypatch):
 
 def shown(jobs):
     """Folders of the results that tables show beside those of some jobs, and those that they do not."""
-    files, outdated = earlier("results", jobs, Checksums())
+    files, outdated = earlier("results", Graph(jobs, {"": list(jobs)}), Checksums())
     return {str(Path(file).parent) for file in files}, {entry.what for entry in outdated}
 
 
@@ -55,7 +56,7 @@ def test_whole_results_of_other_runs_are_shown():
 def test_an_edit_of_a_fit_that_has_been_made_anew_is_left_out_and_told():
     make(FIT, {"settings": "b"})
     assert shown({}) == ({str(VIEWS), str(FIT)}, {str(EDIT)})
-    (entry,) = earlier("results", {}, Checksums())[1]
+    (entry,) = earlier("results", Graph(), Checksums())[1]
     assert entry.why == f"comes from {FIT}, which has been made anew since; run its job again"
 
 

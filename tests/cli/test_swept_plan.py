@@ -9,7 +9,8 @@ import pytest
 
 from texgs.core.errors import ConfigError
 from texgs.workflow import plan
-from texgs.workflow.plan import made, make, note_results, words_of
+from texgs.workflow.graph import Graph
+from texgs.workflow.plan import make, note_results, words_of
 from texgs.workflow.tracked import WHOLE, owner
 
 FITS = {"dataset": "sphere", "fit": "demo", "tracking": "none"}
@@ -69,8 +70,8 @@ def test_a_run_of_a_sweep_makes_what_it_shows_and_what_that_needs():
         "r/other": job("timing"),
     }
     swept = ["r/views", "r/model", "r/compose", "r/edit", "r/timing"]
-    assert made({"lambda_s": swept}, jobs) == {"r/views", "r/model", "r/compose", "r/edit"}
-    assert made({"": ["r/other"], "lambda_s": ["r/model"]}, jobs) == {"r/other", "r/views", "r/model"}
+    assert set(Graph(jobs, {"lambda_s": swept}).run) == {"r/views", "r/model", "r/compose", "r/edit"}
+    assert set(Graph(jobs, {"": ["r/other"], "s": ["r/model"]}).run) == {"r/other", "r/views", "r/model"}
 
 
 def test_every_gpu_that_some_configuration_needs_is_asked_for(planned):

@@ -5,14 +5,12 @@ from __future__ import annotations
 import csv
 import statistics
 import time
-from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from texgs.core.errors import MissingDataError
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
@@ -54,58 +52,28 @@ def forecast(words: tuple[str, ...]) -> Forecast:
     Raises:
         ConfigError, ArgumentError: for a mistake in the words.
     """
+    from texgs.core.checksum import Checksums
     from texgs.workflow.absent import lacking
-    from texgs.workflow.earlier import is_replaced
     from texgs.workflow.experiments import selected
+    from texgs.workflow.graph import graph
     from texgs.workflow.product import as_sweep
 
     selection = selected(as_sweep(words), lacking)
+    planned = graph(selection.by_sweep, Checksums.load())
+    lack_files = {folder for folders in planned.missing.values() for folder in folders}
     table, seconds, done = speeds(), 0.0, 0
     to_do: Counter[str] = Counter()
-    planned = list(planned_jobs(selection))
-    by_folder = {job.output.as_posix(): job for job, _ in planned}
-    known: dict[str, bool] = {}
-    for job, config in planned:
-        if job.is_done() and not is_replaced(job.output.as_posix(), by_folder, known):
+    for folder, job in planned.run.items():
+        if folder in lack_files:
+            continue  # told where the selection is shown
+        if job.is_done() and not planned.is_replaced(folder):
             done += 1
             continue
         to_do[job.stage.name] += 1
-        seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, config))
+        seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, planned.configs[folder]))
     if to_do:
         seconds += START_SECONDS
     return Forecast(selection, to_do, done, seconds)
-
-
-def planned_jobs(selection: Selection) -> Iterator[tuple[Job, Config]]:
-    """The jobs that a run goes through, with their configurations; not those whose files are not there.
-
-    Raises:
-        ConfigError, ArgumentError: for what would stop the run, as `texgs.workflow.plan.add_jobs`.
-    """
-    from texgs.core.checksum import Checksums
-    from texgs.workflow.checks import check_fit
-    from texgs.workflow.job import Job
-    from texgs.workflow.plan import made
-    from texgs.workflow.stage_table import jobs
-    from texgs.workflow.stages.tf import check_basic_tfs
-
-    checksums = Checksums.load()
-    by_folder: dict[str, Job] = {}
-    configs: dict[str, Config] = {}
-    sweeps: dict[str, list[str]] = defaultdict(list)
-    for sweep, config in ((name, each) for name, some in selection.by_sweep.items() for each in some):
-        check_basic_tfs(config.dataset)
-        check_fit(config)
-        try:
-            for stage, each in jobs(config):
-                folder = stage.output(each).as_posix()
-                if folder not in by_folder:
-                    by_folder[folder], configs[folder] = Job.of(stage, each, checksums), each
-                sweeps[sweep].append(folder)
-        except MissingDataError:  # told where the selection is shown
-            continue
-    run = made(sweeps, by_folder)
-    yield from ((job, configs[folder]) for folder, job in by_folder.items() if folder in run)
 
 
 def work_of(job: Job, config: Config) -> tuple[float, int]:

@@ -10,18 +10,18 @@ import os
 import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.project import folders
 from texgs.core.checksum import digest, sha256
-from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.errors import ConfigError
 from texgs.core.io import write_atomic
 from texgs.core.kept import fingerprint, keep, recall
 from texgs.workflow.code import ROOT
 from texgs.workflow.stage import LONG_AGO
-from texgs.workflow.stage_table import RULES, STAGES
+from texgs.workflow.stage_table import RULES, STAGES, SWEPT
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from texgs.workflow.stage import Rule
 
 GROUPS = ("experiment", "dataset", "views", "fit", "edit", "sweep", "device", "tracking")
-SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places that are shown of a sweep
 
 
 @dataclass(frozen=True)
@@ -131,36 +130,34 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     from texgs.config.compose import compose
     from texgs.core.checksum import Checksums
     from texgs.workflow.absent import lacking, left_out, missing_weights
-    from texgs.workflow.earlier import earlier, of_other_settings
+    from texgs.workflow.earlier import earlier
     from texgs.workflow.experiments import apart, selected
+    from texgs.workflow.graph import graph
 
     checksums, selection = Checksums.load(), selected(words, lacking)
     configs = [each for some in selection.by_sweep.values() for each in some]
     config = compose(apart(words)[0])
     results = Path(config.results).as_posix()  # as the folders of the jobs have it
-    jobs: dict[str, Job] = {}
-    missing: list[str] = []
-    sweeps = {sweep: add_jobs(some, checksums, jobs, missing) for sweep, some in selection.by_sweep.items()}
-    run = {folder: jobs[folder] for folder in made(sweeps, jobs)}
-    others, outdated = earlier(results, run, checksums)
-    plain_jobs = {folder: plain(job, results) for folder, job in jobs.items()}
-    note_results(jobs.values(), [each["settings"] for each in plain_jobs.values()])
+    planned = graph(selection.by_sweep, checksums)
+    others, outdated = earlier(results, planned, checksums)
+    plain_jobs = {folder: plain(job, results) for folder, job in planned.jobs.items()}
+    note_results(planned.jobs.values(), [each["settings"] for each in plain_jobs.values()])
     plan = Plan(
         results,
         config.tracking.uri,
         config.tracking.experiment,
         gpu_uses(configs),
         plain_jobs,
-        sweeps,
+        planned.sweeps,
         downloads(configs),
         wildcards(configs),
         left_out({**selection.left_out, **outdated}, results),
         others,
-        of_other_settings(run.values()),
+        planned.of_other_settings,
         notes(results, checksums),
     )
     checksums.save()
-    return plan, list(dict.fromkeys([*missing, *missing_weights(configs)]))
+    return plan, list(dict.fromkeys([*planned.missing, *missing_weights(configs)]))
 
 
 def gpu_uses(configs: Iterable[Config]) -> list[str]:
@@ -183,50 +180,6 @@ def wildcards(configs: Sequence[Config]) -> dict[str, list[str]]:
         "phase": {stage.name for stage in STAGES.values() if stage.place == "phase"},
     }
     return {name: sorted(own) for name, own in values.items()}
-
-
-def add_jobs(
-    configs: Iterable[Config], checksums: Checksums, jobs: dict[str, Job], missing: list[str]
-) -> list[str]:
-    """Add the jobs of some configurations to those by folder, and what is missing for some; their folders."""
-    from texgs.workflow import stage_table as stages
-    from texgs.workflow.checks import check_fit
-    from texgs.workflow.job import Job
-    from texgs.workflow.stages.tf import check_basic_tfs
-
-    folders = []
-    for config in configs:
-        check_basic_tfs(config.dataset)
-        check_fit(config)
-        try:
-            all_jobs = stages.jobs(config)
-        except MissingDataError as error:
-            missing.append(str(error))
-            continue
-        for stage, each in all_jobs:
-            try:
-                job = Job.of(stage, each, checksums)
-            except MissingDataError as error:
-                missing.append(str(error))
-                job = Job(stage, stage.settings(each), {}, stage.output(each))
-            folders.append(job.output.as_posix())
-            known = jobs.setdefault(folders[-1], job)
-            if known != job:
-                raise ConfigError(f"{job.output}: two variants go there; give one another name")
-            jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
-    return list(dict.fromkeys(folders))
-
-
-def made(sweeps: Mapping[str, Iterable[str]], jobs: Mapping[str, Job]) -> set[str]:
-    """The folders of the jobs that a run goes through: of a sweep what is shown, and what that needs."""
-    shown = [folder for sweep in sweeps.values() for folder in sweep if jobs[folder].stage.place in SWEPT]
-    waiting, folders = [*sweeps.get("", ()), *shown], set[str]()
-    while waiting:
-        folder = waiting.pop()
-        if folder in jobs and folder not in folders:
-            folders.add(folder)
-            waiting += [path.parent.as_posix() for path in jobs[folder].inputs.values()]
-    return folders
 
 
 def plain(job: Job, results: str) -> dict[str, Any]:

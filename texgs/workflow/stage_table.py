@@ -16,6 +16,14 @@ if TYPE_CHECKING:
     from texgs.config.schema import Config
 
 PACKAGE = "texgs.workflow.stages"
+SWEPT = (
+    "volume",
+    "views",
+    "phase",
+    "edit",
+    "edit_metrics",
+    "gallery",
+)  # shown of a sweep
 
 
 def discovered() -> Iterator[Stage]:

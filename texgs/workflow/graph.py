@@ -1,0 +1,108 @@
+"""The jobs of a run by their folders: what it goes through, what it replaces, and what it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from texgs.core.errors import ConfigError, MissingDataError
+from texgs.workflow.checks import check_fit
+from texgs.workflow.job import Job
+from texgs.workflow.result import METRICS, stamped
+from texgs.workflow.stage import settings_digest
+from texgs.workflow.stage_table import SWEPT
+from texgs.workflow.stage_table import jobs as jobs_of
+from texgs.workflow.stages.tf import check_basic_tfs
+
+if TYPE_CHECKING:
+    from texgs.config.schema import Config
+    from texgs.core.checksum import Checksums
+
+
+@dataclass
+class Graph:
+    """Jobs, each of which reads files of others or files from elsewhere."""
+
+    jobs: dict[str, Job] = field(default_factory=dict)  # by folder
+    sweeps: dict[str, list[str]] = field(default_factory=dict)  # folders by sweep, "" for those of none
+    configs: dict[str, Config] = field(default_factory=dict)  # of the jobs
+    missing: dict[str, list[str]] = field(default_factory=dict)  # folders of jobs by what they lack
+
+    @cached_property
+    def run(self) -> dict[str, Job]:
+        """The jobs that a run goes through: of a sweep what is shown, and what that needs."""
+        of_sweeps = [folder for sweep, listed in self.sweeps.items() if sweep for folder in listed]
+        shown = [folder for folder in of_sweeps if self.jobs[folder].stage.place in SWEPT]
+        waiting, folders = [*self.sweeps.get("", ()), *shown], set[str]()
+        while waiting:
+            folder = waiting.pop()
+            if folder in self.jobs and folder not in folders:
+                folders.add(folder)
+                waiting += [path.parent.as_posix() for path in self.jobs[folder].inputs.values()]
+        return {folder: job for folder, job in self.jobs.items() if folder in folders}
+
+    @cached_property
+    def of_other_settings(self) -> list[str]:
+        """The folders that hold results of other settings, which the run will replace."""
+        return sorted(
+            folder
+            for folder, job in self.run.items()
+            if (job.output / METRICS).exists()
+            and (stamped(job.output) or {}).get("settings") != settings_digest(job.settings)
+        )
+
+    def is_replaced(self, folder: str) -> bool:
+        """Return whether the run puts another result into a folder, or one that comes from such a result."""
+        if folder not in self.run:
+            return False
+        if folder not in self._replaced:
+            job = self.run[folder]
+            self._replaced[folder] = (
+                not all(path.exists() for path in job.inputs.values())
+                or stamped(job.output) != job.identity()
+                or any(self.is_replaced(path.parent.as_posix()) for path in job.inputs.values())
+            )
+        return self._replaced[folder]
+
+    @cached_property
+    def _replaced(self) -> dict[str, bool]:
+        return {}
+
+    def add(self, config: Config, checksums: Checksums) -> list[str]:
+        """Add the jobs of a configuration, and return their folders.
+
+        Raises:
+            ConfigError, ArgumentError: for basic TFs or a fit with mistakes, and two variants of one folder.
+        """
+        check_basic_tfs(config.dataset)
+        check_fit(config)
+        try:
+            listed = jobs_of(config)
+        except MissingDataError as error:
+            self.missing.setdefault(str(error), [])
+            return []
+        folders = []
+        for stage, each in listed:
+            try:
+                job = Job.of(stage, each, checksums)
+            except MissingDataError as error:
+                job = Job(stage, stage.settings(each), {}, stage.output(each))
+                self.missing.setdefault(str(error), []).append(job.output.as_posix())
+            folders.append(job.output.as_posix())
+            known = self.jobs.setdefault(folders[-1], job)
+            if known != job:
+                raise ConfigError(f"{job.output}: two variants go there; give one another name")
+            self.jobs[folders[-1]] = replace(known, swept=dict(known.swept.items() & job.swept.items()))
+            self.configs.setdefault(folders[-1], each)
+        return folders
+
+
+def graph(by_sweep: Mapping[str, Iterable[Config]], checksums: Checksums) -> Graph:
+    """Return the jobs of some configurations, which are listed by sweep; see `Graph.add`."""
+    made = Graph()
+    for sweep, configs in by_sweep.items():
+        folders = (folder for config in configs for folder in made.add(config, checksums))
+        made.sweeps[sweep] = list(dict.fromkeys(folders))
+    return made
