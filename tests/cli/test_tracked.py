@@ -1,6 +1,8 @@
-"""What the tracking store is told of a job."""
+"""What the tracking store and the metrics file are told of a job."""
 
 import json
+import sys
+from types import SimpleNamespace
 
 import pytest
 
@@ -9,6 +11,7 @@ from texgs.core.checksum import Checksums
 from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
 from texgs.workflow.job import Job
 from texgs.workflow.product import as_sweep
+from texgs.workflow.provenance import device, seed
 from texgs.workflow.stage import for_tf
 from texgs.workflow.stage_table import STAGES
 from texgs.workflow.sweep import variants
@@ -88,3 +91,36 @@ def test_pictures_of_a_gallery_have_a_metric_each():
         "shown_psnr/polar/error/30°": 20.0,
         "shown_psnr": 25.0,
     }
+
+
+class Cuda:
+    """A CUDA that a job has used, or has not."""
+
+    def __init__(self, is_used):
+        self.is_initialized = lambda: is_used
+        if is_used:
+            self.get_device_name = lambda: "H200"  # elsewhere torch has no name to tell
+
+
+@pytest.mark.parametrize(
+    ("settings", "is_used", "expected"),
+    [
+        ({"fit": {"device": "cuda"}}, True, "H200"),
+        ({"fit": {"device": "cuda"}}, False, "CPU"),
+        ({"fit": {"device": "cpu"}, "views": {"mapper": "gpu"}}, True, "CPU"),
+        ({"fit": {"device": "cpu"}, "views": {"mapper": "vtk"}}, False, "CPU"),
+        ({"views": {"mapper": "gpu"}}, True, "H200"),
+        ({"views": {"mapper": "vtk"}}, False, "VTK"),
+        ({"views": {"mapper": "cpu"}}, False, "CPU"),
+        ({}, False, "CPU"),
+    ],
+)
+def test_the_device_is_what_showed_the_scene(monkeypatch, settings, is_used, expected):
+    monkeypatch.setitem(sys.modules, "torch", SimpleNamespace(cuda=Cuda(is_used)))
+    assert device(settings).split()[-1] == expected
+
+
+def test_the_seed_of_a_page_is_that_of_its_look():
+    page = {"look_seed": 3, "fit": {"seed": 1}}
+    assert seed({**page, "look": "gold"}) == 3
+    assert seed({**page, "look": "none"}) == 1
