@@ -174,7 +174,7 @@ def check_document(text: str, config: Config) -> None:
     """Require that the configuration reads a document as the data set that it was written for."""
     from texgs.config.compose import compose
     from texgs.core.errors import ConfigError
-    from texgs.workflow.stages.tf import check_basic_tfs
+    from texgs.workflow.checks import check_basic_tfs
 
     name = config.dataset.name
     with tempfile.TemporaryDirectory() as folder:

@@ -56,10 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
             "results=FOLDER says where results go"
         )
     from texgs.config.compose import compose
-    from texgs.workflow.checks import require_base, require_edit, require_fit, require_fits
+    from texgs.workflow.checks import check_basic_tfs, require_base, require_edit, require_fit, require_fits
     from texgs.workflow.locate import tf_names
     from texgs.workflow.stage_table import STAGES
-    from texgs.workflow.stages.tf import check_basic_tfs
 
     words = tuple(arguments.overrides)
     config, stage = compose(words), STAGES[arguments.verb]

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from texgs.config.compose import compose
 from texgs.config.project import members
-from texgs.core.errors import ConfigError, MissingDataError
+from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD, method_of, methods
 from texgs.fields.kinds import kinds, require
 from texgs.fields.surfels.material import require_material
@@ -113,3 +113,27 @@ def check_edit(config: Config) -> None:
         for look in looks_of(config).values() or [None]:
             method.check(method.of(config.edit, look))
         method.check_fit(method.of(config.edit), config.fit)
+
+
+def check_basic_tfs(dataset: Any) -> None:
+    """Check the points of all basic TFs of a configuration, and that their ranges do not overlap.
+
+    Args:
+        dataset: the part `dataset` of the configuration.
+
+    Raises:
+        ArgumentError: naming the basic TF, or the two that overlap.
+    """
+    from texgs.volume.basic_tfs import check_disjoint
+    from texgs.volume.transfer import TransferFunction
+
+    basic = {}
+    for name, points in dataset.basic_tfs.items():
+        try:
+            basic[name] = TransferFunction(points.opacity, points.color)
+        except ArgumentError as error:
+            raise ArgumentError(f"{dataset.name}: basic TF {name}: {error}") from error
+    try:
+        check_disjoint(basic)
+    except ArgumentError as error:
+        raise ArgumentError(f"{dataset.name}: basic TFs {error}") from error

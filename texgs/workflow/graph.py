@@ -8,13 +8,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ConfigError, MissingDataError
-from texgs.workflow.checks import check_fit
+from texgs.workflow.checks import check_basic_tfs, check_fit
 from texgs.workflow.job import Job
 from texgs.workflow.result import METRICS, stamped
 from texgs.workflow.stage import settings_digest
 from texgs.workflow.stage_table import SWEPT
 from texgs.workflow.stage_table import jobs as jobs_of
-from texgs.workflow.stages.tf import check_basic_tfs
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config

@@ -17,8 +17,7 @@ from texgs.report.results import MeshResult
 from texgs.workflow.inputs import has_volume, last_phase, lens, model_of, prepared_volume, recipe
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.stage import Outcome, Rule, Stage, plain
-from texgs.workflow.stages.settings import Distance, OfTF, Recipe
-from texgs.workflow.stages.tf import in_data_values
+from texgs.workflow.stages.settings import Distance, OfTF, Recipe, in_data_values
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config

@@ -1,14 +1,21 @@
-"""What jobs read of the configuration: what all of them have, and what several share.
+"""What jobs read of the configuration: what all of them have, and what several share, such as basic TFs.
 
 The module of a stage adds its own in a dataclass `Settings`; its function `select` takes the values from the
 configuration. No field has a default, so a value that is not selected is an error.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from texgs.config.dataset import BasicTF
 from texgs.config.views import ViewKeys
+from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
+
+if TYPE_CHECKING:
+    from texgs.volume.transfer import TransferFunction
 
 
 @dataclass
@@ -68,3 +75,29 @@ class OfScene(OfDataset):
     basic_tfs: dict[str, BasicTF]
     views: ViewKeys
     fit: FitLabel
+
+
+def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high: float) -> TransferFunction:
+    """Return a basic TF in the units of the data.
+
+    Args:
+        name: of the TF, for messages.
+        points: of its opacity and colour.
+        tf_values: "data", or "fraction" where the points are on fractions of the data's range.
+        low: smallest value of the data.
+        high: largest value of the data.
+    """
+    from texgs.volume.transfer import TransferFunction
+
+    try:
+        tf = TransferFunction(tuple(points.opacity), tuple(points.color))
+        tf = tf.scaled(low, high) if tf_values == "fraction" else tf
+    except ArgumentError as error:
+        raise ArgumentError(f"basic TF {name}: {error}") from error
+    first, last = tf.support
+    if first >= high or last <= low:
+        raise ArgumentError(
+            f"basic TF {name}: expected a range within the data's [{low:g}, {high:g}], got [{first:g}, "
+            f"{last:g}]; is dataset.tf_values right?"
+        )
+    return tf

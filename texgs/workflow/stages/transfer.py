@@ -42,7 +42,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.volume.basic_tfs import check_disjoint
     from texgs.volume.tf_files import write_paraview
     from texgs.volume.tf_plot import plot
-    from texgs.workflow.stages.tf import in_data_values
+    from texgs.workflow.stages.settings import in_data_values
 
     summary = read_json(inputs["volume"].with_name("volume.json"))
     low, high = summary["minimum"], summary["maximum"]

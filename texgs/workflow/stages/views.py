@@ -20,8 +20,7 @@ from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.result import TIMES
 from texgs.workflow.stage import Outcome, Rule, Stage
-from texgs.workflow.stages.settings import OfTF
-from texgs.workflow.stages.tf import in_data_values
+from texgs.workflow.stages.settings import OfTF, in_data_values
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.io import read_json
-from texgs.workflow.stages.settings import OfScene
-from texgs.workflow.stages.tf import in_data_values
+from texgs.workflow.stages.settings import OfScene, in_data_values
 from texgs.workflow.stages.views import appearance_of, mapper_for
 
 if TYPE_CHECKING:
