@@ -3,7 +3,7 @@ import pytest
 import torch
 
 from texgs.core.errors import ShapeError
-from texgs.edit.color_transfer import color_map
+from texgs.edit.style_start import color_map
 
 
 def colors(seed, count, spread):

@@ -9,10 +9,12 @@ from tests.fit.scenes import ball_images, cameras
 from tests.fit.test_palette import SETTINGS
 from texgs.core.errors import ArgumentError
 from texgs.edit import palette_style
+from texgs.edit.methods.stylerf import StyleRfKeys
 from texgs.edit.objective import Objective
-from texgs.edit.palette_style import PaletteSteps, StyleRfWeights, stylize_palette
+from texgs.edit.palette_style import PaletteSteps, stylize_palette
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe
+from texgs.edit.style_loop import learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.networks import free_color, palette_color
 from texgs.fields.palette.rendering import points_on, shown
@@ -29,7 +31,7 @@ RECIPE = Recipe(
     cropped=False,
     reduce=2,
 )
-WEIGHTS = StyleRfWeights(variation=0.1, distillation=60)
+WEIGHTS = StyleRfKeys(variation=0.1, distillation=60)
 STYLE = StylePicture.of(picture("dots", 96))
 
 
@@ -69,7 +71,10 @@ def test_deferred_gradients_are_those_of_one_graph(field, images, vgg, monkeypat
     recipe = replace(RECIPE, features=1.0)
     objective = Objective.of(recipe, STYLE.scaled(48), 2, vgg, None)
     (layer,) = run.layers(camera)
-    values = run.gather(layer, 0.4, objective, 0.7, camera, 0)
+    monkeypatch.setattr(run, "step", lambda iteration: None)
+    run.follow([camera], [objective], [0.4], 0.7, 0.0)
+    losses = learn_style(run, 1, replace(recipe, iterations=1), "test")
+    values = {name: each[0] for name, each in losses.items()}
     deferred = {name: x.grad.clone() for name, x in run.free.items()}
 
     geometry, parameters = field.geometry, field.parameters

@@ -2,8 +2,8 @@ import pytest
 import torch
 
 from tests.edit.scenes import ball, views
+from texgs.edit.canvas import mean_alpha
 from texgs.edit.recipe import preset
-from texgs.edit.translucency import mean_alpha
 
 
 @pytest.mark.parametrize("opacity", [-3.0, 4.0])

@@ -4,7 +4,7 @@ import torch
 
 from tests.edit.scenes import ball
 from texgs.core.errors import ShapeError
-from texgs.edit.triplanar import project
+from texgs.edit.style_start import project
 from texgs.fields.surfels.texels import owners
 
 

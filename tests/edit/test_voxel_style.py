@@ -8,14 +8,14 @@ import torch
 from tests.fields.voxels.test_voxels import ball
 from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError
+from texgs.edit.methods.arf import ArfKeys
 from texgs.edit.objective import Objective
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe
+from texgs.edit.style_loop import image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.voxel_style import (
     ArfSteps,
-    ArfWeights,
-    image_variation,
     moved,
     object_colors,
     recolored_images,
@@ -29,7 +29,7 @@ from texgs.volume.images import Images
 RECIPE = Recipe(
     iterations=8, features=0.0, distribution=0.0, patches=50.0, behind="white", cropped=False, reduce=2
 )
-WEIGHTS = ArfWeights(content=0.0, variation=0.1)
+WEIGHTS = ArfKeys(content=0.0, variation=0.1)
 STYLE = StylePicture.of(picture("dots", 96))
 A = torch.tensor([[0.6, 0.2, 0.0], [0.1, 0.5, 0.1], [0.0, 0.1, 0.7]])
 B = torch.tensor([0.1, 0.05, 0.15])
@@ -86,11 +86,12 @@ def test_colours_count_by_their_alpha():
 def test_the_step_has_the_gradient_of_autograd(vgg, monkeypatch):
     field = ball(degree=0)
     images, recipe = seen(field.grid, count=1), replace(RECIPE, iterations=1, features=1.0)
-    weights = ArfWeights(content=0.3, variation=0.7)
+    weights = ArfKeys(content=0.3, variation=0.7)
     run = ArfSteps(field.grid, field, weights, torch.Generator())
     gradients = []
-    monkeypatch.setattr(run, "update", lambda step: gradients.append(run.optimizer.gradient.rows.clone()))
-    losses = run.learn_style(images, STYLE, recipe, vgg, "test")
+    monkeypatch.setattr(run, "step", lambda step: gradients.append(run.optimizer.gradient.rows.clone()))
+    run.follow(images, Objective.of_views(recipe, STYLE, images.size, vgg))
+    losses = learn_style(run, 1, recipe, "test")
 
     rows = field.grid.rows.clone().requires_grad_()
     view = render_view(replace(field.grid, rows=rows), images.cameras[0], field.march)
@@ -115,7 +116,7 @@ def test_only_colours_change(vgg, features):
     field = ball(degree=2)
     rows = field.grid.rows.clone()
     recipe = replace(RECIPE, features=features, iterations=3)
-    edited, losses = stylize_voxels(field, seen(field.grid), STYLE, recipe, ArfWeights(), vgg)
+    edited, losses = stylize_voxels(field, seen(field.grid), STYLE, recipe, ArfKeys(), vgg)
     assert torch.equal(field.grid.rows, rows), "the field given is left alone"
     assert torch.equal(edited.grid.masks, field.grid.masks)
     assert torch.equal(edited.grid.rows[:, 3], field.grid.rows[:, 3]), "densities"
@@ -143,7 +144,7 @@ def test_in_the_end_colours_have_the_mean_and_covariance_of_the_style():
     wanted = torch.cat([style.mean, style.pixels.T.cov().flatten()])
     misses = {}
     for is_exact in (True, False):
-        weights = replace(WEIGHTS, is_exact=is_exact)
+        weights = replace(WEIGHTS, exact=is_exact)
         edited, _ = stylize_voxels(field, images, style, RECIPE, weights)
         run = ArfSteps(edited.grid, edited, weights, torch.Generator().manual_seed(3))
         colors = run.rendered_colors(images.cameras, True, 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import torch
@@ -13,6 +14,7 @@ from texgs.fields.bounds import screen_box
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import Render, Texture, rasterize
 
+VIEWS = 6  # that tell how translucent a scene is
 SEEN = 0.02  # of alpha: less is not looked at
 MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
 
@@ -103,3 +105,21 @@ def extent(seen: Tensor) -> slice:
     size = int(used[-1]) + 1 + MARGIN - start
     stop = min(len(seen), start + -(-size // MULTIPLE) * MULTIPLE)
     return slice(start, stop)
+
+
+@torch.no_grad()
+def mean_alpha(model: Surfels, cameras: Sequence[Camera]) -> float:
+    """Mean alpha in [0, 1] of the pixels of a few views, each weighted by its alpha; 1 where nothing shows.
+
+    Weighted so, pixels at the rim of an opaque object hardly count, and the background does not at all.
+
+    Args:
+        model: any stage.
+        cameras: of views that are spread around the model, on any device.
+    """
+    total = square = 0.0
+    for camera in cameras[:: -(-len(cameras) // VIEWS)]:
+        part = around(model, camera.to(model.device))
+        alpha = splatted(model, part, 1.0, features=model.parameters["means"][:, :1]).alpha
+        total, square = total + float(alpha.sum()), square + float(alpha.square().sum())
+    return square / total if total > 0 else 1.0

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import replace
 
 import torch
 
 from texgs.core.camera import Camera
-from texgs.core.progress import progress
-from texgs.edit.objective import Objective, differentiated, finite_values, view_order
+from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
+from texgs.edit.style_loop import Painting, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.harmonics import join, split
@@ -41,25 +40,48 @@ def stylize_gaussians(
     Returns:
         The Gaussians, and the weighted terms of the loss by name, a value for each iteration.
     """
-    width, height = cameras[0].width, cameras[0].height
-    scaled = style.to(model.device).scaled(recipe.pattern * max(width, height))
-    objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, None)
-    geometry, harmonics = model.tensors("geometry"), split(model.parameters["sh"])
-    learned = {name: x.clone(memory_format=torch.contiguous_format) for name, x in harmonics.items()}
-    rates = {"sh": recipe.rate, "sh_rest": HIGHER * recipe.rate}
-    groups = [{"params": [x.requires_grad_()], "lr": rates[name]} for name, x in learned.items()]
-    adam = torch.optim.Adam(groups, eps=1e-15, fused=True)
-    losses: dict[str, list[float]] = defaultdict(list)
-    order = view_order(len(cameras), recipe)
-    for iteration, index in enumerate(progress(order, title=title, unit="iteration")):
-        camera = cameras[index].to(model.device)
-        shown = replace(model, parameters=join({**geometry, **learned})).render(camera)
+    run = GaussianSteps(model, cameras, style, recipe, vgg)
+    losses = learn_style(run, len(cameras), recipe, title)
+    harmonics = {name: x.detach() for name, x in run.harmonics.items()}
+    return replace(model, parameters=join({**run.geometry, **harmonics})), losses
+
+
+class GaussianSteps:
+    """Gaussians whose harmonics are on their way to a style."""
+
+    def __init__(
+        self,
+        model: Gaussians,
+        cameras: Sequence[Camera],
+        style: StylePicture,
+        recipe: Recipe,
+        vgg: Vgg | None,
+    ) -> None:
+        self.model, self.cameras = model, cameras
+        size = cameras[0].width, cameras[0].height
+        self.objective = Objective.of_views(recipe, style.to(model.device), size, vgg)
+        self.geometry = model.tensors("geometry")
+        self.harmonics = {
+            name: x.clone(memory_format=torch.contiguous_format).requires_grad_()
+            for name, x in split(model.parameters["sh"]).items()
+        }
+        rates = {"sh": recipe.rate, "sh_rest": HIGHER * recipe.rate}
+        groups = [{"params": [x], "lr": rates[name]} for name, x in self.harmonics.items()]
+        self.adam = torch.optim.Adam(groups, eps=1e-15, fused=True)
+
+    def render(self, view: int) -> list[Painting]:
+        """Show a view over white."""
+        learned = replace(self.model, parameters=join({**self.geometry, **self.harmonics}))
+        shown = learned.render(self.cameras[view].to(self.model.device))
         image = shown.color.detach().permute(2, 0, 1).clamp(0, 1).requires_grad_()
-        terms = objective.terms(image, shown.alpha.detach(), iteration)
-        for name, value in finite_values(terms, iteration).items():
-            losses[name].append(value)
-        shown.color.backward(differentiated(terms, image).permute(1, 2, 0))
-        adam.step()
-        adam.zero_grad()
-    learned = {name: x.detach() for name, x in learned.items()}
-    return replace(model, parameters=join({**geometry, **learned})), dict(losses)
+        return [
+            Painting(
+                *(image, shown.alpha.detach(), self.objective),
+                lambda gradient: shown.color.backward(gradient.permute(1, 2, 0)),
+            )
+        ]
+
+    def step(self, iteration: int) -> None:
+        """Take a step of Adam."""
+        self.adam.step()
+        self.adam.zero_grad()

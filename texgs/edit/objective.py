@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import isfinite
 
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from texgs.core.errors import ArgumentError, FitError
+from texgs.core.errors import ArgumentError
 from texgs.core.memory import require_memory
 from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.recipe import Recipe
@@ -74,6 +73,14 @@ class Objective:
         if recipe.patches > 0 and recipe.iterations > 0:
             patches = PatchStatistics.of(style.image, style.region, recipe.seed)
         return cls(recipe, reduce, vgg, features, distributions, patches, clip)
+
+    @classmethod
+    def of_views(
+        cls, recipe: Recipe, style: StylePicture, size: tuple[int, int], vgg: Vgg | None
+    ) -> Objective:
+        """Compute the same for a picture behind views of a width and height."""
+        scaled = style.scaled(recipe.pattern * max(size))
+        return cls.of(recipe, scaled, recipe.reduction(*size), vgg, None)
 
     def terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
         """Weighted losses [] by name, differentiable in the image.
@@ -147,32 +154,6 @@ def style_maps(
         share = F.interpolate(style.region[None, None].float(), features.shape[1:], mode="area")[0, 0]
         regions[stride] = share > ON_OBJECT if bool((share > ON_OBJECT).any()) else None
     return maps, regions
-
-
-def view_order(views: int, recipe: Recipe) -> list[int]:
-    """Which view each iteration looks at: all of them in random order once before any again."""
-    generator = torch.Generator().manual_seed(recipe.seed)
-    order: list[int] = []
-    while len(order) < recipe.iterations:
-        order += torch.randperm(views, generator=generator).tolist()
-    return order[: recipe.iterations]
-
-
-def finite_values(terms: Mapping[str, Tensor], iteration: int) -> dict[str, float]:
-    """Values of the terms of a loss."""
-    values = {name: float(term.detach()) for name, term in terms.items()}
-    if not all(map(isfinite, values.values())):
-        raise FitError(
-            f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower "
-            "the rate, and look for values that are not finite in the model"
-        )
-    return values
-
-
-def differentiated(terms: Mapping[str, Tensor], image: Tensor) -> Tensor:
-    """Gradient of the sum of some terms, of the shape of the image that they are of."""
-    total = LOSS_SCALE * torch.stack(list(terms.values())).sum()
-    return torch.autograd.grad(total, image)[0] / LOSS_SCALE
 
 
 def pooled(share: Tensor, side: int, size: torch.Size) -> Tensor:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import cos, pi
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 from torch import Tensor
@@ -14,10 +13,10 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
-from texgs.edit.objective import Objective, differentiated, finite_values, view_order
+from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
+from texgs.edit.style_loop import Painting, Terms, image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.voxel_style import image_variation
 from texgs.fields.palette.colors import cluster_colors
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
@@ -27,20 +26,15 @@ from texgs.models.vgg import Vgg
 from texgs.raster.voxels import camera_rays
 from texgs.volume.images import Images
 
+if TYPE_CHECKING:
+    from texgs.edit.methods.stylerf import StyleRfKeys
+
 CLUSTERS = 4  # of the colours of a style, the largest of which is its dominant one
 LUMINANCE = (0.299, 0.587, 0.114)
 DRAWN, RUN = 4096, 2  # rays a step of the distillation, and neighbours among them
 RATE, LAST_RATE = 1e-2, 7e-5  # of Adam in the distillation
 BETAS = (0.9, 0.99)
 LEAST_WEIGHT = 1e-3  # of points that learn
-
-
-@dataclass(frozen=True)
-class StyleRfWeights:
-    """What StyleRF-VolVis adds to the distance to the styles."""
-
-    variation: float = 1.0  # of images
-    distillation: int = 500  # steps at first, in which free colours learn those of the recoloured palette
 
 
 class Stylized(NamedTuple):
@@ -56,7 +50,7 @@ def stylize_palette(
     images: Images,
     styles: Sequence[StylePicture],
     recipe: Recipe,
-    weights: StyleRfWeights,
+    keys: StyleRfKeys,
     vgg: Vgg | None = None,
     title: str = "style",
 ) -> Stylized:
@@ -70,7 +64,7 @@ def stylize_palette(
         images: its training views.
         styles: one for each palette colour.
         recipe: of the distance to the styles; a view in each iteration.
-        weights: of what is added to it.
+        keys: weight of what is added to it, and steps before.
         vgg: for NNFM, if the recipe wants it.
         title: of progress bars.
     """
@@ -81,8 +75,11 @@ def stylize_palette(
     dominant = [cluster_colors(style.pixels, CLUSTERS, recipe.seed)[0] for style in styles]
     field = replace(field, parameters={**field.parameters, "palette.colors": torch.stack(dominant)})
     run = PaletteSteps(field, torch.Generator().manual_seed(recipe.seed))
-    error = run.distil(images, weights.distillation, title)
-    losses = run.learn_styles(images, styles, recipe, weights.variation, vgg, title)
+    error = run.distil(images, keys.distillation, title)
+    objectives = [Objective.of_views(recipe, style, images.size, vgg) for style in styles]
+    greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
+    run.follow(images.cameras, objectives, greys, keys.variation, recipe.rate)
+    losses = learn_style(run, len(images), recipe, title)
     return Stylized(run.field, losses, error)
 
 
@@ -138,46 +135,26 @@ class PaletteSteps:
             adam.zero_grad()
         return loss.sqrt().item()
 
-    def learn_styles(
+    def follow(
         self,
-        images: Images,
-        styles: Sequence[StylePicture],
-        recipe: Recipe,
+        cameras: Sequence[Camera],
+        objectives: Sequence[Objective],
+        greys: Sequence[float],
         variation: float,
-        vgg: Vgg | None,
-        title: str,
-    ) -> dict[str, list[float]]:
-        """Follow the distance of whole views to the styles; its terms by name."""
-        width, height = images.size
-        side, reduce = recipe.pattern * max(width, height), recipe.reduction(width, height)
-        objectives = [Objective.of(recipe, style.scaled(side), reduce, vgg, None) for style in styles]
-        greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
-        losses: dict[str, list[float]] = defaultdict(list)
-        adam, order = self.adam(recipe.rate), view_order(len(images), recipe)
-        for iteration, index in enumerate(progress(order, title=title, unit="iteration")):
-            sums: dict[str, float] = defaultdict(float)
-            layers = self.layers(images.cameras[index])
-            for objective, grey, layer in zip(objectives, greys, layers, strict=True):
-                for name, value in self.gather(
-                    layer, grey, objective, variation, images.cameras[index], iteration
-                ).items():
-                    sums[name] += value
-            for name, value in sums.items():
-                losses[name].append(value)
-            adam.step()
-            adam.zero_grad()
-        return dict(losses)
+        rate: float,
+    ) -> None:
+        """Learn from whole views from now on: by palette colour its distance to a style, over a grey."""
+        self.cameras, self.objectives, self.greys = cameras, objectives, greys
+        self.variation, self.optimizer = variation, self.adam(rate)
 
-    def gather(
-        self,
-        layer: Sequence[Layer],
-        grey: float,
-        objective: Objective,
-        variation: float,
-        camera: Camera,
-        iteration: int,
-    ) -> dict[str, float]:
-        """Add the gradient of one palette colour's losses, piece by piece; the values of its terms.
+    def render(self, view: int) -> list[Painting]:
+        """Show what a view has of each palette colour."""
+        camera = self.cameras[view]
+        styles = zip(self.layers(camera), self.objectives, self.greys, strict=True)
+        return [self.painting(camera, *each) for each in styles]
+
+    def painting(self, camera: Camera, layer: Sequence[Layer], objective: Objective, grey: float) -> Painting:
+        """Show what a view has of one palette colour.
 
         The image is rendered without a graph, and each piece of it once more with one (deferred
         back-propagation, Zhang et al. 2022). Where a colour is cut off, it learns in the way back only.
@@ -188,14 +165,21 @@ class PaletteSteps:
         color, alpha = planes[:3], planes[3]
         raw = color + grey * (1 - alpha)
         image = raw.clamp(0, 1).requires_grad_()
-        terms = objective.terms(image, alpha, iteration)
-        terms["variation"] = variation * image_variation(image)
-        values = finite_values(terms, iteration)
-        gradient = differentiated(terms, image)
-        pulled = torch.where((raw - image) * gradient < 0, 0, gradient).flatten(1).T  # [N, 3]
-        for part, given in zip(layer, pulled.split(RAYS), strict=True):
-            part.values(self.colors(part))[:, :3].backward(given)
-        return values
+
+        def backward(gradient: Tensor) -> None:
+            pulled = torch.where((raw - image) * gradient < 0, 0, gradient).flatten(1).T  # [N, 3]
+            for part, given in zip(layer, pulled.split(RAYS), strict=True):
+                part.values(self.colors(part))[:, :3].backward(given)
+
+        def added(image: Tensor) -> Terms:
+            return {"variation": self.variation * image_variation(image)}
+
+        return Painting(image, alpha, objective, backward, added)
+
+    def step(self, iteration: int) -> None:
+        """Take a step of Adam."""
+        self.optimizer.step()
+        self.optimizer.zero_grad()
 
     def colors(self, layer: Layer) -> Tensor:
         """Free colours [n, 3] of the points of a layer."""

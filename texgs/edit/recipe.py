@@ -93,7 +93,7 @@ class Recipe:
         return self.reduce or max(1, round(max(width, height) / FULL_RESOLUTION))
 
     def adapted(self, alpha: float) -> Recipe:
-        """The recipe for a scene of which pixels have this alpha, see `translucency.mean_alpha`.
+        """The recipe for a scene of which pixels have this alpha, see `canvas.mean_alpha`.
 
         Layers are averaged in a pixel of a translucent scene. Each learns as if it were opaque. A pixel shows
         the share alpha of the differences between its colours, so these are divided by it beforehand.

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
+from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.edit.color_transfer import color_map
+from texgs.core.rotation import quats_to_matrices
 from texgs.edit.recipe import Start
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.triplanar import project
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import bare_colors
+from texgs.fields.surfels.texels import EXTENT, bare_colors, owners
+
+LEAST = 1e-10  # added to the eigenvalues of covariances
+SHARPNESS = 8  # power of the normal's components that weighs the projections
+CHUNK = 1 << 18  # texels at a time
 
 
 def start_colors(
@@ -52,3 +57,83 @@ def pixel_side(model: Surfels, cameras: Sequence[Camera]) -> float:
         viewmat, K = (x.to(middle) for x in (camera.viewmat, camera.K))
         sides.append((viewmat[2, :3] @ middle + viewmat[2, 3]).abs() / K[1, 1])
     return float(torch.stack(sides).mean())
+
+
+def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
+    """The affine map x -> A x + b that gives colours the mean and covariance of a style's.
+
+    With S the covariances and m the means, A = S_style^(1/2) S_colors^(-1/2) and b = m_style - A m_colors
+    (Zhang et al. 2022, supplement; symmetric square roots). Not differentiable.
+
+    Args:
+        colors: [N, 3].
+        style: [M, 3].
+
+    Returns:
+        A [3, 3] and b [3], float64.
+    """
+    from kornia.enhance import zca_mean
+
+    for name, x in (("colors", colors), ("style", style)):
+        check.shape(name, x, "N 3")
+    (whiten, mean, _), (whiten_style, mean_style, _) = (
+        zca_mean(x.detach().double(), unbiased=False, eps=LEAST) for x in (colors, style)
+    )
+    matrix = torch.linalg.solve(whiten_style, whiten)
+    return matrix, mean_style[0] - matrix @ mean[0]
+
+
+@torch.no_grad()
+def project(parameters: Mapping[str, Tensor], picture: Tensor, pixel: float) -> Tensor:
+    """Colour of every texel [T, 3], in the list's order, from a picture that is mirrored beyond its edges.
+
+    Blended around the picture's mean by weights divided by the root of the sum of their squares, so that
+    contrast is as high where projections meet as elsewhere (Heitz and Neyret 2018).
+
+    Args:
+        parameters: of a textured model.
+        picture: [3, h, w] in [0, 1].
+        pixel: side of one of its pixels on the surface, world units.
+
+    Returns:
+        Colours in [0, 1]; black where the list has texels that no surfel owns.
+    """
+    check.shape("picture", picture, "3 h w")
+    p = parameters
+    axes = quats_to_matrices(p["quats"])  # [N, 3, 3], columns are both tangents and the normal
+    tangents = axes[:, :, :2] * p["scales"].exp()[:, None]  # of one standard deviation
+    weights = axes[:, :, 2].abs() ** SHARPNESS
+    weights = weights / weights.square().sum(1, keepdim=True).sqrt()
+    mean = picture.mean(dim=(1, 2))
+    places, surfels = owners(p)
+    colors = torch.zeros_like(p["texels"])
+    for place, surfel in zip(places.split(CHUNK), surfels.split(CHUNK), strict=True):
+        points = centres(p, place, surfel, tangents)
+        sampled = sample(picture, points / pixel) - mean  # [3, n, 3]
+        blended = torch.einsum("anc,na->nc", sampled, weights[surfel]) + mean
+        colors[place] = blended.clamp(0, 1)
+    return colors
+
+
+def centres(parameters: Mapping[str, Tensor], place: Tensor, surfel: Tensor, tangents: Tensor) -> Tensor:
+    """Centres [n, 3] in the world of the texels at `place` [n] in the list, which belong to `surfel` [n]."""
+    p = parameters
+    sizes, within = p["sizes"].long()[surfel], place - p["offsets"][surfel]
+    cells = torch.stack([within % sizes[:, 0], within // sizes[:, 0]], dim=1)
+    uv = EXTENT * ((cells + 0.5) / sizes - 0.5)  # [n, 2] standard deviations
+    return p["means"][surfel] + (tangents[surfel] @ uv[:, :, None])[:, :, 0]
+
+
+def sample(picture: Tensor, points: Tensor) -> Tensor:
+    """Colours [3, n, 3] of points [n, 3], in pixels around the picture's middle, along each of the axes.
+
+    Seen along x the picture shows z and y, along y it shows x and z, along z it shows x and y; up is +y.
+    """
+    x, y, z = points.unbind(1)
+    size = points.new_tensor(picture.shape[:0:-1])  # width and height
+    planes = torch.stack([torch.stack(pair, 1) for pair in ((z, -y), (x, z), (x, -y))])  # [3, n, 2]
+    grid = planes * 2 / size
+    sampled = F.grid_sample(
+        picture.expand(3, -1, -1, -1), grid[:, None], padding_mode="reflection", align_corners=False
+    )
+    return sampled[:, :, 0].transpose(1, 2)

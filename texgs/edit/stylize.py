@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import torch
 from torch import Tensor
@@ -13,12 +13,14 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.core.progress import progress
-from texgs.edit.objective import FeatureTerm, view_order
+from texgs.edit.canvas import mean_alpha, paint, visible_part
+from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
-from texgs.edit.style_picture import StylePicture
-from texgs.edit.style_steps import Stopwatch, StyleSteps
+from texgs.edit.style_loop import Painting, Stopwatch, learn_style
+from texgs.edit.style_picture import StylePicture, mirrored_crop
+from texgs.edit.style_start import pixel_side, start_colors
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import mean_texels, owners, recolored
 from texgs.models.vgg import Vgg
 
 
@@ -77,17 +79,10 @@ def stylize(
     _check(model, cameras, lights, surfels)
     watch = Stopwatch(model.device)
     with watch.part("start"):
-        steps = StyleSteps.prepare(model, cameras, style, recipe, vgg, clip, surfels)
-    losses: dict[str, list[float]] = defaultdict(list)
-    order = view_order(len(cameras), recipe)
-    for iteration, index in enumerate(progress(order, title=title, unit="iteration")):
-        camera = cameras[index].to(watch.device)
-        terms = steps.step(camera, lights[index], iteration, watch)
-        for name, value in terms.items():
-            losses[name].append(value)
-        if show is not None:
-            show(steps.result)
-    return Stylized(steps.result(), History(dict(losses), dict(watch.seconds)), steps.recipe)
+        run = StyleSteps.prepare(model, cameras, lights, style, recipe, vgg, clip, surfels)
+    offer = (lambda: None) if show is None else partial(show, run.result)
+    losses = learn_style(run, len(cameras), recipe, title, watch=watch, show=offer)
+    return Stylized(run.result(), History(losses, dict(watch.seconds)), run.recipe)
 
 
 def _check(
@@ -103,3 +98,103 @@ def _check(
         check.shape("surfels", surfels, "N", N=len(model))
         if surfels.dtype != torch.bool or not bool(surfels.any()):
             raise ArgumentError("surfels: expected a bool mask that chooses some, got none chosen")
+
+
+@dataclass(eq=False)
+class StyleSteps:
+    """What an edit knows from one step to the next."""
+
+    cameras: Sequence[Camera]
+    lights: Sequence[Light]
+    model: Surfels  # with the colours of its surfels taken out where they change
+    recipe: Recipe
+    style: StylePicture  # at the size at which it is behind the object
+    objective: Objective
+    texels: Tensor  # [T, 3] that learn
+    adam: torch.optim.Optimizer
+    generator: torch.Generator
+    surfels: Tensor | None  # [N] bool, those that change
+    fixed: Tensor | None  # [F] indices of texels that stay
+    owner: Tensor  # [T] surfel of each texel
+
+    @classmethod
+    def prepare(
+        cls,
+        model: Surfels,
+        cameras: Sequence[Camera],
+        lights: Sequence[Light],
+        style: StylePicture,
+        recipe: Recipe,
+        vgg: Vgg | None,
+        clip: FeatureTerm | None,
+        surfels: Tensor | None,
+    ) -> StyleSteps:
+        """Lay the style onto the surface and compute its features."""
+        p = model.parameters
+        if recipe.adapts:
+            recipe = recipe.adapted(mean_alpha(model, cameras))
+        width, height = cameras[0].width, cameras[0].height
+        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height)).vivid(recipe.chroma)
+        objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
+        colors, fixed = -p["palette"].expand_as(p["colors"]), None
+        places, surfel = owners(p)
+        owner = torch.empty_like(surfel).index_copy_(0, places, surfel)
+        moving = None if surfels is None else surfels[owner]
+        texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed, moving)
+        if not recipe.is_textured:
+            texels = mean_texels({**p, "texels": texels}).to(texels)[owner]
+        if surfels is not None:
+            colors = torch.where(surfels[:, None], colors, p["colors"])
+            fixed = (~surfels[owner]).nonzero()[:, 0]
+            texels[fixed] = p["texels"][fixed]
+        bare = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
+        texels.requires_grad_()
+        adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
+        generator = torch.Generator().manual_seed(recipe.seed)
+        return cls(
+            cameras, lights, bare, recipe, scaled, objective, texels, adam, generator, surfels, fixed, owner
+        )
+
+    def render(self, view: int) -> list[Painting]:
+        """Show a view over the style or white."""
+        recipe = self.recipe
+        canvas = paint(
+            self.model,
+            self.texels,
+            self.cameras[view].to(self.model.device),
+            self.lights[view],
+            opacity=recipe.opacity,
+            is_lit=recipe.is_lit,
+            cropped=recipe.cropped,
+            chosen=self.surfels,
+        )
+        part = visible_part(canvas.alpha) if recipe.cropped else (slice(None), slice(None))
+        color, alpha = canvas.color[:, *part], canvas.alpha[part]
+        image = (color.detach() + (1 - alpha) * self.behind(alpha)).clamp(0, 1).requires_grad_()
+        share = alpha if canvas.share is None else canvas.share[part]
+        return [Painting(image, share, self.objective, color.backward)]
+
+    def behind(self, alpha: Tensor) -> Tensor:
+        """What is behind the object [3, h, w]: white, or somewhere in the mirrored style."""
+        if self.recipe.behind == "white":
+            return alpha.new_ones(3, *alpha.shape)
+        top, left = torch.randint(1 << 20, (2,), generator=self.generator).tolist()
+        return mirrored_crop(self.style.image, top, left, *alpha.shape)
+
+    @torch.no_grad()
+    def step(self, iteration: int) -> None:
+        """A step of Adam, after which colours are in [0, 1] again."""
+        recipe = self.recipe
+        self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
+        if not recipe.is_textured:  # equal gradients keep equal what starts equal
+            p = {**self.model.parameters, "texels": self.texels.grad}
+            self.texels.grad = mean_texels(p).to(self.texels)[self.owner]  # type: ignore[arg-type]
+        self.adam.step()
+        self.adam.zero_grad(set_to_none=True)
+        self.texels.clamp_(0, 1)
+        if self.fixed is not None:
+            self.texels[self.fixed] = self.model.parameters["texels"][self.fixed]
+
+    def result(self) -> Surfels:
+        """The model with the texels as they are now."""
+        return recolored(self.model, self.texels.detach(), self.surfels)

@@ -31,16 +31,15 @@ class ArfKeys(FeatureKeys):
 
 def run(task: Task[ArfKeys]) -> EditedScene:
     """Give the models the style; write style.png."""
-    from texgs.edit.voxel_style import ArfWeights, stylize_voxels
+    from texgs.edit.voxel_style import stylize_voxels
     from texgs.volume.images import load
 
     keys, look = task.settings, style.Look.of(task)
-    added = ArfWeights(keys.content, keys.variation, keys.sh_variation, keys.ray_epochs, keys.exact)
 
     def one(name: str, model: Voxels, views: Sequence[View]) -> Voxels:
         recipe = recipe_of(keys, len(views), task.edit.seed)
         edited, look.losses[name] = stylize_voxels(
-            *(model, load(views, task.reduce), look.picture(name), recipe, added, look.vgg),
+            *(model, load(views, task.reduce), look.picture(name), recipe, keys, look.vgg),
             title=look.title(name),
         )
         return edited

@@ -36,11 +36,11 @@ class StyleRfKeys(FeatureKeys):
 
 def run(task: Task[StyleRfKeys]) -> EditedScene:
     """Give the models the styles; write style.png."""
-    from texgs.edit.palette_style import StyleRfWeights, stylize_palette
+    from texgs.edit.palette_style import stylize_palette
     from texgs.volume.images import load
 
     keys, look = task.settings, style.Look.of(task)
-    added, errors = StyleRfWeights(keys.variation, keys.distillation), {}
+    errors = {}
     pictures = [style.picture_of(name, STYLES) for name in keys.styles]
 
     def one(name: str, model: PaletteField, views: Sequence[View]) -> PaletteField:
@@ -48,7 +48,7 @@ def run(task: Task[StyleRfKeys]) -> EditedScene:
         chosen = pictures or [look.picture(name)] * len(model.colors)
         look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
         edited, look.losses[name], errors[name] = stylize_palette(
-            *(model, load(views, task.reduce), chosen, recipe, added, look.vgg), title=look.title(name)
+            *(model, load(views, task.reduce), chosen, recipe, keys, look.vgg), title=look.title(name)
         )
         return edited
 

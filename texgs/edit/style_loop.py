@@ -1,0 +1,134 @@
+"""The loop of all image-driven edits: views of a field, one after the other, bring its colours to a style."""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import NamedTuple, Protocol
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import FitError
+from texgs.core.progress import progress
+from texgs.edit.objective import LOSS_SCALE, Objective
+from texgs.edit.recipe import Recipe
+
+Terms = Mapping[str, Tensor]  # weighted losses [] by name
+
+
+class Painting(NamedTuple):
+    """What a view shows, and how it learns."""
+
+    image: Tensor  # [3, h, w] in [0, 1], a leaf that losses are differentiated by
+    share: Tensor  # [h, w] how much of each pixel is to look like the style
+    objective: Objective
+    backward: Callable[[Tensor], None]  # brings the gradient of the image to what learns
+    added: Callable[[Tensor], Terms] = lambda image: {}  # to the objective's terms
+
+
+class Paintable(Protocol):
+    """A field whose colours follow styles."""
+
+    def render(self, view: int) -> Sequence[Painting]:
+        """Show a view: one image, or one for each layer that follows a style of its own."""
+
+    def step(self, iteration: int) -> None:
+        """Follow the gradients of the last view."""
+
+
+@dataclass(eq=False)
+class Stopwatch:
+    """Seconds by part."""
+
+    device: torch.device
+    seconds: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+
+    @contextmanager
+    def part(self, name: str) -> Iterator[None]:
+        """Add the time that the block takes, on a GPU until its work is done there."""
+        begin = time.perf_counter()
+        yield
+        if self.device.type == "cuda":
+            torch.cuda.synchronize(self.device)
+        self.seconds[name] += time.perf_counter() - begin
+
+
+def learn_style(
+    paintable: Paintable,
+    views: int,
+    recipe: Recipe,
+    title: str,
+    *,
+    watch: Stopwatch | None = None,
+    show: Callable[[], None] = lambda: None,
+) -> dict[str, list[float]]:
+    """Bring a field closer to its styles, by one view in each iteration.
+
+    Args:
+        paintable: that learns.
+        views: how many it has.
+        recipe: of the losses.
+        title: of the progress bar.
+        watch: that measures the parts of iterations.
+        show: is called after each iteration.
+
+    Returns:
+        The weighted terms of the loss by name, a value for each iteration.
+
+    Raises:
+        FitError: if the loss is no longer finite.
+    """
+    watch = watch or Stopwatch(torch.device("cpu"))
+    losses: dict[str, list[float]] = defaultdict(list)
+    for iteration, view in enumerate(progress(view_order(views, recipe), title=title, unit="iteration")):
+        sums: dict[str, float] = defaultdict(float)
+        with watch.part("render"):
+            paintings = paintable.render(view)
+        for painting in paintings:
+            with watch.part("losses"):
+                terms: Terms = painting.objective.terms(painting.image, painting.share, iteration)
+                terms = {**terms, **painting.added(painting.image)}
+                for name, value in finite_values(terms, iteration).items():
+                    sums[name] += value
+            with watch.part("losses, backward"):
+                total = LOSS_SCALE * torch.stack(list(terms.values())).sum()
+                gradient = torch.autograd.grad(total, painting.image)[0] / LOSS_SCALE
+            with watch.part("render, backward"):
+                painting.backward(gradient)
+        with watch.part("update"):
+            paintable.step(iteration)
+        for name, value in sums.items():
+            losses[name].append(value)
+        show()
+    return dict(losses)
+
+
+def view_order(views: int, recipe: Recipe) -> list[int]:
+    """Which view each iteration looks at: all of them in random order once before any again."""
+    generator = torch.Generator().manual_seed(recipe.seed)
+    order: list[int] = []
+    while len(order) < recipe.iterations:
+        order += torch.randperm(views, generator=generator).tolist()
+    return order[: recipe.iterations]
+
+
+def finite_values(terms: Terms, iteration: int) -> dict[str, float]:
+    """Values of the terms of a loss."""
+    values = {name: float(term.detach()) for name, term in terms.items()}
+    if not all(map(isfinite, values.values())):
+        raise FitError(
+            f"style: the loss is not finite in iteration {iteration + 1} ({values}); lower "
+            "the rate, and look for values that are not finite in the model"
+        )
+    return values
+
+
+def image_variation(image: Tensor) -> Tensor:
+    """Mean squared difference [] of neighbouring pixels of [3, h, w], along both sides."""
+    down, right = image.diff(dim=1), image.diff(dim=2)
+    return (down.square().mean() + right.square().mean()) / 2
