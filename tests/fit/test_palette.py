@@ -154,7 +154,7 @@ def test_errors(images):
     with pytest.raises(ArgumentError, match="expected something visible in one of them, found none"):
         PaletteFit(blank, SETTINGS)
     unseen = PaletteFit(images, replace(SETTINGS, voxels=replace(VOXELS, stages=[GridStage(16, 5)])))
-    unseen.settings = replace(unseen.settings, voxels=replace(unseen.settings.voxels, prune_weight=1.0))
+    unseen.voxels.settings = replace(unseen.voxels.settings, prune_weight=1.0)
     with pytest.raises(FitError, match="expected some that show in the views, found none; lower prune_w"):
         list(unseen.run())
     broken = PaletteFit(images, replace(SETTINGS, voxels=VOXELS, rate=1e6))
