@@ -44,22 +44,6 @@ class NoisyTint(Tint):
         return 0.5 * views.images + 0.5 * (color.clamp(0, 1) * alpha + 1 - alpha)
 
 
-class NoisyStripes(Tint):
-    """Stripes on the surface that lie anywhere in every view of every call: crisp, and never the same."""
-
-    name = "noisy stripes"
-
-    def __init__(self, per_unit):
-        super().__init__((0.9, 0.9, 0.9))
-        self.per_unit = per_unit
-
-    def __call__(self, views, instruction, generator):
-        shift = torch.rand(len(views), 1, 1, generator=generator)
-        is_dark = ((views.points[..., 1] * self.per_unit + shift) % 1 < 0.5)[..., None]
-        alpha = views.alphas[..., None]
-        return torch.where(is_dark, 0.1, self.color) * alpha + 1 - alpha
-
-
 class Returns(Identity):
     """Whatever it was given."""
 

@@ -12,11 +12,11 @@ from tests.fields.voxels.test_voxels import ball as voxels
 from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError, FitError
 from texgs.edit.closeness import Closeness, differentiated
-from texgs.edit.dataset_update import azimuth, update_field
-from texgs.edit.field_views import field_views
+from texgs.edit.dataset_update import azimuth, field_views, update_field
 from texgs.edit.gaussian_learner import GaussianLearner, radii
+from texgs.edit.methods.in2n import In2nKeys
 from texgs.edit.turns import Schedule
-from texgs.edit.voxel_learner import VoxelLearner, VoxelLearning, corner
+from texgs.edit.voxel_learner import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
 from texgs.fit.settings import CommonRates
 from texgs.raster.losses import ssim
@@ -46,14 +46,14 @@ def splats(**options):
     return GaussianLearner(model, images, RATES, PIXELS, 100, **options), images
 
 
-def grid(density=0.05):
+def grid(frozen=False):
     field = voxels(degree=1)
-    learning = VoxelLearning(density=density, sh=0.05, patches=4, side=16)
-    return VoxelLearner(field, learning, PATCHES), seen(field.grid, count=5)
+    keys = In2nKeys(frozen=frozen, sh=0.05, patches=4, side=16)
+    return VoxelLearner(field, keys, PATCHES), seen(field.grid, count=5)
 
 
 LEARNERS = {"gaussians": splats, "voxels": grid}
-FROZEN = {"gaussians": lambda: splats(is_frozen=True), "voxels": lambda: grid(density=0.0)}
+FROZEN = {"gaussians": lambda: splats(is_frozen=True), "voxels": lambda: grid(frozen=True)}
 
 
 def color_of(field):

@@ -6,14 +6,13 @@ import pytest
 import torch
 from torch.testing import assert_close
 
-from tests.edit.guidances import Identity, NoisyStripes, NoisyTint, Returns, Tint, Watching
+from tests.edit.guidances import Identity, NoisyTint, Returns, Tint, Watching
 from tests.edit.textured import around, shell
 from tests.fields.surfels.samples import sample
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import Light
-from texgs.edit.axis_views import axis_cameras
-from texgs.edit.target_update import Policy, update
 from texgs.edit.target_views import render_views
+from texgs.edit.text import Policy, update
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.texels import bare_colors, owners, recolored
@@ -95,18 +94,6 @@ def test_only_chosen_surfels_change(model):
     assert (colors[place[upper[surfel]]] - torch.tensor(BLUE)).abs().mean() < 0.02
 
 
-@pytest.mark.parametrize("options", [{"sweeps": 1}, {"iterations": 30}])
-def test_later_rounds_see_the_others_as_they_are(model, options):
-    upper = model.parameters["means"][:, 1] > 0
-    guidance = Watching(BLUE)
-    policy = Policy(rounds=2, opacities=(1.0,), **options)
-    update(model, around(6), guidance, "x", policy, surfels=upper)
-    first, second = (views.images[0] for views in guidance.seen)  # from below
-    lower = (guidance.seen[0].points[0, ..., 1] < -0.2) & (guidance.seen[0].alphas[0] > 0.99)
-    assert int(lower.sum()) > 50
-    assert_close(second[lower], first[lower], atol=0.02, rtol=0)
-
-
 def test_the_palette_still_recolours(model):
     done = update(model, around(6), Tint((0.5, 0.5, 0.5)), "x", QUICK)
     shift = torch.tensor([0.2, -0.1, 0.1])
@@ -144,22 +131,6 @@ def test_refinement_sees_the_first_result(model):
     ).abs().mean() < 0.02
 
 
-def test_rounds_render_what_was_reached_and_keep_the_condition(model):
-    guidance = Watching(BLUE)
-    policy = Policy(rounds=4, group=4, opacities=(1.0,), sweeps=1)
-    done = update(model, around(6), guidance, "x", policy)
-    assert [len(views) for views in guidance.seen] == [4, 4, 4, 4]
-    first, *_, last = guidance.seen
-    originals = render_views(model, bare_colors(model), around(6), None).images
-    assert_close(first.conditions, originals[:4])
-    assert_close(last.conditions, originals[[0, 1, 2, 3]])
-    assert_close(guidance.seen[1].conditions, originals[[4, 5, 0, 1]])
-    solid = last.alphas > 0.95
-    assert (last.images[solid] - torch.tensor(BLUE)).abs().mean() < 0.02
-    assert done.images.shape == (6, 48, 48, 3)
-    assert len(done.views) == 6
-
-
 def test_same_seed_same_model(model):
     guidance = NoisyTint(BLUE, 0.2)
     one, two, other = (
@@ -168,40 +139,6 @@ def test_same_seed_same_model(model):
     )
     assert torch.equal(one, two)
     assert not torch.equal(one, other)
-
-
-def one_shot_and_iterative(model, guidance):
-    """Six axis views once, and many views again and again by Adam as IG2G does; both with frozen geometry."""
-    cameras = around(14, 40)
-    six = list(axis_cameras(cameras[0], model.parameters["means"]).values())
-    once = update(model, six, guidance, "x", Policy())
-    again = update(model, cameras, guidance, "x", Policy(rounds=3, opacities=(1.0,), iterations=120))
-    return once, again
-
-
-def disagreement(done):
-    """Mean squared difference of the edited views and what the model shows of them."""
-    cameras = list(done.views.cameras)
-    views = render_views(done.model, bare_colors(done.model), cameras, None)
-    error = (views.images - done.images).square().sum()
-    return float(error / (3 * views.alphas.sum()))
-
-
-def test_one_shot_edits_agree_with_the_model_more_than_iterative_ones():
-    """The paper's argument: the fewer inconsistent edits a place has, the less they blur each other."""
-    once, again = one_shot_and_iterative(shell(opacity=5.0), NoisyTint(BLUE, 0.15))
-    assert disagreement(once) < 0.7 * disagreement(again)
-
-
-def test_one_shot_edits_stay_crisp_where_iterative_ones_blur():
-    model = shell(opacity=5.0, texels=8)
-    once, again = one_shot_and_iterative(model, NoisyStripes(4.0))
-
-    def contrast(done):
-        views = seen(done.model)
-        return float(views.images[views.alphas > 0.95].std())
-
-    assert contrast(once) > 1.15 * contrast(again)
 
 
 def test_share_of_texels_seen(model):
@@ -257,8 +194,6 @@ def test_bad_arguments(model):
 @pytest.mark.parametrize(
     "values",
     [
-        {"rounds": 0},
-        {"group": 0},
         {"sweeps": 0},
         {"iterations": -1},
         {"rate": 0.0},

@@ -1,7 +1,5 @@
 """Text-driven editing from end to end, offline."""
 
-from dataclasses import replace
-
 import pytest
 import torch
 
@@ -9,7 +7,6 @@ from tests.edit.guidances import Tint, Watching
 from tests.edit.textured import around, shell
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
-from texgs.edit.target_update import Policy
 from texgs.edit.target_views import render_views
 from texgs.edit.text import RECIPES, edit_by_text
 from texgs.fields.surfels.texels import bare_colors, untextured
@@ -48,20 +45,11 @@ def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model
         assert (shown - mean).abs().mean() < 0.01
 
 
-def test_iterative_edits_the_views_given(model, monkeypatch):
-    quick = replace(RECIPES["iterative"], policy=Policy(rounds=2, opacities=(1.0,), iterations=5))
-    monkeypatch.setitem(RECIPES, "iterative", quick)
-    guidance = Watching((0.1, 0.2, 0.3))
-    edit_by_text(model, around(7), guidance, "x", "iterative")
-    assert [views.images.shape for views in guidance.seen] == [(7, 48, 48, 3)] * 2
-
-
-def test_recipes_are_those_of_the_paper_and_its_rivals():
-    paper, iterative = RECIPES["paper"].policy, RECIPES["iterative"].policy
-    assert (paper.rounds, paper.iterations, paper.rate, paper.final) == (1, 1500, 0.025, 1.0)
+def test_the_papers_recipe():
+    paper = RECIPES["paper"].policy
+    assert (paper.iterations, paper.rate, paper.final) == (1500, 0.025, 1.0)
     assert (paper.opacities[0], paper.opacities[-1]) == (2.0, 0.5)
     assert RECIPES["paper"].views == "nearest"
-    assert iterative.rounds * iterative.iterations == 7500
 
 
 def test_refinement_keeps_some_of_the_first_style(model):
@@ -90,7 +78,7 @@ def test_without_texture_some_surfels_have_one_colour_and_others_stay(model):
 
 
 def test_bad_arguments(model):
-    with pytest.raises(ArgumentError, match="recipe: expected one of default, paper, iterative, got 'fast'"):
+    with pytest.raises(ArgumentError, match="recipe: expected one of default, paper, got 'fast'"):
         edit_by_text(model, around(2), Tint((0, 0, 0)), "x", "fast")
     with pytest.raises(ArgumentError, match="cameras: expected those of the training views, got none"):
         edit_by_text(model, [], Tint((0, 0, 0)), "x")

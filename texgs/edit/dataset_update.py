@@ -14,11 +14,11 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import FitError
 from texgs.core.progress import progress
-from texgs.edit.field_views import field_views
 from texgs.edit.turns import Schedule, turns
 from texgs.fields.field import Field
-from texgs.models.guidance import Guidance, require_edited
+from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
+from texgs.raster.normals import depth_to_normal
 from texgs.volume.images import Images
 
 
@@ -148,3 +148,38 @@ def azimuth(camera: Camera) -> float:
     """Angle of a camera around the world's y axis, radians."""
     x, _, z = camera.position.tolist()
     return atan2(z, x)
+
+
+@torch.no_grad()
+def field_views(
+    field: Field, cameras: Sequence[Camera], conditions: Tensor, level: float | None = None
+) -> EditViews:
+    """Render views of a field for a guidance.
+
+    Points are those of the mean depth, and normals those of the surface that they make: fields without
+    surfaces have no others.
+
+    Args:
+        field: that can render depth.
+        cameras: of one size, on the field's device.
+        conditions: [V, H, W, 3] what edits stay close to.
+        level: of noise, see `EditViews`.
+    """
+    images, alphas, points, normals = [], [], [], []
+    for camera in cameras:
+        seen = field.render(camera, outputs=("depth",))
+        assert seen.depth is not None
+        images.append(seen.color.clamp(0, 1))
+        alphas.append(seen.alpha)
+        points.append(camera.unproject(seen.depth))
+        is_seen = (seen.alpha > 0)[..., None]
+        normals.append(depth_to_normal(seen.depth, camera.viewmat, camera.K) * is_seen)
+    return EditViews(
+        torch.stack(images),
+        conditions,
+        torch.stack(alphas),
+        torch.stack(points),
+        torch.stack(normals),
+        list(cameras),
+        level,
+    )

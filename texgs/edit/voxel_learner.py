@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import torch
 
@@ -14,19 +15,11 @@ from texgs.raster.voxels import Rays, Samples, camera_rays
 from texgs.volume.boxes import Box
 from texgs.volume.images import Images
 
+if TYPE_CHECKING:
+    from texgs.edit.methods.in2n import In2nKeys
+
+TV_DENSITY, TV_SH = 1e-5, 1e-3  # weights of total variation of densities and of spherical harmonics
 OCCUPY_EVERY = 50  # iterations between looks at which cells show anything, where densities learn
-
-
-@dataclass(frozen=True)
-class VoxelLearning:
-    """How a grid learns."""
-
-    density: float = 0.05  # rate of densities; 0: they stay
-    sh: float = 0.01  # rate of spherical harmonics
-    tv_density: float = 1e-5  # weight of total variation of densities
-    tv_sh: float = 1e-3  # weight of that of spherical harmonics
-    patches: int = 16  # in an iteration
-    side: int = 32  # of a patch, pixels
 
 
 class VoxelLearner:
@@ -34,12 +27,13 @@ class VoxelLearner:
 
     Args:
         field: to start from; it stays as it is.
-        learning: rates and patches.
+        keys: rates and patches.
         closeness: loss on patches, without D-SSIM.
     """
 
-    def __init__(self, field: Voxels, learning: VoxelLearning, closeness: Closeness) -> None:
-        self.original, self.learning, self.closeness = field, learning, closeness
+    def __init__(self, field: Voxels, keys: In2nKeys, closeness: Closeness) -> None:
+        self.original, self.keys, self.closeness = field, keys, closeness
+        self.density = 0.0 if keys.frozen else keys.density
         self.grid = field.grid.with_rows(field.grid.rows.clone())
         self.optimizer = VoxelOptimizer(self.grid)
         self.iteration = 0
@@ -53,7 +47,7 @@ class VoxelLearner:
     @torch.no_grad()
     def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
         """Learn from patches of these views, drawn at random around what is visible; the loss."""
-        keys, size = self.learning, images.size
+        keys, size = self.keys, images.size
         side = min(keys.side, *size)
         rays, wanted = [], []
         for place in torch.randint(len(views), (keys.patches,), generator=generator).tolist():
@@ -74,12 +68,11 @@ class VoxelLearner:
 
     def _update(self, generator: torch.Generator) -> None:
         """A step of RMSProp, with total variation of some random blocks."""
-        keys = self.learning
-        weights = (keys.tv_density if keys.density else 0.0, keys.tv_sh)
-        add_variation_of_some(self.grid, *weights, generator, self.optimizer.gradient)
-        self.optimizer.step(VoxelRates(keys.density, keys.sh, keys.sh))
+        weight = TV_DENSITY if self.density else 0.0
+        add_variation_of_some(self.grid, weight, TV_SH, generator, self.optimizer.gradient)
+        self.optimizer.step(VoxelRates(self.density, self.keys.sh, self.keys.sh))
         self.iteration += 1
-        if keys.density and self.iteration % OCCUPY_EVERY == 0:
+        if self.density and self.iteration % OCCUPY_EVERY == 0:
             self.grid.refresh_occupancy()
 
 

@@ -48,12 +48,9 @@ def schedule(keys: In2nKeys, views: int) -> Schedule:
 
 def learner(keys: In2nKeys, model: Voxels, images: Images, closeness: Closeness) -> VoxelLearner:
     """The grid, by patches."""
-    from texgs.edit.voxel_learner import VoxelLearner, VoxelLearning
+    from texgs.edit.voxel_learner import VoxelLearner
 
-    density = 0.0 if keys.frozen else keys.density
-    return VoxelLearner(
-        model, VoxelLearning(density, keys.sh, patches=keys.patches, side=keys.side), closeness
-    )
+    return VoxelLearner(model, keys, closeness)
 
 
 METHOD = update_method(

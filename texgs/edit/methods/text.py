@@ -25,9 +25,8 @@ class TextKeys(InstructionKeys):
 
     recipe: str = key(
         "default",
-        "how texels follow: solved; as in the paper; or iterative: views are edited again and again, as in "
-        "Instruct-NeRF2NeRF",
-        choices=("default", "paper", "iterative"),
+        "how texels follow: solved, or as in the paper",
+        choices=("default", "paper"),
     )
     views: str | None = key(
         None,
