@@ -24,6 +24,7 @@ SHIPPED = ROOT / "conf"
         ("experiment=demo", "fit=quick"),
         ("dataset=engine", "edit=text_untextured", "++edit.seed=3", "device=cuda"),
         ("experiment=lambda_s", "edit=wooden_mosaic"),
+        ("edit=style_paper", "fit=paper_short", "dataset=fuel"),
         ("experiment=paper_scenes", "++views.lights=[{kind: directional}]", "++fit.texture={sweeps: 7}"),
         ("experiment=failures", "tracking=none"),
         ("++views.width=7", "++views.width=8", "++views.width=7"),

@@ -6,6 +6,7 @@ configuration with a node for each, takes 0.1 s, and a run has hundreds: here th
 
 import os
 import re
+import warnings
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import asdict
@@ -17,7 +18,7 @@ from hydra._internal.config_repository import CachingConfigRepository, ConfigRep
 from hydra._internal.config_search_path_impl import ConfigSearchPathImpl
 from hydra._internal.defaults_list import create_defaults_list
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import Override
+from hydra.core.override_parser.types import Override, OverrideType
 from hydra.core.plugins import Plugins
 from omegaconf import OmegaConf
 
@@ -29,6 +30,7 @@ from texgs.core.typed import UnknownKey, mismatch
 
 Words = tuple[str, ...]
 Places = tuple[Path, ...]
+ALONE = ("fit", "edit")  # groups of which a run combines many files with those of others
 
 
 class Files:
@@ -41,20 +43,44 @@ class Files:
             path.append("texgs", f"file://{place}")
         self.repository = CachingConfigRepository(ConfigRepository(path))
         self._values: dict[str, dict[str, Any]] = {}
-        self._chosen: dict[Words, list[tuple[str, str]]] = {}
+        self._listed: dict[tuple[str, Words], list[tuple[str, str]]] = {}
 
     def is_choice(self, override: Override) -> bool:
         """Return whether an override chooses a file of a group, rather than setting a key."""
         return self.repository.group_exists(override.key_or_group) and not isinstance(override.value(), dict)
 
     def chosen(self, choices: Words) -> list[tuple[str, str]]:
-        """Return names and packages of the files that some words choose, those that count most at the end."""
-        if choices not in self._chosen:
-            listed = create_defaults_list(
-                self.repository, "config", [*map(parsed, choices)], prepend_hydra=False, skip_missing=True
-            )
-            self._chosen[choices] = [(each.config_path or "", each.package or "") for each in listed.defaults]
-        return self._chosen[choices]
+        """Return names and packages of the files that some words choose, those that count most at the end.
+
+        What a recipe or an edit consists of does not depend on other choices, unless its files override them:
+        a run, which needs all combinations, finds each once.
+        """
+        alone: dict[str, list[tuple[str, str]]] = {}
+        for word in choices:
+            override = parsed(word)
+            if override.key_or_group in ALONE and override.type is OverrideType.CHANGE:
+                files = self.listed(f"{override.key_or_group}/{override.value()}")
+                alone[override.key_or_group] = files
+        if any(package != group for group, files in alone.items() for _, package in files):
+            return self.listed("config", choices)
+        rest = tuple(word for word in choices if parsed(word).key_or_group not in alone)
+        files = self.listed("config", rest)
+        for group, own in alone.items():
+            at = next(index for index, (_, package) in enumerate(files) if package == group)
+            files = [*files[:at], *own, *(each for each in files[at:] if each[1] != group)]
+        return files
+
+    def listed(self, name: str, choices: Words = ()) -> list[tuple[str, str]]:
+        """Return the files of a configuration in the order that Hydra gives them."""
+        if (name, choices) not in self._listed:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # a recipe or an edit by itself needs no _self_
+                listed = create_defaults_list(
+                    self.repository, name, [*map(parsed, choices)], prepend_hydra=False, skip_missing=True
+                )
+            files = [(each.config_path or "", each.package or "") for each in listed.defaults]
+            self._listed[name, choices] = files
+        return self._listed[name, choices]
 
     def values(self, name: str, package: str) -> dict[str, Any]:
         """Return the values of a file, by the names of a package such as `fit`."""
