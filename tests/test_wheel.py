@@ -69,7 +69,7 @@ def project(texgs, tmp_path_factory):
 def test_the_sdist_holds_the_workflow(sdist):
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
-    assert {"Snakefile", "conf/config.yaml", "workflow/rules/fit.smk", "pyproject.toml"} <= names
+    assert {"Snakefile", "conf/config.yaml", "workflow/rules/stages.smk", "pyproject.toml"} <= names
     assert {f"workflow/profiles/{name}/profile.yaml" for name in ("local", "slurm")} <= names
 
 

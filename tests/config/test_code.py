@@ -68,6 +68,14 @@ def test_what_is_not_imported_does_not_count(tree):
     assert edit("texgs/volume/unused.py", "1", "2") == before
 
 
+def test_imports_for_types_do_not_count(tree):
+    edit, before = tree
+    guarded = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from texgs.volume.unused import X\n"
+    with_types = edit("texgs/volume/used.py", "from texgs.core", f"{guarded}from texgs.core")
+    assert with_types != before, "the import of TYPE_CHECKING itself runs"
+    assert edit("texgs/volume/unused.py", "1", "2") == with_types
+
+
 def test_stages_exist_and_differ():
     digests = {code.code_digest(stage.module) for stage in STAGES.values()}
     assert len(digests) == len({stage.module for stage in STAGES.values()})

@@ -90,7 +90,7 @@ def test_views_may_be_given(project, tmp_path):
             {"overrides": "edits=[gold] gallery.grids=[{rows:[{edit:gols}],columns:[{}]}]"},
             "texgs: gallery.grids.pictures.edit: expected one of none, gold, got gols, did you mean gold?",
         ),
-        ({"overrides": "views.fov_y=wide"}, "texgs: views.fov_y: value 'wide' of type 'str'"),
+        ({"overrides": "views.fov_y=wide"}, "texgs: views.fov_y: expected a number, got 'wide'"),
         ({"config": ("dataset=engien",)}, "texgs: dataset: expected one of"),
         ({"config": ("datset=engine",)}, "texgs: --config: expected experiment, dataset"),
         ({"overrides": "dataset.basic_tfs.TF01.opacity=[[0.2,0],[0.6,1]]"}, "TF01 and TF02: expected ranges"),

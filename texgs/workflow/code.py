@@ -46,9 +46,8 @@ class Sources:
             self._known = self._load()
         found = hashlib.sha256(source).hexdigest()
         if found not in self._known:
-            tree = ast.parse(source)
-            imported = list(imports(tree))
-            self._known[found] = [digest(ast.unparse(WithoutWords().visit(tree))), *imported]
+            tree = WithoutWords().visit(ast.parse(source))
+            self._known[found] = [digest(ast.unparse(tree)), *imports(tree)]
             self._is_new = True
         return self._known[found]
 
@@ -70,7 +69,7 @@ class Sources:
 
 
 def imports(tree: ast.AST) -> Iterator[str]:
-    """Names in texgs that a file imports anywhere, also inside functions; some are functions, not modules."""
+    """Yield what a file imports from texgs, also inside functions; some of it is functions, not modules."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
@@ -82,7 +81,10 @@ def imports(tree: ast.AST) -> Iterator[str]:
 
 
 class WithoutWords(ast.NodeTransformer):
-    """Takes out docstrings, `STAGE = ...` and help: the words of `key(...)`, `help=...`, `{"help": ...}`."""
+    """Takes out what no job runs: docstrings, `STAGE = ...`, imports for types, and help.
+
+    Help are the words of `key(...)`, `help=...` and `{"help": ...}`.
+    """
 
     def visit(self, node: ast.AST) -> ast.AST:
         """The node without them."""
@@ -90,7 +92,7 @@ class WithoutWords(ast.NodeTransformer):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             if is_text(node.body[0] if node.body else None):
                 node.body = node.body[1:] or [ast.Pass()]
-        elif isinstance(node, ast.Assign) and is_stage(node):
+        elif is_stage(node) or is_for_types(node):
             return ast.Pass()
         elif isinstance(node, ast.Call):
             node.keywords = [word for word in node.keywords if word.arg not in ("help", "description")]
@@ -103,9 +105,15 @@ class WithoutWords(ast.NodeTransformer):
         return node
 
 
-def is_stage(node: ast.Assign) -> bool:
+def is_stage(node: ast.AST) -> bool:
     """Return whether a statement says what a stage is to the workflow: its job runs something else."""
-    return any(isinstance(name, ast.Name) and name.id in ("STAGE", "STAGES") for name in node.targets)
+    names = node.targets if isinstance(node, ast.Assign) else []
+    return any(isinstance(name, ast.Name) and name.id in ("STAGE", "STAGES") for name in names)
+
+
+def is_for_types(node: ast.AST) -> bool:
+    """Return whether a statement imports what only annotations name."""
+    return isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
 
 
 def is_text(node: ast.stmt | None) -> bool:
