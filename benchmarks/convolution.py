@@ -11,7 +11,7 @@ from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
 from texgs.core.process import keep_freed_memory
-from texgs.models.precision import fast_dtype
+from texgs.models.networks import fast_dtype
 from texgs.models.vgg import STYLE_LAYERS, Vgg, by_torch, channels, rectified
 
 LAYERS = ("relu1_1", "relu1_2", "relu2_1", "relu2_2", *STYLE_LAYERS)

@@ -15,7 +15,7 @@ from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.stylize import History, stylize
 from texgs.fields.surfels.model import Surfels
-from texgs.models.precision import fast_dtype
+from texgs.models.networks import fast_dtype
 from texgs.models.vgg import Vgg
 
 ITERATIONS, FEW = 10, 2  # of a run; the latter for --quick

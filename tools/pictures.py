@@ -11,8 +11,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from texgs.core.camera import Camera, orbit
+from texgs.core.figures import content, write_grid
 from texgs.core.lens import Lens
-from texgs.core.picture_grid import content, write_grid
 from texgs.core.progress import progress
 from texgs.scene.frame import frame
 from texgs.scene.scene_file import read_scene

@@ -10,7 +10,7 @@ import torch
 
 from tests.cli.conftest import TINY, copied
 from texgs.cli.main import main
-from texgs.core.morton import z_order_of
+from texgs.core.geometry import z_order_of
 from texgs.fields.surfels.model_file import read_model
 from texgs.volume.view_set import read_views
 

@@ -6,7 +6,7 @@ from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.edit.pictures import PICTURES
-from texgs.models.filters.vocabulary import understand
+from texgs.models.instruction import understand
 from texgs.workflow.stages.edit import captions, edit_settings, edited_scene, looks_of
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.config.project import members
-from texgs.core.typed import typed
+from texgs.core.keys import typed
 from texgs.workflow.stage_table import STAGES
 
 TF = ("dataset=turbulence", "tf=TF01")

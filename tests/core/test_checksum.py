@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core import checksum
-from texgs.core.checksum import Checksums, combined, sha256
+from texgs.core.checksum import Checksums, combined, of_folders, sha256
 from texgs.core.errors import ArgumentError
 
 
@@ -80,3 +80,19 @@ def test_combined_knows_names_and_not_their_order():
     assert combined([("a", "1"), ("b", "2")]) == combined([("b", "2"), ("a", "1")])
     assert combined([("a", "1"), ("b", "2")]) != combined([("a", "2"), ("b", "1")])
     assert combined([("a", "1")]) != combined([])
+
+
+def test_digests_of_folders_differ_by_contents_and_names_but_not_by_what_python_compiled(tmp_path):
+    (tmp_path / "below").mkdir()
+    file = tmp_path / "below" / "a.py"
+    file.write_text("1")
+    digests = {of_folders(tmp_path)}
+    (tmp_path / "__pycache__").mkdir()
+    (tmp_path / "__pycache__" / "a.pyc").write_text("compiled")
+    digests.add(of_folders(tmp_path))
+    assert len(digests) == 1
+    file.write_text("2")
+    digests.add(of_folders(tmp_path))
+    file.rename(tmp_path / "b.py")
+    digests.add(of_folders(tmp_path))
+    assert len(digests) == 3

@@ -10,8 +10,7 @@ import torch
 from texgs.core import memory
 from texgs.core.errors import LONGEST, ArgumentError, OutOfMemoryError, TexgsError, printable
 from texgs.core.image import read_png
-from texgs.core.io import read_json, write_bytes
-from texgs.core.reading import reading, reading_as
+from texgs.core.io import read_json, reading, reading_as, write_bytes
 
 
 @pytest.mark.parametrize(

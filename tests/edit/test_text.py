@@ -10,7 +10,7 @@ from texgs.core.lens import Lens
 from texgs.edit.target_views import render_views
 from texgs.edit.text import RECIPES, edit_by_text
 from texgs.fields.surfels.texels import bare_colors, untextured
-from texgs.models.filters.guidance import ProceduralFilters
+from texgs.models.filters import ProceduralFilters
 from texgs.volume.cameras import icosphere
 
 

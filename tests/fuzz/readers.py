@@ -32,7 +32,7 @@ from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.texture_file import with_texture, write_texture
 from texgs.fit.checkpoint import latest
-from texgs.models.tensors import read_tensors
+from texgs.models.networks import read_tensors
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment

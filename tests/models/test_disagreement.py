@@ -7,8 +7,8 @@ from tests.edit.guidances import Tint, Watching
 from tests.models.views_of import random_views
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.models.disagreement import Disagreeing
-from texgs.models.filters.guidance import ProceduralFilters
+from texgs.models.filters import ProceduralFilters
+from texgs.models.guidance import Disagreeing
 
 GREY = (0.5, 0.5, 0.5)
 

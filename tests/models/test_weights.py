@@ -9,7 +9,7 @@ from safetensors.torch import save_file
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError, MissingDataError
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
-from texgs.models.tensors import read_tensors
+from texgs.models.networks import read_tensors
 from texgs.models.weights import available, locate
 
 CONTENT = b"weights of a model"

@@ -8,7 +8,7 @@ import torch
 
 from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
 from tests.raster.scenes import random_scene, textured_with_features
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference.render import rasterize
 from texgs.raster.reference.surfels import project
 from texgs.raster.types import OUTPUTS, Options, Texture

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from tests.raster.closed_form import CENTRE, FOCAL, HEIGHT, WIDTH, offsets, view
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference.gaussians import derivative, project
 from texgs.raster.reference.render import rasterize
 from texgs.raster.types import Options

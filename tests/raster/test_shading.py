@@ -11,7 +11,7 @@ from tests.raster.threads import require_same_bits
 from tests.volume.march import shade
 from texgs.core.camera import orbit_direction
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference import shading as definition
 from texgs.raster.shading import blinn_phong, blinn_phong_texture
 from texgs.raster.spherical_harmonics import spherical_harmonics

@@ -10,8 +10,8 @@ from PIL import Image
 
 from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
 from texgs.core.errors import ArgumentError
+from texgs.core.figures import Scale
 from texgs.core.image import write_png
-from texgs.core.picture_grid import Scale
 from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material

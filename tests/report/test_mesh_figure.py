@@ -5,8 +5,8 @@ import torch
 from PIL import Image
 
 from texgs.core.camera import orbit
+from texgs.core.geometry import quats_to_matrices
 from texgs.core.lens import Lens
-from texgs.core.rotation import quats_to_matrices
 from texgs.metrics.surface import sample
 from texgs.report.mesh_figure import CLAY, drawn, facing, lit, write_mesh_figure
 from texgs.volume.isosurface import isosurface

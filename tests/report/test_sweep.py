@@ -4,7 +4,7 @@ import pytest
 
 from tests.fields.surfels.test_composition import ball
 from texgs.core.errors import ArgumentError
-from texgs.core.picture_grid import CELL, DPI
+from texgs.core.figures import CELL, DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.metrics_files import read
 from texgs.report.sweep_figure import ACROSS, WIDTH, sweep_figure

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+from texgs.core.cache import cache_folder, weights_folder
 from texgs.core.errors import TexgsError
-from texgs.core.folders import cache_folder, weights_folder
 
 
 @dataclass(frozen=True)

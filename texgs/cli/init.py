@@ -4,8 +4,7 @@ import argparse
 from pathlib import Path
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
-from texgs.core.reading import is_there
+from texgs.core.io import is_there, write_bytes
 
 README = """\
 # A project of texgs

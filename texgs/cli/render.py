@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Render and write."""
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.core.errors import ArgumentError
     from texgs.core.movie import write_frames
     from texgs.core.progress import progress

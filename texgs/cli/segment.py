@@ -95,12 +95,12 @@ def numbers(text: str) -> tuple[float, float]:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the preview, or the segment and the scene that has it."""
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.core.image import write_png
     from texgs.core.names import new_part_file
     from texgs.edit.new_segment import clicked_model, model_name, new_segment
     from texgs.edit.preview import preview
-    from texgs.models.by_name import mask_model
+    from texgs.models.masks import mask_model
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.volume.cameras import icosphere_of
 

@@ -35,7 +35,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Write ballot.html, then key.json; print the questions."""
     from hashlib import sha256
 
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.core.errors import ArgumentError
     from texgs.core.io import write_bytes
     from texgs.report.left_out import others

@@ -38,8 +38,8 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve until Ctrl-C."""
     from aiohttp import web
 
-    from texgs.core.device import torch_device
-    from texgs.core.folders import cache_folder
+    from texgs.core.cache import cache_folder
+    from texgs.core.check import torch_device
     from texgs.viewer.guard import is_loopback, kept_token
     from texgs.viewer.opening import open_scene
     from texgs.viewer.server import Server

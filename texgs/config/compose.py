@@ -18,7 +18,7 @@ from texgs.config.project import folders
 from texgs.config.schema import Config
 from texgs.config.slips import no_such_key, sentence
 from texgs.core.errors import ConfigError
-from texgs.core.typed import UnknownKey, ValueMismatch, typed
+from texgs.core.keys import UnknownKey, ValueMismatch, typed
 
 NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
 

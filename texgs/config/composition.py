@@ -26,7 +26,7 @@ from texgs.config.describe import keys
 from texgs.config.references import resolve
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
-from texgs.core.typed import UnknownKey, mismatch
+from texgs.core.keys import UnknownKey, mismatch
 
 Words = tuple[str, ...]
 Places = tuple[Path, ...]

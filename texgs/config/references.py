@@ -8,7 +8,7 @@ from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
 from texgs.core.errors import ConfigError
-from texgs.core.typed import ValueMismatch
+from texgs.core.keys import ValueMismatch
 
 REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
 DEEPEST = 20  # references that refer to another one

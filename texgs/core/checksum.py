@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+from texgs.core.cache import cache_folder
 from texgs.core.errors import ArgumentError
-from texgs.core.folders import cache_folder
 from texgs.core.io import write_bytes
 
 CACHE = "checksums.json"  # in the cache folder
@@ -35,6 +35,17 @@ def digest(text: str) -> str:
 def combined(parts: Iterable[tuple[str, str]]) -> str:
     """Return one checksum of several names with their checksums, in any order."""
     return hashlib.sha256(json.dumps(sorted(parts)).encode()).hexdigest()
+
+
+def of_folders(*folders: Path) -> str:
+    """Return one checksum of the names and contents of all files below folders, without compiled Python."""
+    total = hashlib.sha256()
+    for folder in folders:
+        for path in sorted(folder.rglob("*")):
+            if "__pycache__" not in path.parts and path.is_file():
+                total.update(f"{path.relative_to(folder).as_posix()}\0".encode())
+                total.update(hashlib.sha256(path.read_bytes()).digest())
+    return total.hexdigest()
 
 
 class Checksums:

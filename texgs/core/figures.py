@@ -1,17 +1,34 @@
-"""Figures of Matplotlib: they are made without a screen, and the same numbers give the same bytes."""
+"""Figures of Matplotlib, made without a screen and always of the same bytes, and grids of pictures."""
 
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from PIL import Image
 
+from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from torch import Tensor
+
+DPI = 200
+LEFT, CELL, GAP = 0.3, 1.86, 0.08  # inches: the names of the rows, a cell, and what is free behind it
+COLUMNS = 5  # of a page of 10 inches; cells of a row with more are narrower
+TOP, HEAD, FOOT = 0.4, 0.25, 0.28  # inches: the title of the page, and the lines above and below a cell
+LINE = 0.15  # inches of each further line of a title
+LARGE, MEDIUM, SMALL = 11, 9, 8  # points
+LETTER = 0.6  # mean width of a letter, of its size
+CENTERED: dict[str, Any] = {"ha": "center", "va": "center"}
+THRESHOLD = 0.02  # of the brightest value
+MARGIN = 4  # pixels
 
 
 def new_figure(width: float, height: float, dpi: int, layout: str | None = "constrained") -> Figure:
@@ -44,3 +61,189 @@ def words(text: str) -> str:
         '\\$x_{'
     """
     return text.replace("$", r"\$")
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Which colours stand for which values."""
+
+    low: float
+    high: float
+    colormap: str = "viridis"
+
+    def __call__(self, values: Tensor) -> Tensor:
+        """Return colours [..., 3] of values [...]."""
+        import torch
+        from matplotlib import colormaps  # slow to import
+
+        shares = ((values - self.low) / (self.high - self.low)).clamp(0, 1)
+        return torch.from_numpy(colormaps[self.colormap](shares.numpy())[..., :3]).float()
+
+
+@dataclass(frozen=True, eq=False)
+class Cell:
+    """One picture, words in its place, or nothing."""
+
+    title: str = ""
+    pixels: Tensor | np.ndarray | None = None  # [H, W, 3] in [0, 1] or uint8
+    words: str = ""  # below the picture
+    scale: Scale | None = None  # below the picture, instead of words
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """Cells side by side."""
+
+    name: str
+    cells: Sequence[Cell]
+
+    @property
+    def head(self) -> float:
+        """Inches above the cells."""
+        lines = max(cell.title.count("\n") + 1 if cell.title else 0 for cell in self.cells)
+        return HEAD + LINE * (lines - 1) if lines else 0.0
+
+    @property
+    def foot(self) -> float:
+        """Inches below the cells."""
+        has_words = any(cell.scale or (cell.words and cell.pixels is not None) for cell in self.cells)
+        return FOOT if has_words else GAP
+
+
+def write_grid(
+    path: str | Path,
+    rows: Mapping[str, Sequence[np.ndarray | None]],
+    titles: Sequence[str],
+    below: Mapping[str, Sequence[str]] | None = None,
+) -> Path:
+    """Write a PNG with rows of pictures and a title over each column.
+
+    All show the same part of theirs, the smallest square in which one differs from its corner.
+
+    Args:
+        path: target file.
+        rows: pictures [H, W, 3] of one size by the name of the row, in [0, 1] or uint8; as many as titles.
+            A place with None stays empty.
+        titles: of the columns.
+        below: words under the pictures of each row; by default there are none.
+
+    Returns:
+        The path.
+
+    Raises:
+        ArgumentError: if a row has another number of pictures.
+    """
+    return draw(path, grid_rows(rows, titles, below), columns=len(titles))
+
+
+def grid_rows(
+    rows: Mapping[str, Sequence[np.ndarray | None]],
+    titles: Sequence[str],
+    below: Mapping[str, Sequence[str]] | None = None,
+) -> list[Row]:
+    """Return the rows of `write_grid`."""
+    for name, pictures in rows.items():
+        if len(pictures) != len(titles) or not titles:
+            raise ArgumentError(f"{name}: expected {len(titles)} pictures, got {len(pictures)}")
+    none = [""] * len(titles)
+    notes = below or dict.fromkeys(rows, none)
+    box = content([picture for pictures in rows.values() for picture in pictures if picture is not None])
+    grid = []
+    for index, (name, pictures) in enumerate(rows.items()):
+        cells = zip(none if index else titles, pictures, notes[name], strict=True)
+        grid.append(Row(name, [Cell(t, None if p is None else p[box], n) for t, p, n in cells]))
+    return grid
+
+
+def draw(path: str | Path, rows: Sequence[Row], title: str = "", columns: int = COLUMNS) -> Path:
+    """Write rows, whose pictures are of one size, as PNG; see `lay_out`."""
+    return write_figure(path, lay_out(rows, title, columns))
+
+
+def lay_out(rows: Sequence[Row], title: str = "", columns: int = COLUMNS) -> Figure:
+    """Return a figure of rows, whose pictures are of one size.
+
+    Args:
+        rows: at least one, with a picture in one of them.
+        title: line at the top.
+        columns: the page is as wide as a row of so many cells at most.
+    """
+    height, width = next(x.pixels.shape[:2] for row in rows for x in row.cells if x.pixels is not None)
+    columns = min(columns, max(len(row.cells) for row in rows))
+    across, widths = columns * (CELL + GAP), [CELL] * len(rows)
+    for index, row in enumerate(rows):
+        if len(row.cells) > columns:
+            widths[index] = across / len(row.cells) - GAP
+    heights = [wide * height / width for wide in widths]
+    top = TOP if title else GAP
+    page = top + sum(heights) + sum(row.head + row.foot for row in rows)
+    figure = new_figure(LEFT + across, page, DPI, layout=None)
+    figure.text(LEFT / (LEFT + across), 1 - 0.5 * TOP / page, words(title), fontsize=LARGE, va="center")
+    for row, wide, tall in zip(rows, widths, heights, strict=True):
+        top += row.head
+        draw_row(figure, row, top, wide, tall)
+        top += tall + row.foot
+    return figure
+
+
+def draw_row(figure: Figure, row: Row, top: float, wide: float, tall: float) -> None:
+    """Draw cells of a size at a distance from the upper border, in inches."""
+    page_width, page = figure.get_size_inches()
+
+    def axes_at(left: float, top: float, width: float, height: float) -> Axes:
+        """Return axes without ticks in a grey frame, by inches from the upper left corner."""
+        box = (left / page_width, 1 - (top + height) / page, width / page_width, height / page)
+        axes = figure.add_axes(box, xticks=[], yticks=[])
+        axes.spines[:].set(color="0.8", linewidth=0.5)
+        return axes
+
+    size = fitting([cell.title for cell in row.cells], wide)
+    for index, cell in enumerate(row.cells):
+        left = LEFT + index * (wide + GAP)
+        if cell.pixels is not None or cell.words or cell.title:
+            fill(axes_at(left, top, wide, tall), cell, size)
+        if cell.scale is not None:
+            fill_bar(axes_at(left + 0.33 * wide, top + tall + 0.07, 0.34 * wide, 0.1), cell.scale)
+    place = 0.5 * LEFT / page_width, 1 - (top + 0.5 * tall) / page
+    figure.text(*place, words(row.name), rotation=90, fontsize=fitting([row.name], tall), **CENTERED)
+
+
+def fitting(texts: Iterable[str], inches: float) -> float:
+    """Return the size of letters, points, at which the longest line of some texts has room."""
+    longest = max((len(line) for text in texts for line in text.splitlines()), default=0)
+    return min(MEDIUM, 72 * inches / (LETTER * max(longest, 1)))
+
+
+def fill(axes: Axes, cell: Cell, size: float) -> None:
+    """Draw the picture with its title above and its words below, or what there is in its place."""
+    axes.set_title(words(cell.title), fontsize=size, pad=4)
+    if cell.pixels is None:
+        axes.set_frame_on(bool(cell.words))
+        axes.text(
+            *(0.5, 0.5, cell.words), transform=axes.transAxes, family="monospace", fontsize=MEDIUM, **CENTERED
+        )
+        return
+    axes.imshow(np.asarray(cell.pixels), aspect="auto")
+    axes.set_xlabel(words(cell.words), fontsize=SMALL, labelpad=4)
+
+
+def fill_bar(axes: Axes, scale: Scale) -> None:
+    """Draw all colours of a scale, between the values of its ends."""
+    import torch
+
+    axes.imshow(scale(torch.linspace(scale.low, scale.high, 256))[None].numpy(), aspect="auto")
+    for x, value, side in ((-0.1, scale.low, "right"), (1.1, scale.high, "left")):
+        axes.text(x, 0.4, f"{value:.3g}", transform=axes.transAxes, fontsize=SMALL, ha=side, va="center")
+
+
+def content(pictures: Sequence[np.ndarray]) -> tuple[slice, slice]:
+    """Return rows and columns of the smallest square, or what fits of it, with all but the background."""
+    seen = np.zeros(pictures[0].shape[:2], dtype=bool)
+    for picture in pictures:
+        seen |= np.abs(picture.astype(float) - picture[0, 0]).max(axis=2) > THRESHOLD * picture.max()
+    if not seen.any():
+        return slice(None), slice(None)
+    places = [np.flatnonzero(seen.any(axis=axis)) for axis in (1, 0)]
+    side = max(int(at[-1] - at[0]) + 1 + 2 * MARGIN for at in places)
+    starts = [max(0, (int(at[0]) + int(at[-1]) + 1 - side) // 2) for at in places]
+    return slice(starts[0], starts[0] + side), slice(starts[1], starts[1] + side)

@@ -12,9 +12,8 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ShapeError
-from texgs.core.io import write_bytes
+from texgs.core.io import reading, write_bytes
 from texgs.core.memory import require_memory
-from texgs.core.reading import reading
 
 # Pillow opens more: some formats by other programs, which a file should not be able to start.
 FORMATS = ("PNG", "JPEG", "WEBP", "GIF", "TIFF", "BMP", "PPM", "JPEG2000", "AVIF", "TGA")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.core.reading import reading
+from texgs.core.io import reading
 
 LONGEST_HEADER = 1 << 16  # bytes
 MAGIC = b"ply"

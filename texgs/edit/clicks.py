@@ -10,7 +10,7 @@ from torch import Tensor
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.fields.bounds import REACH
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.raster import rasterize

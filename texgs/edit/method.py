@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from texgs.core.keys import typed
 from texgs.core.specifications import specifications
-from texgs.core.typed import typed
 from texgs.fields.kinds import kinds
 
 PACKAGE = "texgs.edit.methods"

@@ -10,7 +10,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.edit.recipe import Start
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.surfels.model import Surfels

@@ -11,8 +11,8 @@ from typing import Protocol
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.io import reading
 from texgs.core.progress import has_curve_logger, log_point, progress
-from texgs.core.reading import reading
 from texgs.core.tensor_file import write_tensors
 from texgs.fit.loop import CHECKED_EVERY, require_finite
 

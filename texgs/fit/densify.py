@@ -5,7 +5,7 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.fields.optimizer import Optimizer
 from texgs.fit.settings import Densify
 from texgs.raster.shading import MATERIAL

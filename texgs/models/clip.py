@@ -13,7 +13,7 @@ from torch.nn import functional as F
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError
-from texgs.models.folder import read_folder
+from texgs.models.networks import read_folder
 from texgs.models.weights import locate
 
 MEAN = (0.48145466, 0.4578275, 0.40821073)  # that CLIP normalises images with, per channel

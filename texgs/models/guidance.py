@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import torch
@@ -79,3 +79,31 @@ def require_edited(edited: Tensor, views: EditViews, name: str) -> Tensor:
     check.shape(f"images edited by {name}", edited, "V H W 3", V=count, H=height, W=width)
     check.finite(**{f"images edited by {name}": edited})
     return edited.to(views.images).clamp(0, 1)
+
+
+class Disagreeing:
+    """Another guidance, whose patterns lie elsewhere and whose colours are off in each view of each call.
+
+    Args:
+        guidance: that edits.
+        amount: standard deviation of shifts of patterns, world units, and of factors on colours.
+
+    Raises:
+        ArgumentError: if the amount is below 0.
+    """
+
+    def __init__(self, guidance: Guidance, amount: float) -> None:
+        if not amount >= 0:
+            raise ArgumentError(f"disagreement: expected 0 or more, got {amount}")
+        self.guidance, self.amount = guidance, amount
+        self.name, self.lit = f"{guidance.name} that disagree by {amount:g}", guidance.lit
+
+    def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
+        """Edited images [V, H, W, 3] over white; see `Guidance`."""
+        shifts, gains = self.amount * torch.randn(2, len(views), 1, 1, 3, generator=generator).to(
+            views.images
+        )
+        moved = replace(views, points=views.points + shifts)
+        edited = require_edited(self.guidance(moved, instruction, generator), views, self.guidance.name)
+        behind = 1 - views.alphas[..., None]  # white
+        return ((edited - behind) * (1 + gains) + behind).clamp(0, 1)

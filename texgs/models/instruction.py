@@ -1,6 +1,37 @@
-"""What a user asks for in words."""
+"""What a user asks for in words, and the words that procedural filters understand."""
+
+from __future__ import annotations
+
+import re
 
 from texgs.core.errors import ArgumentError
+
+Color = tuple[float, float, float]  # red, green, blue in [0, 1]
+
+WORDS = {  # for a filter, by its name
+    "stipple drawing": ("stipple", "stippled", "stippling", "dots", "pointillism"),
+    "pencil hatching": (
+        *("hatching", "hatched", "crosshatching", "crosshatched", "cross hatching", "cross hatched"),
+        "pencil",
+    ),
+    "woodcut": ("woodcut", "wood cut", "linocut", "engraving", "engraved"),
+    "watercolour": ("watercolour", "watercolor", "water", "aquarelle"),
+    "oil painting": ("oil", "oils", "brush strokes", "brushstrokes"),
+    "cartoon": ("cartoon", "comic", "cel shading", "cel shaded", "toon"),
+    "marble": ("marble", "stone"),
+    "wood": ("wood", "wooden"),
+    "mosaic": ("mosaic", "tiles", "tiled"),
+    "gold": ("gold", "golden"),
+    "silver": ("silver", "chrome", "steel"),
+    "copper": ("copper", "bronze"),
+}
+# Words that say nothing about the look.
+FILLERS = """
+    a an and appear as by change color coloured colored colour convert draw drawing drawn effect give have in
+    into it like look made make making object of out paint painted painting picture please render rendered
+    scene sculpture sketch style styled surface texture textured that the them this to transform turn volume
+    was were with
+"""
 
 
 def require_instruction(instruction: str) -> str:
@@ -14,3 +45,42 @@ def require_instruction(instruction: str) -> str:
             f"instruction: expected what to do in words, such as 'make it gold', got {instruction!r}"
         )
     return instruction.strip()
+
+
+def vocabulary() -> list[str]:
+    """What can be asked for, one entry each."""
+    return [*WORDS, "any named colour, such as 'make it dark red' or '#8040ff'"]
+
+
+def understand(instruction: str) -> tuple[str, Color | None]:
+    """Name of the filter that an instruction asks for, in any of the usual wordings; or a colour.
+
+    Raises:
+        ArgumentError: if it is empty, or says anything that is not in the vocabulary, which is listed.
+    """
+    text = require_instruction(instruction)
+    words = [word for word in re.findall(r"[#\w]+", text.lower()) if word not in FILLERS.split()]
+    asked = " ".join(words)
+    for name, synonyms in WORDS.items():
+        if any(asked in (word, f"{word} pencil", f"pencil {word}") for word in synonyms):
+            return name, None
+    color = named_color("".join(words))
+    if color is not None:
+        return f"colour {asked}", color
+    raise ArgumentError(
+        f"instruction: expected one of {', '.join(vocabulary())}; got {text!r}, which needs "
+        "guidance=instruct_pix2pix"
+    )
+
+
+def named_color(name: str) -> Color | None:
+    """Red, green and blue of a colour by its CSS name or as #rrggbb; None if there is no such colour."""
+    from PIL import ImageColor
+
+    if name not in ImageColor.colormap and not name.startswith("#"):
+        return None
+    try:
+        red, green, blue, *_ = ImageColor.getrgb(name)
+    except ValueError:
+        return None
+    return red / 255, green / 255, blue / 255

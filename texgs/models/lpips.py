@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.models.tensors import read_tensors
+from texgs.models.networks import read_tensors
 from texgs.models.vgg import Vgg, channels
 from texgs.models.weights import locate
 

@@ -11,10 +11,8 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core.errors import ArgumentError
-from texgs.models.folder import read_folder
 from texgs.models.masks import Remembered, check_clicks
-from texgs.models.precision import fast_dtype
-from texgs.models.tensors import read_tensors
+from texgs.models.networks import fast_dtype, read_folder, read_tensors
 from texgs.models.weights import locate
 
 MEAN = (123.675 / 255, 116.28 / 255, 103.53 / 255)  # that images are normalised with, per channel

@@ -11,8 +11,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.core import check
-from texgs.models.precision import fast_dtype
-from texgs.models.tensors import read_tensors
+from texgs.models.networks import fast_dtype, read_tensors
 from texgs.models.weights import locate
 from texgs.raster.convolution import RectifiedConvolution
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
 
+from texgs.core.cache import cache_folder, weights_folder
 from texgs.core.checksum import Checksums, combined, sha256
 from texgs.core.errors import ArgumentError, MissingDataError, first_line
-from texgs.core.folders import cache_folder, weights_folder
 from texgs.models.catalogue import CATALOGUE, File, Single, Snapshot
 
 

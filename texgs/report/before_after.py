@@ -9,10 +9,10 @@ import numpy as np
 import torch
 
 from texgs.core.camera import Camera
+from texgs.core.figures import write_grid
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.movie import write_frames
-from texgs.core.picture_grid import write_grid
 from texgs.core.progress import progress
 from texgs.fields.kinds import Kind
 from texgs.scene.frame import frame

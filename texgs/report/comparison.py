@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.picture_grid import COLUMNS, Cell, Row
+from texgs.core.figures import COLUMNS, Cell, Row
 from texgs.fields.field import Field
 from texgs.report.fit_figure import compare, draw_visible
 from texgs.volume.view_set import View

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.picture_grid import Cell, Row, Scale, draw
+from texgs.core.figures import Cell, Row, Scale, draw
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.shading import material

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.core.typed import ValueMismatch, typed
+from texgs.core.keys import ValueMismatch, typed
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.figures import Cell, Row, Scale
 from texgs.core.lens import Lens
-from texgs.core.picture_grid import Cell, Row, Scale
 from texgs.metrics.surface import Points, distances, sample
 from texgs.raster import Render, rasterize
 from texgs.report.fit_figure import VISIBLE, draw_visible

@@ -10,7 +10,7 @@ from typing import Any, Generic, TypeVar
 from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.core.typed import MissingKey, UnknownKey, ValueMismatch
+from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch
 from texgs.fit.kinds import fit_specs
 from texgs.metrics.metric import metrics
 from texgs.report.results import EditMeasures, Result, result_of

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from typing import Any, ClassVar
 
-from texgs.core.typed import typed
+from texgs.core.keys import typed
 
 
 class Result:

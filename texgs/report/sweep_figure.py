@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from PIL import Image
 
-from texgs.core.figures import as_picture, new_figure, words
-from texgs.core.picture_grid import DPI, grid_rows, lay_out
+from texgs.core.figures import DPI, as_picture, grid_rows, lay_out, new_figure, words
 from texgs.report.metrics_files import Record
 from texgs.report.sweep_table import digits_of, measured, natural, number, sweep_runs, variants
 from texgs.report.table import SOURCES

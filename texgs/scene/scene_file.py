@@ -11,11 +11,10 @@ from typing import Any
 import yaml
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
+from texgs.core.io import reading, reading_as, write_bytes
 from texgs.core.light import Light
 from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
-from texgs.core.reading import reading, reading_as
 from texgs.fields.part_edit import PartEdit, color
 from texgs.scene.scene import WHITE, Scene, SceneModel, SceneSegment
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.core.errors import ArgumentError
-from texgs.core.reading import reading
+from texgs.core.io import reading
 from texgs.study.questions import Question, Study, read_key
 
 COLUMNS = ["study", "ballot", "question", "option", "rank"]

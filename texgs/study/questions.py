@@ -15,9 +15,8 @@ from string import ascii_uppercase as LETTERS
 from typing import Any
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json, write_json
-from texgs.core.reading import reading
-from texgs.core.typed import typed
+from texgs.core.io import read_json, reading, write_json
+from texgs.core.keys import typed
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SceneResult
 

@@ -18,9 +18,9 @@ import torch
 from texgs.config.edit import Edit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
+from texgs.core.keys import typed
 from texgs.core.lens import Lens
 from texgs.core.names import part_file
-from texgs.core.typed import typed
 from texgs.edit.method import method_of
 from texgs.edit.task import EditedScene, Task
 from texgs.fields.surfels.model import Surfels

@@ -13,7 +13,7 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from texgs.core.errors import ArgumentError
 from texgs.edit.pictures import PICTURES
 from texgs.fields.files import kind_of
-from texgs.models.filters.vocabulary import WORDS
+from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 from texgs.viewer.description import bounds_of, describe

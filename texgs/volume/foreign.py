@@ -16,7 +16,7 @@ from typing import IO, Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError, OutOfMemoryError
-from texgs.core.reading import reading_as
+from texgs.core.io import reading_as
 from texgs.volume import foreign_reader  # imported here, so that it counts as code of a job
 from texgs.volume.grid import Grid, Triple, byte_count, require_room
 from texgs.volume.headers import METAIMAGE, NRRD, StoredSamples, stored_samples

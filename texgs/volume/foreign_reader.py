@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError, OutOfMemoryError, TexgsError
+from texgs.core.io import reading_as
 from texgs.core.memory import free_memory
-from texgs.core.reading import reading_as
 
 COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 BY_VTK = (".vti", ".vtk", ".slc")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.core.reading import reading_as
+from texgs.core.io import reading_as
 from texgs.volume.grid import Grid, Triple, dims_of, require_room
 from texgs.volume.slabs import ArraySource
 

@@ -9,7 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.core.reading import reading_as
+from texgs.core.io import reading_as
 from texgs.volume.grid import Dims, Grid, Triple
 from texgs.volume.headers import read_fields
 from texgs.volume.slabs import RawSource

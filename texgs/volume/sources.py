@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.reading import reading_as
+from texgs.core.io import reading_as
 from texgs.volume.foreign import open_foreign
 from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of
 from texgs.volume.nifti import open_nifti

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json, write_json
+from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.names import is_number
-from texgs.core.reading import reading_as
 from texgs.volume.transfer import TransferFunction
 
 Point = tuple[float, float, float, float]

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from texgs.core.errors import ArgumentError
+from texgs.core.io import reading_as
 from texgs.core.names import SLICES
-from texgs.core.reading import reading_as
 from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of, require_room
 from texgs.volume.slabs import ArraySource, RawSource, Source
 

@@ -13,10 +13,9 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.image import open_picture, read_rgba
-from texgs.core.io import read_json, write_json
+from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.light import Light
 from texgs.core.names import named_file
-from texgs.core.reading import reading_as
 from texgs.volume.transforms import (
     LENS_KEYS,
     camera_to_world,

@@ -15,9 +15,9 @@ from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
+from texgs.core.cache import cache_folder
 from texgs.core.checksum import digest, sha256
 from texgs.core.errors import ArgumentError
-from texgs.core.folders import cache_folder
 from texgs.core.io import write_bytes
 from texgs.core.native_sources import library_sources
 

@@ -12,8 +12,8 @@ from typing import Any
 from texgs.config.compose import compose
 from texgs.config.describe import value_at
 from texgs.config.project import members
+from texgs.core.keys import typed
 from texgs.core.plain_yaml import parse_yaml
-from texgs.core.typed import typed
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SheetResult

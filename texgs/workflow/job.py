@@ -12,8 +12,8 @@ from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_json
+from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
-from texgs.core.typed import ValueMismatch, typed
 from texgs.report.results import plain
 from texgs.workflow import result, tracked
 from texgs.workflow import tracking as track

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.config.dataset import BasicTF, Volume
+from texgs.core.cache import cache_folder
 from texgs.core.errors import ConfigError, MissingDataError
-from texgs.core.folders import cache_folder
+from texgs.core.io import is_there
 from texgs.core.names import file_name
-from texgs.core.reading import is_there
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config

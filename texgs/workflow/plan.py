@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.project import folders
-from texgs.core.checksum import digest, sha256
+from texgs.core.cache import keep, recall
+from texgs.core.checksum import digest, of_folders, sha256
 from texgs.core.errors import ConfigError
 from texgs.core.io import write_atomic
-from texgs.core.kept import fingerprint, keep, recall
 from texgs.workflow.code import ROOT
 from texgs.workflow.stage import LONG_AGO
 from texgs.workflow.stage_table import RULES, STAGES, SWEPT
@@ -116,7 +116,7 @@ def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
     """
     path = Path(".snakemake", "texgs", f"plan-{digest(repr(words))}.json")
     data = os.environ.get("TEXGS_DATA", "")
-    key = digest("\n".join([*words, data, fingerprint(ROOT / "texgs", *folders())]))
+    key = digest("\n".join([*words, data, of_folders(ROOT / "texgs", *folders())]))
     if is_job and (kept := recall(path, key)):
         with suppress(TypeError):  # of a damaged file, it is made again
             return Plan(**kept), []

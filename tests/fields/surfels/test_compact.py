@@ -13,7 +13,7 @@ from tests.fields.surfels.samples import STAGES, same, sample
 from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError, TexgsError
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.fields.surfels.compact import STEP, open_model, read_compact, seen_surfels, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.metrics.image import psnr

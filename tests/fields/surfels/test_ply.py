@@ -7,7 +7,7 @@ from plyfile import PlyData
 
 from tests.fields.surfels.ply_files import numbered, vertices
 from tests.fields.surfels.samples import same, sample
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.ply import read_ply, write_ply
 from texgs.fields.surfels.shading import ShadingModel, material, raw_material

@@ -10,12 +10,12 @@ from torch.testing import assert_close
 from tests.models.views_of import random_views
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
-from texgs.models.filters.guidance import FILTERS, ProceduralFilters
+from texgs.models.filters import FILTERS, ProceduralFilters
 from texgs.models.filters.material import GOLD, tint
 from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
 from texgs.models.filters.surface import Surface, surface_of
-from texgs.models.filters.vocabulary import WORDS
 from texgs.models.guidance import EditViews
+from texgs.models.instruction import WORDS
 
 GENERATOR = torch.Generator()
 

@@ -3,7 +3,7 @@
 import pytest
 
 from texgs.core.errors import ArgumentError
-from texgs.models.filters.vocabulary import WORDS, named_color, understand, vocabulary
+from texgs.models.instruction import WORDS, named_color, understand, vocabulary
 
 
 @pytest.mark.parametrize(

@@ -36,14 +36,14 @@ class InstructionKeys:
 
     def opened(self, device: torch.device) -> Guidance:
         """What edits the views."""
-        from texgs.models.disagreement import Disagreeing
+        from texgs.models.guidance import Disagreeing
 
         editor = self._editor(device)
         return Disagreeing(editor, self.disagreement) if self.disagreement else editor
 
     def _editor(self, device: torch.device) -> Guidance:
         """The same, whose views agree as well as they can."""
-        from texgs.models.filters.guidance import ProceduralFilters
+        from texgs.models.filters import ProceduralFilters
         from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
         from texgs.models.weights import locate
 
@@ -60,8 +60,7 @@ class InstructionKeys:
 
     def check(self) -> None:
         """Require an instruction that the guidance understands."""
-        from texgs.models.filters.vocabulary import understand
-        from texgs.models.instruction import require_instruction
+        from texgs.models.instruction import require_instruction, understand
 
         instruction = require_instruction(self.instruction)
         if self.guidance == "filters":

@@ -58,7 +58,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
     from texgs.core.names import part_file
     from texgs.edit.new_segment import model_name, new_segment
     from texgs.edit.task import EditedScene
-    from texgs.models.by_name import mask_model
+    from texgs.models.masks import mask_model
 
     settings, device = task.settings, task.device
     name = model_name(task.scene, settings.model, "edit.segment.model")
@@ -125,7 +125,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     """Write edit.png: the view clicked on with its mask, and the segment in it and around, the rest faint."""
     import torch
 
-    from texgs.core.picture_grid import write_grid
+    from texgs.core.figures import write_grid
     from texgs.edit.preview import overlay
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.cameras import orbit_path

@@ -201,7 +201,7 @@ def style_of(settings: StyleKeys, where: str) -> StylePicture:
     """The picture, of it the object that was clicked on."""
     import torch
 
-    from texgs.models.by_name import mask_model
+    from texgs.models.masks import mask_model
 
     def find(image: Tensor) -> Tensor:
         height, width = image.shape[:2]

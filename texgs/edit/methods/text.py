@@ -40,7 +40,7 @@ class TextKeys(InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
-    from texgs.core.picture_grid import write_grid
+    from texgs.core.figures import write_grid
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.fields.surfels.texels import untextured

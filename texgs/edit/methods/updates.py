@@ -36,7 +36,7 @@ class UpdateKeys(InstructionKeys):
         """The loss on views."""
         from texgs.edit.closeness import Closeness
         from texgs.models.lpips import Lpips
-        from texgs.models.precision import fast_dtype
+        from texgs.models.networks import fast_dtype
 
         network = Lpips.load(device=device, dtype=fast_dtype(device)) if self.lpips else None
         return Closeness(self.l1, self.dssim, self.lpips, network)
@@ -140,7 +140,7 @@ def noise_range(where: str, noise: Sequence[float]) -> tuple[tuple[float, float]
 
 def _write_views(path: Path, updates: dict[str, Updated]) -> None:
     """A strip of views of each model that are apart from each other, before and after."""
-    from texgs.core.picture_grid import write_grid
+    from texgs.core.figures import write_grid
 
     rows = {}
     for name, each in updates.items():

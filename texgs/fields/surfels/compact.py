@@ -17,9 +17,8 @@ from torch.nn.functional import normalize
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
+from texgs.core.io import reading, write_bytes
 from texgs.core.memory import require_memory
-from texgs.core.reading import reading
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import describe, model_of, read_model
 from texgs.fields.surfels.texels import mean_texels, owners

@@ -12,8 +12,8 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.geometry import quats_to_matrices
 from texgs.core.ply_file import read_vertices
-from texgs.core.rotation import quats_to_matrices
 from texgs.fields.ply_columns import (
     numbered,
     splat_columns,

@@ -10,9 +10,9 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
+from texgs.core.io import reading
 from texgs.core.memory import require_memory
-from texgs.core.reading import reading
-from texgs.core.torch_file import load_torch
+from texgs.core.tensor_file import load_torch
 from texgs.raster import Texture
 from texgs.raster.arguments import check_texture
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.morton import z_order
+from texgs.core.geometry import z_order
 from texgs.volume.images import Images
 
 AROUND = 6  # pixels around what is visible; the visual hull keeps all others empty

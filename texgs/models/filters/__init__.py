@@ -1,1 +1,69 @@
-"""Filters that answer a documented vocabulary of instructions, for machines without a diffusion model."""
+"""The offline counterpart of a diffusion model: a guidance made of procedural filters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ArgumentError
+from texgs.models.filters import ink, material, paint
+from texgs.models.filters.surface import Surface, surface_of
+from texgs.models.guidance import EditViews
+from texgs.models.instruction import understand
+
+Filter = Callable[[Surface], Tensor]
+
+FILTERS: dict[str, Filter] = {  # by the names of the vocabulary
+    "stipple drawing": ink.stipple,
+    "pencil hatching": ink.hatching,
+    "woodcut": ink.woodcut,
+    "watercolour": paint.watercolour,
+    "oil painting": paint.oil,
+    "cartoon": paint.cartoon,
+    "marble": material.marble,
+    "wood": material.wood,
+    "mosaic": material.mosaic,
+    "gold": partial(material.metal, tones=material.GOLD),
+    "silver": partial(material.metal, tones=material.SILVER),
+    "copper": partial(material.metal, tones=material.COPPER),
+}
+
+
+class ProceduralFilters:
+    """Edits views by filters that are anchored to the surface: no weights, milliseconds to seconds.
+
+    Every filter is a solid texture, a function of the place in the world that a pixel shows and of light
+    that is fixed there, so that all views of a call agree and a texture lifted from them is crisp; the size
+    of patterns and the brightest and the mean colour are those of these views. It answers the entries of
+    `vocabulary` only. It wants to see bare colours: what it paints is what light falls on.
+
+    Args:
+        scale: factor on the size of patterns; 1 gives about 26 of them along the scene.
+        seed: of patterns. They do not depend on the generator of a call, so that one call goes on with what
+            another has begun.
+
+    Raises:
+        ArgumentError: if the scale is not positive.
+    """
+
+    name = "procedural filters"
+    lit = False
+
+    def __init__(self, scale: float = 1.0, seed: int = 0) -> None:
+        if not scale > 0:
+            raise ArgumentError(f"scale: expected a factor above 0, got {scale}")
+        self.scale, self.seed = scale, seed
+
+    @torch.no_grad()
+    def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
+        """Edit the views; see `Guidance`."""
+        name, color = understand(instruction)
+        function = FILTERS[name] if color is None else partial(material.tint, color=color)
+        surface, where = surface_of(views, self.scale, self.seed)
+        edited = views.images.clone()
+        alpha = views.alphas[where][:, None]
+        edited[where] = function(surface) * alpha + 1 - alpha
+        return edited

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference.fragments import Fragments, alpha_of, depth_order, half_extents, largest_rho
 from texgs.raster.types import Options
 

@@ -9,7 +9,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from texgs.core.rotation import quats_to_matrices
+from texgs.core.geometry import quats_to_matrices
 
 
 def blinn_phong_texture(

@@ -29,7 +29,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     It reads model.safetensors of each basic TF, by its name.
     """
     from texgs.core.camera import orbit
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.core.movie import write_frames
     from texgs.scene.frame import frame
     from texgs.scene.scene import Scene, SceneModel

@@ -50,7 +50,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `scene`, and for each model `views.MODEL`, the transforms_train.json of its views.
     """
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.edit.task import Task
     from texgs.report.before_after import write_before_and_after
     from texgs.report.loss_figures import write_convergence

@@ -35,7 +35,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `scene`, edited, `before`, as fitted, and `geometry`, the scene whose depth is taken.
     """
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.metrics.metric import MeasuredScene, values_of
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral, spread

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
-from texgs.core.typed import typed
+from texgs.core.keys import typed
 from texgs.fit.kinds import FitSpec, fit_specs
 from texgs.report.results import FitResult
 from texgs.workflow.inputs import is_fit_of, recipe, view_set
@@ -32,7 +32,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `views`, the transforms_train.json.
     """
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.fit import checkpoint
     from texgs.fit.kinds import FitTask
     from texgs.volume.images import load

@@ -56,7 +56,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads scenes by the names that pictures have for them, and `volume` where one shows it.
     """
-    from texgs.core.picture_grid import write_grid
+    from texgs.core.figures import write_grid
 
     renderer, shown, captions = GalleryRenderer(settings, inputs, settings.size), [], {}
     for grid in settings.grids:

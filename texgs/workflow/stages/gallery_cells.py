@@ -48,7 +48,7 @@ class GalleryRenderer:
     """
 
     def __init__(self, settings: OfScene, inputs: Mapping[str, Path], size: int) -> None:
-        from texgs.core.device import torch_device
+        from texgs.core.check import torch_device
         from texgs.workflow.stages.volume_scene import VolumeScene
 
         self._device, self._lens = torch_device(settings.fit.device), settings.views.lens

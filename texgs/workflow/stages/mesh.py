@@ -47,7 +47,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `model`, of the last phase of a fit; `views`, the transforms_train.json; `volume`.
     """
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.fields.files import open_field
     from texgs.metrics.surface import compare, sample, seen
     from texgs.report.mesh_figure import write_mesh_figure

@@ -45,7 +45,7 @@ def run_phase(
         The model, the seconds of all runs together, and the losses that they looked at. Surfels lie along a
         Z curve: what a tile of a view shows is then mostly together in memory, texels above all.
     """
-    from texgs.core.morton import z_order_of
+    from texgs.core.geometry import z_order_of
     from texgs.fields.surfels.model import Surfels
     from texgs.fit.checkpoint import FOLDER, run_to_end
     from texgs.fit.densify import is_shared

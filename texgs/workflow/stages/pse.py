@@ -47,8 +47,8 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `scene`, the scene.yaml, and `volume`, the volume.nrrd, where there is one.
     """
-    from texgs.core.device import torch_device
-    from texgs.core.picture_grid import write_grid
+    from texgs.core.check import torch_device
+    from texgs.core.figures import write_grid
     from texgs.scene.scene_file import read_scene, write_scene
     from texgs.volume.cameras import orbit_path
     from texgs.workflow.stages.volume_scene import VolumeScene

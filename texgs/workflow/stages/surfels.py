@@ -44,7 +44,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     import torch
 
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.fields.harmonics import join, split, zeroth
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import write_model

@@ -27,7 +27,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `model`, of the stage before, and `views`, the transforms_train.json.
     """
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.fields.surfels.model_file import read_model, write_model
     from texgs.fit.texels import texturize
     from texgs.volume.images import load

@@ -21,7 +21,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     import torch
 
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.metrics.timing import FRAMES, milliseconds
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral, spread

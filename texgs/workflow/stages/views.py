@@ -92,7 +92,7 @@ def appearance_of(views: ViewKeys) -> Appearance:
 
 def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
     """Return the caster on the CPU or a GPU, or VTK."""
-    from texgs.core.device import torch_device
+    from texgs.core.check import torch_device
     from texgs.volume.caster import Caster
 
     if kind == "vtk":

@@ -3,7 +3,7 @@ import pytest
 from PIL import Image
 
 from texgs.core.errors import ArgumentError
-from texgs.core.picture_grid import CELL, DPI, FOOT, GAP, HEAD, LEFT, content, write_grid
+from texgs.core.figures import CELL, DPI, FOOT, GAP, HEAD, LEFT, content, write_grid
 
 
 def picture(rows, columns, size=(60, 80), value=0.2):

@@ -1,7 +1,7 @@
 import pytest
 import torch
 
-from texgs.models import precision
+from texgs.models import networks
 
 
 @pytest.mark.parametrize(
@@ -15,11 +15,11 @@ from texgs.models import precision
 )
 def test_the_format_is_what_the_processor_says(tmp_path, monkeypatch, text, expected):
     (tmp_path / "cpuinfo").write_text(text)
-    monkeypatch.setattr(precision, "CPUINFO", tmp_path / "cpuinfo")
-    precision.has_bfloat16.cache_clear()
-    assert precision.fast_dtype("cpu") == expected
-    assert precision.fast_dtype(torch.device("cuda")) == torch.float16
-    monkeypatch.setattr(precision, "CPUINFO", tmp_path / "none")
-    precision.has_bfloat16.cache_clear()
-    assert precision.fast_dtype("cpu") == torch.float32
-    precision.has_bfloat16.cache_clear()
+    monkeypatch.setattr(networks, "CPUINFO", tmp_path / "cpuinfo")
+    networks.has_bfloat16.cache_clear()
+    assert networks.fast_dtype("cpu") == expected
+    assert networks.fast_dtype(torch.device("cuda")) == torch.float16
+    monkeypatch.setattr(networks, "CPUINFO", tmp_path / "none")
+    networks.has_bfloat16.cache_clear()
+    assert networks.fast_dtype("cpu") == torch.float32
+    networks.has_bfloat16.cache_clear()

@@ -1,0 +1,45 @@
+"""Rotations of quaternions, and an order of points that keeps neighbours in space near in memory."""
+
+import torch
+from torch import Tensor
+
+from texgs.core.errors import ShapeError
+
+BITS = 10  # of each coordinate in a box: cells of a thousandth of its sides
+
+
+def quats_to_matrices(quats: Tensor) -> Tensor:
+    """Return the rotation matrices [..., 3, 3] of quaternions [..., 4] wxyz; columns are the rotated axes.
+
+    Differentiable. A quaternion is normalised first, so its length does not matter unless it is zero.
+    """
+    from kornia.geometry.conversions import quaternion_to_rotation_matrix
+
+    if quats.ndim < 1 or quats.shape[-1] != 4:
+        raise ShapeError(f"quats: expected [..., 4], got {list(quats.shape)}")
+    matrices: Tensor = quaternion_to_rotation_matrix(quats)
+    return matrices
+
+
+def z_order(cells: Tensor) -> Tensor:
+    """Return the order [N], int64, of cells along a Z curve (Morton 1966); equal ones keep theirs.
+
+    Args:
+        cells: [N, D] whole numbers of 0 or more; D times their bits have to fit into 63.
+    """
+    axes = cells.shape[1]
+    code = cells.new_zeros(len(cells), dtype=torch.long)
+    bits = int(cells.max()).bit_length() if len(cells) else 0
+    for bit in range(bits):
+        for axis in range(axes):
+            code |= (cells[:, axis].long() >> bit & 1) << (axes * bit + axis)
+    return code.argsort(stable=True)
+
+
+def z_order_of(points: Tensor) -> Tensor:
+    """Return the order [N] of points [N, D] along a Z curve through the cells of their bounding box."""
+    if not len(points):
+        return points.new_zeros(0, dtype=torch.long)
+    low, high = points.aminmax(dim=0)
+    cells = (points - low) / (high - low).clamp_min(torch.finfo(points.dtype).tiny) * (2**BITS - 1)
+    return z_order(cells.long())
