@@ -12,7 +12,7 @@ from benchmarks import scenes, workload
 from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.raster import losses, normals, shading, spherical_harmonics
+from texgs.raster import losses, normals, shading
 from texgs.raster.reference import losses as definition
 from texgs.raster.reference import shading as shading_definition
 
@@ -93,7 +93,7 @@ def surfels(settings: Settings) -> Iterator[Comparison]:
     yield Comparison("blinn_phong", pair, learned, (position,))
     sh = 0.2 * torch.randn(n, 16, 3, generator=generator).to(device)
     pair = {
-        "texgs": spherical_harmonics.spherical_harmonics,
+        "texgs": shading.spherical_harmonics,
         "torch": shading_definition.spherical_harmonics,
     }
     yield Comparison("spherical_harmonics, degree 3", pair, [sh, made["means"]], (position,))

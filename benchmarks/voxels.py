@@ -8,8 +8,7 @@ from benchmarks.report import Section
 from benchmarks.scenes import camera
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.raster.voxel_colors import drop_sh
-from texgs.raster.voxel_grid import VoxelGrid, pack_rows, voxel_grid
+from texgs.raster.voxel_grid import VoxelGrid, drop_sh, pack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates
 from texgs.raster.voxels import March, Rays, Samples, camera_rays, render_view
 

@@ -10,8 +10,7 @@ from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything, voxels
 from texgs.raster.losses import bilateral_smoothness, l1_dssim
 from texgs.raster.normals import normal_consistency
-from texgs.raster.shading import blinn_phong_texture
-from texgs.raster.spherical_harmonics import spherical_harmonics
+from texgs.raster.shading import blinn_phong_texture, spherical_harmonics
 
 pytestmark = pytest.mark.emulated
 

@@ -21,8 +21,7 @@ from texgs.edit.voxel_style import (
     recolored_images,
     stylize_voxels,
 )
-from texgs.raster.voxel_colors import drop_sh
-from texgs.raster.voxel_grid import unpack_rows
+from texgs.raster.voxel_grid import drop_sh, unpack_rows
 from texgs.raster.voxels import render_view
 from texgs.volume.images import Images
 

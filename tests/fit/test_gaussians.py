@@ -13,7 +13,7 @@ from texgs.fit.loop import Fit
 from texgs.fit.seeds import seed_gaussians
 from texgs.fit.settings import CommonRates, Densify, Seeds
 from texgs.metrics.quality import evaluate, mean
-from texgs.raster.spherical_harmonics import Y00
+from texgs.raster.shading import Y00
 from texgs.volume.view_set import View, ViewSet
 
 from .scenes import SIZE, ball_images, is_finite, run

@@ -11,7 +11,7 @@ from tests.raster.scenes import gaussians, random_scene, textured, textured_with
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import autograd, native
 from texgs.raster.api import rasterize, splat
-from texgs.raster.autograd import Frame, SurfelTensors, View
+from texgs.raster.autograd import SurfelTensors, View
 from texgs.raster.reference import rasterize as reference
 from texgs.raster.types import Options, Texture
 
@@ -133,12 +133,12 @@ def test_scales_of_nothing(render, columns):
 
 def test_library_refuses_what_gaussians_do_not_have():
     scene = gaussians(random_scene())
-    view = View(scene.viewmat, scene.K, 8, 8, None, None, None, frozenset(), Options())
+    view = View(scene.viewmat, scene.K, 8, 8)
     geometry = (scene.means, scene.quats, scene.scales, scene.opacities)
     handle = ctypes.c_void_p()
 
     def forward(surfels, **images):
-        image = autograd.Image(**{name: native.address(x) for name, x in images.items()})
+        image = autograd.Image(**images)
         native.call(
             "texgs_forward",
             *view.structures(surfels),
@@ -159,10 +159,10 @@ def test_library_refuses_what_gaussians_do_not_have():
 
 def test_library_refuses_what_is_not_of_the_forward_call():
     scene = random_scene()
-    view = View(scene.viewmat, scene.K, 8, 8, None, None, None, frozenset(), Options())
+    view = View(scene.viewmat, scene.K, 8, 8)
     surfels = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
     color, alpha = torch.empty(scene.features.shape[1], 8, 8), torch.empty(8, 8)
-    image = autograd.Image(color=native.address(color), alpha=native.address(alpha))
+    image = autograd.Image(color=color, alpha=alpha)
     handle = ctypes.c_void_p()
 
     def call(name, *arguments, of=surfels, view=view):
@@ -173,15 +173,13 @@ def test_library_refuses_what_is_not_of_the_forward_call():
     )
     for name in ("depth", "median", "distortion"):
         with pytest.raises(ArgumentError, match="a gradient of depth, median or distortion without"):
-            call(
-                "texgs_backward", image, autograd.Image(**{name: native.address(alpha)}), autograd.Gradients()
-            )
+            call("texgs_backward", image, autograd.Image(**{name: alpha}), autograd.Gradients())
     fewer = SurfelTensors(*(None if x is None else x[1:] for x in surfels))
     with pytest.raises(ArgumentError, match="frame: expected as many surfels, scales and channels as"):
         call("texgs_backward", image, autograd.Image(), autograd.Gradients(), of=fewer)
     with pytest.raises(ArgumentError, match="frame: expected an image as large as in the forward call"):
         call("texgs_contribute", autograd.Contributions(), view=replace(view, width=9))
-    Frame(handle.value, torch.device("cpu"))  # gives it back
+    native.function(native.library(), "texgs_release")(handle)
 
 
 def test_library_refuses_colours_that_do_not_add_up():
@@ -189,7 +187,7 @@ def test_library_refuses_colours_that_do_not_add_up():
     texture = scene.texture
     tensors = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
     colored = tensors._replace(base=texture.base, gain=texture.gain, texels=texture.texels)
-    view = View(scene.viewmat, scene.K, 8, 8, None, texture.sizes, texture.offsets, frozenset(), Options())
+    view = View(scene.viewmat, scene.K, 8, 8, sizes=texture.sizes, offsets=texture.offsets)
 
     def forward(surfels, channels):
         structures = view.structures(surfels)

@@ -6,9 +6,8 @@ import torch
 from tests.raster.threads import require_same_bits
 from tests.raster.voxel_scenes import SPACING, voxel_scene
 from texgs.core.errors import DeviceError
-from texgs.raster.ray_points import ray_points
 from texgs.raster.voxel_grid import interpolate_rows
-from texgs.raster.voxels import March, render_rays
+from texgs.raster.voxels import March, ray_points, render_rays
 
 
 @pytest.mark.parametrize("transmittance_min", [0.0, 0.1])

@@ -13,8 +13,7 @@ from texgs.core.camera import orbit_direction
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference import shading as definition
-from texgs.raster.shading import blinn_phong, blinn_phong_texture
-from texgs.raster.spherical_harmonics import spherical_harmonics
+from texgs.raster.shading import blinn_phong, blinn_phong_texture, spherical_harmonics
 from texgs.volume.appearance import Appearance
 
 CAMERA = torch.tensor([0.5, 1.0, 3.0])

@@ -162,7 +162,7 @@ def test_any_number_of_threads_gives_the_same_bits():
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
-        ((ONES, ONES.transpose(0, 1)), ShapeError, r"target: expected \[4, 5, 3\] as image, got \[5, 4, 3\]"),
+        ((ONES, ONES.transpose(0, 1)), ShapeError, r"target: expected \[4, 5, 3\], got \[5, 4, 3\]"),
         ((ONES[0, 0], ONES[0, 0]), ShapeError, r"image: expected \[H, W, C\], got \[3\]"),
         ((ONES[:0], ONES[:0]), ShapeError, "image: expected at least one pixel"),
         ((ONES.double(), ONES), ArgumentError, "image: expected float32, got float64"),

@@ -5,8 +5,7 @@ import torch
 
 from tests.raster.voxel_scenes import voxel_scene
 from texgs.core.errors import ShapeError
-from texgs.raster.voxel_colors import drop_sh, recolored
-from texgs.raster.voxel_grid import unpack_rows
+from texgs.raster.voxel_grid import drop_sh, recolored, unpack_rows
 from texgs.raster.voxels import March, render_rays
 
 MATRIX = torch.tensor([[0.8, 0.2, 0.0], [0.1, 0.5, -0.2], [0.0, 0.3, 0.9]])

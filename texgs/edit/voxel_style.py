@@ -19,9 +19,8 @@ from texgs.edit.style_start import color_map
 from texgs.fields.voxels.model import Voxels
 from texgs.fields.voxels.rays import training_rays
 from texgs.models.vgg import Vgg
-from texgs.raster.spherical_harmonics import Y00
-from texgs.raster.voxel_colors import GREY, drop_sh, recolored
-from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster.shading import Y00
+from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolored
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import Rays, Samples, camera_rays
 from texgs.volume.images import Images

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import torch
 from torch import Tensor
 
-from texgs.raster.spherical_harmonics import Y00
+from texgs.raster.shading import Y00
 
 
 def zeroth(colors: Tensor) -> Tensor:

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.raster.spherical_harmonics import DEGREES
+from texgs.raster.shading import DEGREES
 
 
 def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[str, Tensor]:

@@ -105,17 +105,14 @@ def splat(
     Returns:
         Sums [N, C] over all pixels of blending weight times image, and the sums [N] of the weights.
     """
-    size = check.shape("image", image, "H W C")
-    n = check.shape("means", means, "N 3")["N"]
-    check.floating("image", image)
-    check.same_device(means=means, image=image)
+    size = arguments.require({"image": (image, "H W C"), "means": (means, "N 3")})
     arguments.channels("image", size["C"])
     if options.check_finite:
         check.finite(image=image)
     geometry = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
     camera = {"viewmat": viewmat, "K": K}
     with torch.no_grad():
-        surfels = arguments.surfel_tensors(geometry, None, image.new_zeros(n, 1), None)
+        surfels = arguments.surfel_tensors(geometry, None, image.new_zeros(size["N"], 1), None)
         view = arguments.view(surfels, camera, (size["W"], size["H"]), None, (), options)
         frame = bin_surfels(surfels, view, {})
         sums, weights, _, _ = contribute(frame, surfels, view, image.permute(2, 0, 1).contiguous())

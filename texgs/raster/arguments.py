@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection
 from math import isfinite
 from operator import index
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster import native
 from texgs.raster.autograd import SurfelTensors, View
 from texgs.raster.types import OUTPUTS, Options, Texture, check_primitive
@@ -21,47 +22,64 @@ MOST_TEXELS = 2**24  # of one surfel: the library counts them in 32-bit floats
 MAX_SIDE = 2**20 - 16  # pixels; the library counts tiles of 16 of them in 16 bits
 ROUNDING = 1e-4  # of a matrix that was inverted or multiplied
 BYTES_PER_SURFEL = 512  # records, footprints, sorting, a few tiles: what no scene stays below
-AXES = {  # after N
-    "means": "3",
-    "quats": "4",
-    "scales": "2|3",  # surfels or 3D Gaussians
-    "opacities": "",
-    "shift": "2",
-    "features": "C",
-    "base": "3",
-    "gain": "",
+AXES = {
+    "means": "N 3",
+    "quats": "N 4",
+    "scales": "N 2|3",  # surfels or 3D Gaussians
+    "opacities": "N",
+    "shift": "N 2",
+    "features": "N C",
+    "base": "N 3",
+    "gain": "N",
+    "texels": "T 3",
 }
+
+
+Inputs = dict[str, tuple[Tensor, str]]  # tensors with their axes, as `check.shape` takes them, by name
+
+
+def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -> dict[str, int]:
+    """Return the sizes of the axes of tensors; require their shapes, float32 and one device.
+
+    `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
+    """
+    sizes: dict[str, int] = {}
+    for name, (tensor, axes) in tensors.items():
+        sizes |= check.shape(name, tensor, axes, **sizes)
+    given = {name: tensor for name, (tensor, _) in tensors.items()}
+    for name, tensor in given.items():
+        check.floating(name, tensor)
+        if cpu and tensor.device.type != "cpu":
+            raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
+    check.same_device(**given)
+    check.constant(**{name: given[name] for name in constant})
+    return sizes
+
+
+def require_image(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -> None:
+    """Require the same as `require`, and at least one pixel."""
+    if 0 in require(tensors, constant=constant, cpu=cpu).values():
+        name, (image, _) = next(iter(tensors.items()))
+        raise ShapeError(f"{name}: expected at least one pixel, got {list(image.shape)}")
 
 
 def surfel_tensors(
     geometry: dict[str, Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
 ) -> SurfelTensors:
     """Return all tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities."""
-    tensors = geometry | _colors(features, texture)
-    if shift is not None:
-        tensors["shift"] = shift
-    sizes: dict[str, int] = {}
-    for name, axes in AXES.items():
-        if name in tensors:
-            sizes |= check.shape(name, tensors[name], f"N {axes}", **sizes)
+    if features is None and texture is None:
+        raise ArgumentError("rasterize: expected features, a texture or both, got neither")
+    tensors = dict(geometry)
+    if texture is not None:
+        tensors |= {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
+    tensors |= {name: x for name, x in (("shift", shift), ("features", features)) if x is not None}
+    sizes = require({name: (tensors[name], axes) for name, axes in AXES.items() if name in tensors})
     if texture is not None:
         check_texture(texture, sizes["N"])
     if features is not None:
         channels("features", sizes["C"], MAX_CHANNELS - (0 if texture is None else TEXTURE_CHANNELS))
-    for name, tensor in tensors.items():
-        check.floating(name, tensor)
-    device = check.same_device(**tensors)
-    native.require_memory(BYTES_PER_SURFEL * sizes["N"], device)
+    native.require_memory(BYTES_PER_SURFEL * sizes["N"], tensors["means"].device)
     return SurfelTensors(**{name: x.contiguous() for name, x in tensors.items()})
-
-
-def _colors(features: Tensor | None, texture: Texture | None) -> dict[str, Tensor]:
-    if features is None and texture is None:
-        raise ArgumentError("rasterize: expected features, a texture or both, got neither")
-    colors = {} if features is None else {"features": features}
-    if texture is not None:
-        colors |= {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
-    return colors
 
 
 def check_texture(texture: Texture, n: int) -> None:
@@ -126,7 +144,10 @@ def view(
     options: Options,
 ) -> View:
     """Check the rest; `camera` holds viewmat, K and perhaps background, `size` is (width, height)."""
-    _check_camera(camera, surfels)
+    axes = {"viewmat": "4 4", "K": "3 3", "background": f"{surfels.channels}"}
+    cameras = {name: (tensor, axes[name]) for name, tensor in camera.items()}
+    require({"means": (surfels.means, "N 3"), **cameras}, constant=camera)
+    pinhole(camera["viewmat"], camera["K"])
     if isinstance(outputs, str):
         raise ArgumentError(f"outputs: expected a collection of names, got a string; pass ({outputs!r},)")
     wanted = frozenset(outputs)
@@ -145,30 +166,10 @@ def view(
         check.finite(**surfels._asdict(), **camera)
     planes = surfels.channels + 3 * len(wanted) + 2
     native.require_memory(4 * planes * width * height, surfels.means.device)
-    dense = {name: x.detach().contiguous() for name, x in camera.items()}
-    return View(
-        viewmat=dense["viewmat"],
-        K=dense["K"],
-        width=width,
-        height=height,
-        background=dense.get("background"),
-        sizes=None if texture is None else texture.sizes.contiguous(),
-        offsets=None if texture is None else texture.offsets.contiguous(),
-        outputs=wanted,
-        options=options,
-    )
-
-
-def _check_camera(camera: dict[str, Tensor], surfels: SurfelTensors) -> None:
-    check.shape("viewmat", camera["viewmat"], "4 4")
-    check.shape("K", camera["K"], "3 3")
-    if "background" in camera:
-        check.shape("background", camera["background"], "C", C=surfels.channels)
-    for name, tensor in camera.items():
-        check.floating(name, tensor)
-    check.same_device(means=surfels.means, **camera)
-    check.constant(**camera)
-    pinhole(camera["viewmat"], camera["K"])
+    constants: dict[str, Any] = {name: x.detach().contiguous() for name, x in camera.items()}
+    if texture is not None:
+        constants |= {"sizes": texture.sizes.contiguous(), "offsets": texture.offsets.contiguous()}
+    return View(width=width, height=height, outputs=wanted, options=options, **constants)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:

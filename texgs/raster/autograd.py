@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import ctypes
-import weakref
-from ctypes import Structure, c_float, c_int32, c_int64, c_void_p
+from ctypes import byref
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,59 +10,51 @@ import torch
 from torch import Tensor
 
 from texgs.raster import native
-from texgs.raster.types import Options, Statistics
+from texgs.raster.types import DEFAULT_OPTIONS, Options, Statistics
 
 IMAGES = ("color", "alpha", "depth", "median", "normal", "distortion")
 
 
-def _fields(pointers: str, **numbers: type) -> list[tuple[str, type]]:
-    return [(name, c_void_p) for name in pointers.split()] + list(numbers.items())
-
-
-class Surfels(Structure):
+class Surfels(native.Struct):
     """`texgs_surfels`."""
 
-    _fields_ = [
-        ("n", c_int64),
-        ("axes", c_int32),
-        *_fields("means quats scales opacities shift", channels=c_int32),
-        *_fields("features base gain texels sizes offsets", n_texels=c_int64),
-    ]
+    _fields_ = native.fields(
+        "n n, i axes, p means quats scales opacities shift, i channels, "
+        "p features base gain texels sizes offsets, n n_texels"
+    )
 
 
-class Camera(Structure):
+class Camera(native.Struct):
     """`texgs_camera`."""
 
-    _fields_ = _fields("viewmat K", width=c_int32, height=c_int32)
+    _fields_ = native.fields("p viewmat K, i width height")
 
 
-class RenderOptions(Structure):
+class RenderOptions(native.Struct):
     """`texgs_options`."""
 
-    _fields_ = [
-        ("background", c_void_p),
-        *((name, c_float) for name in ("low_pass", "filter_sigma", "dilation")),
-        ("antialiased", c_int32),
-        *((name, c_float) for name in ("alpha_min", "transmittance_min", "near_plane", "far_plane")),
-    ]
+    _fields_ = native.fields(
+        "p background, f low_pass filter_sigma dilation, i antialiased, "
+        "f alpha_min transmittance_min near_plane far_plane"
+    )
 
 
-class Image(Structure):
+class Image(native.Struct):
     """`texgs_image`."""
 
-    _fields_ = _fields("color alpha depth median normal distortion radii")
+    _fields_ = native.fields("p color alpha depth median normal distortion radii")
 
 
-class Gradients(Structure):
+class Gradients(native.Struct):
     """`texgs_gradients`."""
 
-    _fields_ = _fields("means quats scales opacities shift features base gain texels")
+    _fields_ = native.fields("p means quats scales opacities shift features base gain texels")
 
 
-class Contributions(Structure):
+class Contributions(native.Struct):
     """`texgs_contributions`."""
 
-    _fields_ = [("image", c_void_p), ("channels", c_int32), *_fields("sums weight_sum weight_max pixels")]
+    _fields_ = native.fields("p image, i channels, p sums weight_sum weight_max pixels")
 
 
 SCENE = (Surfels, Camera, RenderOptions)
@@ -102,11 +92,11 @@ class View:
     K: Tensor  # [3, 3]
     width: int
     height: int
-    background: Tensor | None  # [C]
-    sizes: Tensor | None  # [N, 2] of the texture
-    offsets: Tensor | None  # [N]
-    outputs: frozenset[str]
-    options: Options
+    outputs: frozenset[str] = frozenset()
+    options: Options = DEFAULT_OPTIONS
+    background: Tensor | None = None  # [C]
+    sizes: Tensor | None = None  # [N, 2] of the texture
+    offsets: Tensor | None = None  # [N]
 
     def structures(self, surfels: SurfelTensors) -> tuple[Surfels, Camera, RenderOptions]:
         """Return the surfels, camera and options as the library takes them."""
@@ -115,53 +105,37 @@ class View:
             n=len(surfels.means),
             axes=surfels.scales.shape[1],
             channels=surfels.channels,
-            sizes=native.address(self.sizes),
-            offsets=native.address(self.offsets),
+            sizes=self.sizes,
+            offsets=self.offsets,
             n_texels=0 if surfels.texels is None else len(surfels.texels),
-            **{name: native.address(x) for name, x in surfels._asdict().items()},
+            **surfels._asdict(),
         )
-        camera = Camera(native.address(self.viewmat), native.address(self.K), self.width, self.height)
-        options = RenderOptions(
-            native.address(self.background),
-            min(o.low_pass, 1e30),  # infinite: no filter; the library multiplies it by 0 at the centre
-            o.filter_sigma,
-            o.dilation,
-            o.antialiased,
-            o.alpha_min,
-            o.transmittance_min,
-            o.near,
-            min(o.far, 1e30),  # infinite: far / (far - near) is 1
-        )
-        return scene, camera, options
+        low_pass = min(o.low_pass, 1e30)  # infinite: no filter; the library multiplies it by 0 at the centre
+        far = min(o.far, 1e30)  # infinite: far / (far - near) is 1
+        filters = (low_pass, o.filter_sigma, o.dilation, o.antialiased)
+        options = RenderOptions(self.background, *filters, o.alpha_min, o.transmittance_min, o.near, far)
+        return scene, Camera(self.viewmat, self.K, self.width, self.height), options
 
 
-class Frame:
-    """Owns one view's sorted and binned surfels in the library until nothing needs them."""
-
-    def __init__(self, handle: int | None, device: torch.device) -> None:
-        self.handle = handle
-        weakref.finalize(self, native.function(native.library(device.type), "texgs_release"), handle)
-
-
-def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> Frame:
+def bin_surfels(surfels: SurfelTensors, view: View, images: dict[str, Tensor]) -> native.Handle:
     """Project, sort and bin the surfels, and render into `images` where it has a "color"."""
     device = surfels.means.device
-    handle = ctypes.c_void_p()
-    image = Image(**{name: native.address(x) for name, x in images.items()})
-    native.call("texgs_forward", *view.structures(surfels), image, ctypes.addressof(handle), device=device)
-    return Frame(handle.value, device)
+    frame = native.Handle("texgs_release", device)
+    scene = view.structures(surfels)
+    native.call("texgs_forward", *scene, Image(**images), byref(frame.pointer), device=device)
+    return frame
 
 
 def contribute(
-    frame: Frame, surfels: SurfelTensors, view: View, image: Tensor | None
+    frame: native.Handle, surfels: SurfelTensors, view: View, image: Tensor | None
 ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Sums [N, C] of weight * image [C, H, W], sum of weights, largest weight and number of pixels [N]."""
+    """Return sums [N, C] of weight * image [C, H, W]; sum of weights, largest weight, pixels [N]."""
     means = surfels.means
     n, channels = len(means), 0 if image is None else len(image)
     sums = means.new_empty(n, channels)
     weight_sum, weight_max, pixels = means.new_empty(3, n)
-    out = Contributions(*native.plain((image, channels, sums, weight_sum, weight_max, pixels)))
-    native.call("texgs_contribute", frame.handle, *view.structures(surfels), out, device=means.device)
+    out = Contributions(image, channels, sums, weight_sum, weight_max, pixels)
+    native.call("texgs_contribute", frame.pointer, *view.structures(surfels), out, device=means.device)
     return sums, weight_sum, weight_max, pixels
 
 
@@ -195,20 +169,10 @@ class RasterizeFunction(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, *grads: Tensor | None) -> tuple[Tensor | None, ...]:
         """Return the gradients of the surfel tensors from those of the images."""
-        saved = ctx.saved_tensors
-        names = SurfelTensors._fields
-        surfels = SurfelTensors(*saved[: len(names)])
-        images = dict(zip(IMAGES, saved[len(names) : len(names) + len(IMAGES)], strict=True))
-        wanted = zip(names, surfels, ctx.needs_input_grad[2:], strict=True)
-        results = {name: torch.empty_like(x) for name, x, needed in wanted if needed and x is not None}
-        dense = {name: None if g is None else g.contiguous() for name, g in zip(IMAGES, grads, strict=True)}
-        native.call(
-            "texgs_backward",
-            ctx.frame.handle,
-            *ctx.view.structures(surfels),
-            Image(**{name: native.address(x) for name, x in images.items()}),
-            Image(**{name: native.address(x) for name, x in dense.items()}),
-            Gradients(**{name: native.address(x) for name, x in results.items()}),
-            device=surfels.means.device,
-        )
-        return None, None, *(results.get(name) for name in names)
+        n = len(SurfelTensors._fields)
+        surfels, images = SurfelTensors(*ctx.saved_tensors[:n]), ctx.saved_tensors[n : n + len(IMAGES)]
+        dense = (None if grad is None else grad.contiguous() for grad in grads)
+        results = native.gradients(surfels, ctx.needs_input_grad[2:])
+        structures = (*ctx.view.structures(surfels), Image(*images), Image(*dense), Gradients(*results))
+        native.call("texgs_backward", ctx.frame.pointer, *structures, device=surfels.means.device)
+        return None, None, *results

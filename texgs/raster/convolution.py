@@ -7,7 +7,6 @@ than kernels do.
 
 from __future__ import annotations
 
-from ctypes import Structure, c_int32, c_void_p
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,10 +15,10 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from texgs.core import check
-from texgs.core.errors import DeviceError, ShapeError
 from texgs.raster import native
+from texgs.raster.arguments import require, require_image
 
+ON_GPU = "torch convolves on GPUs"
 BLOCK = 16  # channels that lie side by side
 TRANSFORM = (  # G of Lavin and Gray 2016, section 4.3
     (1 / 4, 0, 0),
@@ -31,15 +30,10 @@ TRANSFORM = (  # G of Lavin and Gray 2016, section 4.3
 )
 
 
-class NativeConvolution(Structure):
+class NativeConvolution(native.Struct):
     """`texgs_convolution`."""
 
-    _fields_ = [
-        *((name, c_int32) for name in ("width", "height", "inputs", "outputs")),
-        ("kernel", c_void_p),
-        ("bias", c_void_p),
-        ("is_rectified", c_int32),
-    ]
+    _fields_ = native.fields("i width height inputs outputs, p kernel bias, i is_rectified")
 
 
 native.declare("texgs_convolve", NativeConvolution, "ppp")
@@ -61,12 +55,8 @@ class RectifiedConvolution:
     bias: Tensor
 
     def __post_init__(self) -> None:
-        size = check.shape("weight", self.weight, "outputs inputs 3 3")
-        check.shape("bias", self.bias, "outputs", outputs=size["outputs"])
-        check.constant(weight=self.weight, bias=self.bias)
-        for name, x in (("weight", self.weight), ("bias", self.bias)):
-            check.floating(name, x)
-            _require_cpu(name, x)
+        given = {"weight": (self.weight, "outputs inputs 3 3"), "bias": (self.bias, "outputs")}
+        require(given, constant=given, cpu=ON_GPU)
 
     def __call__(self, images: Tensor) -> Tensor:
         """[N, out, H, W] of images [N, in, H, W], both with channels last in memory.
@@ -74,11 +64,7 @@ class RectifiedConvolution:
         Images are copied where they have another order, or a number of channels that 16 does not divide. The
         result is not to be changed in place.
         """
-        check.shape("images", images, "N inputs H W", inputs=self.weight.shape[1])
-        check.floating("images", images)
-        _require_cpu("images", images)
-        if images.numel() == 0:
-            raise ShapeError(f"images: expected at least one pixel, got {list(images.shape)}")
+        require_image({"images": (images, f"N {self.weight.shape[1]} H W")}, cpu=ON_GPU)
         return _Convolve.apply(images, self)
 
     @cached_property
@@ -129,13 +115,8 @@ def _call(kernel: Tensor, images: Tensor, gate: Tensor | None, bias: Tensor | No
     images = images.contiguous(memory_format=torch.channels_last)
     count, _, height, width = images.shape
     result = images.new_empty(count, height, width, outputs)
-    shape = NativeConvolution(*native.plain((width, height, inputs, outputs, kernel, bias, bias is not None)))
+    shape = NativeConvolution(width, height, inputs, outputs, kernel, bias, bias is not None)
     for index in range(count):
         planes = images[index], None if gate is None else gate[index], result[index]
         native.call("texgs_convolve", shape, *planes, device=torch.device("cpu"))
     return result.permute(0, 3, 1, 2)
-
-
-def _require_cpu(name: str, x: Tensor) -> None:
-    if x.device.type != "cpu":
-        raise DeviceError(f"{name}: expected a tensor on cpu, got {x.device}; torch convolves on GPUs")

@@ -5,8 +5,7 @@ On the CPU; deterministic for any number of threads.
 
 from __future__ import annotations
 
-from ctypes import Structure, c_float, c_int32, c_void_p
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -19,22 +18,16 @@ from texgs.raster import native
 BLOCK = 8  # TEXGS_FUSION_BLOCK
 
 
-class NativeLattice(Structure):
+class NativeLattice(native.Struct):
     """`texgs_lattice`."""
 
-    _fields_ = [
-        *(("shape", c_int32 * 3), ("lower", c_float * 3), ("spacing", c_float)),
-        *((name, c_void_p) for name in ("distance", "views", "color")),
-    ]
+    _fields_ = native.fields("3i shape, 3f lower, f spacing, p distance views color")
 
 
-class NativeView(Structure):
+class NativeView(native.Struct):
     """`texgs_depth_view`."""
 
-    _fields_ = [
-        *(("viewmat", c_void_p), ("K", c_void_p), ("width", c_int32), ("height", c_int32)),
-        *(("depth", c_void_p), ("color", c_void_p)),
-    ]
+    _fields_ = native.fields("p viewmat K, i width height, p depth color")
 
 
 native.declare("texgs_fuse", NativeLattice, "np", NativeView, "f")
@@ -69,31 +62,24 @@ class DepthView:
             raise DeviceError(f"view: expected tensors on cpu, got {devices.pop()}; move them")
 
 
-@dataclass(frozen=True, eq=False)
 class Lattice:
     """Means over the views that saw a voxel, of a box of blocks of 8 x 8 x 8 voxels.
 
-    Attributes:
+    Args:
         blocks: along x, y and z.
         lower: place of the first voxel [3], world units.
         spacing: distance of voxels, world units.
+
+    Attributes:
         distance: to the surface in truncations [Z, Y, X], from -1, behind it, to 1.
         views: how many saw a voxel [Z, Y, X].
         color: [Z, Y, X, 3], 0 to 255.
     """
 
-    blocks: tuple[int, int, int]
-    lower: Tensor
-    spacing: float
-    distance: Tensor = field(init=False)
-    views: Tensor = field(init=False)
-    color: Tensor = field(init=False)
-
-    def __post_init__(self) -> None:
-        shape = [BLOCK * n for n in reversed(self.blocks)]
-        object.__setattr__(self, "distance", torch.ones(shape))
-        object.__setattr__(self, "views", torch.zeros(shape))
-        object.__setattr__(self, "color", torch.zeros(*shape, 3))
+    def __init__(self, blocks: tuple[int, int, int], lower: Tensor, spacing: float) -> None:
+        self.blocks, self.lower, self.spacing = blocks, lower, spacing
+        shape = [BLOCK * n for n in reversed(blocks)]
+        self.distance, self.views, self.color = torch.ones(shape), torch.zeros(shape), torch.zeros(*shape, 3)
 
     def add(self, view: DepthView, blocks: Tensor, truncation: float) -> None:
         """Update the voxels of some blocks, in front of the surface and up to the truncation behind it.
@@ -113,15 +99,11 @@ class Lattice:
             raise ArgumentError(f"blocks: expected numbers below {self.blocks}, got others")
         if len(blocks.unique(dim=0)) < len(blocks):
             raise ArgumentError("blocks: expected each one once, got some twice")
-        matrices = [matrix.float().contiguous() for matrix in (view.camera.viewmat, view.camera.K)]
-        depth, color = view.depth.contiguous(), view.color.contiguous()
         chosen = blocks.to(torch.int32).contiguous()
-        lattice = NativeLattice(
-            (c_int32 * 3)(*(BLOCK * n for n in self.blocks)),
-            (c_float * 3)(*self.lower.tolist()),
-            self.spacing,
-            *native.plain((self.distance, self.views, self.color)),
-        )
+        voxels = tuple(BLOCK * n for n in self.blocks)
+        state = (self.distance, self.views, self.color)
+        lattice = NativeLattice(voxels, tuple(self.lower.tolist()), self.spacing, *state)
+        matrices = [matrix.float().contiguous() for matrix in (view.camera.viewmat, view.camera.K)]
         size = (view.camera.width, view.camera.height)
-        seen = NativeView(*native.plain((*matrices, *size, depth, color)))
+        seen = NativeView(*matrices, *size, view.depth.contiguous(), view.color.contiguous())
         native.call("texgs_fuse", lattice, len(chosen), chosen, seen, truncation, device=torch.device("cpu"))

@@ -5,8 +5,6 @@ On the CPU; deterministic for any number of threads.
 
 from __future__ import annotations
 
-import ctypes
-from ctypes import Structure, c_int32, c_int64, c_void_p
 from dataclasses import dataclass
 from functools import cached_property
 from math import ceil, log2
@@ -15,18 +13,18 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from texgs.core import check
-from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.errors import ArgumentError
 from texgs.raster import native
+from texgs.raster.arguments import require
 
 FEATURES = 2  # of each level
 CPU = torch.device("cpu")
 
 
-class NativeHash(Structure):
+class NativeHash(native.Struct):
     """`texgs_hash`."""
 
-    _fields_ = [("levels", c_int32), ("resolution", c_void_p), ("first", c_void_p)]
+    _fields_ = native.fields("i levels, p resolution first")
 
 
 native.declare("texgs_hash_encode", NativeHash, "nppp")
@@ -85,13 +83,8 @@ class HashLevels:
 
     def structure(self) -> NativeHash:
         """Return the levels as the library takes them."""
-        resolution, first = (
-            (c_int32 * self.levels)(*self.resolutions),
-            (c_int64 * len(self.first))(*self.first),
-        )
-        structure = NativeHash(self.levels, ctypes.addressof(resolution), ctypes.addressof(first))
-        structure.arrays = resolution, first  # for as long as the structure is there
-        return structure
+        resolutions = torch.tensor(self.resolutions, dtype=torch.int32)
+        return NativeHash(self.levels, resolutions, torch.tensor(self.first))
 
 
 def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
@@ -108,15 +101,8 @@ def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
     Raises:
         ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
-    check.shape("points", points, "n 3")
-    check.shape("table", table, "rows features", rows=levels.rows, features=FEATURES)
-    check.constant(points=points)
-    for name, x in (("points", points), ("table", table)):
-        check.floating(name, x)
-        if x.device.type != "cpu":
-            raise DeviceError(
-                f"{name}: expected a tensor on cpu, got {x.device}; hash encoding runs on the CPU"
-            )
+    given = {"points": (points, "n 3"), "table": (table, f"{levels.rows} {FEATURES}")}
+    require(given, constant=("points",), cpu="hash encoding runs on the CPU")
     return _Encode.apply(points.contiguous(), table.contiguous(), levels)
 
 

@@ -5,18 +5,17 @@ L1 and structural similarity, which are the photometric loss of 3DGS, and smooth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from texgs.core import check
-from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.errors import ArgumentError
 from texgs.raster import native
+from texgs.raster.arguments import require_image
 
-# Inputs and constants, and whether each input's gradient is wanted, to the value [] and those gradients.
-Evaluate = Callable[[Sequence[Tensor], Sequence[bool]], tuple[Tensor, Sequence[Tensor | None]]]
+Loss = tuple[str, tuple[float, ...], list[bool]]  # function, size and weights, which inputs want a gradient
 native.declare("texgs_l1_dssim", "pp iii ff pp")
 native.declare("texgs_bilateral_smoothness", "ppp iii pp")
 
@@ -72,24 +71,13 @@ def planar(image: Tensor) -> Tensor:
 
 def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
     """Return l1 * mean |image - target| + dssim * (1 - SSIM), checked."""
-    check.shape("image", image, "H W" if image.ndim == 2 else "H W C")
-    if target.shape != image.shape:
-        raise ShapeError(f"target: expected {list(image.shape)} as image, got {list(target.shape)}")
-    if image.numel() == 0:
-        raise ShapeError(f"image: expected at least one pixel, got {list(image.shape)}")
-    check.floating("image", image)
-    check.floating("target", target)
-    check.same_device(image=image, target=target)
-    check.constant(target=target)
+    axes = _axes(image)
+    require_image({"image": (image, axes), "target": (target, axes)}, constant=("target",))
+    return fused_loss("texgs_l1_dssim", [planar(image)], [planar(target)], l1, dssim)
 
-    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
-        x, dense_target = tensors
-        value = x.new_empty(())
-        gradient = torch.empty_like(x) if wanted[0] else None
-        native.call("texgs_l1_dssim", x, dense_target, *x.shape, l1, dssim, value, gradient, device=x.device)
-        return value, [gradient]
 
-    return fused_loss(evaluate, [planar(image)], [planar(target)])
+def _axes(image: Tensor) -> str:
+    return "H W" if image.ndim == 2 else "H W C"
 
 
 def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Tensor:
@@ -112,40 +100,27 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
     Raises:
         ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
-    sizes = check.shape("attribute", attribute, "H W" if attribute.ndim == 2 else "H W C")
-    if attribute.numel() == 0:
-        raise ShapeError(f"attribute: expected at least one pixel, got {list(attribute.shape)}")
-    check.shape("guide", guide, "H W 3", **sizes)
-    check.shape("alpha", alpha, "H W", **sizes)
-    for name, tensor in (("attribute", attribute), ("guide", guide), ("alpha", alpha)):
-        check.floating(name, tensor)
-    check.same_device(attribute=attribute, guide=guide, alpha=alpha)
-    check.constant(guide=guide, alpha=alpha)
-
-    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
-        x, *constants = tensors
-        value = x.new_empty(())
-        gradient = torch.empty_like(x) if wanted[0] else None
-        native.call("texgs_bilateral_smoothness", x, *constants, *x.shape, value, gradient, device=x.device)
-        return value, [gradient]
-
-    return fused_loss(evaluate, [planar(attribute)], [planar(guide), alpha.contiguous()])
+    given = {"attribute": (attribute, _axes(attribute)), "guide": (guide, "H W 3"), "alpha": (alpha, "H W")}
+    require_image(given, constant=("guide", "alpha"))
+    constants = [planar(guide), alpha.contiguous()]
+    return fused_loss("texgs_bilateral_smoothness", [planar(attribute)], constants)
 
 
-def fused_loss(evaluate: Evaluate, inputs: Sequence[Tensor], constants: Sequence[Tensor]) -> Tensor:
-    """Return the value [] of a loss, differentiable once in `inputs`.
+def fused_loss(name: str, inputs: Sequence[Tensor], constants: Sequence[Tensor], *weights: float) -> Tensor:
+    """Return the value [] of a loss of the library, differentiable once in `inputs`.
 
-    Autograd refuses a second backward pass after one of the tensors was changed.
+    Its arguments are inputs, constants, the size of the last input, weights, and where the value and the
+    gradients of the inputs go. Autograd refuses a second backward pass after one of the tensors was changed.
     """
     wanted = [torch.is_grad_enabled() and x.requires_grad for x in inputs]
-    return _FusedLoss.apply(evaluate, wanted, *inputs, *constants)
+    return _FusedLoss.apply((name, (*inputs[-1].shape, *weights), wanted), *inputs, *constants)
 
 
 class _FusedLoss(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, evaluate: Evaluate, wanted: list[bool], *tensors: Tensor) -> Tensor:
-        value, ctx.gradients = evaluate(tensors, wanted)
-        ctx.evaluate, ctx.wanted = evaluate, wanted
+    def forward(ctx: Any, loss: Loss, *tensors: Tensor) -> Tensor:
+        ctx.loss = loss
+        value, ctx.gradients = _evaluate(loss, tensors)
         ctx.save_for_backward(*tensors)
         return value
 
@@ -153,10 +128,19 @@ class _FusedLoss(torch.autograd.Function):
     @torch.autograd.function.once_differentiable
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
         # Autograd may accumulate into what it is handed: another pass through a retained graph computes anew.
-        gradients = ctx.gradients or ctx.evaluate(ctx.saved_tensors, ctx.wanted)[1]
+        gradients = ctx.gradients or _evaluate(ctx.loss, ctx.saved_tensors)[1]
         ctx.gradients = None
         # A weight of 1 is common and scaling a pass over the image; looking at it would make a GPU wait.
         if upstream.device.type != "cpu" or upstream.item() != 1.0:
             gradients = [g if g is None else g.mul_(upstream) for g in gradients]
-        constants = len(ctx.needs_input_grad) - 2 - len(gradients)
-        return None, None, *gradients, *[None] * constants
+        constants = len(ctx.needs_input_grad) - 1 - len(gradients)
+        return None, *gradients, *[None] * constants
+
+
+def _evaluate(loss: Loss, tensors: Sequence[Tensor]) -> tuple[Tensor, list[Tensor | None]]:
+    """Return the value [] of a loss, and the gradients that are wanted of its first tensors."""
+    name, numbers, wanted = loss
+    value = tensors[0].new_empty(())
+    gradients = native.gradients(tensors[: len(wanted)], wanted)
+    native.call(name, *tensors, *numbers, value, *gradients, device=value.device)
+    return value, gradients

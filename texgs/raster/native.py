@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
+import weakref
 from collections.abc import Iterable
 from contextlib import nullcontext
 from ctypes import POINTER, Structure, c_char_p, c_double, c_float, c_int32, c_int64, c_void_p
@@ -30,26 +31,55 @@ CSRC = Path(__file__).parent / "csrc"
 INSTALL = "install texgs again (pip install .)"
 ERRORS = {1: ArgumentError, 2: OutOfMemoryError, 3: DeviceError}
 PASSES = ("project", "sort", "bin", "forward", "backward", "reduce")  # in the order of `texgs_pass`
-
-
 TYPES = {"p": c_void_p, "i": c_int32, "n": c_int64, "f": c_float}
 DECLARED: dict[str, tuple[list[Any], Any]] = {}  # arguments and result of each function of the libraries
 
 
-def declare(name: str, *arguments: str | type[Structure], result: Any = c_int32, stream: bool = True) -> None:
-    """State the C types of a function.
+def fields(layout: str) -> list[tuple[str, Any]]:
+    """Return the fields of a structure: "p means quats, 3i size" has two pointers and three integers."""
+    result = []
+    for part in layout.split(","):
+        kind, *names = part.split()
+        ctype = TYPES[kind] if kind in TYPES else TYPES[kind[-1]] * int(kind[:-1])
+        result += [(name, ctype) for name in names]
+    return result
 
-    Args:
-        name: of the function.
-        arguments: structures, which it takes by address, and letters: p pointer, i int32, n int64, f float.
-        result: a status by default.
-        stream: whether a stream follows the arguments, as `call` passes it.
+
+class Struct(Structure):
+    """A structure of the library; tensors become their addresses, and stay for as long as it does."""
+
+    def __init__(self, *values: Any, **named: Any) -> None:
+        self.kept = values, named
+        super().__init__(*map(plain, values), **{name: plain(value) for name, value in named.items()})
+
+
+def plain(value: Any) -> Any:
+    """Return a value as ctypes takes it: a dense tensor's address, NULL for None."""
+    return value.data_ptr() if isinstance(value, Tensor) else value
+
+
+def gradients(tensors: Iterable[Tensor | None], wanted: Iterable[bool]) -> list[Tensor | None]:
+    """Return memory for the gradients of those tensors that want one."""
+    pairs = zip(tensors, wanted, strict=True)
+    return [torch.empty_like(x) if want and x is not None else None for x, want in pairs]
+
+
+class Handle:
+    """Owns what the library keeps between calls: the address of `pointer` is where it writes it."""
+
+    def __init__(self, release: str, device: torch.device) -> None:
+        self.pointer = c_void_p()
+        weakref.finalize(self, function(library(device.type), release), self.pointer)
+
+
+def declare(name: str, *arguments: str | type[Structure], result: Any = c_int32, stream: bool = True) -> None:
+    """State the C types of a function: structures, which it takes by address, and letters of TYPES.
+
+    The result is a status by default; a stream follows the arguments, as `call` passes it, or none does.
     """
     types: list[Any] = []
     for each in arguments:
-        types += (
-            [TYPES[letter] for letter in each if letter != " "] if isinstance(each, str) else [POINTER(each)]
-        )
+        types += [TYPES[x] for x in each.replace(" ", "")] if isinstance(each, str) else [POINTER(each)]
     DECLARED[name] = [*types, c_void_p] if stream else types, result
 
 
@@ -182,12 +212,7 @@ def call(name: str, *arguments, device: torch.device) -> None:
         stream = None
     else:
         stream = torch.cuda.current_stream(device).cuda_stream
-    _require_success(function(lib, name)(*plain(arguments), stream), lib, device)
-
-
-def plain(arguments: Iterable[Any]) -> list[Any]:
-    """Return arguments as ctypes takes them."""
-    return [x.data_ptr() if isinstance(x, Tensor) else x for x in arguments]
+    _require_success(function(lib, name)(*map(plain, arguments), stream), lib, device)
 
 
 def require_memory(n_bytes: int, device: torch.device) -> None:
@@ -207,8 +232,3 @@ def _require_success(status: int, lib: ctypes.CDLL, device: torch.device) -> Non
     kept_by_torch = error is OutOfMemoryError and device.type == "cuda"
     hint = "; torch.cuda.empty_cache() gives back what torch keeps" if kept_by_torch else ""
     raise error(f"texgs.raster: {function(lib, 'texgs_error')().decode()}{hint}")
-
-
-def address(tensor: Tensor | None) -> int | None:
-    """Return the address of a dense tensor's first element, NULL for None."""
-    return None if tensor is None else tensor.data_ptr()

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from texgs.core import check
-from texgs.core.errors import ShapeError
 from texgs.raster import arguments, native
 from texgs.raster.losses import fused_loss, planar
 
@@ -36,7 +33,7 @@ def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
     Raises:
         ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
-    _check(depth, viewmat, K)
+    _require(depth, viewmat, K)
     normal = _DepthToNormal.apply(depth.contiguous(), viewmat.contiguous(), K.contiguous())
     return normal.permute(1, 2, 0)
 
@@ -60,37 +57,15 @@ def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Te
     Raises:
         ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
-    sizes = _check(depth, viewmat, K)
-    check.shape("normal", normal, "H W 3", **sizes)
-    check.shape("alpha", alpha, "H W", **sizes)
-    check.floating("normal", normal)
-    check.floating("alpha", alpha)
-    check.same_device(depth=depth, normal=normal, alpha=alpha)
-    constants = (alpha.detach().contiguous(), viewmat.contiguous(), K.contiguous())
-
-    def evaluate(tensors: Sequence[Tensor], wanted: Sequence[bool]) -> tuple[Tensor, list[Tensor | None]]:
-        value = depth.new_empty(())
-        gradients = [torch.empty_like(x) if want else None for x, want in zip(tensors, wanted, strict=False)]
-        native.call(
-            "texgs_normal_consistency", *tensors, *depth.shape, value, *gradients, device=depth.device
-        )
-        return value, gradients
-
-    return fused_loss(evaluate, [planar(normal), depth.contiguous()], constants)
+    _require(depth, viewmat, K, normal=(normal, "H W 3"), alpha=(alpha, "H W"))
+    constants = [alpha.detach().contiguous(), viewmat.contiguous(), K.contiguous()]
+    return fused_loss("texgs_normal_consistency", [planar(normal), depth.contiguous()], constants)
 
 
-def _check(depth: Tensor, viewmat: Tensor, K: Tensor) -> dict[str, int]:
-    sizes = check.shape("depth", depth, "H W")
-    if depth.numel() == 0:
-        raise ShapeError(f"depth: expected at least one pixel, got {list(depth.shape)}")
-    check.shape("viewmat", viewmat, "4 4")
-    check.shape("K", K, "3 3")
-    for name, tensor in (("depth", depth), ("viewmat", viewmat), ("K", K)):
-        check.floating(name, tensor)
-    check.same_device(depth=depth, viewmat=viewmat, K=K)
-    check.constant(viewmat=viewmat, K=K)
+def _require(depth: Tensor, viewmat: Tensor, K: Tensor, **others: tuple[Tensor, str]) -> None:
+    camera = {"viewmat": (viewmat, "4 4"), "K": (K, "3 3")}
+    arguments.require_image({"depth": (depth, "H W"), **camera, **others}, constant=camera)
     arguments.pinhole(viewmat, K)
-    return sizes
 
 
 class _DepthToNormal(torch.autograd.Function):
@@ -106,6 +81,6 @@ class _DepthToNormal(torch.autograd.Function):
     def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
         depth, viewmat, K = ctx.saved_tensors
         gradient = torch.empty_like(depth)
-        arguments = (depth, viewmat, K, *depth.shape, upstream.contiguous(), gradient)
-        native.call("texgs_depth_to_normal_backward", *arguments, device=depth.device)
+        inputs = (depth, viewmat, K, *depth.shape, upstream.contiguous())
+        native.call("texgs_depth_to_normal_backward", *inputs, gradient, device=depth.device)
         return gradient, None, None

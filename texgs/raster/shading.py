@@ -1,20 +1,25 @@
-"""Blinn-Phong shading of surfels."""
+"""Colour of surfels: Blinn-Phong shading, and spherical harmonics that depend on the view."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import pi, sqrt
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from texgs.core import check
 from texgs.core.errors import ShapeError
 from texgs.raster import native
+from texgs.raster.arguments import require
 
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")
+Y00 = 0.5 / sqrt(pi)  # the constant harmonic
+DEGREES = {1: 0, 4: 1, 9: 2, 16: 3}  # of spherical harmonics, by number of coefficients
 native.declare("texgs_blinn_phong", "n ppppp i pppp i pp")
 native.declare("texgs_blinn_phong_backward", "n ppppp i pppp i pp ppppppp")
+native.declare("texgs_spherical_harmonics", "n i ppp p")
+native.declare("texgs_spherical_harmonics_backward", "n i ppp pp pp")
 
 
 def blinn_phong(
@@ -85,22 +90,15 @@ def blinn_phong_texture(
     Returns:
         base [N, 3] and gain [N].
     """
-    material = dict(zip(MATERIAL, (ambient, diffuse, specular, shininess), strict=True))
-    surfels = {"color": color, **material, "means": means, "quats": quats}
-    lights = {"camera_position": camera_position} | ({} if light is None else {"light": light})
-    n = check.shape("means", means, "N 3")["N"]
-    check.shape("color", color, "N 3", N=n)
-    check.shape("quats", quats, "N 4", N=n)
-    for name, tensor in lights.items():
-        check.shape(name, tensor, "3")
-    for name, tensor in (surfels | lights).items():
-        check.floating(name, tensor)
-        if name in material and tensor.shape not in ((n,), (1,)):
-            raise ShapeError(f"{name}: expected [{n}] or one for all [1], got {list(tensor.shape)}")
-    check.same_device(**surfels, **lights)
-    check.constant(**lights)
-    dense = [x.contiguous() for x in (*surfels.values(), *lights.values())]
-    return _BlinnPhong.apply(facing, *dense)
+    factors = zip(MATERIAL, (ambient, diffuse, specular, shininess), strict=True)
+    material = {name: (x, name) for name, x in factors}  # each of a length of its own
+    surfels = {"color": (color, "N 3"), **material, "means": (means, "N 3"), "quats": (quats, "N 4")}
+    lights = {"camera_position": (camera_position, "3")} | ({} if light is None else {"light": (light, "3")})
+    sizes = require(surfels | lights, constant=lights)
+    for name in MATERIAL:
+        if sizes[name] not in (sizes["N"], 1):
+            raise ShapeError(f"{name}: expected [{sizes['N']}] or one for all [1], got [{sizes[name]}]")
+    return _BlinnPhong.apply(facing, *(x.contiguous() for x, _ in (*surfels.values(), *lights.values())))
 
 
 class _BlinnPhong(torch.autograd.Function):
@@ -122,8 +120,7 @@ class _BlinnPhong(torch.autograd.Function):
         tensors = ctx.saved_tensors
         grad_base = torch.zeros_like(tensors[0]) if grad_base is None else grad_base.contiguous()
         grad_gain = None if grad_gain is None else grad_gain.contiguous()
-        wanted = zip(tensors, ctx.needs_input_grad[1:], strict=True)
-        gradients = [torch.empty_like(x) if want else None for x, want in wanted]
+        gradients = native.gradients(tensors, ctx.needs_input_grad[1:])
         arguments = (*_arguments(tensors, ctx.facing), grad_base, grad_gain, *gradients[:7])
         native.call("texgs_blinn_phong_backward", *arguments, device=grad_base.device)
         return None, *gradients
@@ -134,3 +131,48 @@ def _arguments(tensors: Sequence[Tensor], facing: bool) -> tuple:
     shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
     light = tensors[8] if len(tensors) > 8 else None
     return len(tensors[0]), *tensors[:5], shared, *tensors[5:8], light, facing
+
+
+def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
+    """Return the colour of surfels seen from a point: max(0, 0.5 + sum_k sh_k Y_k(direction)).
+
+    Real spherical harmonics in the order and with the signs of 3DGS; the direction leads from the camera to
+    the mean (Kerbl et al. 2023). Differentiable in `sh` and `means`; no gradient passes where a colour is
+    clamped to 0.
+
+    Args:
+        sh: [N, K, 3] coefficients, K = 1, 4, 9 or 16 for degree 0 to 3.
+        means: [N, 3] world units.
+        camera_position: [3] world units.
+
+    Returns:
+        [N, 3] colours, 0 or more.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    """
+    position = {"camera_position": (camera_position, "3")}
+    sizes = require({"sh": (sh, "N K 3"), "means": (means, "N 3"), **position}, constant=position)
+    if sizes["K"] not in DEGREES:
+        raise ShapeError(f"sh: expected 1, 4, 9 or 16 coefficients, [N, K, 3], got {list(sh.shape)}")
+    return _SphericalHarmonics.apply(sh.contiguous(), means.contiguous(), camera_position.contiguous())
+
+
+class _SphericalHarmonics(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
+        color = torch.empty_like(means)
+        inputs = (len(sh), DEGREES[sh.shape[1]], sh, means, camera_position)
+        native.call("texgs_spherical_harmonics", *inputs, color, device=sh.device)
+        ctx.save_for_backward(sh, means, camera_position, color)
+        return color
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
+        sh, means, camera_position, color = ctx.saved_tensors
+        inputs = (len(sh), DEGREES[sh.shape[1]], sh, means, camera_position, color)
+        gradients = native.gradients((sh, means), ctx.needs_input_grad[:2])
+        arguments = (*inputs, upstream.contiguous(), *gradients)
+        native.call("texgs_spherical_harmonics_backward", *arguments, device=sh.device)
+        return *gradients, None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from ctypes import Structure, c_float, c_int32, c_int64, c_void_p
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any
@@ -15,25 +14,23 @@ from torch.nn.functional import embedding_bag
 from texgs.core import check
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster import native
+from texgs.raster.arguments import require
+from texgs.raster.shading import Y00
 
 FLOATS = {0: 4, 1: 16, 2: 32}  # of a row, by degree of the spherical harmonics
 DEGREES = {floats: degree for degree, floats in FLOATS.items()}
 SIDES = range(8, 1025, 4)  # voxels along an axis
 PIECE = 1 << 17  # points that are interpolated at a time
+GREY = 0.5  # colour of coefficients that are 0
 EMPTY = 1  # rows before those of voxels: that of all others
 
 
-class NativeGrid(Structure):
+class NativeGrid(native.Struct):
     """`texgs_grid`."""
 
-    _fields_ = [
-        ("size", c_int32 * 3),
-        ("lower", c_float * 3),
-        ("spacing", c_float),
-        ("degree", c_int32),
-        ("n", c_int64),
-        *((name, c_void_p) for name in ("masks", "first", "occupied", "distance", "rows", "density")),
-    ]
+    _fields_ = native.fields(
+        "3i size, 3f lower, f spacing, i degree, n n, p masks first occupied distance rows density"
+    )
 
 
 native.declare("texgs_grid_occupy", NativeGrid, "pp")
@@ -75,14 +72,9 @@ class VoxelGrid:
 
     def structure(self) -> NativeGrid:
         """Return the grid as the library takes it."""
-        return NativeGrid(
-            self.size,
-            self.lower,
-            self.spacing,
-            self.degree,
-            len(self.rows),
-            *native.plain((self.masks, self.first, self.occupied, self.distance, self.rows, self.density)),
-        )
+        lattice = (self.size, self.lower, self.spacing, self.degree, len(self.rows))
+        found = (self.masks, self.first, self.occupied, self.distance)
+        return NativeGrid(*lattice, *found, self.rows, self.density)
 
     @torch.no_grad()
     def refresh(self) -> None:
@@ -103,8 +95,7 @@ class VoxelGrid:
             ShapeError, ArgumentError, DeviceError: if they are not as many, of another length, not float32 or
                 elsewhere.
         """
-        check.shape("rows", rows, "n K", n=len(self.rows))
-        check.floating("rows", rows)
+        require({"rows": (rows, f"{len(self.rows)} K")})
         check.same_device(masks=self.masks, rows=rows)
         if rows.shape[1] not in DEGREES:
             raise ShapeError(f"rows: expected 4, 16 or 32 floats, got {list(rows.shape)}")
@@ -200,6 +191,36 @@ def unpack_rows(rows: Tensor) -> tuple[Tensor, Tensor]:
     if quads.shape[1] == 8:
         sh = torch.cat([sh, quads[:, None, 1:4, 3]], dim=1)
     return quads[:, 0, 3], sh
+
+
+@torch.no_grad()
+def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
+    """Return a grid whose every colour c is matrix @ c + offset, wherever neither is clamped to 0.
+
+    Colour is 0.5 + Y00 s_0 + sum_k Y_k s_k. So the coefficients s_k become A s_k, and s_0 becomes
+    A s_0 + (0.5 A 1 + b - 0.5) / Y00; ARF's own colour transfer leaves the last term as b. Voxels without a
+    row change as well, so that the colours between them and others do. The background is the caller's.
+
+    Args:
+        grid: any.
+        matrix: A, [3, 3].
+        offset: b, [3].
+
+    Raises:
+        ShapeError: if a shape is another.
+    """
+    check.shape("matrix", matrix, "3 3")
+    check.shape("offset", offset, "3")
+    density, sh = unpack_rows(grid.rows)
+    sh = sh @ matrix.T
+    sh[:, 0] += (GREY * matrix.sum(1) + offset - GREY) / Y00
+    return grid.with_rows(pack_rows(density, sh))
+
+
+@torch.no_grad()
+def drop_sh(grid: VoxelGrid) -> VoxelGrid:
+    """Return a grid with the zeroth harmonic alone: colours that are the same from everywhere."""
+    return grid.with_rows(grid.rows[:, :4])
 
 
 def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None) -> Tensor:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from ctypes import Structure, c_float
 from dataclasses import dataclass
 
 import torch
@@ -18,12 +17,10 @@ EPSILON = 1e-8
 BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}
 
 
-class NativeRule(Structure):
+class NativeRule(native.Struct):
     """`texgs_rule`."""
 
-    _fields_ = [
-        (name, c_float) for name in ("rate_density", "rate_base", "rate_sh", "beta1", "beta2", "epsilon")
-    ]
+    _fields_ = native.fields("f rate_density rate_base rate_sh beta1 beta2 epsilon")
 
 
 native.declare("texgs_grid_total_variation", NativeGrid, "np ff pp")
@@ -96,17 +93,8 @@ def add_total_variation(
     blocks = blocks.int().contiguous()
     if len(blocks) and not 0 <= int(blocks.min()) <= int(blocks.max()) < grid.masks.numel():
         raise ArgumentError(f"blocks: expected places from 0 to {grid.masks.numel() - 1}, got others")
-    native.call(
-        "texgs_grid_total_variation",
-        grid.structure(),
-        len(blocks),
-        blocks,
-        density,
-        sh,
-        into.rows,
-        into.touched,
-        device=grid.rows.device,
-    )
+    weighted = (len(blocks), blocks, density, sh, into.rows, into.touched)
+    native.call("texgs_grid_total_variation", grid.structure(), *weighted, device=grid.rows.device)
 
 
 def add_variation_of_some(

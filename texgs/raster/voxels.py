@@ -1,11 +1,10 @@
-"""Rendering of a sparse voxel grid along rays, differentiable in its rows."""
+"""Rays through a sparse voxel grid: blended, differentiable in its rows, or as the points they sample."""
 
 from __future__ import annotations
 
-import ctypes
-import weakref
-from ctypes import Structure, c_float, c_int64, c_void_p
+from ctypes import byref, c_int64
 from dataclasses import dataclass
+from itertools import repeat
 from typing import Any, NamedTuple
 
 import torch
@@ -15,26 +14,23 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.raster import native
+from texgs.raster.arguments import require
 from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 
 PIECE = 16_384  # rays at a time, where memory is to be saved
 
 
-class NativeMarch(Structure):
+class NativeMarch(native.Struct):
     """`texgs_march`."""
 
-    _fields_ = [
-        ("n", c_int64),
-        ("rays", c_void_p),
-        ("background", c_float * 3),
-        ("step", c_float),
-        ("transmittance_min", c_float),
-    ]
+    _fields_ = native.fields("n n, p rays, 3f background, f step transmittance_min")
 
 
 native.declare("texgs_grid_render", NativeGrid, NativeMarch, "pppp")
 native.declare("texgs_grid_backward", "p", NativeGrid, NativeMarch, "pppp")
 native.declare("texgs_grid_mark", "p", NativeGrid, NativeMarch, "p")
+native.declare("texgs_grid_count", "p", result=c_int64, stream=False)
+native.declare("texgs_grid_points", "p", NativeGrid, NativeMarch, "pp")
 native.declare("texgs_grid_release", "p", result=None, stream=False)
 
 
@@ -48,9 +44,7 @@ class March:
 
     def structure(self, rays: Tensor) -> NativeMarch:
         """Return the march along rays [N, 6] as the library takes it."""
-        return NativeMarch(
-            len(rays), native.address(rays), self.background, self.step, self.transmittance_min
-        )
+        return NativeMarch(len(rays), rays, self.background, self.step, self.transmittance_min)
 
 
 class Rays(NamedTuple):
@@ -74,14 +68,11 @@ class RowGradient:
     def check(self, grid: VoxelGrid) -> None:
         """Require a grid of the same layout, on the same device."""
         check.same_device(rows=grid.rows, into=self.rows)
-        given, expected = (
-            (list(self.rows.shape), len(self.touched)),
-            (list(grid.rows.shape), grid.masks.numel()),
-        )
-        if given != expected:
+        given, expected = list(self.rows.shape), list(grid.rows.shape)
+        if (given, len(self.touched)) != (expected, grid.masks.numel()):
             raise ShapeError(
-                f"into: expected the gradient of {expected[0]} rows in {expected[1]} blocks, got one of "
-                f"{given[0]} in {given[1]}; make a new one for each grid"
+                f"into: expected the gradient of {expected} rows in {grid.masks.numel()} blocks, got one of "
+                f"{given} in {len(self.touched)}; make a new one for each grid"
             )
 
 
@@ -91,27 +82,34 @@ class Samples:
     Args:
         grid: its density and occupancy up to date.
         march: how rays are sampled.
-        rays: [N, 6] dense.
+        rays: [N, 6].
         out: where colour, alpha and distance are written, dense; None: nowhere.
+        keep: the samples, 36 bytes each; without them nothing can be gathered.
 
     Raises:
         ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
     """
 
-    def __init__(self, grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None = None) -> None:
+    def __init__(
+        self, grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None = None, keep: bool = True
+    ) -> None:
+        require({"rays": (rays, "N 6")})
+        check.same_device(rays=rays, rows=grid.rows)
         self.grid, self.march, self.rays = grid, march, rays.contiguous()
-        handle = ctypes.c_void_p()
-        _march(grid, march, self.rays, out, ctypes.addressof(handle))
-        self.handle = handle.value
-        release = native.function(native.library(rays.device.type), "texgs_grid_release")
-        weakref.finalize(self, release, handle.value)
+        self.handle = native.Handle("texgs_grid_release", rays.device)
+        kept = byref(self.handle.pointer) if keep else None
+        outputs = (*self._structures(), *(out or (None,) * 3), kept)
+        native.call("texgs_grid_render", *outputs, device=rays.device)
 
     def add_gradient(self, color: Tensor | None, alpha: Tensor | None, into: RowGradient) -> None:
         """Add the gradient of rows from those of colours [N, 3] and alphas [N]."""
         into.check(self.grid)
-        color = None if color is None else _gradient("color", color, "N 3", self.rays)
-        alpha = None if alpha is None else _gradient("alpha", alpha, "N", self.rays)
-        self._call("texgs_grid_backward", color, alpha, into.rows, into.touched)
+        given = {"rays": (self.rays, "N 6")}
+        given |= {} if color is None else {"color": (color, "N 3")}
+        given |= {} if alpha is None else {"alpha": (alpha, "N")}
+        require(given)
+        dense = (None if x is None else x.contiguous() for x in (color, alpha))
+        self.call("texgs_grid_backward", *dense, into.rows, into.touched)
 
     def mark(self, weights: Tensor) -> None:
         """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel.
@@ -120,33 +118,18 @@ class Samples:
             ShapeError, ArgumentError, DeviceError: if there are not as many weights as rows, or they are not
                 float32, dense and where the rows are.
         """
-        check.shape("weights", weights, "n", n=len(self.grid.rows))
-        check.floating("weights", weights)
+        require({"weights": (weights, f"{len(self.grid.rows)}")})
         check.same_device(weights=weights, rows=self.grid.rows)
         if not weights.is_contiguous():
             raise ArgumentError("weights: expected a dense tensor, which is written to; got a view with gaps")
-        self._call("texgs_grid_mark", weights)
+        self.call("texgs_grid_mark", weights)
 
-    def _call(self, name: str, *arguments: Tensor | None) -> None:
-        structures = self.grid.structure(), self.march.structure(self.rays)
-        native.call(name, self.handle, *structures, *arguments, device=self.rays.device)
+    def call(self, name: str, *arguments: Tensor | None) -> None:
+        """Call a function of the library for the samples."""
+        native.call(name, self.handle.pointer, *self._structures(), *arguments, device=self.rays.device)
 
-
-def _gradient(name: str, gradient: Tensor, spec: str, rays: Tensor) -> Tensor:
-    """Return a dense gradient of what rays brought back, checked."""
-    check.shape(name, gradient, spec, N=len(rays))
-    check.floating(name, gradient)
-    check.same_device(**{"rays": rays, name: gradient})
-    return gradient.contiguous()
-
-
-def _march(grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None, samples: int | None) -> None:
-    """Render into `out`, and keep the samples where an address for them is given."""
-    check.shape("rays", rays, "N 6")
-    check.floating("rays", rays)
-    check.same_device(rays=rays, rows=grid.rows)
-    structures, outputs = (grid.structure(), march.structure(rays)), out or (None,) * 3
-    native.call("texgs_grid_render", *structures, *outputs, samples, device=rays.device)
+    def _structures(self) -> tuple[NativeGrid, NativeMarch]:
+        return self.grid.structure(), self.march.structure(self.rays)
 
 
 def render_rays(
@@ -225,9 +208,8 @@ class _Render(torch.autograd.Function):
         rows: Tensor,
     ) -> tuple[Tensor, Tensor, Tensor]:
         out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
-        ctx.samples = Samples(grid, march, rays, out) if keep else None
-        if not keep:
-            _march(grid, march, rays, out, None)
+        samples = Samples(grid, march, rays, out, keep)
+        ctx.samples = samples if keep else None
         ctx.grid, ctx.march, ctx.rays, ctx.into = grid, march, rays, into
         ctx.save_for_backward(rows)  # autograd refuses a backward pass after they were changed
         ctx.mark_non_differentiable(out.distance)
@@ -242,10 +224,31 @@ class _Render(torch.autograd.Function):
         if ctx.samples:
             ctx.samples.add_gradient(color, alpha, into)
         else:
-            for i in range(0, len(ctx.rays), PIECE):
-                part = slice(i, i + PIECE)
-                samples = Samples(ctx.grid, ctx.march, ctx.rays[part])
-                samples.add_gradient(
-                    None if color is None else color[part], None if alpha is None else alpha[part], into
-                )
+            pieces = (repeat(None) if x is None else x.split(PIECE) for x in (ctx.rays, color, alpha))
+            for rays, color_part, alpha_part in zip(*pieces, strict=False):
+                Samples(ctx.grid, ctx.march, rays).add_gradient(color_part, alpha_part, into)
         return None, None, None, None, None, None if ctx.into else into.rows
+
+
+class RayPoints(NamedTuple):
+    """Points of several rays, ray by ray and front to back."""
+
+    points: Tensor  # [m, 3] world
+    ray: Tensor  # [m] int64: index of the ray
+
+
+def ray_points(grid: VoxelGrid, rays: Tensor, march: March) -> RayPoints:
+    """Return the samples of rays [N, 6] that `render_rays` would blend, for fields of networks; on the CPU.
+
+    They lie `march.step` spacings apart where the grid's density is above 0, and end where less light than
+    `march.transmittance_min` passes it.
+
+    Raises:
+        ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
+    """
+    require({"rays": (rays, "N 6")}, cpu="points are listed on the CPU")
+    samples = Samples(grid, march, rays)
+    count = native.function(native.library("cpu"), "texgs_grid_count")(samples.handle.pointer)
+    points, lengths = rays.new_empty(count, 3), torch.empty(len(rays), dtype=torch.int32)
+    samples.call("texgs_grid_points", points, lengths)
+    return RayPoints(points, torch.repeat_interleave(torch.arange(len(rays)), lengths))

@@ -15,7 +15,7 @@ from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
 from texgs.fields.surfels.composition import Part, by_part
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.texels import mean_texels
-from texgs.raster.spherical_harmonics import Y00
+from texgs.raster.shading import Y00
 
 
 def joined(parts: Sequence[Part], edits: Sequence[PartEdit]) -> Surfels:

@@ -18,7 +18,7 @@ from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import geometry
 from texgs.fields.unlit import sizes_in_mib
 from texgs.raster import Options, Render, rasterize
-from texgs.raster.spherical_harmonics import DEGREES, spherical_harmonics
+from texgs.raster.shading import DEGREES, spherical_harmonics
 
 SHAPES = {"means": "N 3", "quats": "N 4", "scales": "N 3", "opacities": "N", "sh": "N K 3"}
 PLY_GEOMETRY = 4 * 14  # bytes of one in a PLY file of 3DGS: mean, normal, opacity, scales, quaternion

@@ -11,10 +11,9 @@ from torch.nn.functional import normalize
 
 from texgs.fields.palette.networks import Parameters, density
 from texgs.raster.hash_encoding import HashLevels
-from texgs.raster.ray_points import ray_points
 from texgs.raster.reference.shading import harmonics
 from texgs.raster.voxel_grid import VoxelGrid
-from texgs.raster.voxels import March
+from texgs.raster.voxels import March, ray_points
 
 RAYS = 8192  # at a time
 

@@ -27,7 +27,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.release_texture import read_texture
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fields.surfels.texels import mean_texels
-from texgs.raster.spherical_harmonics import Y00
+from texgs.raster.shading import Y00
 
 FLAVOURS = ("2dgs", "3dgs", "release")
 FLAT = float(np.float32(math.log(1e-6)))  # third scale of a surfel for viewers of 3D Gaussians

@@ -13,8 +13,7 @@ from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.fields.surfels.material import RANGES, require_material
 from texgs.raster import Options, Texture
-from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture
-from texgs.raster.spherical_harmonics import spherical_harmonics
+from texgs.raster.shading import MATERIAL, blinn_phong, blinn_phong_texture, spherical_harmonics
 
 FAR = 1e4  # world units: a viewer so far away sees all surfels from one direction
 
