@@ -15,12 +15,15 @@ from texgs.core.image import write_png
 from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
+from texgs.report import fit_figure
 from texgs.report.fit_figure import (
     compare,
     frame,
+    lines,
     map_cell,
     maps,
     signed_error,
+    write_comparison,
     write_fit_figure,
 )
 from texgs.volume.view_set import View
@@ -52,15 +55,32 @@ def surfels():
 
 
 MODELS = {"surfels": surfels(), "shading": shading(), "texture": texture()}
+RECIPES = {name: Surfels(ball_seeds(seed=seed, opacity=0.9)) for seed, name in enumerate("abcdef")}
 
 
 @pytest.fixture
-def view(tmp_path):
-    """The ball, cast by rays."""
-    (camera,) = cameras(1)
-    planes = ball_planes(camera)
-    color = planes[:3] - 1 + planes[3]
-    return View(camera, write_png(tmp_path / "view.png", color.permute(1, 2, 0), planes[3]), HEADLIGHT)
+def views(tmp_path):
+    """The ball from two cameras, cast by rays."""
+    named = {}
+    for index, camera in enumerate(cameras(2)):
+        planes = ball_planes(camera)
+        color = planes[:3] - 1 + planes[3]
+        path = write_png(tmp_path / f"{index}.png", color.permute(1, 2, 0), planes[3])
+        named[f"test view {index}"] = View(camera, path, HEADLIGHT)
+    return named
+
+
+@pytest.fixture
+def view(views):
+    return views["test view 0"]
+
+
+@pytest.fixture
+def drawn(monkeypatch):
+    """The rows that are drawn, instead of a picture."""
+    rows = []
+    monkeypatch.setattr(fit_figure, "draw", lambda _path, given, _title: rows.extend(given))
+    return rows
 
 
 def test_the_same_models_give_the_same_bytes_2000_pixels_wide(tmp_path, view):
@@ -74,34 +94,40 @@ def test_the_same_models_give_the_same_bytes_2000_pixels_wide(tmp_path, view):
     assert (pixels[:, [0, -1]] == 255).all()
 
 
-@pytest.mark.parametrize("kind", ["shared", "surfel"])
-def test_words_do_not_overlap(tmp_path, monkeypatch, view, kind):
+def phases(kind):
+    """The phases of a fit whose first one only seeds."""
+    return {"surfels": None, "shading": shading(kind), "texture": texture(kind)}
+
+
+@pytest.mark.parametrize(
+    ("write", "models", "padding"),
+    [
+        (write_fit_figure, phases("shared"), 5),
+        (write_fit_figure, phases("surfel"), 5),
+        (write_comparison, {f"plenoxels_quick{name}": RECIPES[name] for name in "abcd"}, 0),
+    ],
+)
+def test_words_do_not_overlap(tmp_path, monkeypatch, view, write, models, padding):
     drawn = []
     monkeypatch.setattr(Figure, "savefig", lambda figure, _file, **_options: drawn.append(figure))
-    models = {"surfels": None, "shading": shading(kind), "texture": texture(kind)}
-    write_fit_figure(tmp_path / "a.png", models, {"training view 100": view, "b": view}, title="ball, TF01")
+    write(tmp_path / "a.png", models, {"training view 100": view, "b": view}, title="ball, TF01")
     (figure,) = drawn
     figure.draw_without_rendering()
     words = [text for text in figure.findobj(Text) if text.get_text() and text.get_visible()]
-    boxes = [text.get_window_extent().padded(5) for text in words]
+    boxes = [text.get_window_extent().padded(padding) for text in words]
     for index, box in enumerate(boxes):
         corners = [(box.x0, box.y0), (box.x1, box.y1)]
         assert all(figure.bbox.contains(*corner) for corner in corners), words[index]
         for other in range(index):
             assert not box.overlaps(boxes[other]), (words[index], words[other])
         inside = [axes for axes in figure.axes if axes.images and axes.bbox.overlaps(box)]
-        assert not inside, f"{words[index]} lies on a picture"
+        assert not inside or padding == 0, f"{words[index]} lies on a picture"
 
 
 def test_phases_stand_beside_the_view(view):
     panels, visible = compare(MODELS, view, 1)
-    assert [panel.title for panel in panels] == [
-        "ground truth",
-        "surfels",
-        "shading",
-        "texture",
-        "error × 4 (bwr)",
-    ]
+    titles = ["ground truth", "surfels", "shading", "texture", "error × 4 (bwr)"]
+    assert [panel.title for panel in panels] == titles
     truth = ball_planes(view.camera)
     torch.testing.assert_close(panels[0].pixels, truth[:3].permute(1, 2, 0), atol=1 / 255, rtol=0)
     shown = MODELS["shading"].render(view.camera)
@@ -112,7 +138,7 @@ def test_phases_stand_beside_the_view(view):
 
 
 def test_seeds_only_and_half_the_size(view):
-    panels, visible = compare({"surfels": None, "shading": shading(), "texture": texture()}, view, 2)
+    panels, visible = compare(phases("shared"), view, 2)
     assert (panels[1].pixels, panels[1].words) == (None, "seeds only")
     assert panels[0].words == "PSNR over 16 × 16 pixels"
     assert visible.shape == panels[2].pixels.shape[:2] == (16, 16)
@@ -137,16 +163,11 @@ def test_a_perfect_fit_has_no_error(tmp_path):
 
 def test_maps_of_one_material_are_numbers(view):
     panels = maps(texture(), view, 1)
-    assert [panel.title for panel in panels] == [
-        "normals",
-        "depth, world units",
-        "alpha",
-        "material of all surfels",
-    ]
+    titles = ["normals", "depth, world units", "alpha", "material of all surfels"]
+    assert [panel.title for panel in panels] == titles
     numbers = {line.split()[0]: float(line.split()[1]) for line in panels[3].words.splitlines()}
-    assert numbers == pytest.approx(
-        {"ambient": 0.5, "diffuse": 0.5, "specular": 0.1, "shininess": 20}, abs=1e-3
-    )
+    factors = {"ambient": 0.5, "diffuse": 0.5, "specular": 0.1, "shininess": 20}
+    assert numbers == pytest.approx(factors, abs=1e-3)
     assert panels[1].scale.low == pytest.approx(1.5 - 0.3 * math.sqrt(3), abs=0.15), "seeds fill a cube"
     assert torch.equal(panels[0].pixels[0, 0], torch.ones(3)), "the corner is empty"
     middle = panels[0].pixels[10:22, 10:22].mean(dim=(0, 1))
@@ -192,9 +213,37 @@ def test_nothing_visible_shows_the_whole_frame():
     assert nothing[frame(nothing)].shape == (3, 4)
 
 
+def test_each_view_has_a_row_of_fits_and_one_of_their_errors(tmp_path, views, drawn):
+    write_comparison(tmp_path / "a.png", {name: RECIPES[name] for name in "abc"}, views)
+    assert [row.name for row in drawn] == ["test view 0", "errors", "test view 1", "errors"]
+    assert [panel.title for panel in drawn[0].cells] == ["ground truth", "a", "b", "c"]
+    assert len({panel.words for panel in drawn[0].cells[1:]}) == 3
+    (camera, *_), planes = cameras(2), ball_planes(views["test view 0"].camera)
+    image = RECIPES["b"].render(camera).color.clamp(0, 1)
+    error = ((image - planes[:3].permute(1, 2, 0)) ** 2).mean().item()
+    of_b = float(drawn[0].cells[2].words.split()[1])
+    assert of_b == pytest.approx(-10 * math.log10(error), abs=0.05)  # the views have 8 bits
+    assert len({panel.pixels.shape for row in drawn for panel in row.cells if panel.pixels is not None}) == 1
+
+
+def test_more_recipes_than_a_row_has_room_for_go_on_below(tmp_path, views, drawn):
+    write_comparison(tmp_path / "a.png", RECIPES, {"view": views["test view 0"]})
+    assert [[panel.title for panel in row.cells] for row in drawn[::2]] == [
+        ["ground truth", "a", "b", "c"],
+        ["ground truth", "d", "e", "f"],
+    ]
+    assert torch.equal(drawn[0].cells[0].pixels, drawn[2].cells[0].pixels)
+    assert [len(line) for line in lines("abcdefg")] == [4, 3]
+    assert [len(line) for line in lines("abcdefghi")] == [3, 3, 3]
+    assert lines("ab") == ["ab"]
+
+
 def test_mistakes_are_named(tmp_path, view):
     with pytest.raises(ArgumentError, match=r"a\.png: expected a model of the last phase and a view"):
         write_fit_figure(tmp_path / "a.png", {"shading": None}, {"a": view})
     with pytest.raises(ArgumentError, match="got surfels, shading, texture and 0 views"):
         write_fit_figure(tmp_path / "a.png", MODELS, {})
+    for models, shown in (({}, {"a": view}), (RECIPES, {})):
+        with pytest.raises(ArgumentError, match=r"a\.png: expected models and views, got"):
+            write_comparison(tmp_path / "a.png", models, shown)
     assert not (tmp_path / "a.png").exists()

@@ -8,11 +8,10 @@ from urllib.parse import unquote
 import pytest
 from PIL import Image
 
-from tests.report.written import metrics
+from tests.report.written import job
 from tests.study.studies import study
 from texgs.report.html import write_report as write_records
-from texgs.report.left_out import LeftOut, others
-from texgs.report.metrics_files import read_known
+from texgs.report.metrics_files import LeftOut, read_known
 from texgs.report.results import (
     ComparisonResult,
     EditResult,
@@ -59,23 +58,19 @@ class Page(HTMLParser):
         return [text for name, text in self.texts if name == tag]
 
 
-def job(folder, stage, result, pictures=(), **facts):
-    """Metrics of a job in a folder of its own, with pictures."""
-    place = folder / f"{len(list(folder.iterdir()))}-{stage}"
-    place.mkdir()
-    for name in pictures:
-        Image.new("RGB", (8, 4), "red").save(place / name)
-    words = {name: f"Words of {name}." for name in pictures}
-    return metrics(place, stage, result, pictures=words, **facts)
+@pytest.fixture
+def folder(tmp_path):
+    """Of the jobs."""
+    (folder := tmp_path / "jobs").mkdir()
+    return folder
 
 
 @pytest.fixture
-def paths(tmp_path):
-    folder = tmp_path / "jobs"
-    folder.mkdir()
+def paths(folder):
     edit = EditResult("painted", "image", "how", 6.0, follows="style", followed={"TF01": "strokes"})
     part = EditResult("red", "text", "how", 6.0, follows="instruction", followed={"TF01/lobe": "red"})
     timing = TimingResult(4.0, 5.0, 4.0, primitives=9, width=8, height=6, threads=2)
+    comparison, sheet = ComparisonResult(["a", "b"], ["0"]), SheetResult(9, 2, 8, 4)
     return [
         job(folder, "gallery", GalleryResult("image", []), ["gallery.png"], recipe=None),
         job(folder, "timing", timing),
@@ -83,15 +78,8 @@ def paths(tmp_path):
         job(folder, "edit_image", edit, ["edit.png", "style-TF01.png"]),
         job(folder, "pse", PseResult(6, [], []), ["pse.png", "relight.png"]),
         job(folder, "texture", FitResult(60.0, 9, 10, [2.0, 1.0]), tf="TF01"),
-        job(
-            folder,
-            "comparison",
-            ComparisonResult(["a", "b"], ["0"]),
-            ["comparison.png"],
-            tf="TF01",
-            recipe=None,
-        ),
-        job(folder, "sheet", SheetResult(9, 2, 8, 4), ["sheet.png"], tf="TF01", recipe=None),
+        job(folder, "comparison", comparison, ["comparison.png"], tf="TF01", recipe=None),
+        job(folder, "sheet", sheet, ["sheet.png"], tf="TF01", recipe=None),
         job(folder, "star_plot", timing, ["new.png"], recipe=None),
     ]
 
@@ -101,7 +89,7 @@ def write_report(path, paths, left_out=(), votes=None):
     found, old = read_known(paths)
     given = {"user_study": study_table(found, votes), "differences": differences_of(found)}
     more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
-    return write_records(path, found, [*left_out, *others(old)], given, more)
+    return write_records(path, found, [*left_out, *old], given, more)
 
 
 def page(tmp_path, paths, left_out=()):
@@ -135,9 +123,7 @@ def test_every_figure_has_its_words_and_command(tmp_path, paths):
         assert Image.open(io.BytesIO(base64.b64decode(data))).format == "WEBP"
 
 
-def test_figures_of_sweeps_are_galleries_alone(tmp_path):
-    folder = tmp_path / "jobs"
-    folder.mkdir()
+def test_figures_of_sweeps_are_galleries_alone(tmp_path, folder):
     of_sweep = {"sweep": "resolution", "variant": "400"}
     grid = job(folder, "gallery", GalleryResult("ablations", []), ["resolution.png"], **of_sweep)
     single = job(folder, "figure", SheetResult(9, 2, 8, 4), ["figure.png"], **of_sweep)
@@ -146,9 +132,7 @@ def test_figures_of_sweeps_are_galleries_alone(tmp_path):
     assert "Words of figure.png." not in captions
 
 
-def test_commands_have_the_seeds_of_fit_and_edit(tmp_path):
-    folder = tmp_path / "jobs"
-    folder.mkdir()
+def test_commands_have_the_seeds_of_fit_and_edit(tmp_path, folder):
     edit = EditResult("gold", "text", "how", 6.0, follows="instruction", followed={"TF01": "gold"})
     made = job(folder, "edit_text", edit, ["edit.png"], seed=2, fit_seed=3)
     fit = job(folder, "figure", SheetResult(9, 2, 8, 4), ["figure.png"], seed=4, fit_seed=4, tf="TF01")
@@ -203,14 +187,13 @@ def test_what_was_left_out_stands_on_top(tmp_path, paths):
     assert "left-out" not in page(tmp_path, paths).ids
 
 
-def test_a_scene_opens_in_the_report_where_it_is_small_and_elsewhere_by_a_link(tmp_path):
+def test_a_scene_opens_in_the_report_where_it_is_small_and_elsewhere_by_a_link(tmp_path, folder):
     """What stands in a page cannot end the script that holds it."""
     text = "<!doctype html><script>let a = '<\\/script>';</script>"
     paths = []
     for name, is_embedded in (("small", True), ("large scene", False)):
-        folder = tmp_path / name
-        folder.mkdir()
-        path = job(folder, "page", PageResult("gold", 9, 1.0, is_embedded), ["poster.png"])
+        (folder / name).mkdir()
+        path = job(folder / name, "page", PageResult("gold", 9, 1.0, is_embedded), ["poster.png"])
         path.with_name("scene.html").write_text(text)
         paths.append(path)
     report = write_report(tmp_path / "report.html", paths).read_text()

@@ -1,4 +1,69 @@
-from texgs.report.metrics_files import below
+"""Metrics files: which are read, what is refused, and what there is no job of."""
+
+import json
+import re
+
+import pytest
+
+from tests.report.written import metrics
+from texgs.cli.main import main
+from texgs.core.errors import ArgumentError
+from texgs.report.metrics_files import LeftOut, below, note, read, read_known, read_left_out
+from texgs.report.results import FitResult, SceneResult
+
+WOOD = {"what": "data set wood", "why": "its file is not there.", "places": ["views", "phase"]}
+
+
+def test_what_is_left_out_stands_below_tables_that_would_read_it(tmp_path):
+    path = tmp_path / "missing.json"
+    assert read_left_out(path) == read_left_out(None) == [], "without a file nothing is missing"
+    path.write_text(json.dumps([WOOD, {"what": "edit dge", "why": "no weights", "places": ["edit"]}]))
+    entries = read_left_out(path)
+    assert note(entries, ("phase",)) == "Left out: data set wood: its file is not there."
+    assert note(entries, ("edit", "views")) == (
+        "Left out: data set wood: its file is not there. edit dge: no weights."
+    )
+    assert note(entries, ("timing",)) == ""
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ({}, "expected a list of what was left out, got dict"),
+        ([1], "expected entries with what, why and places, got others"),
+        ([{"what": "a"}], "expected entries with what, why and places, got others"),
+        ([{**WOOD, "more": 1}], "expected entries with what, why and places, got others"),
+    ],
+)
+def test_a_file_of_something_else_is_one_sentence(tmp_path, content, message):
+    path = tmp_path / "missing.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(ArgumentError, match=rf"missing\.json: {message}"):
+        read_left_out(path)
+
+
+def test_files_of_other_versions_are_left_out_as_long_as_one_is_good(tmp_path):
+    old = tmp_path / "old.json"
+    old.write_text(json.dumps({"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}))
+    with pytest.raises(ArgumentError, match=r"old\.json: expected the metrics of this version"):
+        read_known([old])
+    good = metrics(tmp_path, "compose", SceneResult(1, 9))
+    with pytest.raises(ArgumentError, match=r"old\.json: expected the metrics of this version"):
+        read([old, good])
+    records, (entry,) = read_known([old, good])
+    assert [record.path for record in records] == [good]
+    assert str(entry) == (
+        f"1 metrics file: of another version of texgs, {old} first; run its job again to have it back."
+    )
+    assert read_known([good]) == (records, [])
+    (tmp_path / "list.json").write_text("[]")
+    with pytest.raises(ArgumentError, match="expected the metrics of a job"):
+        read_known([tmp_path / "list.json", good])
+
+
+@pytest.mark.parametrize("why", ["no file", "no file.", "data set wood: no file"])
+def test_an_entry_names_once_what_is_left_out_and_ends_with_one_full_stop(why):
+    assert str(LeftOut("data set wood", why, [])) == "data set wood: no file."
 
 
 def test_copies_of_tracked_runs_and_jobs_at_work_are_no_results(tmp_path, monkeypatch):
@@ -13,3 +78,30 @@ def test_copies_of_tracked_runs_and_jobs_at_work_are_no_results(tmp_path, monkey
     )
     monkeypatch.chdir(tmp_path)
     assert [path.as_posix() for path in below("results")] == ["results/fuel/volume/metrics.json"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"seed": "x"}, "seed: expected a whole number, got 'x'"),
+        ({"dataset": 3}, "dataset: expected words, got 3"),
+        ({"variant": None}, "variant: expected words, got null"),
+        ({"peak_memory_mib": "much"}, "peak_memory_mib: expected a number, got 'much'"),
+        ({"numbers": [1]}, r"numbers: expected values by name, got \[1\]"),
+        ({"pictures": ["a.png"]}, r"pictures: expected values by name, got \['a.png'\]"),
+        ({"numbers": {"fit_seconds": 1.0, "primitives": "many"}}, "numbers.primitives: .*'many'"),
+        ({"numbers": {"fit_seconds": 1.0, "primitives": 9, "sizes": 3}}, "numbers.sizes: "),
+        (
+            {"result": "EditMeasures", "numbers": {"edit": "a", "method": "b", "style_gram": "x"}},
+            "numbers.style_gram: expected a number, got 'x'",
+        ),
+    ],
+)
+@pytest.mark.parametrize("verb", ["tables", "report"])
+def test_a_value_of_another_type_is_one_sentence_with_file_and_key(tmp_path, capsys, verb, change, message):
+    path = metrics(tmp_path, "shading", FitResult(60.0, 9), "scan", "TF01")
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    assert main([verb, str(path), "--output", str(tmp_path / "out")]) != 0
+    said = capsys.readouterr().err
+    assert re.search(rf"{path.name}: {message}", said), said
+    assert "Traceback" not in said

@@ -1,52 +1,19 @@
 from dataclasses import replace
 
-import pytest
-
 from tests.report.written import lines, metrics, records, rows, sources
-from texgs.report.fit_tables import model_size
-from texgs.report.results import Comparison, FitResult, PseResult, TimingResult
-from texgs.report.scene_tables import edits, rendering
+from texgs.report.results import (
+    Comparison,
+    PseResult,
+    SheetResult,
+    TimingResult,
+    ViewsResult,
+    VolumeResult,
+)
+from texgs.report.scene_tables import datasets, edits, rendering
 from texgs.report.table import UNLIKE
 
-GROUPS = {"geometry MiB": "geometry_mib", "shading MiB": "shading_mib", "texture MiB": "texture_mib"}
+LATTICE = {"spacing": [1.0] * 3, "origin": [0.0] * 3, "minimum": 0.0, "maximum": 1.0, "voxels": 120}
 ALONE = TimingResult(4.0, 5.0, 4.0, primitives=9, width=8, height=6, threads=2)
-
-
-def test_sums_over_the_papers_basic_scenes_are_the_papers_sizes(tmp_path):
-    pixels = {line["dataset"]: int(line["image_px"]) for line in lines("datasets")}
-    for line in lines("model_size"):
-        scenes, size = int(line["basic_scenes"]), pixels[line["dataset"]]
-        seen = {"train_views": 162, "width": size, "height": size}
-        for index in range(scenes):
-            sizes = {group: line[group] / scenes for group in GROUPS.values()}
-            count = round(line["primitives"] / scenes)
-            result = FitResult(60.0, count, sizes=sizes, **seen)
-            metrics(tmp_path, "texture", result, line["dataset"], f"TF{index}", "paper")
-    by_dataset = {row["data set"]: row for row in rows(model_size(records(tmp_path)))}
-    assert len(by_dataset) == len(model_size(records(tmp_path)).rows) == 4
-    for line in lines("model_size"):
-        row = by_dataset[line["dataset"]]
-        assert row["basic scenes"] == line["basic_scenes"]
-        for title, key in (GROUPS | {"primitives": "primitives"}).items():
-            assert row[title] == pytest.approx(line[key])
-            assert row[f"{title} (paper)"] == line[key]
-
-
-def test_sizes_are_sums_over_basic_scenes_not_over_seeds(tmp_path):
-    sizes = {"geometry_mib": 1.0, "shading_mib": 0.5, "texture_mib": 8.0, "total_mib": 9.5}
-    result = FitResult(60.0, 1000, sizes=sizes)
-    for tf in ("TF01", "TF02"):
-        for seed in (0, 1):
-            metrics(tmp_path, "texture", result, tf=tf, dataset="wood", seed=seed)
-    table = model_size(records(tmp_path))
-    own = [paths for paths in sources(table) if paths]
-    assert [[path.stem for path in paths] for paths in own] == [["0000", "0002"], ["0001", "0003"]]
-    ours = [row for row in rows(table) if row["recipe"] != "the paper"]
-    assert [row["recipe"] for row in ours] == ["quick", "quick-s1"]
-    assert (ours[0]["basic scenes"], ours[0]["primitives"], ours[0]["texture MiB"]) == (2, 2000, 16.0)
-    assert ours[0]["texture MiB (paper)"] == UNLIKE
-    theirs = {row["data set"]: row for row in rows(table) if row["recipe"] == "the paper"}
-    assert theirs["wood"]["texture MiB"] == 114.5
 
 
 def test_frames_beside_those_of_the_volume(tmp_path):
@@ -74,3 +41,43 @@ def test_edits_with_and_without_a_volume(tmp_path):
     first, second = rows(edits(records(tmp_path)))
     assert (first["edit"], first["views"], first["PSNR"]) == ("a", 6, 30.0)
     assert (second["edit"], second["PSNR"]) == ("b", None)
+
+
+def test_data_sets_by_size_of_their_views(tmp_path):
+    metrics(tmp_path, "volume", VolumeResult([4, 5, 6], "uint8", **LATTICE, volume_mib=2.5))
+    for tf, size, ms in (("TF01", 64, 10.0), ("TF02", 64, 30.0), ("TF01", 512, 500.0)):
+        metrics(tmp_path, "views", ViewsResult(9, 2, size, size, frame_ms=ms), tf=tf)
+    table = datasets(records(tmp_path))
+    by_size = {row["image, pixels"]: row for row in rows(table)}
+    small, large = by_size["64x64"], by_size["512x512"]
+    assert (small["basic scenes"], small["ms / frame"]) == (2, 20.0)
+    assert (large["basic scenes"], large["ms / frame"]) == (1, 500.0)
+    assert (small["volume, samples"], small["volume MiB"]) == ("4x5x6", 2.5)
+    assert (small["samples (paper)"], small["MiB (paper)"]) == ("256x256x128", 32.0)
+    assert (small["ms / frame (paper)"], large["ms / frame (paper)"]) == (UNLIKE, 16.14)
+    files = [[path.stem for path in paths] for paths in sources(table)]
+    assert sorted(files) == [["0000", "0001", "0002"], ["0000", "0003"]]
+
+
+def test_data_sets_are_in_the_papers_order_and_stand_ins_below(tmp_path):
+    names = [line["dataset"] for line in lines("datasets")]
+    views = ViewsResult(9, 2, 800, 800, frame_ms=1.0)
+    for name in [*sorted(names), "another"]:
+        metrics(tmp_path, "views", views, name, "TF01")
+    metrics(tmp_path, "views", views, "jets", "TF01", stand_in="five jets")
+    entries = rows(datasets(records(tmp_path)))
+    assert [row["data set"] for row in entries] == [
+        names[0],
+        "jets, stand-in for five jets",
+        *names[1:],
+        "another",
+    ]
+    assert [entries[1][c] for c in ("samples (paper)", "MiB (paper)", "ms / frame (paper)")] == [None] * 3
+
+
+def test_published_views_have_a_row_without_a_volume(tmp_path):
+    for tf in ("TF01", "TF04"):
+        metrics(tmp_path, "sheet", SheetResult(92, 181, 800, 800), "vortex", tf)
+    (row,) = rows(datasets(records(tmp_path)))
+    assert (row["image, pixels"], row["basic scenes"], row["volume, samples"]) == ("800x800", 2, None)
+    assert row["basic scenes (paper)"] == 1

@@ -1,62 +1,42 @@
-import json
-
 import pytest
 
 from tests.fields.surfels.test_composition import ball
+from tests.report.written import job, metrics
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import CELL, DPI
 from texgs.fields.surfels.model_file import write_model
 from texgs.report.metrics_files import read
+from texgs.report.results import EditMeasures, EditResult, FitResult
 from texgs.report.sweep_figure import ACROSS, WIDTH, sweep_figure
 from texgs.report.sweep_table import sweep
 from texgs.report.table import SOURCES, Table
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import write_scene
 
+PHASES = ("surfels", "shading", "texture")
 
-def run(
-    folder,
-    variant,
-    seed=0,
-    psnr=30.0,
-    phases=("surfels", "shading", "texture"),
-    dataset="engine",
-    sweep="mine",
-):
-    """Metrics files of one fit."""
-    paths = []
-    for phase in phases:
-        path = folder / f"{dataset}-{variant}-{seed}-{phase}.json"
-        numbers = {"fit_seconds": 60.0, "primitives": 1000}
-        if phase == "texture":
-            numbers |= {"psnr": psnr, "train_psnr": psnr + 1, "ssim": 0.9}
-        if phase == "shading":
-            numbers["material"] = dict.fromkeys(("ambient", "diffuse", "specular", "shininess"), 0.5)
-        record = {"stage": phase, "dataset": dataset, "tf": "TF01", "recipe": "quick"}
-        record |= {"variant": variant, "sweep": sweep}
-        told = {"result": "FitResult", "numbers": numbers}
-        path.write_text(json.dumps({**record, "seed": seed, "peak_memory_mib": 1024.0, **told}))
-        paths.append(path)
-    return paths
+
+def run(folder, variant, seed=0, psnr=30.0, phases=PHASES, sweep="mine"):
+    """Return the metrics files of one fit."""
+    own = {
+        "surfels": {},
+        "shading": {"material": dict.fromkeys(("ambient", "diffuse", "specular", "shininess"), 0.5)},
+        "texture": {"psnr": psnr, "train_psnr": psnr + 1, "ssim": 0.9},
+    }
+    facts = {"tf": "TF01", "variant": variant, "sweep": sweep, "seed": seed}
+    return [metrics(folder, phase, FitResult(60.0, 1000, **own[phase]), **facts) for phase in phases]
 
 
 def edit(folder, variant, seed=0, nnfm=0.5):
-    """Metrics files of one edit and of what was measured of it, in the folders that they have in results."""
-    paths = []
-    told = {"similarity": 0.25, "style_nnfm": nnfm, "frame_mean_ms": 4.0, "frame_max_ms": 5.0}
-    measures = {"primitives": 9, "megabytes": 1.0, "geometry_kept": True, **told}
-    kinds = {
-        "edits": ("EditResult", {"how": "patches", "edit_seconds": 30.0}),
-        "edit_metrics": ("EditMeasures", measures),
-    }
-    for place, (kind, numbers) in kinds.items():
-        path = folder / place / f"style-{variant}-s{seed}" / "metrics.json"
-        path.parent.mkdir(parents=True)
-        facts = {"stage": place, "dataset": "engine", "recipe": "quick", "variant": variant, "sweep": "mine"}
-        facts |= {"seed": seed, "fit_seed": 0, "edit": "style", "result": kind}
-        path.write_text(json.dumps({**facts, "numbers": {"edit": "style", "method": "image", **numbers}}))
-        paths.append(path)
-    return paths
+    """Return the metrics files of one edit and of what was measured of it, in folders of their own."""
+    values = {"similarity": 0.25, "style_nnfm": nnfm, "frame_mean_ms": 4.0, "frame_max_ms": 5.0}
+    values |= {"primitives": 9, "megabytes": 1.0, "geometry_kept": True}
+    result, measures = (
+        EditResult("style", "image", "patches", 30.0),
+        EditMeasures("style", "image", values=values),
+    )
+    facts = {"variant": variant, "sweep": "mine", "seed": seed, "fit_seed": 0, "edit": "style"}
+    return [job(folder, "edits", result, **facts), job(folder, "edit_metrics", measures, **facts)]
 
 
 def column(table: Table, title):
@@ -78,8 +58,8 @@ def test_means_and_spread_over_seeds(tmp_path):
 
 
 def test_a_sweep_of_edits_has_their_measures(tmp_path):
-    paths = edit(tmp_path, "0.5", 0, 0.4) + edit(tmp_path, "0.5", 1, 0.6) + edit(tmp_path, "0", 0, 0.7)
-    table = sweep(read(paths), "mine")
+    first = edit(tmp_path, "0", 0, 0.7)
+    table = sweep(read([*edit(tmp_path, "0.5", 0, 0.4), *edit(tmp_path, "0.5", 1, 0.6), *first]), "mine")
     assert [each.title for each in table.columns][:5] == ["data set", "recipe", "edit", "variant", "seeds"]
     assert column(table, "variant") == ["0", "0.5"], "in the order of their values"
     assert column(table, "seeds") == [1, 2]
@@ -87,11 +67,7 @@ def test_a_sweep_of_edits_has_their_measures(tmp_path):
     assert column(table, "± NNFM") == [None, pytest.approx(0.02**0.5)]
     assert column(table, "minutes") == [0.5, 0.5]
     assert column(table, "Gram") == [None, None]
-    assert table.frame[SOURCES][0] == edit_sources(tmp_path, "0")
-
-
-def edit_sources(folder, variant):
-    return [folder / place / f"style-{variant}-s0" / "metrics.json" for place in ("edits", "edit_metrics")]
+    assert table.frame[SOURCES][0] == first
 
 
 def test_fits_and_edits_of_a_sweep_have_rows_of_their_own(tmp_path):
@@ -120,22 +96,14 @@ def test_the_figure_shows_the_scenes_of_edits(tmp_path):
     assert height > without + CELL * DPI
 
 
-def test_numbers_of_the_paper_do_not_stand_beside_another_data_set(tmp_path):
-    table = sweep(read(run(tmp_path, "42", sweep="views")), "views")
-    assert not [c.title for c in table.columns if "paper" in c.title]
-
-
 def test_a_variant_with_a_missing_phase_is_not_measured(tmp_path):
     table = sweep(read(run(tmp_path, "a", phases=("shading",))), "mine")
     assert column(table, "seeds") == [0]
     assert set(table.frame.iloc[0, 5:-1]) == {None}, "but for the name and the number of seeds"
 
 
-def test_fits_of_another_sweep_do_not_count_and_other_files_are_named(tmp_path):
+def test_fits_of_another_sweep_do_not_count(tmp_path):
     with pytest.raises(
         ArgumentError, match="sweep mine: no fit or edit of it among the metrics files; run it first"
     ):
         sweep(read(run(tmp_path, "a", sweep="other")), "mine")
-    (tmp_path / "x.json").write_text("[]")
-    with pytest.raises(ArgumentError, match=r"x\.json: expected the metrics of a job"):
-        read([tmp_path / "x.json"])

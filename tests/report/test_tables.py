@@ -1,14 +1,9 @@
-import json
-import re
-
 import pytest
 
 from tests.report.written import lines, metrics, records
 from tests.study.studies import study
 from texgs.cli.main import main
-from texgs.core.errors import ArgumentError
-from texgs.report.left_out import LeftOut
-from texgs.report.metrics_files import read
+from texgs.report.metrics_files import LeftOut
 from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.report.sections import SECTIONS
 from texgs.report.tables import specs, tables_of
@@ -108,36 +103,3 @@ def test_the_verb_writes_three_files_a_table_and_a_document(tmp_path, capsys):
     assert "Left out: data set wood: no file." in said.out
     assert "Left out: 1 metrics file: of another version of texgs" in said.err
     assert "## Table 1. Data sets" not in said.out, "tables without rows are not printed"
-
-
-def test_a_file_that_is_no_metrics_is_named(tmp_path):
-    (tmp_path / "a.json").write_text("[]")
-    with pytest.raises(ArgumentError, match=r"a\.json: expected the metrics of a job"):
-        read([tmp_path / "a.json"])
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"seed": "x"}, "seed: expected a whole number, got 'x'"),
-        ({"dataset": 3}, "dataset: expected words, got 3"),
-        ({"variant": None}, "variant: expected words, got null"),
-        ({"peak_memory_mib": "much"}, "peak_memory_mib: expected a number, got 'much'"),
-        ({"numbers": [1]}, r"numbers: expected values by name, got \[1\]"),
-        ({"pictures": ["a.png"]}, r"pictures: expected values by name, got \['a.png'\]"),
-        ({"numbers": {"fit_seconds": 1.0, "primitives": "many"}}, "numbers.primitives: .*'many'"),
-        ({"numbers": {"fit_seconds": 1.0, "primitives": 9, "sizes": 3}}, "numbers.sizes: "),
-        (
-            {"result": "EditMeasures", "numbers": {"edit": "a", "method": "b", "style_gram": "x"}},
-            "numbers.style_gram: expected a number, got 'x'",
-        ),
-    ],
-)
-@pytest.mark.parametrize("verb", ["tables", "report"])
-def test_a_value_of_another_type_is_one_sentence_with_file_and_key(tmp_path, capsys, verb, change, message):
-    path = metrics(tmp_path, "shading", FitResult(60.0, 9), "scan", "TF01")
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    assert main([verb, str(path), "--output", str(tmp_path / "out")]) != 0
-    said = capsys.readouterr().err
-    assert re.search(rf"{path.name}: {message}", said), said
-    assert "Traceback" not in said

@@ -4,6 +4,8 @@ import csv
 import json
 from importlib.resources import files
 
+from PIL import Image
+
 from texgs.report.metrics_files import read
 from texgs.report.results import plain
 from texgs.report.table import SOURCES
@@ -20,32 +22,40 @@ def metrics(folder, stage, result, dataset="engine", tf=None, recipe="quick", **
     return path
 
 
+def job(folder, stage, result, pictures=(), **facts):
+    """Write the metrics file of a job in a folder of its own, with pictures; returns its path."""
+    place = folder / f"{len(list(folder.iterdir())):04}-{stage}"
+    place.mkdir()
+    for name in pictures:
+        Image.new("RGB", (8, 4), "red").save(place / name)
+    words = {name: f"Words of {name}." for name in pictures}
+    return metrics(place, stage, result, pictures=words, **facts)
+
+
 def records(folder):
-    """All jobs of a folder."""
+    """Return all jobs of a folder."""
     return read(folder.glob("*.json"))
 
 
 def rows(table):
-    """Cells by the headings of their columns."""
+    """Return cells by the headings of their columns."""
     return table.frame[[column.title for column in table.columns]].to_dict("records")
 
 
 def sources(table):
-    """The metrics files of each row."""
+    """Return the metrics files of each row."""
     return table.frame[SOURCES].tolist()
 
 
 def lines(name):
-    """The lines of a file of the paper's numbers, numbers as such."""
+    """Return the lines of a file of the paper's numbers, numbers as such."""
+
+    def number(text):
+        try:
+            return float(text)
+        except ValueError:
+            return text
+
     text = files("texgs.report").joinpath("paper", f"{name}.csv").read_text().splitlines()
-    return [
-        {key: number(value) for key, value in line.items()}
-        for line in csv.DictReader(line for line in text if not line.startswith("#"))
-    ]
-
-
-def number(text):
-    try:
-        return float(text)
-    except ValueError:
-        return text
+    rows = csv.DictReader(line for line in text if not line.startswith("#"))
+    return [{key: number(value) for key, value in row.items()} for row in rows]

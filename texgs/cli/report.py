@@ -14,13 +14,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the report and print its path."""
     from texgs.cli.tables import given_tables, records_of
     from texgs.report.html import write_report
-    from texgs.report.left_out import others, read_left_out
+    from texgs.report.metrics_files import read_left_out
     from texgs.study.ballots import votes_beside
     from texgs.study.votes_figure import shown
 
     records, old = records_of(arguments, "report")
-    left_out, votes = read_left_out(arguments.missing), votes_beside(arguments.study)
+    left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(arguments.study)
     given = given_tables(records, votes)
     more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
-    print(write_report(arguments.output, records, [*left_out, *others(old)], given, more))
+    print(write_report(arguments.output, records, left_out, given, more))
     return 0

@@ -38,7 +38,6 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.check import torch_device
     from texgs.core.errors import ArgumentError
     from texgs.core.io import write_bytes
-    from texgs.report.left_out import others
     from texgs.report.metrics_files import below, read_known
     from texgs.study.ballot_page import ballot_page
     from texgs.study.questions import KINDS, Study, questions_of, write_key
@@ -51,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not LEAST <= arguments.size <= MOST:
         raise ArgumentError(f"--size: expected {LEAST} to {MOST} pixels, got {arguments.size}")
     records, old = read_known(below(arguments.results))
-    for entry in others(old):
+    for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
     questions = questions_of(records, arguments.edits, arguments.seed)
     films = films_of(questions, arguments.size, arguments.frames, torch_device(arguments.device))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from texgs.report.metrics_files import Record
+    from texgs.report.metrics_files import LeftOut, Record
     from texgs.report.table import Table
     from texgs.study.ballots import Votes
 
@@ -26,13 +26,13 @@ def add_arguments(parser: argparse.ArgumentParser, output: str = "results/tables
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the tables and print those that have rows."""
-    from texgs.report.left_out import others, read_left_out
+    from texgs.report.metrics_files import read_left_out
     from texgs.report.table import write_tables
     from texgs.report.tables import tables_of
     from texgs.study.ballots import votes_beside
 
     records, old = records_of(arguments, "tables")
-    for entry in others(old):
+    for entry in old:
         print(f"Left out: {entry}", file=sys.stderr)
     given = given_tables(records, votes_beside(arguments.study))
     tables = tables_of(records, read_left_out(arguments.missing), given)
@@ -43,8 +43,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def records_of(arguments: argparse.Namespace, verb: str) -> "tuple[list[Record[Any]], list[Path]]":
-    """Read the metrics files that are given, by default all, and name those of other versions of texgs."""
+def records_of(arguments: argparse.Namespace, verb: str) -> "tuple[list[Record[Any]], list[LeftOut]]":
+    """Read the metrics files that are given, by default all, and tell of those of other versions of texgs."""
     from texgs.core.errors import ArgumentError
     from texgs.report.metrics_files import below, read_known
 

@@ -1,15 +1,15 @@
-"""Pictures of a scene before and after an edit."""
+"""Pictures of an edit: the scene before and after it, and the losses on the way."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
 
 from texgs.core.camera import Camera
-from texgs.core.figures import write_grid
+from texgs.core.figures import new_figure, words, write_figure, write_grid
 from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.core.movie import write_frames
@@ -29,17 +29,7 @@ TURN = 36  # frames of the turntable
 def write_before_and_after(
     before: Scene, after: Scene, kind: Kind, lens: Lens, output: Path, device: torch.device, title: str
 ) -> None:
-    """Write edit.png, views of both, also under another light where they can be relit, and turntable.mp4.
-
-    Args:
-        before: the scene.
-        after: the same scene, edited.
-        kind: of its fields.
-        lens: of the cameras, but for the size of images.
-        output: folder.
-        device: that renders.
-        title: of the progress bars.
-    """
+    """Write edit.png, views of both, under another light where they can be relit too, and turntable.mp4."""
     cameras = orbit_path(SHOWN, POLAR, *lens.square(SIZE))
     lights, titles = [before.light] * SHOWN, [f"view {index + 1}" for index in range(SHOWN)]
     if "relight" in kind.can:
@@ -63,3 +53,16 @@ def pictures(
     composition = scene.open(device)
     for camera, light in zip(cameras, lights, strict=True):
         yield frame(composition, camera, light, scene.edits, background=scene.background)
+
+
+def write_convergence(path: str | Path, curves: Mapping[str, Mapping[str, Sequence[float]]]) -> Path:
+    """Write a PNG with the weighted losses of an edit over its iterations, by term, by what was edited."""
+    figure = new_figure(8, 3.2, 120)
+    axes = figure.subplots()
+    axes.set(xlabel="iterations, one view each", ylabel="loss of one view")
+    for name, terms in curves.items():
+        for term, values in terms.items():
+            axes.plot(range(1, len(values) + 1), values, label=words(f"{name}: {term}"), linewidth=1)
+    if axes.lines:
+        axes.legend(fontsize=7)
+    return write_figure(path, figure)

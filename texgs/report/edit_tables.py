@@ -10,7 +10,7 @@ from texgs.metrics.metric import Measure, metrics
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import DATA, LABEL, THEIRS, cells, in_order, mean_rows, paper
 from texgs.report.results import EditMeasures, EditResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, data_frame
+from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
 
 MINUTES = Measure("minutes", "minutes", 2, "down", "editing_min")
 LABELS = (*map(Column, (DATA, LABEL, "edit", "method")), Column("pixels", None, UNPUBLISHED))
@@ -32,16 +32,11 @@ NOT_ALIKE = (
 )
 FOLLOWED = ("style", "instruction", "")  # what edits follow, in the order of the table of all edits
 Edit = Record[EditResult]
-Measures = Mapping[tuple[str, str, str], Record[EditMeasures]]  # by data set, label of the fit and edit
+Rows = list[dict[str, Any]]
 
 
 def measures(is_paper: bool = False, without: str = "") -> list[Measure]:
-    """Return what is measured of edits, in the order of columns.
-
-    Args:
-        is_paper: whether only that of tables that are as in the paper.
-        without: a metric to leave out.
-    """
+    """Return what is measured of edits, in the order of columns; all, or what the paper's tables have."""
     listed = [
         (metric.order, measure)
         for metric in metrics().values()
@@ -51,30 +46,25 @@ def measures(is_paper: bool = False, without: str = "") -> list[Measure]:
     return [measure for _, measure in sorted([*listed, (20, MINUTES)], key=lambda each: each[0])]
 
 
-def columns(listed: Iterable[Measure]) -> list[Column]:
-    """Return the columns of measures."""
-    return [Column(measure.title, measure.digits) for measure in listed]
-
-
 def image_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all edits by pictures, of which the paper measures no CLIP scores."""
-    measured = measures_of(records)
-    return table("style", edits_of("style", records), measured, measures(is_paper=True, without="clip"))
+    rows = [row for row in rows_of(records) if row["kind"] == "style"]
+    return table("style", rows, measures(is_paper=True, without="clip"))
 
 
 def text_driven(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all edits by instructions, but for other methods with frozen geometry."""
-    measured = measures_of(records)
-    edits = [each for each in edits_of("instruction", records) if not is_frozen_by_choice(each, measured)]
-    return table("instruction", edits, measured, measures(is_paper=True))
+    rows = [row for row in rows_of(records) if row["kind"] == "instruction"]
+    free = [row for row in rows if row["has_texture"] or not row["is_kept"]]
+    return table("instruction", free, measures(is_paper=True))
 
 
 def text_driven_frozen(records: Iterable[Record[Any]]) -> Table:
     """Return all edits by instructions that keep geometry; none where only those do that always do."""
-    measured, edits = measures_of(records), edits_of("instruction", records)
-    frozen = [each for each in edits if is_frozen_by_choice(each, measured)]
-    kept = [each for each in edits if each in frozen or has_texture(each)] if frozen else []
-    return table("", kept, measured, measures(is_paper=True))
+    rows = [row for row in rows_of(records) if row["kind"] == "instruction"]
+    kept = [row for row in rows if row["has_texture"] or row["is_kept"]]
+    is_chosen = not all(row["has_texture"] for row in kept)
+    return table("", kept if is_chosen else [], measures(is_paper=True))
 
 
 def looks(records: Iterable[Record[Any]]) -> Table:
@@ -83,80 +73,64 @@ def looks(records: Iterable[Record[Any]]) -> Table:
         "Minutes of the edit alone; frames spread over the test path; NNFM and Gram distance to the style in "
         f"views that it was not learned from. {CONSISTENCY}"
     )
-    measured = measures_of(records)
-    edits = sorted(
-        in_order([each for each in of(EditResult, records) if not each.is_swept]),
-        key=lambda each: FOLLOWED.index(each.result.follows),
-    )
-    rows = [
-        {
-            **row_of(each, measured.get(key_of(each))),
-            "method": each.result.how,
-            "follows": words_of(each.result.followed),
-            "lambda_s": each.result.lambda_s,
-        }
-        for each in edits
-    ]
+    rows = sorted(rows_of(records), key=lambda row: FOLLOWED.index(row["kind"]))
     labels = [*LABELS[:4], Column("follows"), Column("lambda_s", 2, "-")]
-    sentences = notes([each.result for each in measured.values()])
-    return Table(" ".join([caption, *sentences]), [*labels, *columns(measures())], rows)
+    columns = [Column(measure.title, measure.digits) for measure in measures()]
+    shown = [{**row, "method": row["how"]} for row in rows]
+    return Table(" ".join([caption, *notes(rows)]), [*labels, *columns], shown)
 
 
-def measures_of(records: Iterable[Record[Any]]) -> Measures:
-    """Return what was measured of edits that are of no sweep."""
-    return {key_of(each): each for each in of(EditMeasures, records) if not each.is_swept}
-
-
-def edits_of(follows: str, records: Iterable[Record[Any]]) -> list[Edit]:
-    """Return the edits that follow the same and are of no sweep, in the order of tables."""
-    edits = in_order(of(EditResult, records))
-    return [each for each in edits if each.result.follows == follows and not each.is_swept]
-
-
-def table(follows: str, edits: Sequence[Edit], measured: Measures, listed: Sequence[Measure]) -> Table:
+def table(follows: str, rows: Rows, listed: Sequence[Measure]) -> Table:
     """Return rows of edits, their means, and the paper's rows of edits that follow the same."""
-    rows = [row_of(each, measured.get(key_of(each))) for each in edits]
     titles = [measure.title for measure in listed]
-    means = mean_rows(data_frame(rows), (LABEL, "edit", "method"), ["pixels", *titles])
-    theirs = published(follows, listed) if edits and follows else []
+    columns = [Column(measure.title, measure.digits) for measure in listed]
+    means = mean_rows(rows, (LABEL, "edit", "method"), ["pixels", *titles])
+    theirs = published(follows, listed) if rows and follows else []
     sentences = [CAPTION, NOT_ALIKE] if theirs else [CAPTION]
     if set(titles) >= {measure.title for measure in metrics()["clip"].measures}:
-        sentences += notes([measured[key_of(each)].result for each in edits if key_of(each) in measured])
-    return Table(" ".join(sentences), [*LABELS, *columns(listed)], [*rows, *means, *theirs])
+        sentences += notes(rows)
+    return Table(" ".join(sentences), [*LABELS, *columns], [*rows, *means, *theirs])
 
 
-def key_of(record: Record[EditResult] | Record[EditMeasures]) -> tuple[str, str, str]:
-    """Return what an edit and its measures have in common."""
-    return record.dataset, record.label, record.result.edit
+def rows_of(records: Iterable[Record[Any]]) -> Rows:
+    """Return a row for each edit that is of no sweep, in the order of tables."""
+    return [row_of(*pair) for pair in pairs_of(in_order(each for each in records if not each.is_swept))]
 
 
-def has_texture(edit: Edit) -> bool:
-    """Return whether looks change within the primitives of a field, so that its geometry may stay anyway."""
-    kind = kinds().get(edit.field)
-    return kind is not None and "texture" in kind.can
+def pairs_of(records: Sequence[Record[Any]]) -> list[tuple[Edit, Record[EditMeasures] | None]]:
+    """Return each edit with what was measured of it."""
 
+    def key(record: Record[Any]) -> tuple[str, str, str]:
+        return record.dataset, record.label, record.result.edit
 
-def is_frozen_by_choice(edit: Edit, measured: Measures) -> bool:
-    """Return whether geometry stayed as it was although the field has no textures."""
-    own = measured.get(key_of(edit))
-    return own is not None and bool(own.result.values.get("geometry_kept")) and not has_texture(edit)
+    measured = {key(each): each for each in of(EditMeasures, records)}
+    return [(edit, measured.get(key(edit))) for edit in of(EditResult, records)]
 
 
 def row_of(edit: Edit, measured: Record[EditMeasures] | None) -> dict[str, Any]:
-    """Return the row of one edit of one scene."""
-    row = cells(edit, edit=edit.result.edit, method=edit.result.method, counts=not edit.stand_in)
-    values, result = {"minutes": edit.result.edit_seconds / 60}, measured.result if measured else None
-    if measured and result:
-        values |= result.values
-        row[SOURCES] = [edit.path, measured.path]
-    row["pixels"] = f"{result.width}x{result.height}" if result and result.width else None
-    return row | measured_cells(measures(), values)
+    """Return the row of one edit of one scene, for all tables."""
+    made, seen, field = edit.result, measured.result if measured else None, kinds().get(edit.field)
+    names = cells(edit, edit=made.edit, method=made.method, how=made.how, counts=not edit.stand_in)
+    return names | {
+        "kind": made.follows,
+        "follows": words_of(made.followed),
+        "lambda_s": made.lambda_s,
+        "pixels": f"{seen.width}x{seen.height}" if seen and seen.width else None,
+        "has_texture": field is not None and "texture" in field.can,  # geometry may stay anyway
+        "is_kept": seen is not None and bool(seen.values.get("geometry_kept")),
+        "values": seen.values if seen else {},
+        **measured_cells(measures(), edit, measured),
+    }
 
 
-def measured_cells(listed: Iterable[Measure], values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values by the titles of their columns, as tables say them."""
+def measured_cells(
+    listed: Iterable[Measure], edit: Edit, measured: Record[EditMeasures] | None
+) -> dict[str, Any]:
+    """Return minutes and measures of an edit by the titles of columns, as tables say them, and its files."""
+    values = {"minutes": edit.result.edit_seconds / 60, **(measured.result.values if measured else {})}
     cells = {measure.title: (measure.words or {}, values.get(measure.name)) for measure in listed}
-    return {title: words.get(value, value) for title, (words, value) in cells.items()}
+    files = [edit.path, measured.path] if measured else [edit.path]
+    return {title: words.get(value, value) for title, (words, value) in cells.items()} | {SOURCES: files}
 
 
 def words_of(followed: Mapping[str, str]) -> str:
@@ -177,11 +151,11 @@ def published(follows: str, listed: Sequence[Measure]) -> list[dict[str, Any]]:
     return [{**blank, **labels, **line} for line in lines.to_dict("records")]
 
 
-def notes(measured: Sequence[EditMeasures]) -> list[str]:
+def notes(rows: Rows) -> list[str]:
     """Return what metrics say beside their numbers, such as which CLIP it was, and why it was not."""
     return [
         sentence.format(value)
         for metric in metrics().values()
         for key, sentence in (metric.notes or {}).items()
-        for value in sorted({each.values[key] for each in measured if each.values.get(key)})
+        for value in sorted({row["values"][key] for row in rows if row["values"].get(key)})
     ]

@@ -1,9 +1,10 @@
-"""Figure of a fit: a basic model after each phase beside views it has not seen, and its maps in one."""
+"""Figures of fits beside views that they have not seen: one phase by phase with its maps, or several fits."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,7 @@ import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.figures import Cell, Row, Scale, draw
+from texgs.core.figures import COLUMNS, Cell, Row, Scale, draw
 from texgs.fields.field import Field
 from texgs.fields.surfels.model import Surfels, geometry
 from texgs.fields.surfels.shading import material
@@ -27,6 +28,7 @@ MAGNIFIED = 4  # a quarter of the range of colours has the full colour
 DIVERGING = "bwr"  # 0 is white
 ERROR = Scale(-1 / MAGNIFIED, 1 / MAGNIFIED, DIVERGING)  # red where too bright, blue where too dark
 MARGIN = 1.06  # of what is shown around what is visible
+KEY = Cell("", words="of the worst channel\nred: too bright\nblue: too dark")
 
 
 @torch.no_grad()
@@ -51,9 +53,6 @@ def write_fit_figure(
         reduce: of the images, as in `images.load`.
         title: line at the top.
 
-    Returns:
-        The path.
-
     Raises:
         ArgumentError: if there is no view, a model is missing, or the path is not writable.
     """
@@ -68,6 +67,43 @@ def write_fit_figure(
     name, view = next(iter(views.items()))
     rows.append(Row(name, maps(last, view, reduce)))
     return draw_visible(path, rows, torch.stack([visible for _, visible in compared]).any(dim=0), title)
+
+
+@torch.no_grad()
+def write_comparison(
+    path: str | Path,
+    models: Mapping[str, Field],
+    views: Mapping[str, View],
+    reduce: int = 1,
+    title: str = "",
+) -> Path:
+    """Draw fits by recipe side by side as PNG, in one step; arguments are those of `write_fit_figure`.
+
+    Each view has a row with the view and each fit with its PSNR, and below it a row with the errors, as in
+    the figure of one fit. More recipes than a row has room for go on in further rows, beside the view again.
+
+    Raises:
+        ArgumentError: if there is no view or no model, or the path is not writable.
+    """
+    if not views or not models:
+        raise ArgumentError(f"{path}: expected models and views, got {len(models)} and {len(views)}")
+    rows: list[Row] = []
+    visible: list[Tensor] = []
+    for name, view in views.items():
+        for recipes in lines(list(models)):
+            compared = [compare({recipe: models[recipe]}, view, reduce) for recipe in recipes]
+            truth, _, _ = compared[0][0]
+            rows.append(Row(name, [truth, *(fit for (_, fit, _), _ in compared)]))
+            rows.append(Row("errors", [KEY, *(error for (_, _, error), _ in compared)]))
+            visible += [where for _, where in compared]
+    return draw_visible(path, rows, torch.stack(visible).any(dim=0), title)
+
+
+def lines(recipes: Sequence[str]) -> list[Sequence[str]]:
+    """Return the recipes in as few lines as there is room for beside a view, about as many in each."""
+    count = ceil(len(recipes) / (COLUMNS - 1))
+    size = ceil(len(recipes) / count)
+    return [recipes[first : first + size] for first in range(0, len(recipes), size)]
 
 
 def draw_visible(path: str | Path, rows: list[Row], visible: Tensor, title: str) -> Path:
@@ -138,8 +174,8 @@ def map_cell(title: str, values: Tensor, alpha: Tensor) -> Cell:
     return Cell(title, torch.lerp(torch.ones(3), scale(values), alpha[..., None]).clamp(0, 1), scale=scale)
 
 
-def frame(visible: Tensor) -> tuple[slice, slice]:
-    """Rows and columns of the smallest part of an image, of its aspect, around what is visible [H, W]."""
+def frame(visible: Tensor) -> tuple[slice, slice]:  # [H, W]
+    """Return rows and columns of the smallest part of an image, of its aspect, with all that is visible."""
     places = visible.nonzero()
     if not len(places):
         return slice(None), slice(None)

@@ -2,30 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable
+from typing import Any
 
 from texgs.fit.kinds import fit_specs
 from texgs.report.metrics_files import Record, of, phases
-from texgs.report.published import (
-    ALIKE,
-    DATA,
-    LABEL,
-    cells,
-    grouped,
-    in_order,
-    is_alike,
-    paper,
-    paper_columns,
-    rank,
-    side_by_side,
-    volumes,
-)
+from texgs.report.published import DATA, LABEL, beside_paper, cells, in_order, is_alike, rank
 from texgs.report.results import FitResult, MeshResult
-from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table, data_frame
-
-if TYPE_CHECKING:
-    from pandas import DataFrame
+from texgs.report.table import SOURCES, UNPUBLISHED, Column, Table
 
 Run = dict[str, Record[FitResult]]  # a fit by its phases
 PHASES = {  # columns of the table of phases, by the headings of the paper's file
@@ -50,7 +34,6 @@ SIZES = {
     "texture_mib": Column("texture MiB", 1),
     "primitives": Column("primitives", 0),
 }
-SCENES = Column("basic scenes", 0)
 VARIANTS = {  # by the sweep: the heading of its variants, and that of the paper's file
     "views": ("training views", "views"),
     "resolution": ("pixels", "image_px"),
@@ -67,41 +50,29 @@ MESHES = {
 }
 
 
-def published(name: str, keys: Mapping[str, str], columns: Mapping[str, Column]) -> DataFrame:
-    """Read the paper's numbers of fits, with the number of basic scenes of each data set."""
-    frame = paper(name, {"dataset": DATA, **keys}, {key: column.title for key, column in columns.items()})
-    return frame.assign(**{SCENES.title: [volumes()[dataset]["basic_scenes"] for dataset in frame[DATA]]})
-
-
 def phase_rows(records: Iterable[Record[Any]]) -> list[dict[str, Any]]:
     """Return the phases of fits that are of no sweep, by data set, label and order; unknown ones last."""
     order = {phase: place for place, phase in enumerate(phases())}
     unswept = [record for record in of(FitResult, records) if not record.is_swept]
     unswept.sort(key=lambda each: (rank(each), each.label, order.get(each.stage, len(order))))
-    return [_phase_row(record, record.result) for record in unswept]
-
-
-def _phase_row(record: Record[FitResult], result: FitResult) -> dict[str, Any]:
-    gpu = result.peak_gpu_memory_mib
-    measured = {
-        "PSNR": result.psnr,
-        "SSIM": result.ssim,
-        "minutes": result.fit_seconds / 60,
-        "CPU GiB": record.facts["peak_memory_mib"] / 1024,
-        "GPU GiB": None if gpu is None else gpu / 1024,
-        "primitives": result.primitives,
-    }
-    return cells(record, phase=record.stage, alike=is_alike(record), **measured)
+    rows = []
+    for record in unswept:
+        result, gpu = record.result, record.result.peak_gpu_memory_mib
+        numbers = {
+            "PSNR": result.psnr,
+            "SSIM": result.ssim,
+            "minutes": result.fit_seconds / 60,
+            "CPU GiB": record.facts["peak_memory_mib"] / 1024,
+            "GPU GiB": None if gpu is None else gpu / 1024,
+            "primitives": result.primitives,
+        }
+        rows.append(cells(record, phase=record.stage, alike=is_alike(record), **numbers))
+    return rows
 
 
 def fitting(records: Iterable[Record[Any]]) -> Table:
     """Return the table of all phases of fits: means over the basic scenes of a data set."""
-    titles, keys = [column.title for column in PHASES.values()], (DATA, "phase")
-    names = (DATA, "TF", LABEL, "phase", "rank", "published", "alike", SOURCES, *titles)
-    ours = grouped(data_frame(phase_rows(records), names), (DATA, LABEL, "phase"), titles)
-    rows = side_by_side(ours, published("fitting", {"phase": "phase"}, PHASES), keys, titles)
-    labels = [Column(DATA), Column(LABEL), Column("phase"), SCENES]
-    return Table(ALIKE, [*labels, *PHASES.values(), *paper_columns(PHASES.values())], rows)
+    return beside_paper(phase_rows(records), "fitting", {"phase": "phase"}, PHASES)
 
 
 def fits(records: Iterable[Record[Any]]) -> Table:
@@ -141,53 +112,30 @@ def measures_of(run: Run) -> dict[str, Any]:
 
 
 def ablation(records: Iterable[Record[Any]], sweep: str) -> Table:
-    """Return the table of one of the paper's sweeps: means over seeds and basic scenes.
-
-    Args:
-        records: jobs; those of other sweeps do not count.
-        sweep: a key of `VARIANTS`; the names of its like begin with it, such as `views_quick`.
-    """
+    """Return the table of one of `VARIANTS`, and of sweeps whose names begin so, such as `views_quick`."""
     variant, heading = VARIANTS[sweep]
     own = [each for each in records if each.sweep == sweep or each.sweep.startswith(f"{sweep}_")]
     rows = []
     for run in runs_of(in_order([each for each in own if each.variant])):
         first, end = next(iter(run.values())), end_of(run)
         number = int(first.variant) if first.variant.isdigit() else 0
-        row = cells(first, **measures_of(run), alike=end is not None and is_variant(end, sweep, number))
+        meant = {"views": number} if sweep == "views" else {"pixels": number}
+        row = cells(first, **measures_of(run), alike=end is not None and is_alike(end, **meant))
         row |= {LABEL: first.recipe, variant: first.variant, SOURCES: [part.path for part in run.values()]}
         rows.append(row)
     rows.sort(key=lambda row: (len(row[variant]), row[variant]))  # numbers, as words
-    titles = [column.title for column in RUNS.values()]
-    names = (DATA, "TF", LABEL, variant, "rank", "published", "alike", SOURCES, *titles)
-    ours = grouped(data_frame(rows, names), (DATA, LABEL, variant), titles)
-    table = side_by_side(ours, published(sweep, {heading: variant}, RUNS), (DATA, variant), titles)
-    labels = [Column(DATA), Column(LABEL), Column(variant), SCENES]
-    return Table(ALIKE, [*labels, *RUNS.values(), *paper_columns(RUNS.values())], table)
-
-
-def is_variant(end: Record[FitResult], sweep: str, number: int) -> bool:
-    """Return whether a fit is what the paper's number of its variant is of."""
-    return is_alike(end, views=number) if sweep == "views" else is_alike(end, pixels=number)
+    return beside_paper(rows, sweep, {heading: variant}, RUNS)
 
 
 def model_size(records: Iterable[Record[Any]]) -> Table:
     """Return the sizes of the models of a data set together, as the paper's appendix counts them."""
-    titles = [column.title for column in SIZES.values()]
     rows = []
     for record in in_order(of(FitResult, records)):
         if record.result.sizes and not record.is_swept:
             numbers = {**record.result.sizes, "primitives": record.result.primitives}
             sizes = {column.title: numbers[key] for key, column in SIZES.items()}
             rows.append(cells(record, alike=is_alike(record), **sizes))
-    names = (DATA, "TF", LABEL, "rank", "published", "alike", SOURCES, *titles)
-    ours = grouped(data_frame(rows, names), (DATA, LABEL), titles, sum)
-    theirs = published("model_size", {}, SIZES)
-    scenes = dict(zip(theirs[DATA], theirs[SCENES.title], strict=True))
-    counts = zip(ours["published"], ours[SCENES.title], ours["alike"], strict=True)
-    ours["alike"] = [alike and scenes.get(dataset) == count for dataset, count, alike in counts]
-    table = side_by_side(ours, theirs, (DATA,), titles)
-    labels = [Column(DATA), Column(LABEL), SCENES]
-    return Table(ALIKE, [*labels, *SIZES.values(), *paper_columns(SIZES.values())], table)
+    return beside_paper(rows, "model_size", {}, SIZES, is_sum=True)
 
 
 def meshes(records: Iterable[Record[Any]]) -> Table:

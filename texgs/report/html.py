@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
+from texgs.core.figures import as_picture, new_figure, words
 from texgs.core.io import write_bytes
-from texgs.report.left_out import LeftOut
-from texgs.report.loss_figures import loss_figures
-from texgs.report.metrics_files import Record
-from texgs.report.published import THEIRS
+from texgs.report.metrics_files import LeftOut, Record, of
+from texgs.report.published import THEIRS, in_order
+from texgs.report.results import FitResult
 from texgs.report.sections import SECTIONS, Figure, data_uri, figures
 from texgs.report.sweep_figure import sweep_figure
 from texgs.report.table import SOURCES, Table
@@ -48,12 +50,6 @@ def write_report(
         left_out: what is not there.
         given: tables that need more than records, by name, as for `tables_of`.
         more: figures that need more than records, by section.
-
-    Returns:
-        The path.
-
-    Raises:
-        ArgumentError: if the target cannot be written.
     """
     from jinja2 import Environment
 
@@ -61,7 +57,9 @@ def write_report(
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     pictures = figures(records, Path(path).resolve().parent)
     pictures["fitting"] += loss_figures(records)
-    pictures["ablations"] += [shown_sweep(records, name) for name in sweeps_of(records)]
+    for name in sweeps_of(records):
+        drawn = data_uri(sweep_figure(records, name))
+        pictures["ablations"].append(Figure(f"sweep {name}", "", SWEPT, drawn, ""))
     for section, own in (more or {}).items():
         pictures[section] += own
     text = environment.from_string(template).render(
@@ -72,8 +70,7 @@ def write_report(
         versions=versions([record.facts for record in records]),
         headings=(*JOB, *SOURCE),
         sources_from=len(JOB),
-        kinds=kinds,
-        is_theirs=is_theirs,
+        is_theirs=lambda cells: any(cell.startswith(THEIRS) for cell in cells),
         sources=SOURCES,
     )
     return write_bytes(path, text.encode())
@@ -95,9 +92,30 @@ def sections(
     return shown
 
 
-def shown_sweep(records: Sequence[Record[Any]], name: str) -> Figure:
-    """Return the figure of a sweep."""
-    return Figure(f"sweep {name}", "", SWEPT, data_uri(sweep_figure(records, name)), "")
+def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
+    """Draw curves of the phases that have looked at their loss more than once, but for those of sweeps."""
+    by_dataset: dict[str, list[Record[FitResult]]] = {}
+    for record in in_order(of(FitResult, records)):
+        if len(record.result.losses) > 1 and not record.is_swept:
+            by_dataset.setdefault(record.title, []).append(record)
+    shown = "Loss of single views while fields were fitted."
+    return [
+        Figure(title, "", shown, data_uri(curves(phases)), "", is_narrow=True)
+        for title, phases in by_dataset.items()
+    ]
+
+
+def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:
+    """Draw losses over iterations, a curve for each phase of each basic TF."""
+    figure = new_figure(8, 3.2, 120)
+    axes = figure.subplots()
+    axes.set(xlabel="iterations", ylabel="loss of one view")
+    for phase in phases:
+        losses, total = phase.result.losses, phase.result.iterations
+        steps = [total * (index + 1) / len(losses) for index in range(len(losses))]
+        axes.semilogy(steps, losses, label=words(f"{phase.tf} {phase.label} {phase.stage}"))
+    axes.legend(fontsize=7)
+    return as_picture(figure)
 
 
 def job(metrics: Mapping[str, Any]) -> list[str]:
@@ -110,13 +128,3 @@ def job(metrics: Mapping[str, Any]) -> list[str]:
 def versions(jobs: Sequence[Mapping[str, Any]]) -> list[str]:
     """Return what the jobs ran with, each combination once."""
     return sorted({", ".join(f"{name} {v}" for name, v in metrics["versions"].items()) for metrics in jobs})
-
-
-def is_theirs(cells: Iterable[str]) -> bool:
-    """Return whether a row has the paper's numbers alone, by its cells."""
-    return any(cell.startswith(THEIRS) for cell in cells)
-
-
-def kinds(table: Table) -> list[str]:
-    """Return the class of each column: numbers stand to the right."""
-    return ["text" if column.digits is None else "number" for column in table.columns]

@@ -35,9 +35,6 @@ def write_mesh_figure(
         surface: points on what counts of that; errors are distances from them.
         lens: of the pictures, but for their size.
         title: line at the top.
-
-    Returns:
-        The path.
     """
     truth, ours = sample(reference, COUNT), sample(mesh, COUNT)
     error = Scale(0, FAR, "inferno")

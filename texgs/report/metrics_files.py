@@ -1,8 +1,8 @@
-"""The metrics files of jobs, read and checked."""
+"""The metrics files of jobs, read and checked, and what there is no job of."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -10,10 +10,10 @@ from typing import Any, Generic, TypeVar
 from texgs.config.schema import NO_SWEEP
 from texgs.core.errors import ArgumentError
 from texgs.core.io import read_json
-from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch
+from texgs.core.keys import MissingKey, UnknownKey, ValueMismatch, typed
 from texgs.fit.kinds import fit_specs
 from texgs.metrics.metric import metrics
-from texgs.report.results import EditMeasures, Result, result_of
+from texgs.report.results import EditMeasures, Result
 
 COPIES = "mlartifacts"  # folder of the files that MLflow keeps of runs
 WORDS = ("stage", "dataset", "field", "variant", "sweep", "stand_in", "result")
@@ -59,6 +59,19 @@ class Record(Generic[R_co]):
         return self.sweep not in ("", NO_SWEEP)
 
 
+@dataclass(frozen=True)
+class LeftOut:
+    """Something that a run has no jobs of."""
+
+    what: str  # such as "data set wood"
+    why: str  # one sentence
+    places: list[str]  # of the jobs that there are none of, names of rules of the workflow
+
+    def __str__(self) -> str:
+        why = self.why.removeprefix(f"{self.what}: ")  # sentences that name it themselves
+        return f"{self.what}: {why.rstrip('. ')}."
+
+
 class OtherVersionError(ArgumentError):
     """A metrics file is of another version of texgs."""
 
@@ -73,8 +86,8 @@ def read(paths: Iterable[str | Path]) -> list[Record[Any]]:
     return [_record(path) for path in sorted(map(Path, paths))]
 
 
-def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Path]]:
-    """Read the metrics of this version of texgs, as `read`, and name the files of other versions.
+def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[LeftOut]]:
+    """Read the metrics of this version of texgs, as `read`, and say how many are of other versions.
 
     Raises:
         ArgumentError: if a file is no metrics file, or all are of other versions.
@@ -86,9 +99,37 @@ def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Pat
             records.append(_record(path))
         except OtherVersionError as error:
             others[path] = error
-    if others and not records:
-        raise next(iter(others.values()))
-    return records, list(others)
+    if not others:
+        return records, []
+    first, error = next(iter(others.items()))
+    if not records:
+        raise error
+    what = f"{len(others)} metrics files" if len(others) > 1 else "1 metrics file"
+    why = f"of another version of texgs, {first} first; run its job again to have it back"
+    return records, [LeftOut(what, why, [])]
+
+
+def read_left_out(path: str | Path | None) -> list[LeftOut]:
+    """Return what a file says was left out; nothing without a file.
+
+    Raises:
+        ArgumentError: if the file is no list of entries with `what`, `why` and `places`.
+    """
+    if path is None or not Path(path).exists():
+        return []
+    entries = read_json(path)
+    if not isinstance(entries, list):
+        raise ArgumentError(f"{path}: expected a list of what was left out, got {type(entries).__name__}")
+    try:
+        return [typed(LeftOut, entry) for entry in entries]
+    except ValueMismatch as error:
+        raise ArgumentError(f"{path}: expected entries with what, why and places, got others") from error
+
+
+def note(left_out: Iterable[LeftOut], places: Collection[str]) -> str:
+    """Return what of a table is left out, in words; empty where all is there."""
+    entries = [str(entry) for entry in left_out if set(entry.places) & set(places)]
+    return " ".join(["Left out:", *entries]) if entries else ""
 
 
 def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
@@ -98,13 +139,12 @@ def of(kind: type[R_co], records: Iterable[Record[Any]]) -> list[Record[R_co]]:
 
 def below(folder: str | Path) -> list[Path]:
     """Find the metrics files of all results in a folder, not of jobs at work or copies of tracked runs."""
+
+    def is_aside(name: str) -> bool:
+        return name.startswith(".") or name == COPIES
+
     paths = Path(folder).rglob("metrics.json")
     return sorted(path for path in paths if not any(map(is_aside, path.relative_to(folder).parts)))
-
-
-def is_aside(folder: str) -> bool:
-    """Return whether a folder holds no results, by its name."""
-    return folder.startswith(".") or folder == COPIES
 
 
 def phases() -> list[str]:
@@ -113,12 +153,13 @@ def phases() -> list[str]:
 
 
 def _record(path: Path) -> Record[Any]:
+    """Read one metrics file."""
     facts = read_json(path)
     if not isinstance(facts, dict) or "numbers" not in facts:
         raise ArgumentError(f"{path}: expected the metrics of a job, got something else")
     _check(path, facts)
     try:
-        result = result_of(facts["result"], facts["numbers"])
+        result = Result.kinds[facts["result"]].of(facts["numbers"])
         if isinstance(result, EditMeasures):
             _check_values(path, result.values)
         stage, dataset = facts["stage"], facts["dataset"]
@@ -139,8 +180,7 @@ def _check(path: Path, facts: Mapping[str, Any]) -> None:
         value = facts.get(key)
         if value is not None and (not isinstance(value, kind) or isinstance(value, bool)):
             raise ArgumentError(f"{path}: {key}: expected {words}, got {value!r:.60}; run the job again")
-    for key in WORDS:
-        if key in facts and facts[key] is None:
+        if value is None and key in WORDS and key in facts:
             raise ArgumentError(f"{path}: {key}: expected words, got null; run the job again")
 
 

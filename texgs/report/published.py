@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from statistics import fmean
@@ -11,10 +10,10 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from texgs.report.metrics_files import Record
 from texgs.report.results import FitResult
-from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, data_frame
+from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
 
 if TYPE_CHECKING:
-    from pandas import DataFrame, Series
+    from pandas import DataFrame
 
 R = TypeVar("R", bound=Record[Any])
 THEIRS = "the paper"  # in place of a recipe, in rows of its own numbers
@@ -26,21 +25,16 @@ ALIKE = (
     "even there scenes differ, so that PSNR, SSIM and primitives are not like for like."
 )
 DATA, LABEL = "data set", "recipe"  # titles of columns
+SCENES = Column("basic scenes", 0)
+Rows = Sequence[Mapping[str, Any]]
 
 
 def paper(name: str, keys: Mapping[str, str], numbers: Mapping[str, str]) -> DataFrame:
-    """Read the paper's numbers of a table.
-
-    Args:
-        name: of its file.
-        keys: titles of the columns of names, by their headings in the file.
-        numbers: titles of the columns of numbers, by their headings in the file; others are left out.
-    """
+    """Read the paper's names and numbers of a table, each with titles by their headings in its file."""
     import pandas as pd  # slow to import
 
-    text = files("texgs.report").joinpath("paper", f"{name}.csv").read_text(encoding="utf-8")
-    lines = [line for line in text.splitlines() if not line.startswith("#")]
-    frame = pd.read_csv(io.StringIO("\n".join(lines)), dtype=str)
+    with files("texgs.report").joinpath("paper", f"{name}.csv").open() as file:
+        frame = pd.read_csv(file, comment="#", dtype=str)
     frame = frame.reindex(columns=[*keys, *numbers]).rename(columns={**keys, **numbers})
     return frame.astype(dict.fromkeys(numbers.values(), float))
 
@@ -94,13 +88,7 @@ def cells(record: Record[Any], **more: Any) -> dict[str, Any]:
 
 
 def is_alike(record: Record[FitResult], pixels: int | None = None, views: int = VIEWS) -> bool:
-    """Return whether the paper's numbers of a fit may stand beside those of a phase.
-
-    Args:
-        record: of the phase.
-        pixels: width and height of the paper's images; default those of the data set.
-        views: the paper's training views.
-    """
+    """Return whether the paper's numbers, of these pixels and training views, may stand beside a phase's."""
     pixels = images(record.dataset) if pixels is None else pixels
     seen = (record.result.width, record.result.height, record.result.train_views)
     is_other = bool(record.stand_in) or (bool(record.variant) and not record.is_swept)
@@ -108,81 +96,87 @@ def is_alike(record: Record[FitResult], pixels: int | None = None, views: int = 
     return is_paper and not is_other and seen == (pixels, pixels, views)
 
 
-def mean(values: Series | Iterable[float | None]) -> float | None:
+def mean(values: Iterable[float | None]) -> float | None:
     """Return the mean; None where a value is missing, or there is none."""
     listed = list(values)
     return fmean(listed) if listed and None not in listed else None
 
 
-def grouped(
-    rows: DataFrame, keys: Sequence[str], titles: Iterable[str], merge: Callable[[Series], Any] = mean
-) -> DataFrame:
-    """Return a row for each group of rows with the same keys.
+def beside_paper(
+    rows: Rows,
+    name: str,
+    keys: Mapping[str, str],
+    columns: Mapping[str, Column],
+    is_sum: bool = False,
+) -> Table:
+    """Return a table of fits: means over the basic scenes of a data set, beside the paper's numbers.
 
     Args:
         rows: of single basic scenes, made of `cells`, with `alike`.
-        keys: columns that tell groups apart.
-        titles: columns of numbers that are merged.
-        merge: of the numbers of a group.
+        name: of the paper's file.
+        keys: titles that tell rows of one data set and recipe apart, by their headings in the file.
+        columns: of the numbers, by their headings in the file.
+        is_sum: whether rows are sums instead, so that the paper's have to be of as many basic scenes.
     """
+    titles = [column.title for column in columns.values()]
+    theirs = paper(name, {"dataset": DATA, **keys}, dict(zip(columns, titles, strict=True)))
+    theirs[SCENES.title] = [volumes()[dataset]["basic_scenes"] for dataset in theirs[DATA]]
+    ours = grouped(rows, (DATA, LABEL, *keys.values()), titles, is_sum)
+    if is_sum:
+        counts = ours["published"].map(lambda name: volumes().get(name, {}).get("basic_scenes"))
+        ours["alike"] &= ours[SCENES.title] == counts
+    names = [*map(Column, (DATA, LABEL, *keys.values())), SCENES]
+    published = [Column(f"{each.title} (paper)", each.digits, UNPUBLISHED) for each in columns.values()]
+    shown = side_by_side(ours, theirs, ("published", *keys.values()), titles)
+    return Table(ALIKE, [*names, *columns.values(), *published], shown)
+
+
+def grouped(rows: Rows, keys: Sequence[str], titles: Sequence[str], is_sum: bool) -> DataFrame:
+    """Return a row for each group of rows with the same keys, with means or sums of the titles' numbers."""
+    names = list(dict.fromkeys((*keys, "TF", "rank", "published", "alike", SOURCES, *titles)))
     merged = [
         {
             **group.iloc[0],
-            **{title: merge(group[title]) for title in titles},
-            "basic scenes": group["TF"].nunique(dropna=False),
+            **{title: sum(group[title]) if is_sum else mean(group[title]) for title in titles},
+            SCENES.title: group["TF"].nunique(dropna=False),
             "alike": all(group["alike"]),
             SOURCES: group[SOURCES].sum(),
         }
-        for _, group in rows.groupby(list(keys), sort=False, dropna=False)
+        for _, group in data_frame(rows, names).groupby(list(keys), sort=False, dropna=False)
     ]
-    return data_frame(merged, None if merged else [*rows.columns, "basic scenes"])
+    return data_frame(merged, [*names, SCENES.title])
 
 
-def paper_columns(columns: Iterable[Column]) -> list[Column]:
-    """Return columns of the paper's numbers beside ours."""
-    return [Column(f"{column.title} (paper)", column.digits, UNPUBLISHED) for column in columns]
-
-
-def side_by_side(
-    ours: DataFrame, published: DataFrame, keys: Sequence[str], titles: Sequence[str]
-) -> DataFrame:
+def side_by_side(ours: DataFrame, theirs: DataFrame, keys: Sequence[str], titles: Sequence[str]) -> DataFrame:
     """Return our rows in the paper's order, with rows of its own for numbers that stand in none of ours.
 
     Without a data set of the paper's, or a stand-in for one, there are only ours.
-
-    Args:
-        ours: rows as of `grouped`.
-        published: the paper's numbers.
-        keys: columns that both have, the data set first.
-        titles: columns of the numbers that stand beside ours.
     """
     import pandas as pd  # slow to import
 
-    own, theirs = ["published", *keys[1:]], published
-    numbers = published[[*keys, *titles]].astype(object)
-    rows = ours.merge(numbers, "left", left_on=own, right_on=list(keys), suffixes=("", " (paper)"))
+    published = [DATA, *keys[1:]]
+    numbers = theirs[[*published, *titles]].astype(object)
+    rows = ours.merge(numbers, "left", left_on=list(keys), right_on=published, suffixes=("", " (paper)"))
     is_alike = rows["alike"].astype(bool)
     for title in titles:
         cell = rows[f"{title} (paper)"]
         rows[f"{title} (paper)"] = cell.mask(~is_alike & cell.notna(), UNLIKE)
     if any(place < len(volumes()) for place, _, _ in rows["rank"]):
-        shown = set(rows.loc[is_alike, own].itertuples(index=False, name=None))
-        is_left = [key not in shown for key in published[list(keys)].itertuples(index=False, name=None)]
-        theirs = published[is_left]
-        theirs = theirs.assign(**{LABEL: THEIRS}, rank=[rank_in_paper(name) for name in theirs[DATA]])
-        rows = pd.concat([rows, theirs.astype(object)], ignore_index=True)
+        shown = set(rows.loc[is_alike, list(keys)].itertuples(index=False, name=None))
+        is_left = [key not in shown for key in theirs[published].itertuples(index=False, name=None)]
+        left = theirs[is_left]
+        left = left.assign(**{LABEL: THEIRS}, rank=[rank_in_paper(name) for name in left[DATA]])
+        rows = pd.concat([rows, left.astype(object)], ignore_index=True)
     places = rows["rank"].tolist()
     return rows.iloc[sorted(range(len(rows)), key=places.__getitem__)]
 
 
-def mean_rows(rows: DataFrame, keys: Sequence[str], titles: Iterable[str]) -> list[dict[str, Any]]:
+def mean_rows(rows: Rows, keys: Sequence[str], titles: Iterable[str]) -> list[dict[str, Any]]:
     """Return a row for each group of two rows or more with the same keys, of data sets that count.
 
     A column of numbers has their mean where all rows have one; words stay where they are the same in all.
     """
-    if not len(rows):
-        return []
-    groups = rows[rows["counts"].astype(bool)].groupby(list(keys), sort=False, dropna=False)
+    counted = data_frame([row for row in rows if row["counts"]], [*keys, *titles, SOURCES])
     return [
         {
             DATA: f"mean of {len(group)}",
@@ -190,12 +184,13 @@ def mean_rows(rows: DataFrame, keys: Sequence[str], titles: Iterable[str]) -> li
             **{title: _mean_cell(group[title].tolist()) for title in titles},
             SOURCES: group[SOURCES].sum(),
         }
-        for _, group in groups
+        for _, group in counted.groupby(list(keys), sort=False, dropna=False)
         if len(group) > 1
     ]
 
 
 def _mean_cell(values: Sequence[Any]) -> Any:
+    """Return the mean of numbers, or the words that are the same in all rows."""
     if all(isinstance(value, int | float) for value in values):
         return fmean(values)
     return values[0] if len(set(values)) == 1 else None

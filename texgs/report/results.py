@@ -26,11 +26,7 @@ class Result:
 
     @classmethod
     def of(cls, numbers: Mapping[str, Any]) -> Any:
-        """Return the result that `plain` made these numbers of.
-
-        Raises:
-            ValueMismatch: for a key that is unknown or missing, or a value of another type.
-        """
+        """Return the result that `plain` made these numbers of; others are a ValueMismatch."""
         return typed(cls, numbers)
 
 
@@ -227,9 +223,3 @@ def plain(result: Result) -> dict[str, Any]:
     told: dict[str, Any] = asdict(result)  # type: ignore[call-overload]
     told |= told.pop("values", {})
     return {name: value for name, value in told.items() if value is not None}
-
-
-def result_of(kind: str, numbers: Mapping[str, Any]) -> Result:
-    """Return the result that `plain` made these numbers of."""
-    result: Result = Result.kinds[kind].of(numbers)
-    return result

@@ -10,6 +10,7 @@ from texgs.report.metrics_files import Record, of
 from texgs.report.published import (
     DATA,
     LABEL,
+    SCENES,
     THEIRS,
     cells,
     images,
@@ -21,13 +22,13 @@ from texgs.report.published import (
     volumes,
 )
 from texgs.report.results import PseResult, SheetResult, TimingResult, ViewsResult, VolumeResult
-from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table, data_frame
+from texgs.report.table import SOURCES, UNLIKE, UNPUBLISHED, Column, Table
 
 DATASETS = (
     Column(DATA),
     Column("volume, samples"),
     Column("image, pixels"),
-    Column("basic scenes", 0),
+    SCENES,
     Column("volume MiB", 1),
     Column("ms / frame", 1),
     Column("device", None, UNPUBLISHED),
@@ -86,7 +87,7 @@ def dataset_row(
     row = {
         DATA: first.title,
         "image, pixels": f"{width}x{height}",
-        "basic scenes": len({record.tf for record in views}),
+        SCENES.title: len({record.tf for record in views}),
         "ms / frame": mean([getattr(record.result, "frame_ms", None) for record in views]),
         "device": device or None,
         SOURCES: [each.path for each in (volume, *views) if each],
@@ -113,9 +114,8 @@ def rendering(records: Iterable[Record[Any]]) -> Table:
     """Return the time of frames of whole scenes, and of their volumes in the same job."""
     timings = [record for record in in_order(of(TimingResult, records)) if not record.is_swept]
     rows = [timing_row(record) for record in timings]
-    keys = (LABEL, "pixels", "device", "threads")
     titles = [column.title for column in RENDERING[5:]]
-    means = mean_rows(data_frame(rows), keys, titles)
+    means = mean_rows(rows, (LABEL, "pixels", "device", "threads"), titles)
     if any(meant(record) in volumes() for record in timings):
         means += [published_time("image", "800x800"), published_time("text", "512x512")]
     return Table("", RENDERING, [*rows, *means])
@@ -146,11 +146,8 @@ def published_time(driven: str, pixels: str) -> dict[str, Any]:
     numbers = {"primitives": "primitives", "render_mean_ms": "mean ms", "render_max_ms": "max ms"}
     lines = paper(f"{driven}_npse", {"method": "method"}, numbers).set_index("method")
     labels = {DATA: "mean of 4", LABEL: f"{THEIRS}, {driven}-driven", "pixels": pixels, "device": "RTX 4090"}
-    return {
-        **labels,
-        **lines.loc["TexGS-VolVis"],
-        **dict.fromkeys([column.title for column in RENDERING[8:]], UNPUBLISHED),
-    }
+    others = dict.fromkeys([column.title for column in RENDERING[8:]], UNPUBLISHED)
+    return {**labels, **lines.loc["TexGS-VolVis"], **others}
 
 
 def edits(records: Iterable[Record[Any]]) -> Table:

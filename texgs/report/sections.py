@@ -59,11 +59,9 @@ class Figure:
 
 
 def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figure]]:
-    """All pictures of jobs by section, in the order of data sets; of sweeps those that show all variants.
+    """Return all pictures of jobs by section, by data set; of sweeps those that show all variants.
 
-    Args:
-        records: of the jobs.
-        folder: of the report, which links begin at.
+    Links to larger pages begin at the folder of the report.
     """
     by_section: dict[str, list[Figure]] = {name: [] for name in SECTIONS}
     for record in in_order(records):

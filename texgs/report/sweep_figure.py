@@ -11,7 +11,7 @@ from PIL import Image
 
 from texgs.core.figures import DPI, as_picture, grid_rows, lay_out, new_figure, words
 from texgs.report.metrics_files import Record
-from texgs.report.sweep_table import digits_of, measured, natural, number, sweep_runs, variants
+from texgs.report.sweep_table import measured, natural, number, sweep_runs, variants
 from texgs.report.table import SOURCES
 
 if TYPE_CHECKING:
@@ -29,10 +29,6 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
     """Draw a panel for each measure that differs between runs, and below them the edited scenes.
 
     Variants that are numbers make an axis, with the standard deviation over seeds; others have bars.
-
-    Args:
-        records: jobs; the scenes of edits lie beside their metrics.
-        name: of the sweep.
     """
     runs = sweep_runs(records, name)
     titles, pictures = different(runs), looks(runs)
@@ -50,27 +46,27 @@ def sweep_figure(records: Iterable[Record[Any]], name: str) -> Image.Image:
 
 def stacked(pictures: Sequence[Image.Image]) -> Image.Image:
     """Return pictures one below the other, on white."""
-    page = Image.new(
-        "RGB", (max(each.width for each in pictures), sum(each.height for each in pictures)), "white"
-    )
-    top = 0
+    width, height = max(each.width for each in pictures), sum(each.height for each in pictures)
+    page, top = Image.new("RGB", (width, height), "white"), 0
     for each in pictures:
         page.paste(each, (0, top))
         top += each.height
     return page
 
 
-def different(runs: DataFrame) -> list[str]:
-    """Return the measures that differ between runs; all that there are, where none does."""
+def different(runs: DataFrame) -> dict[str, int]:
+    """Return the measures that differ between runs with their digits; all that there are, where none does."""
     titles = measured(runs)
-    counts = runs[titles].nunique()
-    differ = [title for title in titles if counts[title] > 1]
-    return differ or [title for title in titles if counts[title]] or titles[:1]
+    counts = runs[list(titles)].nunique()
+    for least in (1, 0):
+        if shown := {title: digits for title, digits in titles.items() if counts[title] > least}:
+            return shown
+    return dict(list(titles.items())[:1])
 
 
 def draw_panels(
     figure: Figure,
-    titles: Sequence[str],
+    titles: Mapping[str, int],
     series: Mapping[str, DataFrame],
     name: str,
     bars: Sequence[str],
@@ -78,7 +74,7 @@ def draw_panels(
     """Draw a panel for each measure, with a line or a bar for each of `bars` for each of the series."""
     rows, thick = -(-len(titles) // ACROSS), 0.8 / len(series)
     panels = figure.subplots(rows, min(ACROSS, len(titles)), squeeze=False).ravel()
-    for axes, title in zip(panels, titles, strict=False):
+    for axes, (title, digits) in zip(panels, titles.items(), strict=False):
         axes.set_title(words(title), fontsize=9)
         axes.tick_params(labelsize=7)
         for index, (label, table) in enumerate(series.items()):
@@ -87,7 +83,7 @@ def draw_panels(
             if bars:
                 shift = thick * (index - 0.5 * (len(series) - 1))
                 places = [bars.index(each) + shift for each in known["variant"]]
-                draw_bars(axes, places, means, spread, label, thick, digits_of(title))
+                draw_bars(axes, places, means, spread, label, thick, digits)
             else:
                 draw_line(axes, [float(each) for each in known["variant"]], means, spread, label)
         if bars:

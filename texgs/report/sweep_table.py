@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
 from texgs.metrics.metric import Measure
-from texgs.report.edit_tables import key_of, measured_cells, measures
-from texgs.report.fit_tables import measures_of, runs_of
-from texgs.report.metrics_files import Record, of
+from texgs.report.edit_tables import measured_cells, measures, pairs_of
+from texgs.report.fit_tables import Run, measures_of, runs_of
+from texgs.report.metrics_files import Record
 from texgs.report.published import DATA, LABEL
-from texgs.report.results import EditMeasures, EditResult
 from texgs.report.table import SOURCES, Column, Table, data_frame
 
 if TYPE_CHECKING:
@@ -33,18 +32,13 @@ def sweep(records: Iterable[Record[Any]], name: str) -> Table:
     """Return the table of variants: a row for the fits of each, and one for each of its edits.
 
     Columns of names that all rows leave empty are left out.
-
-    Args:
-        records: jobs; those of other fits and edits do not count.
-        name: of the sweep.
     """
     runs = sweep_runs(records, name)
     table, titles = variants(runs), measured(runs)
     spread = [title for title in titles if table[f"± {title}"].notna().any()]
     named = [title for title in [*SERIES, "variant"] if runs[title].any()]
     columns = [*map(Column, named), Column("seeds", 0)]
-    for title in titles:
-        digits = digits_of(title)
+    for title, digits in titles.items():
         columns.append(Column(title, digits))
         if title in spread:
             columns.append(Column(f"± {title}", digits + (digits == 0)))
@@ -60,45 +54,40 @@ def sweep_runs(records: Iterable[Record[Any]], name: str) -> DataFrame:
     A fit is one run with all its phases; one that misses a phase has no measures.
     """
     own = [record for record in records if record.variant and record.sweep == name]
-    runs = [*(fit_run(list(run.values())) for run in runs_of(own)), *edit_runs(own)]
+    runs = [*map(fit_run, runs_of(own)), *edit_runs(own)]
     if not runs:
         raise ArgumentError(f"sweep {name}: no fit or edit of it among the metrics files; run it first")
-    runs.sort(
-        key=lambda run: (
-            run[DATA],
-            bool(run["edit"]),
-            *(run[key] for key in SERIES[1:]),
-            natural(run["variant"]),
-        )
-    )
+    runs.sort(key=lambda run: natural(run["variant"]))
+    runs.sort(key=lambda run: (run[DATA], bool(run["edit"]), *(run[key] for key in SERIES[1:])))
     numbers = [*OF_FITS, *MATERIAL, *(measure.title for measure in edit_measures())]
     return data_frame(runs, [*SERIES, "variant", "series", "is_done", SOURCES, *dict.fromkeys(numbers)])
 
 
-def fit_run(phases: Sequence[Record[Any]]) -> dict[str, Any]:
+def fit_run(run: Run) -> dict[str, Any]:
     """Return the row of a fit with all its phases."""
-    run = {phase.stage: phase for phase in phases}
-    values = measures_of(run)
+    values, first = measures_of(run), next(iter(run.values()))
     material = run["shading"].result.material if "shading" in run and values else {}
     factors = {title: material.get(factor) for title, factor in MATERIAL.items()}
-    row = _names(phases[0], str(phases[0].tf), "")
-    return {**row, "is_done": bool(values), SOURCES: [each.path for each in phases], **values, **factors}
+    sources = [phase.path for phase in run.values()]
+    return {
+        **_names(first, str(first.tf), ""),
+        "is_done": bool(values),
+        SOURCES: sources,
+        **values,
+        **factors,
+    }
 
 
 def edit_runs(records: Sequence[Record[Any]]) -> list[dict[str, Any]]:
     """Return the rows of edits, with what was measured of those with a new look."""
-    measured = {key_of(each): each for each in of(EditMeasures, records)}
-    rows = []
-    for record in of(EditResult, records):
-        metrics = measured.get(key_of(record))
-        values = {"minutes": record.result.edit_seconds / 60, **(metrics.result.values if metrics else {})}
-        sources = [record.path, *([metrics.path] if metrics else [])]
-        row = _names(record, "", record.result.edit)
-        rows.append({**row, "is_done": True, SOURCES: sources, **measured_cells(edit_measures(), values)})
-    return rows
+    return [
+        {**_names(edit, "", edit.result.edit), "is_done": True, **measured_cells(edit_measures(), edit, seen)}
+        for edit, seen in pairs_of(records)
+    ]
 
 
 def _names(record: Record[Any], tf: str, edit: str) -> dict[str, Any]:
+    """Return what a run is called."""
     names = {DATA: record.dataset, "TF": tf, LABEL: record.recipe, "edit": edit}
     return {**names, "variant": record.variant, "series": " ".join(filter(None, names.values()))}
 
@@ -108,26 +97,20 @@ def edit_measures() -> list[Measure]:
     return [measure for measure in measures() if measure.digits is not None]
 
 
-def measured(runs: DataFrame) -> list[str]:
-    """Return the titles of what is measured of fits, where there are some, and of edits."""
-    of_fits = [*OF_FITS, *MATERIAL] if (runs["edit"] == "").any() else []
-    of_edits = ["minutes", *(measure.title for measure in edit_measures())] if runs["edit"].any() else []
-    return list(dict.fromkeys([*of_fits, *of_edits]))
-
-
-def digits_of(title: str) -> int:
-    """Return how many digits the numbers of a column have after the point."""
+def measured(runs: DataFrame) -> dict[str, int]:
+    """Return the digits of what is measured of fits, where there are some, and of edits, by titles."""
+    of_fits = {**OF_FITS, **dict.fromkeys(MATERIAL, 2)} if (runs["edit"] == "").any() else {}
     of_edits = {measure.title: measure.digits or 0 for measure in edit_measures()}
-    return {**of_edits, **dict.fromkeys(MATERIAL, 2), **OF_FITS}[title]
+    return of_fits | ({"minutes": 2, **of_edits} if runs["edit"].any() else {})
 
 
 def variants(runs: DataFrame) -> DataFrame:
     """Return a row for each variant: means over the seeds that are done, and their standard deviations."""
-    titles, rows = measured(runs), []
+    rows = []
     for _, group in runs.groupby([*SERIES, "variant"], sort=False):
         done = group[group["is_done"].astype(bool)]
         row = {**group.iloc[0], "seeds": len(done), SOURCES: group[SOURCES].sum()}
-        for title in titles:
+        for title in measured(runs):
             row[title], row[f"± {title}"] = spread_of(done[title])
         rows.append(row)
     return data_frame(rows)

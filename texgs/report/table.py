@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import re
+import unicodedata
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.io import write_bytes
-from texgs.report.latex import document, one_line, tabular
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -20,6 +21,40 @@ UNPUBLISHED = "-"  # in columns of the paper's numbers: it has none
 UNLIKE = "≠"  # there: it has one, of something else
 FORMATS = ("csv", "md", "tex")
 DOCUMENT = "tables.tex"
+FORMULAS = r"""± \pm  × \times  ° ^\circ  · \cdot  ≠ \neq  ≤ \leq  ≥ \geq  → \rightarrow  ↑ \uparrow
+  ↓ \downarrow  − -  ² ^2  ³ ^3  α \alpha  β \beta  λ \lambda  µ \mu  μ \mu  σ \sigma"""
+SPECIAL = {  # letters that LaTeX takes for something else, or has other names for
+    **{letter: f"${formula}$" for letter, formula in re.findall(r"(\S) (\S+)", FORMULAS)},
+    **{letter: f"\\{letter}" for letter in "&%$#_{}"},
+    **{"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}", "…": r"\ldots{}"},
+    **{"[": "{[}", "]": "{]}"},  # after the end of a row they would hold an argument
+    **{"–": "--", "—": "---", "‘": "`", "’": "'", "“": "``", "”": "''"},
+}
+HEAD = r"""% All tables of a report: pdflatex tables.tex
+\documentclass{article}
+\usepackage[a3paper,margin=15mm]{geometry}
+\usepackage[T1]{fontenc}
+\usepackage[utf8]{inputenc}
+\usepackage{booktabs}
+\usepackage{graphicx}
+\newsavebox{\tablebox}
+% A table at its own size, or as wide as the page.
+\newcommand{\fitted}[1]{\sbox{\tablebox}{\input{#1}\unskip}%
+  \ifdim\wd\tablebox>\linewidth\resizebox{\linewidth}{!}{\usebox{\tablebox}}\else\usebox{\tablebox}\fi}
+\begin{document}
+"""
+FLOAT = r"""\begin{table}[p]
+\centering
+\textbf{%s}
+
+\medskip
+%s
+
+\medskip
+\fitted{%s.tex}
+\end{table}
+\clearpage
+"""
 
 
 @dataclass(frozen=True)
@@ -29,6 +64,11 @@ class Column:
     title: str
     digits: int | None = None  # after the point; None: as they are
     missing: str = MISSING  # in place of a cell that has no value
+
+    @property
+    def is_number(self) -> bool:
+        """Return whether its cells are numbers, which stand to the right."""
+        return self.digits is not None
 
     def text(self, cell: Any) -> str:
         """Return a cell as people read it."""
@@ -46,12 +86,16 @@ class Table:
     rows: DataFrame | Sequence[Mapping[str, Any]]  # by titles; SOURCES may be among them
     heading: str = ""
 
+    @property
+    def titles(self) -> list[str]:
+        """Return the headings of all columns."""
+        return [column.title for column in self.columns]
+
     @cached_property
     def frame(self) -> DataFrame:
         """Return the cells by title, with None for what is missing, and a list of paths in SOURCES."""
-        titles = [*(column.title for column in self.columns), SOURCES]
         rows = data_frame(self.rows) if isinstance(self.rows, Sequence) else self.rows
-        frame = rows.reindex(columns=titles).astype(object).reset_index(drop=True)
+        frame = rows.reindex(columns=[*self.titles, SOURCES]).astype(object).reset_index(drop=True)
         frame = frame.where(frame.notna(), None)
         frame[SOURCES] = [sources or [] for sources in frame[SOURCES]]
         return frame
@@ -61,10 +105,10 @@ class Table:
         """Return whether there are no rows."""
         return len(self.rows) == 0
 
-    def texts(self) -> list[list[str]]:
+    @cached_property
+    def texts(self) -> DataFrame:
         """Return all cells as people read them."""
-        texts = [map(column.text, self.frame[column.title].tolist()) for column in self.columns]
-        return [list(row) for row in zip(*texts, strict=True)]
+        return data_frame({c.title: list(map(c.text, self.frame[c.title].tolist())) for c in self.columns})
 
     def csv(self) -> str:
         """Return comma separated values, numbers in full; an empty cell has no number of its own."""
@@ -74,24 +118,25 @@ class Table:
 
     def markdown(self) -> str:
         """Return a Markdown table, numbers to the right."""
-        rule = ["---" if column.digits is None else "---:" for column in self.columns]
-        lines = [[column.title for column in self.columns], rule, *self.texts()]
+        rule = ["---:" if column.is_number else "---" for column in self.columns]
+        lines = [self.titles, rule, *self.texts.to_numpy().tolist()]
         rows = [" | ".join(one_line(text).replace("|", r"\|") for text in line) for line in lines]
         parts = [f"## {self.heading}"] if self.heading else []
         parts += ["\n".join(f"| {row} |" for row in rows), one_line(self.caption)]
         return "\n\n".join(parts) + "\n"
 
     def latex(self) -> str:
-        """Return a tabular of LaTeX."""
-        kinds = "".join("l" if column.digits is None else "r" for column in self.columns)
-        return tabular(kinds, [column.title for column in self.columns], self.texts(), self.caption)
+        """Return a tabular of LaTeX between rules of booktabs, with the caption as a comment."""
+        kinds = "".join("r" if column.is_number else "l" for column in self.columns)
+        texts = self.texts.map(escape).rename(columns=escape)
+        return f"% {one_line(self.caption)}\n" + texts.to_latex(index=False, column_format=kinds)
 
 
-def data_frame(rows: Iterable[Mapping[str, Any]], columns: Sequence[str] | None = None) -> DataFrame:
+def data_frame(rows: Any, columns: Sequence[str] | None = None) -> DataFrame:
     """Return rows as a data frame that keeps each value as it is; without rows it has the columns alone."""
     import pandas as pd  # slow to import
 
-    return pd.DataFrame(list(rows), columns=columns, dtype=object)
+    return pd.DataFrame(rows, columns=columns, dtype=object)
 
 
 def write_table(folder: str | Path, name: str, table: Table) -> None:
@@ -102,8 +147,28 @@ def write_table(folder: str | Path, name: str, table: Table) -> None:
 
 def write_tables(folder: str | Path, tables: Mapping[str, Table]) -> None:
     """Write the files of each table, and tables.tex, which has those with rows and their captions."""
+    floats = []
     for name, table in tables.items():
         write_table(folder, name, table)
-    shown = {name: table for name, table in tables.items() if not table.is_empty}
-    floats = {name: (table.heading or name, table.caption) for name, table in shown.items()}
-    write_bytes(Path(folder, DOCUMENT), document(floats).encode())
+        if not table.is_empty:
+            floats.append(FLOAT % (escape(table.heading or name), escape(table.caption), name))
+    text = "".join([HEAD, *floats, "\\end{document}\n"])
+    write_bytes(Path(folder, DOCUMENT), text.encode())
+
+
+def escape(text: str) -> str:
+    """Return text as LaTeX prints it, in one line; what the fonts of pdflatex may not have by its code."""
+    return "".join(map(printed, one_line(text)))
+
+
+def printed(letter: str) -> str:
+    """Return a letter as LaTeX prints it."""
+    if letter in SPECIAL:
+        return SPECIAL[letter]
+    is_accented = "LATIN" in unicodedata.name(letter, "") and ord(letter) <= 0x17F  # the encoding T1 has it
+    return letter if letter.isascii() or is_accented else rf"\texttt{{U+{ord(letter):04X}}}"
+
+
+def one_line(text: str) -> str:
+    """Return text without line breaks, which end a row of a table."""
+    return " ".join(text.split())

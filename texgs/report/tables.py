@@ -9,8 +9,7 @@ from typing import Any
 
 from texgs.report.edit_tables import image_driven, looks, text_driven, text_driven_frozen
 from texgs.report.fit_tables import ablation, fits, fitting, meshes, model_size
-from texgs.report.left_out import LeftOut, note
-from texgs.report.metrics_files import Record
+from texgs.report.metrics_files import LeftOut, Record, note
 from texgs.report.results import EditResult, FitResult
 from texgs.report.scene_tables import datasets, edits, rendering
 from texgs.report.sweep_table import sweep
@@ -41,13 +40,7 @@ class TableSpec:
         left_out: Sequence[LeftOut] = (),
         given: Table | None = None,
     ) -> Table:
-        """Return the table of some jobs, whose caption says what it shows and what is left out.
-
-        Args:
-            records: of the jobs.
-            left_out: what there is no job of.
-            given: the table, where it is not made of records alone.
-        """
+        """Return the table of some jobs, or the given one; its caption says what it shows and lacks."""
         made = self.make(records) if self.make else given or Table("", [], [])
         where = f"In the paper: {self.paper}." if self.paper else ""
         parts = (self.caption, where, made.caption, note(left_out, self.places))
@@ -188,13 +181,7 @@ def tables_of(
     left_out: Sequence[LeftOut] = (),
     given: Mapping[str, Table] | None = None,
 ) -> dict[str, Table]:
-    """Return all tables of some jobs by their names, also those without rows.
-
-    Args:
-        records: of the jobs.
-        left_out: what there is no job of.
-        given: tables by name that need more than records, see `texgs.study` and `texgs.workflow`.
-    """
+    """Return all tables of some jobs by their names, also empty ones; `given` need more than records."""
     given = given or {}
     return {
         spec.name: spec.table(records, left_out, given.get(spec.name)) for spec in specs(sweeps_of(records))

@@ -32,7 +32,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     transforms_train.json; without test views training views are shown.
     """
     from texgs.fields.files import open_field
-    from texgs.report.comparison import write_comparison
+    from texgs.report.fit_figure import write_comparison
     from texgs.volume.view_set import read_views
 
     shown = shown_views(read_views(inputs["views"].parent))

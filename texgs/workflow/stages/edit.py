@@ -52,8 +52,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from texgs.core.check import torch_device
     from texgs.edit.task import Task
-    from texgs.report.before_after import write_before_and_after
-    from texgs.report.loss_figures import write_convergence
+    from texgs.report.before_after import write_before_and_after, write_convergence
     from texgs.scene.scene_file import read_scene, write_scene
 
     method, title = method_of(settings.edit), f"{settings.dataset}: edit"
