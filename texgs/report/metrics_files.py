@@ -101,9 +101,9 @@ def read_known(paths: Iterable[str | Path]) -> tuple[list[Record[Any]], list[Lef
             others[path] = error
     if not others:
         return records, []
-    first, error = next(iter(others.items()))
+    first = next(iter(others))
     if not records:
-        raise error
+        raise others[first]
     what = f"{len(others)} metrics files" if len(others) > 1 else "1 metrics file"
     why = f"of another version of texgs, {first} first; run its job again to have it back"
     return records, [LeftOut(what, why, [])]

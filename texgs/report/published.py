@@ -96,7 +96,7 @@ def is_alike(record: Record[FitResult], pixels: int | None = None, views: int = 
     return is_paper and not is_other and seen == (pixels, pixels, views)
 
 
-def mean(values: Iterable[float | None]) -> float | None:
+def mean(values: Iterable[Any]) -> float | None:
     """Return the mean; None where a value is missing, or there is none."""
     listed = list(values)
     return fmean(listed) if listed and None not in listed else None
