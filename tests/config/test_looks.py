@@ -7,7 +7,8 @@ from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.edit.pictures import PICTURES
 from texgs.models.instruction import understand
-from texgs.workflow.stages.edit import captions, edit_settings, edited_scene, looks_of
+from texgs.workflow.stage_table import STAGES
+from texgs.workflow.stages.edit import captions, edited_scene, looks_of
 
 
 def test_an_edit_follows_its_own_picture_unless_it_asks_for_looks():
@@ -27,7 +28,7 @@ def test_an_edit_follows_its_own_picture_unless_it_asks_for_looks():
 def test_methods_by_words_follow_the_instruction(edit):
     config = compose(("dataset=engine", f"edit={edit}", "edit.looks=true"))
     assert looks_of(config) == {"TF01": "a watercolour", "TF02": "turn it into copper"}
-    assert edit_settings(config)["followed"] == looks_of(config)
+    assert STAGES[f"edit_{config.edit.method}"].settings(config)["followed"] == looks_of(config)
 
 
 def test_picture_files_of_looks_are_inputs(tmp_path):

@@ -34,7 +34,6 @@ STAGE = Stage(
     help="project a volume by its largest samples",
     rule=Rule("projection", "{dataset}/projection", ("projection.png",), target="volumes", threads=1),
     schema=OfDataset,
-    select=lambda config: {},
     inputs=prepared_volume,
     work=work,
     applies=has_volume,

@@ -13,7 +13,7 @@ from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.edit.method import method_of
 from texgs.workflow.gallery_scenes import check_changes, fit_of, takers
-from texgs.workflow.inputs import prepared_volume, scene_settings, sibling
+from texgs.workflow.inputs import prepared_volume, sibling
 from texgs.workflow.stage import edit_folder, fit_folder, made
 
 FRONT, SIDE = [-90.0, 20.0], [0.0, 20.0]  # azimuth and polar angle of cameras, degrees
@@ -29,10 +29,14 @@ class Place:
     file: Path
 
 
-def gallery_settings(config: Config) -> dict[str, Any]:
-    """What the stage reads: the pictures of all places, and what it takes to show the volume."""
-    size, name = config.gallery.size, config.gallery.name
-    command = f"texgs run experiment={name}" if name in members("experiment") else ""
+def gallery_command(config: Config) -> str:
+    """Return the command that makes the pictures; empty where it is no experiment of a file."""
+    name = config.gallery.name
+    return f"texgs run experiment={name}" if name in members("experiment") else ""
+
+
+def gallery_grids(config: Config) -> list[dict[str, Any]]:
+    """Return what the stage reads of the pictures of all places."""
     shown = []
     for grid, places in places_of(config):
         rows = [
@@ -41,8 +45,7 @@ def gallery_settings(config: Config) -> dict[str, Any]:
         ]
         titles = [column.title for column in grid.columns]
         shown.append({"name": grid.name, "caption": grid.caption, "columns": titles, "rows": rows})
-    given = {"section": config.gallery.section, "size": size, "command": command, "grids": shown}
-    return {**scene_settings(config), **given}
+    return shown
 
 
 def gallery_inputs(config: Config) -> dict[str, Path]:

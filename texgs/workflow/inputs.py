@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from texgs.config.project import members
+from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD
 from texgs.fit.kinds import fit_specs
 from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
 
 def is_fit(config: Config) -> bool:
@@ -89,63 +87,31 @@ def models_of_scene(config: Config) -> dict[str, Path]:
     return {f"model.{name}": path for name, path in all_models(config).items()}
 
 
-def scene_settings(config: Config) -> dict[str, Any]:
-    """Return what stages read that compare a scene with its volume."""
+def shown_tfs(config: Config) -> dict[str, Any]:
+    """Return the basic TFs that scenes are compared with; none where there is no volume."""
     basic = {} if config.dataset.views_folder is not None else config.dataset.basic_tfs
-    return {
-        "tf_values": config.dataset.tf_values,
-        "basic_tfs": {name: basic[name] for name in tf_names(config) if name in basic},
-        "views": view_settings(config),
-        **fit_label(config),
-    }
+    return {name: basic[name] for name in tf_names(config) if name in basic}
 
 
-def lens(config: Config) -> dict[str, float]:
-    """Return distance and field of view of the views, which pictures of scenes share."""
-    return {"radius": config.views.radius, "fov_y": config.views.fov_y}
-
-
-def fit_label(config: Config, later: Sequence[str] = ()) -> dict[str, Any]:
-    """Return which fit this is, and what it runs on. One that variants of a sweep share is of none of them.
-
-    Args:
-        config: of a job.
-        later: keys of the recipe that only later jobs read.
-    """
-    from texgs.config.schema import NO_SWEEP
+def variant_of_fit(config: Config) -> str:
+    """Return the variant of the fit; empty for a fit that all variants of a sweep share."""
     from texgs.workflow.variants import fit_variant
 
-    variant = fit_variant(config)
-    return {
-        "fit": {
-            "name": config.fit.name,
-            "field": config.fit.field,
-            "seed": config.fit.seed,
-            "sweep": config.sweep.name if variant else NO_SWEEP,
-            "variant": variant,
-            "device": config.device.name,
-            "changed": is_changed(config.fit, later),
-        }
-    }
+    return fit_variant(config)
 
 
-def recipe(*parts: str, later: Sequence[str] = ()) -> Callable[[Config], dict[str, Any]]:
-    """Return what a stage of the fit reads, as a function: what holds for all, and its own parts.
-
-    Args:
-        parts: keys of the recipe.
-        later: those of later stages.
-    """
-    return lambda config: {
-        "fit": {
-            **fit_label(config, later)["fit"],
-            **{part: getattr(config.fit, part) for part in ("reduce", *parts)},
-        }
-    }
+def sweep_of_fit(config: Config) -> str:
+    """Return the sweep that the fit is of."""
+    return config.sweep.name if variant_of_fit(config) else NO_SWEEP
 
 
 def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
-    """Return whether a recipe is not that of the file with its name, but for its seed and for some keys."""
+    """Return whether a recipe is not that of the file with its name, but for its seed and for some keys.
+
+    Args:
+        fit: recipe of a job.
+        later: keys of it that only later jobs read.
+    """
     from texgs.config.compose import compose
 
     if fit.name not in members("fit"):
@@ -160,7 +126,12 @@ def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
 
 def view_settings(config: Config) -> dict[str, Any]:
     """Return how views are rendered, without the name of their folder."""
-    return {name: value for name, value in plain(config.views).items() if name != "name"}
+    return without(config.views, "name")
+
+
+def without(table: Any, *names: str) -> dict[str, Any]:
+    """Return a table of the configuration without some of its keys."""
+    return {name: value for name, value in plain(table).items() if name not in names}
 
 
 def with_recipe(config: Config, name: str) -> Config:

@@ -125,7 +125,7 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
             "run": run.id,
             "result": type(outcome.result).__name__,
             "numbers": plain(outcome.result),
-            "pictures": dict(outcome.pictures),
+            "pictures": dict(job.stage.rule.shown if outcome.pictures is None else outcome.pictures),
         }
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)

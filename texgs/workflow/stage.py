@@ -1,8 +1,9 @@
 """What a stage of the workflow is: the configuration it reads, the code it runs, the place of its files.
 
-A stage is one module of texgs/workflow/stages, see `stage_table`. A job's settings are written once to a file
-named after their contents. That file is an input of the job and the digest of the code a parameter, so a
-changed value or line of code reruns what depends on it.
+A stage is one module of texgs/workflow/stages, see `stage_table`. Its settings are a dataclass whose fields
+say by `read` which values of the configuration they have. Those of a job are written once to a file named
+after their contents. That file is an input of the job and the digest of the code a parameter, so a changed
+value or line of code reruns what depends on it.
 """
 
 from __future__ import annotations
@@ -11,11 +12,13 @@ import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from datetime import datetime
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import Any, Literal, cast, get_type_hints
 
 import yaml
 
+from texgs.config.schema import Config
 from texgs.core.checksum import digest
 from texgs.core.io import write_atomic
 from texgs.edit.method import methods
@@ -23,9 +26,6 @@ from texgs.fields.kinds import kinds
 from texgs.metrics.metric import metrics
 from texgs.report.results import Result
 from texgs.workflow.code import code_digest
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
 LONG_AGO = 946684800  # the year 2000, in seconds
 EVERY = 1024  # threads, of which a job gets as many as there are
@@ -54,7 +54,7 @@ class Outcome:
     """A result for metrics.json, and pictures for the report and the tracked run."""
 
     result: Result
-    pictures: Mapping[str, str] = field(default_factory=dict)  # what files of the output show, by their names
+    pictures: Mapping[str, str] | None = None  # captions of files of the output; default those of the rule
 
 
 @dataclass(frozen=True)
@@ -68,8 +68,7 @@ class Stage:
     order: int  # among the stages: behind those whose files it reads
     help: str  # what it does, in `texgs --help`
     rule: Rule
-    schema: type[Any]  # dataclass of its settings
-    select: Callable[[Config], dict[str, Any]]  # the part of the configuration that is its settings
+    schema: type[Any]  # dataclass of its settings, whose fields say what they `read`
     inputs: Callable[[Config], dict[str, Path]]  # the files it reads, by name
     work: Callable[[Any, dict[str, Path], Path], Outcome]  # its job: from settings and inputs to a folder
     applies: Callable[[Config], bool] = lambda config: True  # whether a data set or edit goes through it
@@ -91,16 +90,8 @@ class Stage:
         return self.rule.is_per_tf
 
     def settings(self, config: Config) -> dict[str, Any]:
-        """Return what a job reads, as plain lists and dicts.
-
-        Raises:
-            ConfigError: if the stage works on one basic TF, and `config.tf` is none of the data set's.
-        """
-        of_all = {"dataset": config.dataset.name, "stand_in": config.dataset.stand_in}
-        selected = {"stage": self.name, **of_all, **self.select(config)}
-        if self.per_tf:
-            selected["tf"] = config.tf
-        return cast(dict[str, Any], plain(selected))
+        """Return what a job reads, as plain lists and dicts."""
+        return cast(dict[str, Any], plain({"stage": self.name, **selected(self.schema, config)}))
 
     def output(self, config: Config) -> Path:
         """Return the folder of the job's files."""
@@ -119,6 +110,26 @@ class Stage:
         if self.name == "edit_metrics":
             modules += [metric.run.__module__ for metric in metrics().values()]
         return digest(" ".join(map(code_digest, modules)))
+
+
+def read(source: str | Callable[[Config], Any]) -> Any:
+    """Return the field of settings that has a value of the configuration.
+
+    Args:
+        source: the key of the configuration, such as `"fit.seed"`, or a function of it.
+    """
+    return field(metadata={"read": attrgetter(source) if isinstance(source, str) else source})
+
+
+def selected(schema: type[Any], config: Config) -> dict[str, Any]:
+    """Return the values that the fields of a dataclass, and of its parts, read of a configuration."""
+    hints, values = get_type_hints(schema), {}
+    for each in fields(schema):
+        if "read" in each.metadata:
+            values[each.name] = each.metadata["read"](config)
+        elif is_dataclass(part := hints[each.name]):
+            values[each.name] = selected(cast(type[Any], part), config)
+    return values
 
 
 def settings_file(settings: dict[str, Any], results: str) -> str:

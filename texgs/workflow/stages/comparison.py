@@ -4,25 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from texgs.report.results import ComparisonResult
 from texgs.workflow.inputs import is_first_recipe, is_fit, is_swept, last_phase, view_set, with_recipe
-from texgs.workflow.stage import Outcome, Rule, Stage, made
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.figure import shown_views
 from texgs.workflow.stages.settings import OfTF
 
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
-SHOWN = "Test views, the fit of each recipe with its PSNR, and below it its error."
-
-
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfTF):
     """What the stage reads of the configuration."""
 
-    reduce: int  # of images
+    reduce: int = read("fit.reduce")  # of images
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -37,14 +31,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     shown = shown_views(read_views(inputs["views"].parent))
     models = {recipe: open_field(path) for recipe, path in inputs.items() if recipe != "views"}
-    write_comparison(
-        output / "comparison.png",
-        models,
-        shown,
-        settings.reduce,
-        f"{settings.dataset}/{settings.tf}, {len(models)} recipes",
-    )
-    return Outcome(ComparisonResult(list(models), list(shown)), {"comparison.png": SHOWN})
+    title = f"{settings.dataset}/{settings.tf}, {len(models)} recipes"
+    write_comparison(output / "comparison.png", models, shown, settings.reduce, title)
+    return Outcome(ComparisonResult(list(models), list(shown)))
 
 
 def inputs(config: Config) -> dict[str, Path]:
@@ -68,10 +57,9 @@ STAGE = Stage(
         "{dataset}/{tf}/comparison/{gallery}",
         ("comparison.png",),
         target="comparisons",
-        shown={"comparison.png": SHOWN},
+        shown={"comparison.png": "Test views, the fit of each recipe with its PSNR, and below it its error."},
     ),
     schema=Settings,
-    select=lambda config: {"reduce": config.fit.reduce},
     inputs=inputs,
     work=work,
     applies=applies,

@@ -6,19 +6,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.report.results import SceneResult
-from texgs.workflow.inputs import all_models, fit_label, has_scene, lens
-from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.inputs import all_models, has_scene
+from texgs.workflow.stage import Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
 
-SHOWN = "The basic models as one scene, rendered from their primitives."
 AZIMUTH, POLAR = -60.0, 20.0  # of the picture, degrees
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfDataset):
     """What the stage reads of the configuration."""
 
-    image: int
+    image: int = read("dataset.image")
     lens: Distance
     fit: FitLabel
 
@@ -41,7 +40,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     camera = orbit(AZIMUTH, POLAR, *settings.lens.lens.square(settings.image))
     picture = frame(composition, camera, scene.light, scene.edits, background=scene.background)
     write_frames(output / "scene.png", [picture])
-    return Outcome(SceneResult(len(scene.models), len(composition)), {"scene.png": SHOWN})
+    return Outcome(SceneResult(len(scene.models), len(composition)))
 
 
 STAGE = Stage(
@@ -54,10 +53,9 @@ STAGE = Stage(
         ("scene.yaml", "scene.png"),
         target="scenes",
         gpu=("fit",),
-        shown={"scene.png": SHOWN},
+        shown={"scene.png": "The basic models as one scene, rendered from their primitives."},
     ),
     schema=Settings,
-    select=lambda config: {"image": config.dataset.image, "lens": lens(config), **fit_label(config)},
     inputs=all_models,
     work=work,
     applies=has_scene,

@@ -17,13 +17,12 @@ from texgs.edit.keys import EditKeys
 from texgs.edit.method import Method, method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditResult
-from texgs.workflow.inputs import fit_label, lens, models_of_scene, scene_before, view_set
+from texgs.workflow.inputs import models_of_scene, scene_before, view_set
 from texgs.workflow.locate import tf_names
-from texgs.workflow.stage import Outcome, Rule, Stage
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import Distance, FitLabel, OfDataset
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
     from texgs.edit.task import Task
 
 CAPTIONS = {"style": "styled", "instruction": "instructed"}  # keys of a look by what a method follows
@@ -33,16 +32,62 @@ SHOWN = "Before and after the edit; what can be relit, under another light too."
 VIEWS = "views."  # before the name of a model, in the names of inputs
 
 
-@dataclass
-class Settings(OfDataset):
-    """What the stage reads of the configuration."""
+def edit_keys(config: Config) -> dict[str, Any]:
+    """Return what jobs of edits read of theirs: what all edits have, and the keys of the method."""
+    keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
+    return {name: getattr(config.edit, name) for name in keys} | captions(config)
 
-    edit: Edit
-    fit: FitLabel
-    reduce: int
+
+def captions(config: Config) -> dict[str, str]:
+    """Return both captions of an edit: its own, or those of all basic scenes together."""
+    edit, table = config.edit, config.dataset.looks
+    names = list(looks_of(config))
+    if not names:
+        return {name: getattr(edit, name) for name in ("source_caption", "target_caption")}
+    after = CAPTIONS[method_of(edit).follows]
+    return {
+        "source_caption": " and ".join(table[name].caption for name in names),
+        "target_caption": " and ".join(getattr(table[name], after) for name in names),
+    }
+
+
+def looks_of(config: Config) -> dict[str, str]:
+    """What each model of a scene follows; empty where all follow what the edit itself says."""
+    edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
+    if not edit.looks:
+        return {}
+    follows, names = method_of(edit).follows, tf_names(config)
+    if not follows:
+        raise ConfigError(
+            f"edit.looks: expected a method that follows a picture or an instruction, got {edit.method}"
+        )
+    for name in names:
+        if name not in table:
+            raise ConfigError(
+                f"dataset.looks of {dataset}: expected a look for each of {', '.join(names)}, got none for "
+                f"{name}; add one, or set edit.looks=false"
+            )
+    return {name: getattr(table[name], follows) for name in names}
+
+
+@dataclass(kw_only=True)
+class EditedFit(FitLabel):
+    """The same, with the variant of the edit."""
+
+    sweep: str = read("sweep.name")
+    variant: str = read("variant")
+
+
+@dataclass(kw_only=True)
+class Settings(OfDataset):
+    """What the stage reads of the configuration; `weights` comes from the job."""
+
+    edit: Edit = read(edit_keys)
+    fit: EditedFit
+    reduce: int = read("fit.reduce")
     lens: Distance
     weights: dict[str, str | None]
-    followed: dict[str, str]  # by model: what it follows, where that is not what the edit says
+    followed: dict[str, str] = read(looks_of)  # by model, where not as the edit says
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -113,15 +158,6 @@ def followed(task: Task[Any]) -> dict[str, str]:
     return {name: method.followed(task.settings_for(name.split("/")[0])) for name in parts}
 
 
-def edit_settings(config: Config) -> dict[str, Any]:
-    """Return what jobs of edits read: what all edits have, and the keys of this one's method."""
-    keys = [*(field.name for field in fields(EditKeys)), config.edit.method]
-    edit = {name: getattr(config.edit, name) for name in keys} | captions(config)
-    given = {"reduce": config.fit.reduce, "lens": lens(config), "followed": looks_of(config)}
-    label = fit_label(config)["fit"] | {"sweep": config.sweep.name, "variant": config.variant}
-    return {"edit": edit, "fit": label, **given}
-
-
 def edited_scene(config: Config) -> dict[str, Path]:
     """Return the scene that an edit starts from, its models, their training views, and files of styles."""
     from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
@@ -159,38 +195,6 @@ def files_of_scene(scene: Path) -> dict[str, Path]:
     return files
 
 
-def looks_of(config: Config) -> dict[str, str]:
-    """What each model of a scene follows; empty where all follow what the edit itself says."""
-    edit, dataset, table = config.edit, config.dataset.name, config.dataset.looks
-    if not edit.looks:
-        return {}
-    follows, names = method_of(edit).follows, tf_names(config)
-    if not follows:
-        raise ConfigError(
-            f"edit.looks: expected a method that follows a picture or an instruction, got {edit.method}"
-        )
-    for name in names:
-        if name not in table:
-            raise ConfigError(
-                f"dataset.looks of {dataset}: expected a look for each of {', '.join(names)}, got none for "
-                f"{name}; add one, or set edit.looks=false"
-            )
-    return {name: getattr(table[name], follows) for name in names}
-
-
-def captions(config: Config) -> dict[str, str]:
-    """Return both captions of an edit: its own, or those of all basic scenes together."""
-    edit, table = config.edit, config.dataset.looks
-    names = list(looks_of(config))
-    if not names:
-        return {name: getattr(edit, name) for name in ("source_caption", "target_caption")}
-    after = CAPTIONS[method_of(edit).follows]
-    return {
-        "source_caption": " and ".join(table[name].caption for name in names),
-        "target_caption": " and ".join(getattr(table[name], after) for name in names),
-    }
-
-
 RULE = Rule(
     "edit",
     "{dataset}/scene/{fit}/edits/{edit}",
@@ -209,7 +213,6 @@ def stage_of(method: Method[Any]) -> Stage:
         help=method.summary,
         rule=RULE,
         schema=Settings,
-        select=edit_settings,
         inputs=edited_scene,
         work=work,
         applies=lambda config: config.tf is None and config.edit.method == method.name,

@@ -4,30 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from texgs.config.views import ViewKeys
 from texgs.edit.method import method_of, methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import EditMeasures
 from texgs.workflow.inputs import view_settings, with_recipe
-from texgs.workflow.stage import EVERY, Outcome, Rule, Stage, made
+from texgs.workflow.stage import EVERY, Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.edit import Settings as EditSettings
-from texgs.workflow.stages.edit import edit_settings, edited_scene
+from texgs.workflow.stages.edit import edited_scene
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
     from texgs.metrics.metric import StyledModel
     from texgs.scene.scene import Scene
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(EditSettings):
     """What the stage reads of the configuration."""
 
-    compared: int
-    clip: str
-    views: ViewKeys
+    compared: int = read("metric.views")
+    clip: str = read("metric.clip")
+    views: ViewKeys = read(view_settings)
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -78,12 +77,6 @@ def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledMode
     return styles
 
 
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    measures = {"compared": config.metric.views, "clip": config.metric.clip}
-    return {**edit_settings(config), **measures, "views": view_settings(config)}
-
-
 def inputs(config: Config) -> dict[str, Path]:
     """Return the scene as edited and as fitted, what says where its surfaces are, and the views of all TFs.
 
@@ -112,7 +105,6 @@ STAGE = Stage(
         gpu=("fit",),
     ),
     schema=Settings,
-    select=select,
     inputs=inputs,
     work=work,
     applies=applies,

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from texgs.fit.kinds import fit_specs
 from texgs.report.results import Result
-from texgs.workflow.inputs import fit_label, is_fit, view_set
-from texgs.workflow.stage import Outcome, Rule, Stage, made
+from texgs.workflow.inputs import is_fit, view_set
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
     from texgs.volume.view_set import View, ViewSet
-
-SHOWN = "Test views, the phases of the fit, errors, normals, depth and material."
 
 
 @dataclass(frozen=True)
@@ -27,14 +24,14 @@ class FigureResult(Result, section="fitting"):
     primitives: int
 
 
-@dataclass
+@dataclass(kw_only=True)
 class ShownFit(Recipe):
     """What the figure says of a fit."""
 
-    surfels_iterations: int
+    surfels_iterations: int = read("fit.surfels.iterations")
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfTF):
     """What the stage reads of the configuration."""
 
@@ -60,31 +57,16 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         counts["texels"] = len(last.parameters["texels"])
     title = f"{settings.dataset}/{settings.tf}, recipe {fit.name}: "
     title += ", ".join(f"{count:,} {things}" for things, count in counts.items())
-    write_fit_figure(
-        output / "figure.png",
-        {phase: model if is_fitted(phase, fit) else None for phase, model in models.items()},
-        shown,
-        fit.reduce,
-        title,
-    )
-    return Outcome(FigureResult(list(shown), len(last)), {"figure.png": SHOWN})
+    only_seeds = {"surfels"} if fit.surfels_iterations == 0 else set()  # phases that do not fit
+    fitted = {phase: None if phase in only_seeds else model for phase, model in models.items()}
+    write_fit_figure(output / "figure.png", fitted, shown, fit.reduce, title)
+    return Outcome(FigureResult(list(shown), len(last)))
 
 
 def shown_views(views: ViewSet) -> dict[str, View]:
     """Return two test views by the names that stand beside them; training views where there are none."""
     split, candidates = ("test", views.test) if views.test else ("training", views.train)
     return {f"{split} view {index}": candidates[index] for index in sorted({0, len(candidates) // 3})}
-
-
-def is_fitted(phase: str, fit: ShownFit) -> bool:
-    """Return whether a phase does more than seed."""
-    return phase != "surfels" or fit.surfels_iterations > 0
-
-
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    shown = {"reduce": config.fit.reduce, "surfels_iterations": config.fit.surfels.iterations}
-    return {"fit": {**fit_label(config)["fit"], **shown}}
 
 
 def inputs(config: Config) -> dict[str, Path]:
@@ -98,10 +80,13 @@ STAGE = Stage(
     order=90,
     help="show a fit beside test views, with its maps",
     rule=Rule(
-        "figure", "{dataset}/{tf}/{fit}/figure", ("figure.png",), "figures", shown={"figure.png": SHOWN}
+        "figure",
+        "{dataset}/{tf}/{fit}/figure",
+        ("figure.png",),
+        target="figures",
+        shown={"figure.png": "Test views, the phases of the fit, errors, normals, depth and material."},
     ),
     schema=Settings,
-    select=select,
     inputs=inputs,
     work=work,
     applies=is_fit,

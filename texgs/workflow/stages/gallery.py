@@ -10,17 +10,47 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.progress import progress
 from texgs.report.results import GalleryResult, Shown
 from texgs.workflow.inputs import has_scene, is_first_recipe
-from texgs.workflow.stage import Outcome, Rule, Stage
-from texgs.workflow.stages.gallery_cells import GalleryCell, GalleryRenderer, RenderedCell
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
 from texgs.workflow.stages.settings import OfScene
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
+    import numpy as np
+
+    from texgs.core.camera import Camera
+    from texgs.scene.session import Session
 
 ERRORS = (
     "Errors are those of the worst channel, four times enlarged, red where the scene is too bright and blue "
     "where it is too dark, with the PSNR of the picture."
 )
+
+
+def command(config: Config) -> str:
+    """Return the command that makes the pictures."""
+    from texgs.workflow.galleries import gallery_command  # not at the top: it loads Hydra
+
+    return gallery_command(config)
+
+
+def grids(config: Config) -> list[dict[str, Any]]:
+    """Return the pictures of all places."""
+    from texgs.workflow.galleries import gallery_grids
+
+    return gallery_grids(config)
+
+
+@dataclass
+class GalleryCell:
+    """What the configuration says of one picture, see `texgs.config.gallery`."""
+
+    scene: str  # its name among the inputs
+    show: str  # scene, volume, error, or "" for nothing
+    view: list[float]
+    fov_y: float | None
+    box: list[float]
+    pixels: int | None
+    light: list[float]
+    changes: list[str]
 
 
 @dataclass
@@ -41,14 +71,22 @@ class Grid:
     rows: list[Row]
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfScene):
     """What the stage reads of the configuration."""
 
-    section: str
-    size: int
-    command: str
-    grids: list[Grid]
+    section: str = read("gallery.section")
+    size: int = read("gallery.size")
+    command: str = read(command)
+    grids: list[Grid] = read(grids)
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedCell:
+    """A picture, or nothing."""
+
+    pixels: np.ndarray | None = None  # [H, W, 3] in [0, 1]
+    psnr: float | None = None  # against the volume, where the picture shows the difference, dB
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -61,7 +99,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     renderer, shown, captions = GalleryRenderer(settings, inputs, settings.size), [], {}
     for grid in settings.grids:
         taken = pictures(grid, renderer, f"{settings.dataset}: {grid.name}")
-        shown += entries(grid, taken)
+        shown += [
+            Shown(grid.name, row, column, each.psnr)
+            for row, line in taken.items()
+            for column, each in zip(grid.columns, line, strict=True)
+            if each.pixels is not None
+        ]
         pixels = {title: [each.pixels for each in row] for title, row in taken.items()}
         below = {
             title: ["" if each.psnr is None else f"{each.psnr:.1f} dB" for each in row]
@@ -85,21 +128,81 @@ def pictures(grid: Grid, renderer: GalleryRenderer, title: str) -> dict[str, lis
     return {row.title: [taken[row.title, column] for column in range(len(row.pictures))] for row in grid.rows}
 
 
-def entries(grid: Grid, taken: Mapping[str, list[RenderedCell]]) -> list[Shown]:
-    """Return what is shown, in words and numbers."""
-    return [
-        Shown(grid.name, row, column, each.psnr)
-        for row, line in taken.items()
-        for column, each in zip(grid.columns, line, strict=True)
-        if each.pixels is not None
-    ]
+class GalleryRenderer:
+    """Takes pictures. A scene stays open until one of another is taken.
 
+    Args:
+        settings: of a job that shows scenes and their volume.
+        inputs: scene files by name, and `volume` where one is shown.
+        size: pixels of each side of a picture.
+    """
 
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads: the pictures of all places, and what it takes to show the volume."""
-    from texgs.workflow.galleries import gallery_settings  # not at the top: it loads Hydra
+    def __init__(self, settings: OfScene, inputs: Mapping[str, Path], size: int) -> None:
+        from texgs.core.check import torch_device
+        from texgs.workflow.stages.volume_scene import VolumeScene
 
-    return gallery_settings(config)
+        self._device, self._lens = torch_device(settings.fit.device), settings.views.lens
+        self._inputs, self._size = inputs, size
+        self._volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
+        self._open: tuple[str, Session] | None = None
+
+    def render(self, cell: GalleryCell) -> RenderedCell:
+        """Return one picture."""
+        import torch
+
+        from texgs.core.light import Light
+        from texgs.metrics.image import psnr
+        from texgs.report.fit_figure import ERROR, signed_error
+        from texgs.scene.changes import apply_all
+
+        if not cell.show:
+            return RenderedCell()
+        session = self._session(cell.scene)
+        try:
+            apply_all(session, cell.changes)
+            if cell.light:
+                session.set_light(Light("directional", *cell.light))
+            camera = self._camera(cell)
+            scene = None if cell.show == "volume" else session.frame(camera).astype("float32") / 255
+            volume = None if cell.show == "scene" else self._volume_frame(session, camera)
+        finally:
+            while session.undo():
+                pass
+        shown = [self._cut(image, cell) for image in (scene, volume) if image is not None]
+        if len(shown) == 1:
+            return RenderedCell(shown[0])
+        image, truth = map(torch.from_numpy, shown)
+        return RenderedCell(ERROR(signed_error(image, truth)).numpy(), psnr(image, truth))
+
+    def _session(self, name: str) -> Session:
+        from texgs.scene.scene_file import read_scene
+        from texgs.scene.session import Session
+
+        if self._open is None or self._open[0] != name:
+            self._open = (name, Session(read_scene(self._inputs[name]), self._device))
+        return self._open[1]
+
+    def _volume_frame(self, session: Session, camera: Camera) -> np.ndarray:
+        assert self._volume is not None, "an input where a place shows it"
+        over = self._volume.over_background(camera, session.scene, session.composition.palettes)
+        return over.clip(0, 1)
+
+    def _camera(self, cell: GalleryCell) -> Camera:
+        """Return the camera of the whole view."""
+        from texgs.core.camera import orbit
+
+        size = cell.pixels or round(self._size / (cell.box[2] if cell.box else 1))
+        azimuth, polar = cell.view
+        return orbit(azimuth, polar, self._lens.radius, cell.fov_y or self._lens.fov_y, size, size)
+
+    def _cut(self, image: np.ndarray, cell: GalleryCell) -> np.ndarray:
+        """Return the part of a view that is shown, as large as a picture, each pixel that of its place."""
+        import numpy as np
+
+        left, top, side = cell.box or (0, 0, 1)
+        across = (np.arange(self._size) + 0.5) / self._size * side * len(image)
+        rows, columns = ((across + start * len(image)).astype(int) for start in (top, left))
+        return image[rows[:, None], columns]
 
 
 def inputs(config: Config) -> dict[str, Path]:
@@ -129,7 +232,6 @@ STAGE = Stage(
     help="show all looks of a data set side by side",
     rule=Rule("gallery", "{dataset}/gallery/{gallery}", target="galleries", gpu=("views", "fit")),
     schema=Settings,
-    select=select,
     inputs=inputs,
     work=work,
     applies=applies,

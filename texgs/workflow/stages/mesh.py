@@ -6,39 +6,37 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from texgs.config.dataset import BasicTF
 from texgs.config.mesh import MeshKeys
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json
 from texgs.fields.kinds import kinds
 from texgs.report.results import MeshResult
-from texgs.workflow.inputs import has_volume, last_phase, lens, model_of, prepared_volume, recipe
+from texgs.workflow.inputs import has_volume, last_phase, model_of, prepared_volume, without
 from texgs.workflow.locate import basic_tf
-from texgs.workflow.stage import Outcome, Rule, Stage, plain
-from texgs.workflow.stages.settings import Distance, OfTF, Recipe, in_data_values
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, read
+from texgs.workflow.stages.settings import Distance, OfTF, Recipe, basic_tfs_of
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
     from texgs.core.camera import Camera
     from texgs.fields.field import Field
     from texgs.raster import Render
     from texgs.volume.isosurface import Mesh
 
-SHOWN = "The isosurface of the volume, the mesh of the fit, and its distance from it."
+ERRORS = ("chamfer", "accuracy", "completeness", "f_score", "normal_angle")
 MEASURED = 200_000  # points on each surface
 VISIBLE = 200  # pixels of the views that decide what can be seen
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfTF):
     """What the stage reads of the configuration."""
 
     fit: Recipe
-    tf_values: str
-    points: BasicTF
-    mesh: MeshKeys
+    tf_values: str = read("dataset.tf_values")
+    points: BasicTF = read(basic_tf)
+    mesh: MeshKeys = read(lambda config: without(config.mesh, "tfs"))
     lens: Distance
 
 
@@ -71,18 +69,14 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     title = f"{settings.dataset}/{settings.tf}, recipe {settings.fit.name}: {len(mesh.triangles):,} triangles"
     write_mesh_figure(output / "mesh.png", mesh, reference, whole[visible], settings.lens.lens, title)
     result = MeshResult(
-        chamfer=errors.chamfer,
-        accuracy=errors.accuracy,
-        completeness=errors.completeness,
-        f_score=errors.f_score,
-        normal_angle=errors.normal_angle,
+        **{name: getattr(errors, name) for name in ERRORS},
         vertices=len(mesh.vertices),
         triangles=len(mesh.triangles),
         mesh_seconds=seconds,
         tolerance=keys.tolerance,
         visible=float(visible.double().mean()),
     )
-    return Outcome(result, {"mesh.png": SHOWN})
+    return Outcome(result)
 
 
 def reference_of(settings: Settings, volume: Path) -> Mesh:
@@ -90,11 +84,8 @@ def reference_of(settings: Settings, volume: Path) -> Mesh:
     from texgs.volume.isosurface import surface_of
     from texgs.volume.nrrd_file import open_grid
 
-    grid, summary = open_grid(volume), read_json(volume.with_name("volume.json"))
-    tf = in_data_values(
-        settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
-    )
-    return surface_of(grid, tf, settings.mesh.opacity)
+    (tf,) = basic_tfs_of(volume, {settings.tf: settings.points}, settings.tf_values).values()
+    return surface_of(open_grid(volume), tf, settings.mesh.opacity)
 
 
 def shown_by(field: Field) -> Callable[[Camera], Render]:
@@ -107,17 +98,6 @@ def shown_by(field: Field) -> Callable[[Camera], Render]:
         raise ArgumentError(f"mesh: expected a fit of {able}, got one of {field.kind}, which has no depth")
     black = torch.zeros(3, device=field.device)
     return lambda camera: field.render(camera, background=black, outputs=(output,))
-
-
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    return {
-        **recipe()(config),
-        "tf_values": config.dataset.tf_values,
-        "points": basic_tf(config),
-        "mesh": {name: value for name, value in plain(config.mesh).items() if name != "tfs"},
-        "lens": lens(config),
-    }
 
 
 def applies(config: Config) -> bool:
@@ -135,10 +115,9 @@ STAGE = Stage(
         ("mesh.ply", "reference.ply", "mesh.png"),
         target="meshes",
         gpu=("fit",),
-        shown={"mesh.png": SHOWN},
+        shown={"mesh.png": "The isosurface of the volume, the mesh of the fit, and its distance from it."},
     ),
     schema=Settings,
-    select=select,
     inputs=lambda config: {**model_of(last_phase(config))(config), **prepared_volume(config)},
     work=work,
     applies=applies,

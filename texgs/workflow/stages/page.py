@@ -4,31 +4,27 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from texgs.core.io import write_bytes
 from texgs.core.memory import MIB
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.report.results import PageResult
-from texgs.workflow.inputs import fit_label, is_fit, is_swept, models_of_scene
-from texgs.workflow.stage import Outcome, Rule, Stage, made
+from texgs.workflow.inputs import is_fit, is_swept, models_of_scene
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, made, read
 from texgs.workflow.stages.settings import FitLabel, OfDataset
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
 
 SHOWN = "The scene: open it to turn it, to move its light, and to change colours and opacities."
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfDataset):
     """What the stage reads of the configuration."""
 
     fit: FitLabel
-    look: str  # name of the edit, or "none"
-    look_seed: int  # its seed
-    embedded: float  # MiB of the largest page that the report holds
+    look: str = read("edit.name")  # or "none"
+    look_seed: int = read("edit.seed")
+    embedded: float = read("page.embedded")  # MiB of the largest page that the report holds
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -46,12 +42,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     mib = page.path.stat().st_size / MIB
     result = PageResult(settings.look, page.surfels, mib, mib <= settings.embedded)
     return Outcome(result, {"poster.jpg": SHOWN})
-
-
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    look = {"look": config.edit.name, "look_seed": config.edit.seed}
-    return {**look, "embedded": config.page.embedded, **fit_label(config)}
 
 
 def inputs(config: Config) -> dict[str, Path]:
@@ -79,7 +69,6 @@ STAGE = Stage(
         shown={"scene.html": SHOWN},
     ),
     schema=Settings,
-    select=select,
     inputs=inputs,
     work=work,
     applies=applies,

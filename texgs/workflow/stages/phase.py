@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.memory import MIB
 from texgs.fit.settings import Phase
-from texgs.workflow.stage import Rule
+from texgs.report.results import FitResult
+from texgs.workflow.stage import Outcome, Rule
+from texgs.workflow.stages.settings import OfTF, Recipe
 
 if TYPE_CHECKING:
     import torch
@@ -23,56 +26,94 @@ if TYPE_CHECKING:
 PHASE = Rule("phase", "{dataset}/{tf}/{fit}/{phase}", ("model.safetensors",), target="fits", gpu=("fit",))
 
 
-def gpu_memory(device: torch.device) -> float | None:
-    """Return the peak memory of the GPU in this process, MiB; None on a CPU."""
-    import torch
+@dataclass(kw_only=True)
+class PhaseSettings(OfTF):
+    """What all phases read of the configuration."""
 
-    return torch.cuda.max_memory_allocated(device) / MIB if device.type == "cuda" else None
-
-
-def run_phase(
-    parameters: Mapping[str, Tensor],
-    shading: ShadingModel,
-    images: Images,
-    phase: Phase,
-    seed: int,
-    output: Path,
-    title: str,
-) -> tuple[Surfels, float, list[float]]:
-    """Run the loop from the last checkpoint in the folder, if there is one.
-
-    Returns:
-        The model, the seconds of all runs together, and the losses that they looked at. Surfels lie along a
-        Z curve: what a tile of a view shows is then mostly together in memory, texels above all.
-    """
-    from texgs.core.geometry import z_order_of
-    from texgs.fields.surfels.model import Surfels
-    from texgs.fit.checkpoint import FOLDER, run_to_end
-    from texgs.fit.densify import is_shared
-    from texgs.fit.loop import Fit
-
-    fit = Fit(parameters, shading, images, phase, seed)
-    seconds = run_to_end(fit, output / FOLDER, title)
-    order = z_order_of(fit.parameters["means"].detach())
-    ordered = {
-        name: x.detach() if is_shared(name, x) else x.detach()[order] for name, x in fit.parameters.items()
-    }
-    return Surfels(ordered, shading), seconds, fit.losses
+    fit: Recipe
 
 
-def quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
-    """Return which views a model is of, and PSNR and SSIM on the test views, where there are some."""
-    from texgs.metrics.quality import evaluate, mean
-    from texgs.volume.reduced import smaller
+@dataclass(frozen=True, eq=False)
+class FitJob:
+    """One phase of the fit of a basic TF: what it starts with, and how its result is told."""
 
-    camera = smaller(views.train[0].camera, reduce)
-    seen = {"train_views": len(views.train), "width": camera.width, "height": camera.height}
-    return seen | (mean(evaluate(model, views.test, reduce, f"{title}: test views")) if views.test else {})
+    fit: Recipe
+    title: str  # of progress bars
+    device: torch.device
+    views: ViewSet
+    images: Images  # the training views, reduced
+    output: Path
+    metadata: Mapping[str, str]  # of the field: where it is from
 
+    @classmethod
+    def of(cls, settings: PhaseSettings, inputs: Mapping[str, Path], output: Path) -> FitJob:
+        """Return the job with the views that it reads."""
+        from texgs.core.check import torch_device
+        from texgs.volume.images import load
+        from texgs.volume.view_set import read_views
 
-def training_quality(model: Field, views: ViewSet, reduce: int, title: str) -> dict[str, Any]:
-    """Return the same on the views that the model was fitted to."""
-    from texgs.metrics.quality import evaluate, mean
+        fit, views = settings.fit, read_views(inputs["views"].parent)
+        title = f"{settings.dataset}/{settings.tf}: {settings.stage}"
+        metadata = {"dataset": settings.dataset, "tf": settings.tf}
+        images = load(views.train, fit.reduce)
+        return cls(fit, title, torch_device(fit.device), views, images, output, metadata)
 
-    measured = mean(evaluate(model, views.train, reduce, f"{title}: training views"))
-    return {f"train_{name}": value for name, value in measured.items()}
+    def run(
+        self, parameters: Mapping[str, Tensor], shading: ShadingModel, phase: Phase
+    ) -> tuple[Surfels, float, list[float]]:
+        """Run the loop of surfels from the last checkpoint in the folder, if there is one.
+
+        Returns:
+            The model, the seconds of all runs together, and the losses that they looked at. Surfels lie along
+            a Z curve: what a tile of a view shows is then mostly together in memory, texels above all.
+        """
+        from texgs.core.geometry import z_order_of
+        from texgs.fields.surfels.model import Surfels
+        from texgs.fit.checkpoint import FOLDER, run_to_end
+        from texgs.fit.densify import is_shared
+        from texgs.fit.loop import Fit
+
+        fit = Fit(parameters, shading, self.images, phase, self.fit.seed)
+        seconds = run_to_end(fit, self.output / FOLDER, self.title)
+        order = z_order_of(fit.parameters["means"].detach())
+        ordered = {
+            name: x.detach() if is_shared(name, x) else x.detach()[order]
+            for name, x in fit.parameters.items()
+        }
+        return Surfels(ordered, shading), seconds, fit.losses
+
+    def outcome(
+        self,
+        field: Field,
+        seconds: float,
+        iterations: int = 0,
+        losses: Sequence[float] = (),
+        measured: Sequence[str] = ("test",),
+        **more: Any,
+    ) -> Outcome:
+        """Return the result, with the quality on `test` and `train` views; the checkpoint goes."""
+        import torch
+
+        from texgs.fit import checkpoint
+        from texgs.volume.reduced import smaller
+
+        camera = smaller(self.views.train[0].camera, self.fit.reduce)
+        scores: dict[str, Any] = {}
+        for split in measured:
+            scores |= self.quality(field, split)
+        is_gpu = self.device.type == "cuda"
+        memory = torch.cuda.max_memory_allocated(self.device) / MIB if is_gpu else None
+        checkpoint.discard(self.output / checkpoint.FOLDER)
+        seen = {"train_views": len(self.views.train), "width": camera.width, "height": camera.height}
+        told = {**(seen if measured else {}), **scores, "peak_gpu_memory_mib": memory, **more}
+        return Outcome(FitResult(seconds, len(field), iterations, list(losses), **told))
+
+    def quality(self, field: Field, split: str) -> dict[str, float]:
+        """Return PSNR and SSIM on `test` or `train` views, where there are some, as the result names them."""
+        from texgs.metrics.quality import evaluate, mean
+
+        views, words = (self.views.test, "test") if split == "test" else (self.views.train, "training")
+        if not views:
+            return {}
+        scores = mean(evaluate(field, views, self.fit.reduce, f"{self.title}: {words} views"))
+        return scores if split == "test" else {f"train_{name}": value for name, value in scores.items()}

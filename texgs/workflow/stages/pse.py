@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from statistics import fmean
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.progress import progress
 from texgs.fields.kinds import kinds
 from texgs.report.results import Comparison, PseResult
-from texgs.workflow.inputs import has_scene, scene_and_volume, scene_settings
+from texgs.workflow.inputs import has_scene, scene_and_volume
 from texgs.workflow.stage import Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
 
@@ -34,14 +34,6 @@ LEFT = (-150.0, 20.0)  # azimuth and polar angle of a light, degrees
 SWEEP = (-30.0, -15.0, 0.0, 15.0, 30.0, 45.0)  # polar angles of the light in the paper's figure, degrees
 
 
-@dataclass(frozen=True)
-class Step:
-    """One edited scene."""
-
-    title: str
-    scene: Scene
-
-
 def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     """Write a scene file for each edit, pse.png and relight.png.
 
@@ -57,36 +49,32 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     composition = scene.open(torch_device(settings.fit.device))
     volume = VolumeScene(settings, inputs["volume"]) if "volume" in inputs else None
     cameras = orbit_path(COMPARED, POLAR, *settings.views.lens)
-    done: dict[str, list[Comparison]] = {}
     can = kinds()[settings.fit.field].can
-    groups = {
-        "pse": chain(scene, composition.palettes, can),
-        "relight": light_sweep(scene),
-    }
-    for group, steps in groups.items():
+    groups = {"pse": chain(scene, composition.palettes, can), "relight": light_sweep(scene)}
+    done: dict[str, list[Comparison]] = {group: [] for group in groups}
+    for group, scenes in groups.items():
         rows: dict[str, list[np.ndarray]] = {}
-        done[group] = []
-        for step in progress(steps, title=f"{settings.dataset}: {group}", unit="edit"):
-            write_scene(output / f"{group}-{len(done[group])}.yaml", step.scene)
-            comparison, shown = compared(step, composition, volume, cameras)
+        steps = progress(scenes.items(), len(scenes), title=f"{settings.dataset}: {group}", unit="edit")
+        for title, changed in steps:
+            write_scene(output / f"{group}-{len(done[group])}.yaml", changed)
+            comparison, shown = compared(title, changed, composition, volume, cameras)
             done[group].append(comparison)
             for name, image in shown.items():
                 rows.setdefault(name, []).append(image)
-        titles = [caption(entry) for entry in done[group]]
-        write_grid(output / f"{group}.png", rows, titles)
+        write_grid(output / f"{group}.png", rows, [caption(entry) for entry in done[group]])
     end = BELOW if volume else "."
     return Outcome(PseResult(COMPARED, **done), {name: words + end for name, words in PICTURES.items()})
 
 
-def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> list[Step]:
-    """Return the edits of the paper's figure in order: opacity, colour, magnitude and direction of the light.
+def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str]) -> dict[str, Scene]:
+    """Return the scenes of the paper's figure by title: opacity, colour, strength and direction of the light.
 
     Each is on top of those before it. What fields of a kind cannot do is left out, but for the direction of
     the light: without shading it changes nothing.
     """
     from texgs.core.light import Light
 
-    names, steps = list(scene.models), [Step("as fitted", scene)]
+    names, steps = list(scene.models), {"as fitted": scene}
     changes: list[tuple[str, Mapping[str, Mapping[str, Any]]]] = [
         (f"+ opacity of {names[0]} x 0.4", {names[0]: {"opacity": 0.4}})
     ]
@@ -97,19 +85,18 @@ def chain(scene: Scene, fitted: Sequence[tuple[float, ...]], can: Collection[str
         magnitude = {"ambient": 0.7, "diffuse": 1.2, "specular": 2.0}
         changes.append(("+ k_a x 0.7, k_d x 1.2, k_s x 2", dict.fromkeys(names, magnitude)))
     for title, change in changes:
-        steps.append(Step(title, edited(steps[-1].scene, change)))
-    return [
-        *steps,
-        Step("+ light from the left", replace(steps[-1].scene, light=Light("directional", *LEFT))),
-    ]
+        scene = steps[title] = edited(scene, change)
+    return {**steps, "+ light from the left": replace(scene, light=Light("directional", *LEFT))}
 
 
-def light_sweep(scene: Scene) -> list[Step]:
-    """Return the steps of a light that moves from below the object to above it."""
+def light_sweep(scene: Scene) -> dict[str, Scene]:
+    """Return the scene under a light that moves from below the object to above it, by title."""
     from texgs.core.light import Light
 
-    lights = {f"light at (-90°, {polar:g}°)": Light("directional", -90.0, polar) for polar in SWEEP}
-    return [Step(title, replace(scene, light=light)) for title, light in lights.items()]
+    return {
+        f"light at (-90°, {polar:g}°)": replace(scene, light=Light("directional", -90.0, polar))
+        for polar in SWEEP
+    }
 
 
 def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
@@ -124,7 +111,7 @@ def edited(scene: Scene, changes: Mapping[str, Mapping[str, Any]]) -> Scene:
 
 
 def compared(
-    step: Step, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
+    title: str, scene: Scene, composition: Composed, volume: VolumeScene | None, cameras: Sequence[Camera]
 ) -> tuple[Comparison, dict[str, np.ndarray]]:
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     import torch
@@ -134,22 +121,19 @@ def compared(
 
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}
     shown: dict[str, np.ndarray] = {}
-    background = torch.tensor(step.scene.background, device=composition.device)
+    background = torch.tensor(scene.background, device=composition.device)
     for camera in cameras if volume else cameras[:1]:
-        image = composition.render(
-            camera.to(background.device), step.scene.light, step.scene.edits, background=background
-        ).color
-        image = image.cpu()
+        here = camera.to(background.device)
+        image = composition.render(here, scene.light, scene.edits, background=background).color.cpu()
         shown.setdefault("scene", image.clamp(0, 1).numpy())
         if volume is not None:
-            rgba = torch.from_numpy(volume.render(camera, step.scene, composition.palettes))
-            truth = rgba[..., :3] + (1 - rgba[..., 3:]) * background.cpu()
+            truth = torch.from_numpy(volume.over_background(camera, scene, composition.palettes))
             shown.setdefault("volume", truth.clamp(0, 1).numpy())
             shown.setdefault("error", ERROR(signed_error(image, truth)).numpy())
             scores["psnr"].append(psnr(image, truth))
             scores["ssim"].append(ssim(image, truth))
     means = {name: fmean(values) for name, values in scores.items() if values}
-    return Comparison(step.title, **means), shown
+    return Comparison(title, **means), shown
 
 
 def caption(entry: Comparison) -> str:
@@ -171,7 +155,6 @@ STAGE = Stage(
         shown={name: f"{words}." for name, words in PICTURES.items()},
     ),
     schema=OfScene,
-    select=scene_settings,
     inputs=scene_and_volume,
     work=work,
     applies=has_scene,

@@ -1,65 +1,69 @@
 """What jobs read of the configuration: what all of them have, and what several share, such as basic TFs.
 
-The module of a stage adds its own in a dataclass `Settings`; its function `select` takes the values from the
-configuration. No field has a default, so a value that is not selected is an error.
+The module of a stage adds its own in a dataclass `Settings`. Each field says what it reads.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.config.dataset import BasicTF
 from texgs.config.views import ViewKeys
 from texgs.core.errors import ArgumentError
+from texgs.core.io import read_json
 from texgs.core.lens import Lens
+from texgs.workflow.inputs import is_changed, shown_tfs, sweep_of_fit, variant_of_fit, view_settings
+from texgs.workflow.stage import read
 
 if TYPE_CHECKING:
     from texgs.volume.transfer import TransferFunction
 
 
-@dataclass
+@dataclass(kw_only=True)
 class OfDataset:
     """A job of a data set."""
 
     stage: str
-    dataset: str
-    stand_in: str  # what the data stand in for
+    dataset: str = read("dataset.name")
+    stand_in: str = read("dataset.stand_in")  # what the data stand in for
 
 
-@dataclass
+@dataclass(kw_only=True)
 class OfTF(OfDataset):
     """A job of one basic TF."""
 
-    tf: str
+    tf: str = read("tf")
 
 
-@dataclass
+@dataclass(kw_only=True)
 class FitLabel:
-    """Which fit this is, and what it runs on."""
+    """Which fit this is, and what it runs on. One that variants of a sweep share is of none of them."""
 
-    name: str
-    field: str  # a kind of field
-    seed: int
-    sweep: str
-    variant: str
-    device: str
-    changed: bool  # from the file of its name
+    name: str = read("fit.name")
+    field: str = read("fit.field")  # a kind of field
+    seed: int = read("fit.seed")
+    sweep: str = read(sweep_of_fit)
+    variant: str = read(variant_of_fit)
+    device: str = read("device.name")
+    changed: bool = read(lambda config: is_changed(config.fit))  # from the file of its name
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Recipe(FitLabel):
     """The same, with what all stages of a fit read."""
 
-    reduce: int
+    reduce: int = read("fit.reduce")
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Distance:
-    """Where cameras of pictures of a scene stand."""
+    """Where cameras of pictures of a scene stand: as far as those of the views."""
 
-    radius: float  # world units
-    fov_y: float  # degrees
+    radius: float = read("views.radius")  # world units
+    fov_y: float = read("views.fov_y")  # degrees
 
     @property
     def lens(self) -> Lens:
@@ -67,14 +71,21 @@ class Distance:
         return Lens(self.radius, self.fov_y)
 
 
-@dataclass
+@dataclass(kw_only=True)
 class OfScene(OfDataset):
     """A job that compares a scene with its volume."""
 
-    tf_values: str
-    basic_tfs: dict[str, BasicTF]
-    views: ViewKeys
+    tf_values: str = read("dataset.tf_values")
+    basic_tfs: dict[str, BasicTF] = read(shown_tfs)
+    views: ViewKeys = read(view_settings)
     fit: FitLabel
+
+
+def basic_tfs_of(volume: Path, points: Mapping[str, BasicTF], tf_values: str) -> dict[str, TransferFunction]:
+    """Return basic TFs in the units of a prepared volume, volume.nrrd with volume.json beside it."""
+    summary = read_json(volume.with_name("volume.json"))
+    bounds = summary["minimum"], summary["maximum"]
+    return {name: in_data_values(name, each, tf_values, *bounds) for name, each in points.items()}
 
 
 def in_data_values(name: str, points: BasicTF, tf_values: str, low: float, high: float) -> TransferFunction:

@@ -4,37 +4,33 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from texgs.fit.settings import Material, Phase
-from texgs.report.results import FitResult
-from texgs.workflow.inputs import is_fit_of, model_of, recipe
-from texgs.workflow.stage import Outcome, Stage
-from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, run_phase
-from texgs.workflow.stages.settings import OfTF, Recipe
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
+from texgs.workflow.inputs import is_changed, is_fit_of, model_of
+from texgs.workflow.stage import Outcome, Stage, read
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.settings import Recipe
 
 HARMONICS = ("sh", "sh_rest")
 LATER = ("texture",)  # keys of a recipe that later stages read
 
 
-@dataclass
+@dataclass(kw_only=True)
 class ShadingRecipe(Recipe):
     """What this phase reads of a recipe besides."""
 
-    material_range: str
-    materials: str
-    first_material: Material
+    material_range: str = read("fit.material_range")
+    materials: str = read("fit.materials")
+    first_material: Material = read("fit.first_material")
+    changed: bool = read(lambda config: is_changed(config.fit, LATER))
 
 
-@dataclass
-class Settings(OfTF):
+@dataclass(kw_only=True)
+class Settings(PhaseSettings):
     """What the stage reads of the configuration."""
 
     fit: ShadingRecipe
-    phase: Phase
+    phase: Phase = read("fit.shading")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -42,46 +38,24 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `model`, of the stage before, and `views`, the transforms_train.json.
     """
-    from texgs.core.check import torch_device
     from texgs.fields.harmonics import base_color
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import read_model, write_model
     from texgs.fields.surfels.shading import material, raw_material
-    from texgs.fit import checkpoint
-    from texgs.volume.images import load
-    from texgs.volume.view_set import read_views
 
-    fit, phase = settings.fit, settings.phase
-    title = f"{settings.dataset}/{settings.tf}: shading"
-    device = torch_device(fit.device)
-    views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
-    images = load(views.train, fit.reduce)
+    fit, phase, job = settings.fit, settings.phase, FitJob.of(settings, inputs, output)
+    before = read_model(inputs["model"]).to(job.device)
     start = {name: x for name, x in before.parameters.items() if name not in HARMONICS}
     start["colors"] = base_color(before.parameters["sh"])
     first = raw_material(**asdict(fit.first_material), kind=fit.material_range)
     rows = 1 if fit.materials == "shared" else len(before)
-    start |= {name: value.to(device).repeat(rows) for name, value in first.items()}
-    model, seconds, losses = run_phase(start, before.shading, images, phase, fit.seed, output, title)
+    start |= {name: value.to(job.device).repeat(rows) for name, value in first.items()}
+    model, seconds, losses = job.run(start, before.shading, phase)
     model = Surfels(model.parameters, before.shading, before.metadata)
     write_model(output / "model.safetensors", model)
     factors = material(model.parameters, before.shading.material)
-    result = FitResult(
-        seconds,
-        len(model),
-        phase.iterations,
-        losses,
-        material={name: float(value.median()) for name, value in factors.items()},
-        **quality(model, views, fit.reduce, title),
-        peak_gpu_memory_mib=gpu_memory(device),
-    )
-    checkpoint.discard(output / checkpoint.FOLDER)
-    return Outcome(result)
-
-
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    shared = recipe("material_range", "materials", "first_material", later=LATER)(config)
-    return {**shared, "phase": config.fit.shading}
+    medians = {name: float(value.median()) for name, value in factors.items()}
+    return job.outcome(model, seconds, phase.iterations, losses, material=medians)
 
 
 STAGE = Stage(
@@ -90,7 +64,6 @@ STAGE = Stage(
     help="fit relightable surfels with Blinn-Phong shading",
     rule=PHASE,
     schema=Settings,
-    select=select,
     inputs=model_of("surfels"),
     work=work,
     applies=is_fit_of("surfels"),

@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 SHOWN = 12  # views
-CAPTION = "Views that the model was fitted to, and test views."
 
 
 def work(settings: OfTF, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -33,8 +32,7 @@ def work(settings: OfTF, inputs: dict[str, Path], output: Path) -> Outcome:
     pictures = [fromarray(view.load().numpy()) for view in shown]
     write_contact_sheet(output / "sheet.png", [picture.crop(common_box(pictures)) for picture in pictures])
     camera = views.train[0].camera
-    result = SheetResult(len(views.train), len(views.test), camera.width, camera.height)
-    return Outcome(result, {"sheet.png": CAPTION})
+    return Outcome(SheetResult(len(views.train), len(views.test), camera.width, camera.height))
 
 
 def common_box(pictures: list[Image]) -> tuple[int, int, int, int]:
@@ -56,10 +54,9 @@ STAGE = Stage(
         ("sheet.png",),
         target="sheets",
         threads=1,
-        shown={"sheet.png": CAPTION},
+        shown={"sheet.png": "Views that the model was fitted to, and test views."},
     ),
     schema=OfTF,
-    select=lambda config: {},
     inputs=view_set,
     work=work,
     applies=lambda config: is_fit(config) and config.views.name == "views",  # of those of a sweep none

@@ -4,37 +4,33 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from texgs.fit.settings import Phase, Seeds
-from texgs.report.results import FitResult
-from texgs.workflow.inputs import is_fit_of, prepared_volume, recipe, view_set
-from texgs.workflow.stage import Outcome, Stage
-from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, run_phase
-from texgs.workflow.stages.settings import OfTF, Recipe
-
-if TYPE_CHECKING:
-    from texgs.config.schema import Config
+from texgs.workflow.inputs import is_changed, is_fit_of, prepared_volume, view_set
+from texgs.workflow.stage import Config, Outcome, Stage, read
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
+from texgs.workflow.stages.settings import Recipe
 
 LATER = ("materials", "first_material", "shading", "texture")  # keys of a recipe that later stages read
 
 
-@dataclass
+@dataclass(kw_only=True)
 class SurfelsRecipe(Recipe):
     """What this phase reads of a recipe besides."""
 
-    low_pass: float
-    facing: bool
-    material_range: str
-    seeds: Seeds
+    low_pass: float = read("fit.low_pass")
+    facing: bool = read("fit.facing")
+    material_range: str = read("fit.material_range")
+    seeds: Seeds = read("fit.seeds")
+    changed: bool = read(lambda config: is_changed(config.fit, LATER))
 
 
-@dataclass
-class Settings(OfTF):
+@dataclass(kw_only=True)
+class Settings(PhaseSettings):
     """What the stage reads of the configuration."""
 
     fit: SurfelsRecipe
-    phase: Phase
+    phase: Phase = read("fit.surfels")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -44,47 +40,29 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     import torch
 
-    from texgs.core.check import torch_device
     from texgs.fields.harmonics import join, split, zeroth
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import write_model
     from texgs.fields.surfels.shading import ShadingModel
-    from texgs.fit import checkpoint
     from texgs.fit.seeds import seed_surfels
-    from texgs.volume.images import load
     from texgs.volume.nrrd_file import open_grid
-    from texgs.volume.view_set import read_views
 
-    fit, phase = settings.fit, settings.phase
-    title = f"{settings.dataset}/{settings.tf}: surfels"
-    views = read_views(inputs["views"].parent)
-    images = load(views.train, fit.reduce)
-    rendered = views.metadata.get("shading") or {}
+    fit, phase, job = settings.fit, settings.phase, FitJob.of(settings, inputs, output)
+    rendered = job.views.metadata.get("shading") or {}
     local_viewer = bool(rendered.get("local_viewer", True))
     shading = ShadingModel(fit.low_pass, fit.material_range, local_viewer, fit.facing)  # type: ignore[arg-type]
     volume = open_grid(inputs["volume"]) if "volume" in inputs else None
-    parameters, colors = seed_surfels(images, views, **asdict(fit.seeds), seed=fit.seed, volume=volume)
+    parameters, colors = seed_surfels(
+        job.images, job.views, **asdict(fit.seeds), seed=fit.seed, volume=volume
+    )
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)
-    device = torch_device(fit.device)
-    start = {name: x.to(device) for name, x in {**parameters, **split(sh)}.items()}
-    model, seconds, losses = run_phase(start, shading, images, phase, fit.seed, output, title)
-    model = Surfels(join(model.parameters), shading, {"dataset": settings.dataset, "tf": settings.tf})
+    start = {name: x.to(job.device) for name, x in {**parameters, **split(sh)}.items()}
+    model, seconds, losses = job.run(start, shading, phase)
+    model = Surfels(join(model.parameters), shading, job.metadata)
     write_model(output / "model.safetensors", model)
-    measured = quality(model, views, fit.reduce, title) if phase.iterations else {}
-    checkpoint.discard(output / checkpoint.FOLDER)
-    return Outcome(
-        FitResult(
-            seconds, len(model), phase.iterations, losses, peak_gpu_memory_mib=gpu_memory(device), **measured
-        )
-    )
-
-
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    shared = recipe("low_pass", "facing", "material_range", "seeds", later=LATER)(config)
-    return {**shared, "phase": config.fit.surfels}
+    return job.outcome(model, seconds, phase.iterations, losses, ("test",) if phase.iterations else ())
 
 
 def inputs(config: Config) -> dict[str, Path]:
@@ -99,7 +77,6 @@ STAGE = Stage(
     help="seed surfels and fit them with spherical harmonics",
     rule=PHASE,
     schema=Settings,
-    select=select,
     inputs=inputs,
     work=work,
     applies=is_fit_of("surfels"),

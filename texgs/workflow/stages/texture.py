@@ -7,19 +7,16 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from texgs.fit.settings import TextureKeys
-from texgs.report.results import FitResult
-from texgs.workflow.inputs import is_fit_of, model_of, recipe
-from texgs.workflow.stage import Outcome, Stage
-from texgs.workflow.stages.phase import PHASE, gpu_memory, quality, training_quality
-from texgs.workflow.stages.settings import OfTF, Recipe
+from texgs.workflow.inputs import is_fit_of, model_of
+from texgs.workflow.stage import Outcome, Stage, read
+from texgs.workflow.stages.phase import PHASE, FitJob, PhaseSettings
 
 
-@dataclass
-class Settings(OfTF):
+@dataclass(kw_only=True)
+class Settings(PhaseSettings):
     """What the stage reads of the configuration."""
 
-    fit: Recipe
-    texture: TextureKeys
+    texture: TextureKeys = read("fit.texture")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -27,30 +24,17 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `model`, of the stage before, and `views`, the transforms_train.json.
     """
-    from texgs.core.check import torch_device
     from texgs.fields.surfels.model_file import read_model, write_model
     from texgs.fit.texels import texturize
-    from texgs.volume.images import load
-    from texgs.volume.view_set import read_views
 
-    fit, title = settings.fit, f"{settings.dataset}/{settings.tf}: texture"
-    device = torch_device(fit.device)
-    views, before = read_views(inputs["views"].parent), read_model(inputs["model"]).to(device)
-    images = load(views.train, fit.reduce)
+    job = FitJob.of(settings, inputs, output)
+    before, keys = read_model(inputs["model"]).to(job.device), asdict(settings.texture)
     start = time.monotonic()
-    model = texturize(before, images, **asdict(settings.texture), seed=fit.seed, title=title)
+    model = texturize(before, job.images, **keys, seed=settings.fit.seed, title=job.title)
     seconds = time.monotonic() - start
     write_model(output / "model.safetensors", model)
-    result = FitResult(
-        seconds,
-        len(model),
-        sizes=model.sizes(),
-        notes={"texels": len(model.parameters["texels"])},
-        **quality(model, views, fit.reduce, title),
-        **training_quality(model, views, fit.reduce, title),
-        peak_gpu_memory_mib=gpu_memory(device),
-    )
-    return Outcome(result)
+    notes = {"texels": len(model.parameters["texels"])}
+    return job.outcome(model, seconds, measured=("test", "train"), sizes=model.sizes(), notes=notes)
 
 
 STAGE = Stage(
@@ -59,7 +43,6 @@ STAGE = Stage(
     help="give relightable surfels textures",
     rule=PHASE,
     schema=Settings,
-    select=lambda config: {**recipe()(config), "texture": config.fit.texture},
     inputs=model_of("shading"),
     work=work,
     applies=is_fit_of("surfels"),

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from statistics import fmean, median
 
 from texgs.report.results import TimingResult
-from texgs.workflow.inputs import has_scene, scene_and_volume, scene_settings
+from texgs.workflow.inputs import has_scene, scene_and_volume
 from texgs.workflow.stage import EVERY, Outcome, Rule, Stage
 from texgs.workflow.stages.settings import OfScene
 
@@ -31,29 +32,18 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     path = spiral(max(2, views.test.count), *views.lens)
     composition = scene.open(torch_device(settings.fit.device))
     title = f"{settings.dataset}: timing"
-    device = composition.device
-    frames = milliseconds(
-        lambda camera: composition.render(camera.to(device), scene.light, scene.edits),
+    times = milliseconds(
+        lambda camera: composition.render(camera.to(composition.device), scene.light, scene.edits),
         spread(path, FRAMES),
         title,
     )
-    result = TimingResult(
-        fmean(frames),
-        max(frames),
-        median(frames),
-        len(composition),
-        views.width,
-        views.height,
-        torch.get_num_threads(),
-    )
+    conditions = len(composition), views.width, views.height, torch.get_num_threads()
+    result = TimingResult(fmean(times), max(times), median(times), *conditions)
     if "volume" in inputs:
-        volume = VolumeScene(settings, inputs["volume"])
-        of_volume = milliseconds(
-            lambda camera: volume.render(camera, scene, composition.palettes),
-            spread(path, VOLUME_FRAMES),
-            f"{title}, volume",
-        )
-        result = replace(result, volume_mean_ms=fmean(of_volume), volume_max_ms=max(of_volume))
+        volume, few = VolumeScene(settings, inputs["volume"]), spread(path, VOLUME_FRAMES)
+        render = partial(volume.render, scene=scene, palettes=composition.palettes)
+        times = milliseconds(render, few, f"{title}, volume")
+        result = replace(result, volume_mean_ms=fmean(times), volume_max_ms=max(times))
     return Outcome(result)
 
 
@@ -69,7 +59,6 @@ STAGE = Stage(
         gpu=("views", "fit"),
     ),
     schema=OfScene,
-    select=scene_settings,
     inputs=scene_and_volume,
     work=work,
     applies=has_scene,

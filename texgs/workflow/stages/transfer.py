@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.config.dataset import BasicTF
-from texgs.core.io import read_json
 from texgs.report.results import Result
 from texgs.workflow.inputs import has_volume, prepared_volume
-from texgs.workflow.stage import Outcome, Rule, Stage
-from texgs.workflow.stages.settings import OfDataset
-
-SHOWN = "Histogram of the volume with the basic transfer functions."
+from texgs.workflow.stage import Outcome, Rule, Stage, read
+from texgs.workflow.stages.settings import OfDataset, basic_tfs_of
 
 
 @dataclass(frozen=True)
@@ -23,13 +20,13 @@ class TransferResult(Result, section="data"):
     ranges: dict[str, list[float]]  # lowest and highest value of each
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfDataset):
     """What the stage reads of the configuration."""
 
-    title: str
-    tf_values: str
-    basic_tfs: dict[str, BasicTF]
+    title: str = read("dataset.title")
+    tf_values: str = read("dataset.tf_values")
+    basic_tfs: dict[str, BasicTF] = read("dataset.basic_tfs")
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -39,23 +36,20 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     import numpy as np
 
+    from texgs.core.io import read_json
     from texgs.volume.basic_tfs import check_disjoint
     from texgs.volume.tf_files import write_paraview
     from texgs.volume.tf_plot import plot
-    from texgs.workflow.stages.settings import in_data_values
 
+    basic = basic_tfs_of(inputs["volume"], settings.basic_tfs, settings.tf_values)
     summary = read_json(inputs["volume"].with_name("volume.json"))
     low, high = summary["minimum"], summary["maximum"]
-    basic = {
-        name: in_data_values(name, points, settings.tf_values, low, high)
-        for name, points in settings.basic_tfs.items()
-    }
     check_disjoint(basic)
     plot(output / "transfer.png", np.array(summary["histogram"]), low, high, basic, settings.title)
     for name, tf in basic.items():
         write_paraview(output / f"{name}.paraview.json", tf, f"{settings.dataset} {name}")
     ranges = {name: list(tf.support) for name, tf in basic.items()}
-    return Outcome(TransferResult(len(basic), ranges), {"transfer.png": SHOWN})
+    return Outcome(TransferResult(len(basic), ranges))
 
 
 STAGE = Stage(
@@ -68,10 +62,9 @@ STAGE = Stage(
         ("transfer.png",),
         target="volumes",
         threads=1,
-        shown={"transfer.png": SHOWN},
+        shown={"transfer.png": "Histogram of the volume with the basic transfer functions."},
     ),
     schema=Settings,
-    select=lambda config: {key: getattr(config.dataset, key) for key in ("title", "tf_values", "basic_tfs")},
     inputs=prepared_volume,
     work=work,
     applies=has_volume,

@@ -12,18 +12,17 @@ from typing import TYPE_CHECKING, Any, Literal
 from texgs.config.dataset import BasicTF
 from texgs.config.views import CameraPath, ViewKeys
 from texgs.core.errors import ArgumentError
-from texgs.core.io import read_json, write_atomic
+from texgs.core.io import write_atomic
 from texgs.core.lens import Lens
 from texgs.core.progress import progress
 from texgs.report.results import ViewsResult
 from texgs.workflow.inputs import has_volume, prepared_volume, view_settings
 from texgs.workflow.locate import basic_tf
 from texgs.workflow.result import TIMES
-from texgs.workflow.stage import Outcome, Rule, Stage
-from texgs.workflow.stages.settings import OfTF, in_data_values
+from texgs.workflow.stage import Outcome, Rule, Stage, read
+from texgs.workflow.stages.settings import OfTF, basic_tfs_of
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
     from texgs.core.camera import Camera
     from texgs.volume.appearance import Appearance
     from texgs.volume.caster import Caster
@@ -36,13 +35,13 @@ SPLITS: tuple[Literal["train", "test"], ...] = ("train", "test")
 TURNTABLE = 320  # pixels of its longer side
 
 
-@dataclass
+@dataclass(kw_only=True)
 class Settings(OfTF):
     """What the stage reads of the configuration."""
 
-    tf_values: str
-    points: BasicTF
-    views: ViewKeys
+    tf_values: str = read("dataset.tf_values")
+    points: BasicTF = read(basic_tf)
+    views: ViewKeys = read(view_settings)
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -59,17 +58,15 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.volume.view_set import write_transforms
 
     views, title = settings.views, f"{settings.dataset}/{settings.tf}"
-    grid, summary = open_grid(inputs["volume"]), read_json(inputs["volume"].with_name("volume.json"))
-    tf = in_data_values(
-        settings.tf, settings.points, settings.tf_values, summary["minimum"], summary["maximum"]
-    )
+    grid = open_grid(inputs["volume"])
+    (tf,) = basic_tfs_of(inputs["volume"], {settings.tf: settings.points}, settings.tf_values).values()
     appearance = appearance_of(views)
     mapper = mapper_for(views.mapper, grid, appearance)
     times, coverages = Times(output / TIMES), []
     shots = {split: views_of(views, split, output) for split in SPLITS}
     for split, shot in shots.items():
         render_views(mapper, tf, shot, f"{title}: {split} views", times)
-        coverages += [coverage(view) for view in shot]
+        coverages += [float((view.load()[..., 3] > 0).float().mean()) for view in shot]
         if not any(coverages):  # the training views come first
             raise ArgumentError(
                 f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
@@ -182,32 +179,17 @@ def describe(settings: Settings, tf: TransferFunction, grid: Grid, mapper: Mappe
     }
 
 
-def coverage(view: View) -> float:
-    """Return the share of pixels that show something."""
-    return float((view.load()[..., 3] > 0).float().mean())
-
-
 def result_of(shots: Mapping[Any, list[View]], times: Times, coverages: list[float]) -> ViewsResult:
     """Return counts, sizes, mean coverage, and the time per view over all runs that this job took."""
-    camera = shots["train"][0].camera
-    result = ViewsResult(
-        len(shots["train"]), len(shots["test"]), camera.width, camera.height, mean(coverages)
-    )
-    if not times.others:
+    camera, frames = shots["train"][0].camera, times.others
+    counts = len(shots["train"]), len(shots["test"])
+    result = ViewsResult(*counts, camera.width, camera.height, mean(coverages))
+    if not frames:
         return result
+    first = times.first[0]
     return replace(
-        result,
-        frame_ms=median(times.others),
-        frame_max_ms=max(times.others),
-        first_frame_ms=times.first[0],
-        frames_ms=times.others,
+        result, frame_ms=median(frames), frame_max_ms=max(frames), first_frame_ms=first, frames_ms=frames
     )
-
-
-def select(config: Config) -> dict[str, Any]:
-    """Return what the stage reads."""
-    points = {"tf_values": config.dataset.tf_values, "points": basic_tf(config)}
-    return {**points, "views": view_settings(config)}
 
 
 STAGE = Stage(
@@ -221,7 +203,6 @@ STAGE = Stage(
         gpu=("views",),
     ),
     schema=Settings,
-    select=select,
     inputs=prepared_volume,
     work=work,
     applies=has_volume,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,21 +12,22 @@ from texgs.core.io import write_json
 from texgs.core.memory import MIB
 from texgs.core.progress import progress
 from texgs.report.results import VolumeResult
-from texgs.workflow.inputs import has_volume
+from texgs.workflow.inputs import has_volume, without
 from texgs.workflow.locate import cached_volume, source_file
-from texgs.workflow.stage import Outcome, Rule, Stage, plain
+from texgs.workflow.stage import Config, Outcome, Rule, Stage, plain, read
 from texgs.workflow.stages.settings import OfDataset
 
 if TYPE_CHECKING:
-    from texgs.config.schema import Config
     from texgs.volume.slabs import Source
 
+TOLD = ("dims", "dtype", "spacing", "origin", "minimum", "maximum", "voxels")  # in metrics.json, too
 
-@dataclass
+
+@dataclass(kw_only=True)
 class Settings(OfDataset):
     """What the stage reads of the configuration."""
 
-    volume: Volume
+    volume: Volume = read(lambda config: without(config.dataset.volume, "obtain"))
 
 
 def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
@@ -37,10 +38,6 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.volume.prepare import prepare
 
     volume = settings.volume
-
-    def slabs(steps: Iterable[tuple[int, int]], total: int) -> Iterable[tuple[int, int]]:
-        return progress(steps, total, title=f"{settings.dataset}: volume", unit="slab")
-
     summary = prepare(
         source(volume, inputs["source"]) if volume.generator is None else generated(volume, volume.generator),
         output / "volume.nrrd",
@@ -49,21 +46,12 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
         method=volume.method,
         up=volume.up,
         nan_value=volume.nan_value,
-        progress=slabs,
+        progress=partial(progress, title=f"{settings.dataset}: volume", unit="slab"),
     )
     write_json(output / "volume.json", asdict(summary))
-    return Outcome(
-        VolumeResult(
-            list(summary.dims),
-            summary.dtype,
-            list(summary.spacing),
-            list(summary.origin),
-            summary.minimum,
-            summary.maximum,
-            summary.voxels,
-            volume_mib=(output / "volume.nrrd").stat().st_size / MIB,
-        )
-    )
+    size = (output / "volume.nrrd").stat().st_size / MIB
+    told = {name: plain(getattr(summary, name)) for name in TOLD}
+    return Outcome(VolumeResult(**told, volume_mib=size))
 
 
 def generated(volume: Volume, generator: str) -> Source:
@@ -88,11 +76,6 @@ def source(volume: Volume, path: Path) -> Source:
     return open_source(path, series=volume.series, **said)
 
 
-def select(config: Config) -> dict[str, Any]:
-    """Return the volume's keys, but for how to obtain its file."""
-    return {"volume": {key: x for key, x in plain(config.dataset.volume).items() if key != "obtain"}}
-
-
 def inputs(config: Config) -> dict[str, Path]:
     """Return the volume's file, where there is one."""
     path = source_file(config)
@@ -105,7 +88,6 @@ STAGE = Stage(
     help="make or read the volume of a data set, and check it",
     rule=Rule("volume", "{dataset}/volume", ("volume.nrrd", "volume.json"), threads=1),
     schema=Settings,
-    select=select,
     inputs=inputs,
     work=work,
     applies=has_volume,

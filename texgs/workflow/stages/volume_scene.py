@@ -8,8 +8,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.core.io import read_json
-from texgs.workflow.stages.settings import OfScene, in_data_values
+from texgs.workflow.stages.settings import OfScene, basic_tfs_of
 from texgs.workflow.stages.views import appearance_of, mapper_for
 
 if TYPE_CHECKING:
@@ -32,11 +31,7 @@ class VolumeScene:
     def __init__(self, settings: OfScene, volume: Path) -> None:
         from texgs.volume.nrrd_file import open_grid
 
-        summary = read_json(volume.with_name("volume.json"))
-        bounds = (settings.tf_values, summary["minimum"], summary["maximum"])
-        self.tfs = {
-            name: in_data_values(name, points, *bounds) for name, points in settings.basic_tfs.items()
-        }
+        self.tfs = basic_tfs_of(volume, settings.basic_tfs, settings.tf_values)
         self.grid = open_grid(volume)
         self.look = appearance_of(settings.views)
         self._mapper = mapper_for(settings.views.mapper, self.grid, self.look)
@@ -67,6 +62,15 @@ class VolumeScene:
             return np.zeros((camera.height, camera.width, 4), dtype=np.float32)
         self._mapper = self._mapper.looking(replace(self.look, **factors[0]))
         return self._mapper.render(combine(shown), camera, scene.light)
+
+    def over_background(
+        self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]
+    ) -> np.ndarray:
+        """Return the same over the scene's background, [H, W, 3]."""
+        import numpy as np
+
+        rgba = self.render(camera, scene, palettes)
+        return rgba[..., :3] + (1 - rgba[..., 3:]) * np.asarray(scene.background, dtype="float32")
 
 
 def edited(tf: TransferFunction, edit: PartEdit, palette: Sequence[float]) -> TransferFunction:
