@@ -12,7 +12,7 @@ from benchmarks import scenes, workload
 from benchmarks.report import Section
 from benchmarks.settings import Settings
 from benchmarks.timing import Case, measure
-from texgs.raster import losses, normals, shading
+from texgs.raster import losses, shading
 from texgs.raster.reference import losses as definition
 from texgs.raster.reference import shading as shading_definition
 
@@ -72,7 +72,7 @@ def images(settings: Settings) -> Iterator[Comparison]:
     yield Comparison("l1_dssim", l1_dssim, [color], (target, LAMBDA_DSSIM))
     noise = torch.rand(3, *target.shape[:2], generator=torch.Generator().manual_seed(3)).to(settings.device)
     yield Comparison("l1_dssim, no pixel equal", l1_dssim, [color], (noise.permute(1, 2, 0), LAMBDA_DSSIM))
-    pair = {"texgs": normals.normal_consistency, "torch": definition.normal_consistency}
+    pair = {"texgs": losses.normal_consistency, "torch": definition.normal_consistency}
     inputs = [render.normal, render.depth]
     yield Comparison("normal_consistency", pair, inputs, (render.alpha, camera.viewmat, camera.K))
     pair = {"texgs": losses.bilateral_smoothness, "kornia": definition.bilateral_smoothness}

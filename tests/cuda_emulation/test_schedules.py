@@ -8,8 +8,7 @@ from tests.raster import test_normals, test_shading, test_smoothness, test_ssim
 from tests.raster.agreement import evaluate
 from tests.raster.scenes import gaussians, random_scene, textured
 from tests.raster.test_determinism import everything, voxels
-from texgs.raster.losses import bilateral_smoothness, l1_dssim
-from texgs.raster.normals import normal_consistency
+from texgs.raster.losses import bilateral_smoothness, l1_dssim, normal_consistency
 from texgs.raster.shading import blinn_phong_texture, spherical_harmonics
 
 pytestmark = pytest.mark.emulated

@@ -7,7 +7,7 @@ from torch.nn.functional import normalize
 from tests.raster.threads import require_same_bits
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.raster.normals import depth_to_normal, normal_consistency
+from texgs.raster.losses import depth_to_normal, normal_consistency
 from texgs.raster.reference import losses as definition
 
 SIZES = [(1, 1), (3, 3), (2, 40), (33, 7), (7, 33), (70, 130)]
@@ -131,5 +131,5 @@ def test_errors_name_the_argument():
         depth_to_normal(depth.double(), viewmat, K)
     with pytest.raises(ArgumentError, match="viewmat: not differentiable here"):
         depth_to_normal(depth, viewmat.requires_grad_(), K)
-    with pytest.raises(ShapeError, match="depth: expected at least one pixel"):
+    with pytest.raises(ArgumentError, match="image: expected at least one pixel"):
         depth_to_normal(depth[:0], viewmat.detach(), K)

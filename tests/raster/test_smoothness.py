@@ -87,5 +87,5 @@ def test_errors_name_the_argument():
         bilateral_smoothness(attribute.double(), guide, alpha)
     with pytest.raises(ArgumentError, match="guide: not differentiable here"):
         bilateral_smoothness(attribute, guide.requires_grad_(), alpha)
-    with pytest.raises(ShapeError, match="attribute: expected at least one pixel"):
+    with pytest.raises(ArgumentError, match="image: expected at least one pixel"):
         bilateral_smoothness(attribute[:0], guide.detach()[:0], alpha[:0])

@@ -164,7 +164,7 @@ def test_any_number_of_threads_gives_the_same_bits():
     [
         ((ONES, ONES.transpose(0, 1)), ShapeError, r"target: expected \[4, 5, 3\], got \[5, 4, 3\]"),
         ((ONES[0, 0], ONES[0, 0]), ShapeError, r"image: expected \[H, W, C\], got \[3\]"),
-        ((ONES[:0], ONES[:0]), ShapeError, "image: expected at least one pixel"),
+        ((ONES[:0], ONES[:0]), ArgumentError, "image: expected at least one pixel"),
         ((ONES.double(), ONES), ArgumentError, "image: expected float32, got float64"),
         ((ONES, ONES.half()), ArgumentError, "target: expected float32, got float16"),
         ((ONES, ONES, 1.5), ArgumentError, "lambda_dssim: expected 0 to 1, got 1.5"),

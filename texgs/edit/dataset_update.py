@@ -18,7 +18,7 @@ from texgs.edit.turns import Schedule, turns
 from texgs.fields.field import Field
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
-from texgs.raster.normals import depth_to_normal
+from texgs.raster.losses import depth_to_normal
 from texgs.volume.images import Images
 
 

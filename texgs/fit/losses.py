@@ -14,8 +14,7 @@ from texgs.fields.surfels.model import geometry
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.settings import Losses
 from texgs.raster import Options, Render, Texture, rasterize
-from texgs.raster.losses import bilateral_smoothness, l1_dssim, ssim
-from texgs.raster.normals import normal_consistency
+from texgs.raster.losses import bilateral_smoothness, l1_dssim, normal_consistency, ssim
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
 

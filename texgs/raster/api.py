@@ -63,10 +63,8 @@ def rasterize(
         Render with color [H, W, C], alpha [H, W], and the outputs asked for. Images are views of planar
         memory.
     """
-    geometry = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
-    camera = {"viewmat": viewmat, "K": K} | ({} if background is None else {"background": background})
-    surfels = arguments.surfel_tensors(geometry, shift, features, texture)
-    view = arguments.view(surfels, camera, (width, height), texture, outputs, options)
+    surfels = arguments.surfel_tensors((means, quats, scales, opacities), shift, features, texture)
+    view = arguments.view(surfels, (viewmat, K, background), (width, height), texture, outputs, options)
     extra: dict = {}
     images = RasterizeFunction.apply(view, extra, *surfels)
     image = dict(zip(IMAGES, images, strict=True))
@@ -94,9 +92,9 @@ def splat(
 
     Args:
         image: [H, W, C], C from 1 to 32.
-        means: [N, 3] and the rest as in `rasterize`.
+        means: [N, 3]; this, quats, scales, opacities, viewmat and K are as in `rasterize`.
         quats: [N, 4].
-        scales: [N, 2] of surfels or [N, 3] of 3D Gaussians.
+        scales: [N, 2 or 3].
         opacities: [N].
         viewmat: [4, 4].
         K: [3, 3].
@@ -109,11 +107,10 @@ def splat(
     arguments.channels("image", size["C"])
     if options.check_finite:
         check.finite(image=image)
-    geometry = {"means": means, "quats": quats, "scales": scales, "opacities": opacities}
-    camera = {"viewmat": viewmat, "K": K}
+    geometry = (means, quats, scales, opacities)
     with torch.no_grad():
         surfels = arguments.surfel_tensors(geometry, None, image.new_zeros(size["N"], 1), None)
-        view = arguments.view(surfels, camera, (size["W"], size["H"]), None, (), options)
+        view = arguments.view(surfels, (viewmat, K, None), (size["W"], size["H"]), None, (), options)
         frame = bin_surfels(surfels, view, {})
         sums, weights, _, _ = contribute(frame, surfels, view, image.permute(2, 0, 1).contiguous())
     return sums, weights

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from math import isfinite
 from operator import index
-from typing import Any
 
 import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, DeviceError, ShapeError
+from texgs.core.errors import ArgumentError, DeviceError
 from texgs.raster import native
 from texgs.raster.autograd import SurfelTensors, View
 from texgs.raster.types import OUTPUTS, Options, Texture, check_primitive
@@ -35,7 +34,7 @@ AXES = {
 }
 
 
-Inputs = dict[str, tuple[Tensor, str]]  # tensors with their axes, as `check.shape` takes them, by name
+Inputs = Mapping[str, tuple[Tensor | None, str]]  # by name: a tensor, if any, and axes as in `check.shape`
 
 
 def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -> dict[str, int]:
@@ -44,50 +43,37 @@ def require(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -
     `constant` names those for which there is no gradient, `cpu` says why other devices are refused.
     """
     sizes: dict[str, int] = {}
-    for name, (tensor, axes) in tensors.items():
-        sizes |= check.shape(name, tensor, axes, **sizes)
-    given = {name: tensor for name, (tensor, _) in tensors.items()}
+    given = {name: tensor for name, (tensor, _) in tensors.items() if tensor is not None}
+    for name, tensor in given.items():
+        sizes |= check.shape(name, tensor, tensors[name][1], **sizes)
     for name, tensor in given.items():
         check.floating(name, tensor)
         if cpu and tensor.device.type != "cpu":
             raise DeviceError(f"{name}: expected a tensor on cpu, got {tensor.device}; {cpu}")
     check.same_device(**given)
-    check.constant(**{name: given[name] for name in constant})
+    check.constant(**{name: given.get(name) for name in constant})
     return sizes
 
 
-def require_image(tensors: Inputs, *, constant: Collection[str] = (), cpu: str = "") -> None:
-    """Require the same as `require`, and at least one pixel."""
-    if 0 in require(tensors, constant=constant, cpu=cpu).values():
-        name, (image, _) = next(iter(tensors.items()))
-        raise ShapeError(f"{name}: expected at least one pixel, got {list(image.shape)}")
-
-
 def surfel_tensors(
-    geometry: dict[str, Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
+    geometry: Sequence[Tensor], shift: Tensor | None, features: Tensor | None, texture: Texture | None
 ) -> SurfelTensors:
-    """Return all tensors of surfels or 3D Gaussians; `geometry` holds means, quats, scales and opacities."""
+    """Return all tensors of surfels or 3D Gaussians; `geometry` is means, quats, scales and opacities."""
     if features is None and texture is None:
         raise ArgumentError("rasterize: expected features, a texture or both, got neither")
-    tensors = dict(geometry)
-    if texture is not None:
-        tensors |= {"base": texture.base, "gain": texture.gain, "texels": texture.texels}
-    tensors |= {name: x for name, x in (("shift", shift), ("features", features)) if x is not None}
-    sizes = require({name: (tensors[name], axes) for name, axes in AXES.items() if name in tensors})
+    colors = (None, None, None) if texture is None else (texture.base, texture.gain, texture.texels)
+    tensors = SurfelTensors._make((*geometry, shift, features, *colors))
+    sizes = require({name: (x, AXES[name]) for name, x in tensors._asdict().items()})
     if texture is not None:
         check_texture(texture, sizes["N"])
     if features is not None:
         channels("features", sizes["C"], MAX_CHANNELS - (0 if texture is None else TEXTURE_CHANNELS))
-    native.require_memory(BYTES_PER_SURFEL * sizes["N"], tensors["means"].device)
-    return SurfelTensors(**{name: x.contiguous() for name, x in tensors.items()})
+    native.require_memory(BYTES_PER_SURFEL * sizes["N"], tensors.means.device)
+    return SurfelTensors._make(None if x is None else x.contiguous() for x in tensors)
 
 
 def check_texture(texture: Texture, n: int) -> None:
-    """Require a layout for n surfels. Where textures lie is checked on the CPU only; a GPU would wait.
-
-    Raises:
-        ArgumentError, ShapeError, DeviceError: naming the field, or the first two textures that overlap.
-    """
+    """Require a layout for n surfels. Where textures lie is checked on the CPU only; a GPU would wait."""
     check.shape("texture.texels", texture.texels, "T 3")
     check.shape("texture.sizes", texture.sizes, "N 2", N=n)
     check.shape("texture.offsets", texture.offsets, "N", N=n)
@@ -137,17 +123,21 @@ def channels(name: str, n: int, most: int = MAX_CHANNELS) -> None:
 
 def view(
     surfels: SurfelTensors,
-    camera: dict[str, Tensor],
+    camera: tuple[Tensor, Tensor, Tensor | None],
     size: tuple[int, int],
     texture: Texture | None,
     outputs: Collection[str],
     options: Options,
 ) -> View:
-    """Check the rest; `camera` holds viewmat, K and perhaps background, `size` is (width, height)."""
-    axes = {"viewmat": "4 4", "K": "3 3", "background": f"{surfels.channels}"}
-    cameras = {name: (tensor, axes[name]) for name, tensor in camera.items()}
-    require({"means": (surfels.means, "N 3"), **cameras}, constant=camera)
-    pinhole(camera["viewmat"], camera["K"])
+    """Check the rest; `camera` is viewmat, K and background or None, `size` is (width, height)."""
+    viewmat, K, background = camera
+    constant = {
+        "viewmat": (viewmat, "4 4"),
+        "K": (K, "3 3"),
+        "background": (background, f"{surfels.channels}"),
+    }
+    require({"means": (surfels.means, "N 3"), **constant}, constant=constant)
+    pinhole(viewmat, K)
     if isinstance(outputs, str):
         raise ArgumentError(f"outputs: expected a collection of names, got a string; pass ({outputs!r},)")
     wanted = frozenset(outputs)
@@ -163,22 +153,20 @@ def view(
     if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE):
         raise ArgumentError(f"width, height: expected 1 to {MAX_SIDE} pixels, got {width} x {height}")
     if options.check_finite:
-        check.finite(**surfels._asdict(), **camera)
+        check.finite(**surfels._asdict(), **{name: x for name, (x, _) in constant.items()})
     planes = surfels.channels + 3 * len(wanted) + 2
     native.require_memory(4 * planes * width * height, surfels.means.device)
-    constants: dict[str, Any] = {name: x.detach().contiguous() for name, x in camera.items()}
-    if texture is not None:
-        constants |= {"sizes": texture.sizes.contiguous(), "offsets": texture.offsets.contiguous()}
-    return View(width=width, height=height, outputs=wanted, options=options, **constants)
+    layout = () if texture is None else (texture.sizes.contiguous(), texture.offsets.contiguous())
+    matrices = (viewmat.detach().contiguous(), K.detach().contiguous())
+    background = None if background is None else background.detach().contiguous()
+    return View(*matrices, width, height, wanted, options, background, *layout)
 
 
 def pinhole(viewmat: Tensor, K: Tensor) -> None:
     """Require the entries that the library takes for granted. On the CPU only: a GPU would have to wait.
 
-    Focal lengths are above 0, there is no skew, and last rows are those of homogeneous coordinates.
-
-    Raises:
-        ArgumentError: naming the matrix and the row. NaN and infinity pass, they have a check of their own.
+    Focal lengths are above 0, there is no skew, and last rows are those of homogeneous coordinates. NaN
+    and infinity pass, they have a check of their own.
     """
     if K.device.type != "cpu":
         return

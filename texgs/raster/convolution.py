@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from texgs.raster import native
-from texgs.raster.arguments import require, require_image
+from texgs.raster.arguments import require
 
 ON_GPU = "torch convolves on GPUs"
 BLOCK = 16  # channels that lie side by side
@@ -46,9 +46,6 @@ class RectifiedConvolution:
     Args:
         weight: [out, in, 3, 3] float32, constant.
         bias: [out] float32, constant.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
 
     weight: Tensor
@@ -59,12 +56,12 @@ class RectifiedConvolution:
         require(given, constant=given, cpu=ON_GPU)
 
     def __call__(self, images: Tensor) -> Tensor:
-        """[N, out, H, W] of images [N, in, H, W], both with channels last in memory.
+        """Return [N, out, H, W] of images [N, in, H, W], both with channels last in memory.
 
         Images are copied where they have another order, or a number of channels that 16 does not divide. The
         result is not to be changed in place.
         """
-        require_image({"images": (images, f"N {self.weight.shape[1]} H W")}, cpu=ON_GPU)
+        require({"images": (images, f"N {self.weight.shape[1]} H W")}, cpu=ON_GPU)
         return _Convolve.apply(images, self)
 
     @cached_property

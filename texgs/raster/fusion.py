@@ -12,8 +12,9 @@ from torch import Tensor
 
 from texgs.core import check
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, DeviceError
+from texgs.core.errors import ArgumentError
 from texgs.raster import native
+from texgs.raster.arguments import require
 
 BLOCK = 8  # TEXGS_FUSION_BLOCK
 
@@ -35,31 +36,21 @@ native.declare("texgs_fuse", NativeLattice, "np", NativeView, "f")
 
 @dataclass(frozen=True, eq=False)
 class DepthView:
-    """What a view knows of a surface; on the CPU.
-
-    Raises:
-        ArgumentError, DeviceError: if images are not as large as the camera's, of other types or elsewhere.
-    """
+    """What a view knows of a surface; on the CPU."""
 
     camera: Camera
     depth: Tensor  # [H, W] float32, camera z in world units, 0 where there is no surface
     color: Tensor  # [H, W, 3] uint8
 
     def __post_init__(self) -> None:
-        size = (self.camera.height, self.camera.width)
-        if tuple(self.depth.shape) != size or tuple(self.color.shape) != (*size, 3):
+        size = f"{self.camera.height} {self.camera.width}"
+        viewmat, K = self.camera.viewmat.float(), self.camera.K.float()
+        require({"depth": (self.depth, size), "viewmat": (viewmat, "4 4"), "K": (K, "3 3")}, cpu="move it")
+        check.shape("color", self.color, f"{size} 3")
+        if self.color.dtype != torch.uint8 or self.color.device.type != "cpu":
             raise ArgumentError(
-                f"view: expected depth {size} and color {(*size, 3)}, got {tuple(self.depth.shape)} and "
-                f"{tuple(self.color.shape)}"
+                f"color: expected uint8 on cpu, got {self.color.dtype} on {self.color.device}"
             )
-        if (self.depth.dtype, self.color.dtype) != (torch.float32, torch.uint8):
-            raise ArgumentError(
-                f"view: expected depth of float32 and color of uint8, got {self.depth.dtype} and "
-                f"{self.color.dtype}"
-            )
-        tensors = (self.depth, self.color, self.camera.viewmat, self.camera.K)
-        if devices := {x.device.type for x in tensors} - {"cpu"}:
-            raise DeviceError(f"view: expected tensors on cpu, got {devices.pop()}; move them")
 
 
 class Lattice:
@@ -84,13 +75,7 @@ class Lattice:
     def add(self, view: DepthView, blocks: Tensor, truncation: float) -> None:
         """Update the voxels of some blocks, in front of the surface and up to the truncation behind it.
 
-        Args:
-            view: the surface.
-            blocks: which [N, 3], each once, by numbers along x, y and z.
-            truncation: world units.
-
-        Raises:
-            ArgumentError, ShapeError: if a block is none of the lattice's, or twice there.
+        `blocks` [N, 3] are numbers along x, y and z, each block once; the truncation is in world units.
         """
         check.shape("blocks", blocks, "N 3")
         if blocks.is_floating_point():

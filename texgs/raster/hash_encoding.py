@@ -36,9 +36,6 @@ class HashLevels:
     """Lattices over the unit cube whose points have rows of one table; sides grow by a constant factor.
 
     A level with more lattice points than `entries` has so many rows, which points share by their hash.
-
-    Raises:
-        ArgumentError: naming the value that is out of range.
     """
 
     levels: int = 16
@@ -88,18 +85,11 @@ class HashLevels:
 
 
 def encode(points: Tensor, table: Tensor, levels: HashLevels) -> Tensor:
-    """Return the features [n, 2 levels] at points [n, 3] of the unit cube, differentiable in the table.
+    """Return the features [n, 2 levels] at points [n, 3] of the unit cube, differentiable in table [rows, 2].
 
     Trilinear between the lattice points of each level; points outside of the cube have the features of its
-    faces. For a definition see `texgs.raster.reference.hash_encoding`.
-
-    Args:
-        points: any number of them.
-        table: [rows, 2] of all levels, one after the other.
-        levels: of the lattices.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
+    faces. The table has all levels, one after the other. For a definition see
+    `texgs.raster.reference.hash_encoding`.
     """
     given = {"points": (points, "n 3"), "table": (table, f"{levels.rows} {FEATURES}")}
     require(given, constant=("points",), cpu="hash encoding runs on the CPU")

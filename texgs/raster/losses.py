@@ -1,6 +1,6 @@
-"""Losses of images whose library function returns the gradient along with the value.
+"""Losses of images: photometric, smooth but across edges, normals as the depth has them; and those normals.
 
-L1 and structural similarity, which are the photometric loss of 3DGS, and smoothness but across edges.
+The library returns the gradients of a loss along with its value.
 """
 
 from __future__ import annotations
@@ -13,11 +13,14 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.raster import native
-from texgs.raster.arguments import require_image
+from texgs.raster.arguments import pinhole, require
 
 Loss = tuple[str, tuple[float, ...], list[bool]]  # function, size and weights, which inputs want a gradient
 native.declare("texgs_l1_dssim", "pp iii ff pp")
 native.declare("texgs_bilateral_smoothness", "ppp iii pp")
+native.declare("texgs_depth_to_normal", "ppp ii p")
+native.declare("texgs_depth_to_normal_backward", "ppp ii pp")
+native.declare("texgs_normal_consistency", "ppppp ii ppp")
 
 
 def ssim(image: Tensor, target: Tensor) -> Tensor:
@@ -35,15 +38,12 @@ def ssim(image: Tensor, target: Tensor) -> Tensor:
 
     Returns:
         [] between -1 and 1; exactly 1 for equal images.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     return 1.0 - _weighted(image, target, 0.0, 1.0)
 
 
 def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor:
-    """Photometric loss (1 - lambda) mean |image - target| + lambda (1 - SSIM) (Kerbl et al. 2023, eq. 7).
+    """Return (1 - lambda) mean |image - target| + lambda (1 - SSIM), as 3DGS (Kerbl et al. 2023, eq. 7).
 
     Differentiable in `image`; pixels equal to the target have no L1 gradient. SSIM is that of `ssim`. Alpha
     is a second image: add `weight * l1_dssim(alpha, target_alpha)`.
@@ -55,9 +55,6 @@ def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor
 
     Returns:
         [] 0 or more; exactly 0 for equal images.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     if not 0.0 <= lambda_dssim <= 1.0:
         raise ArgumentError(f"lambda_dssim: expected 0 to 1, got {lambda_dssim}")
@@ -72,11 +69,12 @@ def planar(image: Tensor) -> Tensor:
 def _weighted(image: Tensor, target: Tensor, l1: float, dssim: float) -> Tensor:
     """Return l1 * mean |image - target| + dssim * (1 - SSIM), checked."""
     axes = _axes(image)
-    require_image({"image": (image, axes), "target": (target, axes)}, constant=("target",))
+    require({"image": (image, axes), "target": (target, axes)}, constant=("target",))
     return fused_loss("texgs_l1_dssim", [planar(image)], [planar(target)], l1, dssim)
 
 
 def _axes(image: Tensor) -> str:
+    """Return the axes of an image with channels or without."""
     return "H W" if image.ndim == 2 else "H W C"
 
 
@@ -96,14 +94,59 @@ def bilateral_smoothness(attribute: Tensor, guide: Tensor, alpha: Tensor) -> Ten
 
     Returns:
         [] 0 or more.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     given = {"attribute": (attribute, _axes(attribute)), "guide": (guide, "H W 3"), "alpha": (alpha, "H W")}
-    require_image(given, constant=("guide", "alpha"))
+    require(given, constant=("guide", "alpha"))
     constants = [planar(guide), alpha.contiguous()]
     return fused_loss("texgs_bilateral_smoothness", [planar(attribute)], constants)
+
+
+def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """Return the unit normals of the surface that a depth map samples.
+
+    The cross product of central differences of the unprojected pixels (Huang et al. 2024, section 5); it
+    faces the camera. Differentiable in `depth`.
+
+    Args:
+        depth: [H, W] camera z, world units; 0 or less where there is no surface.
+        viewmat: [4, 4] world to camera, a rigid motion, OpenCV axes.
+        K: [3, 3] intrinsics in pixels, without skew.
+
+    Returns:
+        [H, W, 3] in world axes; 0 at the border of the image and where one of the four neighbours has no
+        depth (2DGS takes such a neighbour to lie at the camera).
+    """
+    _require(depth, viewmat, K)
+    normal = _DepthToNormal.apply(depth.contiguous(), viewmat.contiguous(), K.contiguous())
+    return normal.permute(1, 2, 0)
+
+
+def normal_consistency(normal: Tensor, depth: Tensor, alpha: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+    """Return the mean over pixels of 1 - alpha * normal . depth_to_normal(depth): the normal loss of 2DGS.
+
+    Surfels are pulled into the surface that they form together (Huang et al. 2024, eq. 14). Differentiable in
+    `normal` and `depth`; alpha is a weight without a gradient, whether it requires one or not.
+
+    Args:
+        normal: [H, W, 3] blended world normals, as rendered.
+        depth: [H, W] camera z, world units; 0 or less where there is no surface.
+        alpha: [H, W] in [0, 1].
+        viewmat: [4, 4] world to camera, a rigid motion, OpenCV axes.
+        K: [3, 3] intrinsics in pixels, without skew.
+
+    Returns:
+        [] between 0 and 2.
+    """
+    _require(depth, viewmat, K, normal=(normal, "H W 3"), alpha=(alpha, "H W"))
+    constants = [alpha.detach().contiguous(), viewmat.contiguous(), K.contiguous()]
+    return fused_loss("texgs_normal_consistency", [planar(normal), depth.contiguous()], constants)
+
+
+def _require(depth: Tensor, viewmat: Tensor, K: Tensor, **others: tuple[Tensor, str]) -> None:
+    """Require a depth map of a camera, and what else is given of it."""
+    camera = {"viewmat": (viewmat, "4 4"), "K": (K, "3 3")}
+    require({"depth": (depth, "H W"), **camera, **others}, constant=camera)
+    pinhole(viewmat, K)
 
 
 def fused_loss(name: str, inputs: Sequence[Tensor], constants: Sequence[Tensor], *weights: float) -> Tensor:
@@ -144,3 +187,21 @@ def _evaluate(loss: Loss, tensors: Sequence[Tensor]) -> tuple[Tensor, list[Tenso
     gradients = native.gradients(tensors[: len(wanted)], wanted)
     native.call(name, *tensors, *numbers, value, *gradients, device=value.device)
     return value, gradients
+
+
+class _DepthToNormal(torch.autograd.Function):
+    @staticmethod
+    def forward(ctx: Any, depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
+        normal = depth.new_empty(3, *depth.shape)
+        native.call("texgs_depth_to_normal", depth, viewmat, K, *depth.shape, normal, device=depth.device)
+        ctx.save_for_backward(depth, viewmat, K)
+        return normal
+
+    @staticmethod
+    @torch.autograd.function.once_differentiable
+    def backward(ctx: Any, upstream: Tensor) -> tuple[Tensor | None, ...]:
+        depth, viewmat, K = ctx.saved_tensors
+        gradient = torch.empty_like(depth)
+        inputs = (depth, viewmat, K, *depth.shape, upstream.contiguous())
+        native.call("texgs_depth_to_normal_backward", *inputs, gradient, device=depth.device)
+        return gradient, None, None

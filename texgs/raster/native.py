@@ -144,11 +144,7 @@ def _require_own_sources(lib: ctypes.CDLL) -> None:
 
 
 def function(lib: ctypes.CDLL, name: str) -> Any:
-    """Return a function of a library, as it is declared.
-
-    Raises:
-        NativeError: if the library lacks it, as one of other sources may.
-    """
+    """Return a function of a library, as it is declared; one of other sources may lack it."""
     try:
         found = getattr(lib, name)
     except AttributeError:

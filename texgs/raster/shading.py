@@ -60,9 +60,6 @@ def blinn_phong(
 
     Returns:
         [N, 3] shaded colours.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     material = (ambient, diffuse, specular, shininess)
     return blinn_phong_texture(color, *material, means, quats, camera_position, light, facing=facing)[0]
@@ -93,16 +90,17 @@ def blinn_phong_texture(
     factors = zip(MATERIAL, (ambient, diffuse, specular, shininess), strict=True)
     material = {name: (x, name) for name, x in factors}  # each of a length of its own
     surfels = {"color": (color, "N 3"), **material, "means": (means, "N 3"), "quats": (quats, "N 4")}
-    lights = {"camera_position": (camera_position, "3")} | ({} if light is None else {"light": (light, "3")})
+    lights = {"camera_position": (camera_position, "3"), "light": (light, "3")}
     sizes = require(surfels | lights, constant=lights)
     for name in MATERIAL:
         if sizes[name] not in (sizes["N"], 1):
             raise ShapeError(f"{name}: expected [{sizes['N']}] or one for all [1], got [{sizes[name]}]")
-    return _BlinnPhong.apply(facing, *(x.contiguous() for x, _ in (*surfels.values(), *lights.values())))
+    tensors = (x for x, _ in (*surfels.values(), *lights.values()))
+    return _BlinnPhong.apply(facing, *(None if x is None else x.contiguous() for x in tensors))
 
 
 class _BlinnPhong(torch.autograd.Function):
-    """`facing`, then colour, material, means, quats, camera position and, unless at the camera, the light."""
+    """`facing`, then colour, material, means, quats, camera position, and the light or None."""
 
     @staticmethod
     def forward(ctx: Any, facing: bool, *tensors: Tensor) -> tuple[Tensor, Tensor]:
@@ -127,10 +125,9 @@ class _BlinnPhong(torch.autograd.Function):
 
 
 def _arguments(tensors: Sequence[Tensor], facing: bool) -> tuple:
-    """Surfels, colour, material, bits of what is shared of it, means, quats, camera, light and `facing`."""
+    """Return the arguments of the library, with a bit for each factor of the material that is shared."""
     shared = sum(len(x) == 1 and 1 << k for k, x in enumerate(tensors[1:5]))
-    light = tensors[8] if len(tensors) > 8 else None
-    return len(tensors[0]), *tensors[:5], shared, *tensors[5:8], light, facing
+    return len(tensors[0]), *tensors[:5], shared, *tensors[5:], facing
 
 
 def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> Tensor:
@@ -147,9 +144,6 @@ def spherical_harmonics(sh: Tensor, means: Tensor, camera_position: Tensor) -> T
 
     Returns:
         [N, 3] colours, 0 or more.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     position = {"camera_position": (camera_position, "3")}
     sizes = require({"sh": (sh, "N K 3"), "means": (means, "N 3"), **position}, constant=position)

@@ -67,7 +67,7 @@ class VoxelGrid:
         return DEGREES[self.rows.shape[1]]
 
     def __len__(self) -> int:
-        """Number of voxels with a row."""
+        """Return the number of voxels with a row."""
         return len(self.rows) - EMPTY
 
     def structure(self) -> NativeGrid:
@@ -89,12 +89,7 @@ class VoxelGrid:
         )
 
     def with_rows(self, rows: Tensor) -> VoxelGrid:
-        """Return the same voxels with other rows, [n, 4, 16 or 32].
-
-        Raises:
-            ShapeError, ArgumentError, DeviceError: if they are not as many, of another length, not float32 or
-                elsewhere.
-        """
+        """Return the same voxels with other rows, [n, 4, 16 or 32]."""
         require({"rows": (rows, f"{len(self.rows)} K")})
         check.same_device(masks=self.masks, rows=rows)
         if rows.shape[1] not in DEGREES:
@@ -139,9 +134,6 @@ def voxel_grid(mask: Tensor, lower: Sequence[float], spacing: float, degree: int
         lower: world position of voxel (0, 0, 0), 3 numbers.
         spacing: of voxels, world units.
         degree: of the spherical harmonics, 0 to 2.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: naming the argument at fault.
     """
     check.shape("mask", mask, "X Y Z")
     if mask.dtype != torch.bool or any(side not in SIDES for side in mask.shape):
@@ -200,14 +192,7 @@ def recolored(grid: VoxelGrid, matrix: Tensor, offset: Tensor) -> VoxelGrid:
     Colour is 0.5 + Y00 s_0 + sum_k Y_k s_k. So the coefficients s_k become A s_k, and s_0 becomes
     A s_0 + (0.5 A 1 + b - 0.5) / Y00; ARF's own colour transfer leaves the last term as b. Voxels without a
     row change as well, so that the colours between them and others do. The background is the caller's.
-
-    Args:
-        grid: any.
-        matrix: A, [3, 3].
-        offset: b, [3].
-
-    Raises:
-        ShapeError: if a shape is another.
+    `matrix` is A, [3, 3], `offset` b, [3].
     """
     check.shape("matrix", matrix, "3 3")
     check.shape("offset", offset, "3")
@@ -224,35 +209,26 @@ def drop_sh(grid: VoxelGrid) -> VoxelGrid:
 
 
 def interpolate_rows(grid: VoxelGrid, points: Tensor, out: Tensor | None = None) -> Tensor:
-    """Return the trilinear rows [m, K] at world points [m, 3]; outside of the lattice they are the first one.
+    """Return the trilinear rows [m, K] at world points [m, 3], in `out` if it is given.
 
-    Args:
-        grid: any.
-        points: in any number.
-        out: [m, K] where to write them.
+    Outside of the lattice they are the first one.
     """
     links = grid.links()
     out = points.new_empty(len(points), grid.rows.shape[1]) if out is None else out
     for rows, part in zip(out.split(PIECE), points.split(PIECE), strict=True):
-        rows.copy_(_interpolated(grid, links, part))
+        at = (part - part.new_tensor(grid.lower)) / grid.spacing
+        cell = at.floor().int()
+        size = cell.new_tensor(grid.size)
+        corners, weights = [], []
+        for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
+            place = cell + offset  # [m, 3]
+            inside = ((place >= 0) & (place < size)).all(1)
+            x, y, z = place.clamp_min(0).minimum(size - 1).long().unbind(1)
+            corners.append(links[x, y, z] * inside)
+            weights.append((1 - (at - place).abs()).prod(1))
+        index, weight = torch.stack(corners, 1), torch.stack(weights, 1)
+        rows.copy_(embedding_bag(index, grid.rows.detach(), per_sample_weights=weight, mode="sum"))
     return out
-
-
-def _interpolated(grid: VoxelGrid, links: Tensor, points: Tensor) -> Tensor:
-    """Return the same for some points, with the rows of all voxels [X, Y, Z]."""
-    at = (points - points.new_tensor(grid.lower)) / grid.spacing
-    cell = at.floor().int()
-    size = cell.new_tensor(grid.size)
-    corners, weights = [], []
-    for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
-        place = cell + offset  # [m, 3]
-        inside = ((place >= 0) & (place < size)).all(1)
-        x, y, z = place.clamp_min(0).minimum(size - 1).long().unbind(1)
-        corners.append(links[x, y, z] * inside)
-        weights.append((1 - (at - place).abs()).prod(1))
-    return embedding_bag(
-        torch.stack(corners, 1), grid.rows.detach(), per_sample_weights=torch.stack(weights, 1), mode="sum"
-    )
 
 
 def _blocks(lattice: Tensor) -> Tensor:

@@ -14,7 +14,7 @@ from texgs.raster.voxel_grid import NativeGrid, VoxelGrid
 from texgs.raster.voxels import RowGradient
 
 EPSILON = 1e-8
-BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}
+BETAS = {"rmsprop": (0.0, 0.95), "adam": (0.9, 0.99)}  # of means of gradients and of their squares
 
 
 class NativeRule(native.Struct):
@@ -45,22 +45,16 @@ class VoxelOptimizer:
     Args:
         grid: whose rows are changed in place; its density follows them, its occupancy does not.
         kind: "rmsprop" or "adam".
-        betas: of the means of gradients and of their squares; the first is not used by "rmsprop".
 
     Raises:
         ArgumentError: if the kind is unknown.
     """
 
-    def __init__(
-        self,
-        grid: VoxelGrid,
-        kind: str = "rmsprop",
-        betas: tuple[float, float] | None = None,
-    ) -> None:
+    def __init__(self, grid: VoxelGrid, kind: str = "rmsprop") -> None:
         if kind not in BETAS:
             raise ArgumentError(f"optimizer: expected {' or '.join(BETAS)}, got {kind!r}")
         self.grid = grid
-        self.betas = betas or BETAS[kind]
+        self.betas = BETAS[kind]
         self.gradient = RowGradient(grid)
         self.first = torch.zeros_like(grid.rows) if kind == "adam" else None
         self.second = torch.zeros_like(grid.rows)
@@ -79,14 +73,8 @@ def add_total_variation(
     """Add the gradient of total variation over the voxels of some blocks.
 
     For every float of a row, weight * sqrt(1e-9 + sum over x, y, z of (next voxel - voxel)^2); a voxel
-    without a row counts as equal.
-
-    Args:
-        grid: any.
-        blocks: [m] int32, places in the flattened `grid.masks`.
-        density: weight of the density's variation.
-        sh: weight of the coefficients'.
-        into: where the gradient is added.
+    without a row counts as equal. `blocks` [m] are places in the flattened `grid.masks`; `density` is the
+    weight of the density's variation, `sh` that of the coefficients'.
     """
     into.check(grid)
     check.same_device(rows=grid.rows, blocks=blocks)
@@ -103,22 +91,11 @@ def add_variation_of_some(
     sh: float,
     generator: torch.Generator,
     into: RowGradient,
-    share: float = 0.01,
+    share: float = 0.01,  # as in Plenoxels
 ) -> None:
     """Add the gradient of total variation of a share of the blocks with voxels, drawn at random.
 
     Weights are those of a mean over voxels, on average: they do not depend on how many are drawn.
-
-    Args:
-        grid: any.
-        density: weight of the density's variation.
-        sh: weight of the coefficients'.
-        generator: of the blocks.
-        into: where the gradient is added.
-        share: of the blocks, as Plenoxels does.
-
-    Raises:
-        ShapeError: as `add_total_variation`.
     """
     blocks = grid.masks.flatten().nonzero()[:, 0]
     if not len(blocks):

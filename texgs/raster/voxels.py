@@ -85,16 +85,12 @@ class Samples:
         rays: [N, 6].
         out: where colour, alpha and distance are written, dense; None: nowhere.
         keep: the samples, 36 bytes each; without them nothing can be gathered.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
     """
 
     def __init__(
         self, grid: VoxelGrid, march: March, rays: Tensor, out: Rays | None = None, keep: bool = True
     ) -> None:
-        require({"rays": (rays, "N 6")})
-        check.same_device(rays=rays, rows=grid.rows)
+        require({"rays": (rays, "N 6"), "rows": (grid.rows, "n K")})
         self.grid, self.march, self.rays = grid, march, rays.contiguous()
         self.handle = native.Handle("texgs_grid_release", rays.device)
         kept = byref(self.handle.pointer) if keep else None
@@ -104,22 +100,13 @@ class Samples:
     def add_gradient(self, color: Tensor | None, alpha: Tensor | None, into: RowGradient) -> None:
         """Add the gradient of rows from those of colours [N, 3] and alphas [N]."""
         into.check(self.grid)
-        given = {"rays": (self.rays, "N 6")}
-        given |= {} if color is None else {"color": (color, "N 3")}
-        given |= {} if alpha is None else {"alpha": (alpha, "N")}
-        require(given)
+        require({"rays": (self.rays, "N 6"), "color": (color, "N 3"), "alpha": (alpha, "N")})
         dense = (None if x is None else x.contiguous() for x in (color, alpha))
         self.call("texgs_grid_backward", *dense, into.rows, into.touched)
 
     def mark(self, weights: Tensor) -> None:
-        """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel.
-
-        Raises:
-            ShapeError, ArgumentError, DeviceError: if there are not as many weights as rows, or they are not
-                float32, dense and where the rows are.
-        """
-        require({"weights": (weights, f"{len(self.grid.rows)}")})
-        check.same_device(weights=weights, rows=self.grid.rows)
+        """Raise weights [n] of rows to the largest blending weight of a sample in a cell around the voxel."""
+        require({"rows": (self.grid.rows, "n K"), "weights": (weights, "n")})
         if not weights.is_contiguous():
             raise ArgumentError("weights: expected a dense tensor, which is written to; got a view with gaps")
         self.call("texgs_grid_mark", weights)
@@ -129,6 +116,7 @@ class Samples:
         native.call(name, self.handle.pointer, *self._structures(), *arguments, device=self.rays.device)
 
     def _structures(self) -> tuple[NativeGrid, NativeMarch]:
+        """Return the grid and the march as the library takes them."""
         return self.grid.structure(), self.march.structure(self.rays)
 
 
@@ -178,11 +166,7 @@ def render_view(
     into: RowGradient | None = None,
     keep: bool = True,
 ) -> GridView:
-    """Render all pixels of a camera, differentiable in the grid's rows; see `render_rays`.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError: as `render_rays`.
-    """
+    """Render all pixels of a camera, differentiable in the grid's rows; see `render_rays`."""
     size = (camera.height, camera.width)
     rays = camera_rays(camera).flatten(0, 1)
     color, alpha, distance = render_rays(grid, rays, march, into=into, keep=keep)
@@ -191,7 +175,7 @@ def render_view(
 
 
 def camera_rays(camera: Camera) -> Tensor:
-    """Rays [H, W, 6] through the pixel centres of a camera; directions have length 1 along its axis."""
+    """Return rays [H, W, 6] through the pixel centres; directions have length 1 along the camera's axis."""
     direction = camera.rays()
     return torch.cat([camera.position.expand_as(direction), direction], dim=-1)
 
@@ -242,9 +226,6 @@ def ray_points(grid: VoxelGrid, rays: Tensor, march: March) -> RayPoints:
 
     They lie `march.step` spacings apart where the grid's density is above 0, and end where less light than
     `march.transmittance_min` passes it.
-
-    Raises:
-        ShapeError, ArgumentError, DeviceError, OutOfMemoryError: naming the argument at fault.
     """
     require({"rays": (rays, "N 6")}, cpu="points are listed on the CPU")
     samples = Samples(grid, march, rays)

@@ -24,7 +24,7 @@ class Fragments:
 
 
 def depth_order(depth: Tensor, opacities: Tensor, options: Options) -> Tensor:
-    """Indices [M] of what a view keeps of N primitives, front to back; equal depths keep their order."""
+    """Return the indices [M] of what a view keeps of N, front to back; equal depths keep their order."""
     kept = (depth > options.near) & (opacities >= options.alpha_min)
     order = torch.argsort(depth, stable=True)
     return order[kept[order]]
@@ -42,6 +42,6 @@ def largest_rho(opacity: Tensor, options: Options) -> Tensor:
 
 
 def half_extents(low: Tensor, high: Tensor, size: tuple[int, int]) -> Tensor:
-    """Half of the longer side [M] of boxes with corners [M, 2], at most the diagonal; 0 where off screen."""
+    """Return half the longer side [M] of boxes with corners [M, 2], at most the diagonal; 0 off screen."""
     on_screen = ((high > 0) & (low < torch.tensor(size, device=low.device))).all(1)
     return torch.where(on_screen, ((high - low) / 2).amax(1).clamp(max=math.hypot(*size)), 0.0)

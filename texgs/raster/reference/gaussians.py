@@ -60,7 +60,7 @@ def project(
 
 
 def area(covariance: Tensor) -> Tensor:
-    """Determinants [M] of symmetric matrices [M, 2, 2]: squared areas of their ellipses, in units of pi."""
+    """Return the determinants [M] of symmetric [M, 2, 2]: squared areas of their ellipses over pi^2."""
     return covariance[:, 0, 0] * covariance[:, 1, 1] - covariance[:, 0, 1] ** 2
 
 
@@ -90,7 +90,7 @@ def intersect(gaussians: Projected, pixels: Tensor, options: Options) -> Fragmen
 
 
 def visible_radii(gaussians: Projected, size: tuple[int, int], options: Options) -> Tensor:
-    """Half of the longer side [M] of the box in which alpha can reach alpha_min, see `Statistics.radii`."""
+    """Return half the longer side [M] of the box in which alpha reaches alpha_min, `Statistics.radii`."""
     if options.alpha_min == 0:
         return torch.full_like(gaussians.depth, math.hypot(*size))
     rho = largest_rho(gaussians.opacity, options)

@@ -23,7 +23,7 @@ def l1_dssim(image: Tensor, target: Tensor, lambda_dssim: float = 0.2) -> Tensor
 
 
 def depth_to_normal(depth: Tensor, viewmat: Tensor, K: Tensor) -> Tensor:
-    """Return the world normals [H, W, 3] of a depth map [H, W]; see `texgs.raster.normals`."""
+    """Return the world normals [H, W, 3] of a depth map [H, W]; see `texgs.raster.losses`."""
     height, width = depth.shape
     y, x = torch.meshgrid(
         torch.arange(height, dtype=depth.dtype, device=depth.device) + 0.5,

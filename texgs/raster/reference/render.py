@@ -1,8 +1,7 @@
 """The definition of the rasterizer: every primitive at every pixel, in plain torch.
 
 Any floating-point type, every result differentiable by autograd, memory proportional to pixels times
-primitives.
-The native rasterizers follow this file; tests compare them with it in float64.
+primitives. The native rasterizers follow this file; tests compare them with it in float64.
 """
 
 from __future__ import annotations
@@ -51,26 +50,6 @@ def rasterize(
     Differentiable in every floating-point tensor, the camera included. `options.alpha_min = 0` and
     `options.transmittance_min = 0` switch the two thresholds off: what remains is smooth except where surfels
     change order. Follows Huang et al. 2024 (2DGS), section 4, and Kerbl et al. 2023 (3DGS), section 4.
-
-    Args:
-        means: [N, 3] world units.
-        quats: [N, 4] wxyz, of any length but zero.
-        scales: [N, 2] standard deviations along the tangents of surfels, or [N, 3] along the axes of 3D
-            Gaussians, world units.
-        opacities: [N] in [0, 1].
-        viewmat: [4, 4] world to camera, OpenCV axes.
-        K: [3, 3] intrinsics in pixels, without skew; pixel centres lie at +0.5.
-        width: of the image in pixels.
-        height: of the image in pixels.
-        features: [N, F] one colour per surfel or Gaussian.
-        texture: a colour that varies over the surfel; with both, first its three channels, then the features.
-        background: [C], black by default.
-        shift: [N, 2] pixels added to the whole projection of a surfel, zero by default.
-        outputs: any of "depth", "median", "normal", "distortion", "statistics".
-        options: filter, thresholds and depth range.
-
-    Returns:
-        Render with color [H, W, C], alpha [H, W], and the outputs asked for.
     """
     check_primitive(scales, texture is not None, outputs)
     kind, size = kind_of(scales), (width, height)
@@ -135,7 +114,7 @@ def pixel_centres(width: int, height: int, like: Tensor) -> Tensor:
 
 
 def composite(alpha: Tensor, transmittance_min: float) -> tuple[Tensor, Tensor]:
-    """Blending weights [P, M] of fragments front to back, and the light [P, M] that reaches each of them."""
+    """Return the weights [P, M] of fragments front to back, and the light [P, M] that reaches each."""
     after = torch.cumprod(1 - alpha, 1)
     before = torch.nn.functional.pad(after, (1, 0), value=1.0)[:, :-1]
     return torch.where(after >= transmittance_min, alpha * before, 0.0), before

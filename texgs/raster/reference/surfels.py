@@ -108,7 +108,7 @@ def intersect(surfels: Projected, pixels: Tensor, options: Options) -> Fragments
 
 
 def visible_radii(surfels: Projected, size: tuple[int, int], options: Options) -> Tensor:
-    """Half of the longer side [M] of the box in which alpha can reach alpha_min, see `Statistics.radii`."""
+    """Return half the longer side [M] of the box in which alpha reaches alpha_min, `Statistics.radii`."""
     if options.alpha_min == 0:
         return torch.full_like(surfels.depth, math.hypot(*size))
     rho = largest_rho(surfels.opacity, options)

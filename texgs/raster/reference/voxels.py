@@ -21,7 +21,7 @@ def render_rays(
     step: float = 0.5,
     transmittance_min: float = 1e-3,
 ) -> tuple[Tensor, Tensor, Tensor]:
-    """Colour [N, 3] over the background, alpha [N] and expected distance [N] (Fridovich-Keil et al. 2022).
+    """Return colour [N, 3] over the background, alpha [N], mean distance [N] (Fridovich-Keil et al. 2022).
 
     Args:
         density: [X, Y, Z] at the lattice points.
@@ -56,7 +56,7 @@ def render_rays(
 
 
 def crossing(origin: Tensor, direction: Tensor, high: Tensor, step: float) -> tuple[Tensor, Tensor]:
-    """Distance at which rays enter the box from 0 to `high`, and their number of samples in it, [N] each."""
+    """Return where rays enter the box from 0 to `high`, and how many samples they have in it, [N] each."""
     faces = torch.stack([-origin / direction, (high - origin) / direction])  # [2, N, 3]
     near = faces.amin(0).amax(1).clamp_min(0)
     far = faces.amax(0).amin(1)
