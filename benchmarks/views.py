@@ -17,12 +17,11 @@ from benchmarks.timing import Case, measure
 from tests.volume.vtk_caster import VtkCaster
 from texgs.core.lens import Lens
 from texgs.core.light import Light
-from texgs.volume.appearance import Appearance
 from texgs.volume.cameras import icosphere
 from texgs.volume.caster import Caster
 from texgs.volume.generate import sphere
 from texgs.volume.grid import Grid
-from texgs.volume.render import render_views
+from texgs.volume.render import Appearance, render_views
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import View
 

@@ -103,7 +103,7 @@ def test_geometry_of_the_test_views(folder):
 
 
 def test_empty_views_fail_again_the_same_way(folder, capsys, monkeypatch):
-    monkeypatch.setattr(views_stage, "mapper_for", lambda *_: Blank())
+    monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
     for _ in range(2):
         assert main(["views", *TINY]) == 2
         error = capsys.readouterr().err.splitlines()[-1]
@@ -120,7 +120,7 @@ def test_a_resumed_job_may_have_only_empty_views_left(folder, monkeypatch):
     lost = [views / "train" / "r_0011.png", *(views / "test").iterdir(), views / METRICS]
     for path in lost:
         path.unlink()
-    monkeypatch.setattr(views_stage, "mapper_for", lambda *_: Blank())
+    monkeypatch.setattr(views_stage, "renderer_for", lambda *_: Blank())
     assert main(["views", *TINY]) == 0
     assert len(whole["frames_ms"]) == 15 - 1
     resumed = numbers(views)

@@ -20,8 +20,7 @@ from texgs.edit.voxel_learner import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
 from texgs.fit.settings import CommonRates
 from texgs.raster.losses import ssim
-from texgs.volume.boxes import Box
-from texgs.volume.images import Images
+from texgs.volume.images import Box, Images
 
 COLOR = (0.8, 0.3, 0.1)
 RATES = CommonRates(means=1e-4, sh=0.05, sh_rest=0.0025, means_final=1.0, final=1.0)

@@ -11,7 +11,7 @@ from texgs.core.camera import orbit
 from texgs.fields.bounds import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
-from texgs.volume.boxes import MARGIN, Box, content_box
+from texgs.volume.images import MARGIN, Box, content_box
 
 
 def box_of(seen):

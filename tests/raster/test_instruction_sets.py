@@ -16,9 +16,9 @@ from tests.raster.threads import with_threads
 from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.raster import native
-from texgs.volume.appearance import Appearance
 from texgs.volume.caster import OUTPUTS, Caster
 from texgs.volume.grid import Grid
+from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 pytestmark = pytest.mark.subprocess

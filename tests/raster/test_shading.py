@@ -14,7 +14,7 @@ from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.geometry import quats_to_matrices
 from texgs.raster.reference import shading as definition
 from texgs.raster.shading import blinn_phong, blinn_phong_texture, spherical_harmonics
-from texgs.volume.appearance import Appearance
+from texgs.volume.render import Appearance
 
 CAMERA = torch.tensor([0.5, 1.0, 3.0])
 MATERIAL = ("ambient", "diffuse", "specular", "shininess")

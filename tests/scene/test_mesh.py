@@ -9,8 +9,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render
 from texgs.scene.mesh import fuse, write_mesh
-from texgs.volume.cameras import icosphere
-from texgs.volume.geodesic import geodesic_vertices
+from texgs.volume.cameras import geodesic_vertices, icosphere
 from texgs.volume.isosurface import Mesh
 
 RADIUS, VOXEL = 0.4, 1 / 128

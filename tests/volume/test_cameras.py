@@ -9,7 +9,7 @@ import torch
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
 from texgs.volume import cameras
-from texgs.volume.geodesic import geodesic_vertices
+from texgs.volume.cameras import geodesic_vertices
 
 RADIUS = 4.0311  # of the published views
 LENS = {"radius": RADIUS, "fov_y": 30.0, "width": 80, "height": 60}

@@ -16,9 +16,9 @@ from tests.volume.vtk_caster import VtkCaster
 from texgs.core.camera import Camera, intrinsics, look_at, orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.volume.appearance import Appearance
 from texgs.volume.caster import OUTPUTS, TYPES, Cast, Caster, points_of
 from texgs.volume.grid import Grid
+from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 
 HEADLIGHT = Light("headlight")
@@ -341,7 +341,7 @@ def test_another_shading_is_that_of_a_caster_that_has_it(device):
         Appearance(ambient=0.1, specular=0.0),
         orbit(9, 9, 3, 30, 9, 9),
     )
-    image = Caster(grid, Appearance(), device).looking(dark).render(SHELLS, camera, HEADLIGHT)
+    image = Caster(grid, Appearance(), device).with_appearance(dark).render(SHELLS, camera, HEADLIGHT)
     np.testing.assert_array_equal(image, Caster(grid, dark, device).render(SHELLS, camera, HEADLIGHT))
 
 
@@ -414,7 +414,7 @@ import numpy as np, sys
 from texgs.core.camera import orbit
 from texgs.core.light import Light
 from texgs.core.memory import peak_memory
-from texgs.volume.appearance import Appearance
+from texgs.volume.render import Appearance
 from texgs.volume.caster import Caster
 from texgs.volume.grid import Grid
 from texgs.volume.transfer import TransferFunction

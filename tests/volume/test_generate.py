@@ -1,66 +1,122 @@
-from math import pi
+"""Generated volumes: orbitals against books and the Schroedinger equation, flows against statistics."""
+
+from math import pi, sqrt
 
 import numpy as np
 import pytest
-import torch
+from scipy.ndimage import label
 
 from texgs.core.errors import ArgumentError
-from texgs.volume.generate import GENERATORS, jets, sphere, turbulence
+from texgs.volume import generate
+from texgs.volume.generate import GENERATORS, jets, orbital_cube, sphere, turbulence, wave_function
+
+NUMBERS = [
+    (n, degree, order) for n in range(1, 5) for degree in range(n) for order in range(-degree, degree + 1)
+]
+TABLE = {  # in Bohr radii
+    (1, 0, 0): lambda x, y, z, r: np.exp(-r) / sqrt(pi),
+    (2, 0, 0): lambda x, y, z, r: (2 - r) * np.exp(-r / 2) / sqrt(32 * pi),
+    (2, 1, 0): lambda x, y, z, r: z * np.exp(-r / 2) / sqrt(32 * pi),
+    (2, 1, -1): lambda x, y, z, r: y * np.exp(-r / 2) / sqrt(32 * pi),
+    (3, 2, 0): lambda x, y, z, r: (3 * z**2 - r**2) * np.exp(-r / 3) / (81 * sqrt(6 * pi)),
+    (3, 2, 1): lambda x, y, z, r: sqrt(2) * x * z * np.exp(-r / 3) / (81 * sqrt(pi)),
+    (3, 2, 2): lambda x, y, z, r: (x**2 - y**2) * np.exp(-r / 3) / (81 * sqrt(2 * pi)),
+    (4, 3, 0): lambda x, y, z, r: z * (5 * z**2 - 3 * r**2) * np.exp(-r / 4) / (3072 * sqrt(5 * pi)),
+}
 
 
-@pytest.fixture(scope="module", autouse=True)
-def one_thread():
-    """Threads of torch wait for each other, which on a busy machine takes longer than the work."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+@pytest.mark.parametrize("numbers", TABLE)
+def test_an_orbital_is_the_formula_of_the_books(numbers):
+    x, y, z = np.random.default_rng(0).uniform(-12, 12, (3, 500))
+    expected = TABLE[numbers](x, y, z, np.sqrt(x**2 + y**2 + z**2))
+    np.testing.assert_allclose(wave_function(*numbers, x, y, z), expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("numbers", NUMBERS)
+def test_an_orbital_solves_the_schrodinger_equation(numbers):
+    """-laplace(psi) / 2 - psi / r = E psi with E = -1 / (2 n^2), by differences of fourth order."""
+    step, weights = 0.05, {0: -5 / 2, 1: 4 / 3, -1: 4 / 3, 2: -1 / 12, -2: -1 / 12}
+    points = np.random.default_rng(1).uniform(-9, 9, (3, 200))
+    points = points[:, np.linalg.norm(points, axis=0) > 2]
+    shifts = step * np.eye(3)[:, :, None]
+    laplacian = sum(
+        weight * wave_function(*numbers, *(points + count * shift))
+        for count, weight in weights.items()
+        for shift in shifts
+    ) / step**2  # fmt: skip
+    psi = wave_function(*numbers, *points)
+    energy = -0.5 * laplacian - psi / np.linalg.norm(points, axis=0)
+    np.testing.assert_allclose(energy, -psi / (2 * numbers[0] ** 2), atol=1e-5 * np.abs(psi).max())
+
+
+def test_orbitals_are_orthonormal():
+    axis = np.linspace(-32, 32, 65)
+    places = (axis, axis[:, None], axis[:, None, None])
+    smooth = [(n, degree, order) for n, degree, order in NUMBERS if degree >= 1 and n <= 3]
+    orbitals = np.stack([wave_function(*numbers, *places).ravel() for numbers in smooth])
+    np.testing.assert_allclose(orbitals @ orbitals.T, np.eye(len(orbitals)), atol=2e-3)
+
+
+@pytest.mark.parametrize("numbers", [(3, 2, 0), (4, 3, 0), (4, 2, -1)])
+def test_a_cube_holds_the_whole_orbital_whatever_its_size(numbers):
+    small, large = orbital_cube(25, *numbers), orbital_cube(97, *numbers)
+    np.testing.assert_allclose(small, large[::4, ::4, ::4], atol=1e-12)
+    assert 0.95 < np.abs(large).max() <= 1, "the largest amplitude is 1 and lies between samples"
+    for axis in range(3):
+        assert np.abs(np.take(large, (0, -1), axis)).max() <= 0.05
+
+
+def test_the_axis_of_an_orbital_points_up():
+    values = orbital_cube(33, 2, 1, 0)
+    assert (values[:, 17:].min(), values[:, 16].max()) == (pytest.approx(0, abs=1e-2), 0)
+    np.testing.assert_allclose(values, values.swapaxes(0, 2), atol=1e-12)
+    np.testing.assert_allclose(values, -values[:, ::-1], atol=1e-12)
 
 
 @pytest.fixture(scope="module")
-def plumes():
+def plumes(one_thread):
     return jets(32)
 
 
+@pytest.fixture
+def short(monkeypatch, one_thread):
+    """Turbulence that has hardly begun."""
+    monkeypatch.setattr(generate, "DURATION", 0.02)
+
+
 def test_sphere_falls_from_the_centre_to_the_faces():
-    grid = sphere(33)
-    assert grid.values[16, 16, 16] == 1
-    np.testing.assert_allclose(
-        grid.values[16, 16, 16:], 0.5 + 0.5 * np.cos(pi * np.arange(17) / 16), atol=1e-6
-    )
-    assert grid.values[0].max() == pytest.approx(0, abs=1e-6)
-    assert grid.values[0, 0, 0] == 0
+    values = sphere(33).values
+    assert values[16, 16, 16] == 1
+    np.testing.assert_allclose(values[16, 16, 16:], 0.5 + 0.5 * np.cos(pi * np.arange(17) / 16), atol=1e-6)
+    assert values[0].max() == pytest.approx(0, abs=1e-6)
+    assert values[0, 0, 0] == 0
     for axes in ((0, 1), (1, 2)):
-        np.testing.assert_array_equal(grid.values, grid.values.swapaxes(*axes))
-    np.testing.assert_allclose(grid.values, grid.values[::-1], atol=1e-6)
+        np.testing.assert_array_equal(values, values.swapaxes(*axes))
+    np.testing.assert_allclose(values, values[::-1], atol=1e-6)
 
 
-def test_turbulence_is_one_flow_at_every_size():
-    small, large, odd = (turbulence(size, duration=0.02).values for size in (16, 48, 17))
+def test_turbulence_is_one_flow_at_every_size(short):
+    small, large, odd = (turbulence(size).values for size in (16, 48, 17))
     np.testing.assert_allclose(small, large[::3, ::3, ::3], atol=1e-5)
     assert odd.shape == (17, 17, 17)
-    np.testing.assert_array_equal(small, turbulence(16, duration=0.02).values)
-    assert np.abs(small - turbulence(16, seed=1, duration=0.02).values).max() > 0.1
+    np.testing.assert_array_equal(small, turbulence(16).values)
+    assert np.abs(small - turbulence(16, seed=1).values).max() > 0.1
 
 
-def test_turbulence_starts_random_and_forms_thin_strong_vortices():
+def test_turbulence_starts_random_and_forms_thin_strong_vortices(monkeypatch, one_thread):
     # Random vorticity is Gaussian: 1 % of the volume holds 4.54 % of its square (chi-squared with three
     # degrees of freedom). Tubes concentrate it.
-    start, later = (strongest_percent(turbulence(32, duration=time).values) for time in (0, 0.4))
-    assert start == pytest.approx(0.0454, rel=0.05)
-    assert later > 1.4 * start
-
-
-def strongest_percent(strength):
-    """Share of the summed squares that the strongest percent of the samples holds."""
-    squares = np.sort(strength.ravel() ** 2)
-    return squares[-len(squares) // 100 :].sum() / squares.sum()
+    shares = []
+    for duration in (0, 0.4):
+        monkeypatch.setattr(generate, "DURATION", duration)
+        squares = np.sort(turbulence(32).values.ravel() ** 2)
+        shares.append(squares[-len(squares) // 100 :].sum() / squares.sum())
+    assert shares[0] == pytest.approx(0.0454, rel=0.05)
+    assert shares[1] > 1.4 * shares[0]
 
 
 def test_jets_enter_as_five_discs_and_break_up(plumes):
     floor, top = plumes.values[:, 0], plumes.values[:, -1]  # [Z, X]
-    from scipy.ndimage import label
-
     assert label(floor > 0.5)[1] == 5
     # Area of five discs of radius 0.5 in a square of side 2 pi, counted in cells.
     assert (floor > 0.5).mean() == pytest.approx(5 * pi * 0.25 / (2 * pi) ** 2, rel=0.2)
@@ -70,27 +126,12 @@ def test_jets_enter_as_five_discs_and_break_up(plumes):
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_grids_are_float_cubes_between_0_and_1(name, plumes):
-    grid = (
-        plumes
-        if name == "jets"
-        else GENERATORS[name](32, **({"duration": 0.02} if name == "turbulence" else {}))
-    )
+def test_grids_are_float_cubes_between_0_and_1_that_are_not_too_small(name, plumes, short):
+    grid = plumes if name == "jets" else GENERATORS[name](32)
     assert grid.values.dtype == np.float32
     assert len(set(grid.dims)) == 1
     assert grid.spacing == (1, 1, 1)
     assert 0 <= grid.values.min() < 0.05
     assert 0.7 < grid.values.max() <= 1
-
-
-@pytest.mark.parametrize("name", GENERATORS)
-def test_too_small_sizes_are_named(name):
     with pytest.raises(ArgumentError, match="size: expected at least 16 samples along each side, got 8"):
         GENERATORS[name](8)
-
-
-def test_a_negative_viscosity_is_named():
-    with pytest.raises(
-        ArgumentError, match=r"expected a duration of at least 0 and a viscosity above 0, got 1\.5 and -1"
-    ):
-        turbulence(16, viscosity=-1)

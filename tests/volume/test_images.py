@@ -7,8 +7,7 @@ from PIL import Image
 from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.core.image import write_png
-from texgs.volume.images import load
-from texgs.volume.reduced import over_white, smaller
+from texgs.volume.images import load, over_white, smaller
 from texgs.volume.view_set import View, read_views, write_transforms
 
 

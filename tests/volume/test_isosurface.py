@@ -1,21 +1,18 @@
-"""Isosurfaces of fields in closed form."""
+"""Isosurfaces of fields in closed form, and points where a volume shows."""
 
 import numpy as np
 import pytest
 
+from tests.volume.functions import GREY
+from tests.volume.scenes import ball
 from texgs.core.errors import ArgumentError
+from texgs.volume import isosurface as module
 from texgs.volume.grid import Grid
-from texgs.volume.isosurface import isosurface, opaque_ranges, surface_of
+from texgs.volume.isosurface import isosurface, opaque_ranges, surface_of, visible_voxels
 from texgs.volume.transfer import TransferFunction
 
 WHITE = [(0.0, 1.0, 1.0, 1.0)]
-
-
-def ball(size=48, dtype=np.float32):
-    """1 in the middle of the box, 0 at the distance 1 of half a side, linear in between."""
-    axis = np.linspace(-1, 1, size)
-    z, y, x = np.meshgrid(axis, axis, axis, indexing="ij")
-    return (1 - np.sqrt(x**2 + y**2 + z**2)).astype(dtype)
+NARROW = TransferFunction(((10, 0), (11, 1), (13, 1), (14, 0)), ((10, 1, 0, 0), (14, 0, 0, 1)))
 
 
 def signed_volume(mesh):
@@ -25,7 +22,7 @@ def signed_volume(mesh):
 
 def test_a_ball_has_its_radius_and_faces_outwards():
     step = 1 / 47
-    mesh = isosurface(ball(), 0.4, (step,) * 3, (-0.5,) * 3)
+    mesh = isosurface(ball().values, 0.4, (step,) * 3, (-0.5,) * 3)
     radii = np.linalg.norm(mesh.vertices, axis=1)
     assert np.abs(radii - 0.3).max() < 0.02 * step
     assert signed_volume(mesh) == pytest.approx(4 / 3 * np.pi * 0.3**3, rel=0.01)
@@ -35,13 +32,12 @@ def test_spacing_and_origin_are_x_y_z():
     values = np.zeros((4, 6, 8), np.float32)
     values[1:3, 1:5, 1:7] = 1
     mesh = isosurface(values, 0.5, (1.0, 2.0, 3.0), (10.0, 20.0, 30.0))
-    low, high = mesh.vertices.min(0), mesh.vertices.max(0)
-    assert low.tolist() == [10.5, 21.0, 31.5]
-    assert high.tolist() == [16.5, 29.0, 37.5]
+    assert mesh.vertices.min(0).tolist() == [10.5, 21.0, 31.5]
+    assert mesh.vertices.max(0).tolist() == [16.5, 29.0, 37.5]
 
 
 def test_a_level_that_is_not_reached_has_no_surface():
-    mesh = isosurface(ball(), 2.0, (1.0,) * 3, (0.0,) * 3)
+    mesh = isosurface(ball().values, 2.0, (1.0,) * 3, (0.0,) * 3)
     assert mesh.vertices.shape == mesh.triangles.shape == (0, 3)
 
 
@@ -55,14 +51,11 @@ def test_ranges_in_which_a_function_is_opaque():
     assert opaque_ranges(tf, 0.9) == []
 
 
-@pytest.mark.parametrize("dtype", [np.float32, np.uint8])
-def test_a_shell_has_two_sides(dtype):
-    scale = 1 if dtype == np.float32 else 200
-    grid = Grid((scale * ball().clip(0, 1)).astype(dtype), (2.0, 2.0, 2.0))
-    tf = TransferFunction(
-        [(0.2 * scale, 0.0), (0.4 * scale, 1.0), (0.6 * scale, 1.0), (0.8 * scale, 0.0)], WHITE
-    )
-    mesh = surface_of(grid, tf, 0.5)
+@pytest.mark.parametrize(("dtype", "scale"), [(np.float32, 1), (np.uint8, 200)])
+def test_a_shell_has_two_sides(dtype, scale):
+    grid = Grid((scale * ball().values.clip(0, 1)).astype(dtype), (2.0, 2.0, 2.0))
+    points = [(0.2 * scale, 0.0), (0.4 * scale, 1.0), (0.6 * scale, 1.0), (0.8 * scale, 0.0)]
+    mesh = surface_of(grid, TransferFunction(points, WHITE), 0.5)
     radii = np.linalg.norm(mesh.vertices, axis=1)
     outer, inner = 0.5 * (1 - 0.3), 0.5 * (1 - 0.7)
     assert np.minimum(np.abs(radii - outer), np.abs(radii - inner)).max() < 0.005
@@ -73,8 +66,7 @@ def test_what_is_cut_by_the_box_ends_there():
     """A slab through the whole volume: its sides are faces of the box."""
     values = np.zeros((8, 8, 8), np.float32)
     values[3:5] = 1
-    tf = TransferFunction([(0.0, 0.0), (1.0, 1.0)], WHITE)
-    mesh = surface_of(Grid(values), tf, 0.5)
+    mesh = surface_of(Grid(values), TransferFunction([(0.0, 0.0), (1.0, 1.0)], WHITE), 0.5)
     assert np.abs(mesh.vertices[:, :2]).max() == pytest.approx(0.5, abs=1e-3)
     assert signed_volume(mesh) == pytest.approx(2 / 7, rel=0.01)
 
@@ -82,4 +74,41 @@ def test_what_is_cut_by_the_box_ends_there():
 def test_a_glassy_function_has_no_surface():
     tf = TransferFunction([(0.2, 0.0), (0.4, 0.1), (0.6, 0.0)], WHITE)
     with pytest.raises(ArgumentError, match=r"as opaque as 0\.5 somewhere in the volume.*another basic TF"):
-        surface_of(Grid(ball()), tf, 0.5)
+        surface_of(ball(), tf, 0.5)
+
+
+def ramp(n=24):
+    """A field that is the x index, on cells of 1 x 2 x 1."""
+    return Grid(np.broadcast_to(np.arange(n, dtype=np.float32), (n, n, n)).copy(), (1.0, 2.0, 1.0))
+
+
+def test_points_lie_where_the_volume_shows_in_world_units():
+    points, colors = visible_voxels(ramp(), NARROW, 1500, seed=0)
+    low, high = np.array(ramp().aabb)
+    assert points.shape == colors.shape == (1500, 3)
+    assert points.dtype == np.float32
+    assert ((points >= low - 1e-6) & (points <= high + 1e-6)).all()
+    at = (points[:, 0] - low[0]) / (ramp().scale * 1.0)  # x index
+    assert 10.4 < at.min() < at.max() < 13.6
+    np.testing.assert_allclose(colors[:, 0], 1 - (np.round(at) - 10) / 4, atol=0.26)
+    np.testing.assert_allclose(points[:, 1:].mean(axis=0), 0, atol=0.02)
+
+
+def test_chances_grow_with_opacity():
+    tf = TransferFunction(((4, 0), (5, 0.1), (6, 0), (14, 0), (15, 0.4), (16, 0)), GREY)
+    points, _ = visible_voxels(ramp(), tf, 200, seed=1)
+    assert 0.72 < float((points[:, 0] > 0).mean()) < 0.88, "0.4 : 0.1"
+
+
+def test_fewer_visible_samples_than_wanted_and_none():
+    points, _ = visible_voxels(ramp(6), TransferFunction(((0, 0), (1, 1), (2, 0)), GREY), 1000, seed=0)
+    assert len(points) == 36
+    with pytest.raises(ArgumentError, match="expected samples that the transfer function shows, found none"):
+        visible_voxels(ramp(6), NARROW, 10, seed=0)
+
+
+def test_large_volumes_are_looked_at_with_a_stride(monkeypatch):
+    monkeypatch.setattr(module, "MOST", 24**3 // 8)
+    points, _ = visible_voxels(ramp(), NARROW, 10_000, seed=0)
+    assert len(points) == 12 * 12, "every second sample along each axis: x = 12"
+    np.testing.assert_array_equal(points, visible_voxels(ramp(), NARROW, 10_000, seed=0)[0])

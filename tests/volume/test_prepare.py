@@ -1,6 +1,8 @@
 import itertools
 import subprocess
 import sys
+from collections import Counter
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -9,10 +11,9 @@ from hypothesis import strategies as st
 
 from texgs.core.errors import ArgumentError
 from texgs.volume import slabs
-from texgs.volume.grid import Grid
+from texgs.volume.grid import UPRIGHT, Grid
 from texgs.volume.nrrd_file import open_grid
-from texgs.volume.orientation import UPRIGHT
-from texgs.volume.prepare import prepare
+from texgs.volume.prepare import BINS, KEPT_TYPES, prepare, summarize
 from texgs.volume.sources import ArraySource, open_source
 
 # World coordinates in those of the volume, written out by hand.
@@ -121,14 +122,36 @@ def test_types(tmp_path, dtype, kept):
     np.testing.assert_array_equal(grid.values, values)
 
 
-@pytest.mark.parametrize("dtype", ["uint8", "int8", "uint16", "int16", "float32"])
-def test_summary(tmp_path, dtype):
-    values = (np.random.default_rng(0).normal(size=(20, 21, 22)) * 30 + 60).astype(dtype)
-    summary = prepare(source_of(values, (1.0, 2.0, 3.0)), tmp_path / "v.nrrd")
-    low, high = float(values.min()), float(values.max())
-    assert (summary.minimum, summary.maximum, summary.voxels) == (low, high, values.size)
-    assert (summary.dims, summary.spacing, summary.origin) == ((22, 21, 20), (1, 2, 3), (0, 0, 0))
-    np.testing.assert_array_equal(summary.histogram, np.histogram(values, 256, (low, high))[0])
+RNG = np.random.default_rng(0)
+VALUES = {
+    "uint8": RNG.integers(3, 200, (6, 5, 4)).astype(np.uint8),
+    "int16": RNG.integers(-3000, 3000, (6, 5, 4)).astype(np.int16),
+    "int32": RNG.integers(-(2**31), 2**31, (6, 5, 4)).astype(np.int32),
+    "float32": RNG.normal(size=(6, 5, 4)).astype(np.float32),
+    "ten steps of float32": (1e7 + RNG.integers(0, 10, (6, 5, 4))).astype(np.float32),
+    "ten steps of float64": 1e16 + 2.0 * RNG.integers(0, 10, (6, 5, 4)),
+    "smallest numbers": np.linspace(0, 3e-45, 120).reshape(6, 5, 4).astype(np.float32),
+    "largest numbers": np.linspace(-3.4e38, 3.4e38, 120).reshape(6, 5, 4).astype(np.float32),
+}
+
+
+def counts(values):
+    """Oracle: the bin of each sample in exact arithmetic."""
+    numbers = [Fraction(value.item()) for value in values.ravel()]
+    low, high = min(numbers), max(numbers)
+    bins = Counter(min(int((number - low) * BINS / (high - low)), BINS - 1) for number in numbers)
+    return tuple(bins[index] for index in range(BINS))
+
+
+@pytest.mark.parametrize("values", VALUES.values(), ids=VALUES.keys())
+def test_lattice_range_and_histogram(tmp_path, values):
+    source = source_of(values, (1.0, 2.0, 3.0), (-1.0, 0.0, 1.0))
+    summary = summarize(source, float(values.min()), float(values.max()))
+    assert (summary.dims, summary.dtype, summary.voxels) == ((4, 5, 6), values.dtype.name, 120)
+    assert (summary.spacing, summary.origin) == ((1.0, 2.0, 3.0), (-1.0, 0.0, 1.0))
+    assert summary.histogram == counts(values)
+    if values.dtype.name in KEPT_TYPES:
+        assert prepare(source, tmp_path / "v.nrrd") == summary
 
 
 def test_values_that_are_not_finite(tmp_path):
@@ -202,7 +225,7 @@ PEAK = """
 import sys
 from pathlib import Path
 from texgs.volume.sources import open_source
-from texgs.volume.prepare import prepare
+from texgs.volume.prepare import BINS, KEPT_TYPES, prepare, summarize
 edge = int(sys.argv[2])
 source = open_source(sys.argv[1], dims=(edge, edge, edge), dtype="uint8")
 prepare(source, sys.argv[1] + ".nrrd", reduce=int(sys.argv[3]), up="+z")

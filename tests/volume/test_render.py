@@ -4,14 +4,15 @@ import numpy as np
 import pytest
 
 from texgs.core.camera import orbit
-from texgs.core.light import Light
+from texgs.core.errors import ArgumentError
+from texgs.core.light import HEADLIGHT, Light
 from texgs.volume import render
-from texgs.volume.render import Times, render_views
+from texgs.volume.render import Appearance, Times, directions, render_views
 from texgs.volume.view_set import View
 
 
 class Grey:
-    """A mapper whose images say how many it has made."""
+    """A renderer whose images say how many it has made."""
 
     local_viewer = False
 
@@ -26,7 +27,7 @@ class Grey:
 @pytest.fixture
 def views(tmp_path):
     camera = orbit(0, 0, 3.5, 30, 5, 4)
-    return [View(camera, tmp_path / "train" / f"r_{index:04}.png", Light("headlight")) for index in range(6)]
+    return [View(camera, tmp_path / "train" / f"r_{index:04}.png", HEADLIGHT) for index in range(6)]
 
 
 def levels(views):
@@ -62,3 +63,21 @@ def test_an_interruption_before_an_image_is_written_loses_no_time(views, tmp_pat
     assert [entry["is_first"] for entry in after.values()] == [True, False, False, True, False, False]
     assert times.first == [entry["ms"] for entry in after.values() if entry["is_first"]]
     assert times.others == [entry["ms"] for entry in after.values() if not entry["is_first"]]
+
+
+@pytest.mark.parametrize("field", ["ambient", "diffuse", "specular", "shininess", "step", "opacity_unit"])
+@pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])
+def test_factors_and_lengths_are_checked(field, value):
+    least = "more than 0" if field in ("step", "opacity_unit") else "at least 0"
+    with pytest.raises(ArgumentError, match=f"{field}: expected {least}, got {value}"):
+        Appearance(**{field: value})
+
+
+def test_viewer_and_lights_are_distant():
+    camera = orbit(-60, 20, 2, 40, 80, 80)
+    to_viewer, to_light = directions(camera, HEADLIGHT)
+    np.testing.assert_allclose(to_viewer, -camera.viewmat[2, :3], atol=1e-7)
+    np.testing.assert_array_equal(to_viewer, to_light)
+    to_viewer, to_light = directions(camera, Light("directional", 90, 0))
+    np.testing.assert_allclose(to_viewer, -camera.viewmat[2, :3], atol=1e-7)
+    np.testing.assert_allclose(to_light, [0, 0, -1], atol=1e-12)

@@ -135,4 +135,4 @@ def test_what_the_other_process_runs_counts_as_code_of_a_job():
         if name not in seen and read is not None:
             seen.add(name)
             waiting += read[1]
-    assert {f"texgs.volume.{name}" for name in ("foreign_reader", "itk_image", "vtk_image", "dicom")} <= seen
+    assert {f"texgs.volume.{name}" for name in ("foreign", "itk_image", "vtk_image", "dicom")} <= seen

@@ -5,8 +5,8 @@ from hypothesis import strategies as st
 
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
-from texgs.volume.basic_tfs import check_disjoint
 from texgs.volume.suggest import suggest
+from texgs.volume.transfer import check_disjoint
 
 RNG = np.random.default_rng(0)
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from tests.volume.functions import GREY, STEPS, TENT, functions
 from texgs.core.errors import ArgumentError
-from texgs.volume.transfer import TransferFunction
+from texgs.volume.transfer import TransferFunction, check_disjoint, combine, just_above
 
 
 class TestEvaluation:
@@ -142,3 +142,47 @@ def test_wrong_opacity_is_named(opacity, message):
 def test_wrong_color_is_named(color, message):
     with pytest.raises(ArgumentError, match=message):
         TransferFunction(((0, 0), (1, 1)), color)
+
+
+def test_overlap_names_both_functions_and_ranges():
+    other = TransferFunction(((3.5, 0), (5, 1)), GREY)
+    with pytest.raises(ArgumentError, match=r"TF01 and TF02: .*\(1, 4\) and \(3.5, 5\)"):
+        check_disjoint({"TF01": TENT, "TF02": other})
+    check_disjoint({"TF01": TENT, "TF02": TransferFunction(((4, 1), (5, 1)), GREY)})
+    check_disjoint({})
+
+
+@given(functions(), functions(), st.integers(0, 40))
+def test_combined_functions_show_what_each_shows(first, second, apart):
+    """Away from the ends of ranges, where steps may be, the sum of opacities is that of the one visible."""
+    low, high = first.support
+    moved = high - second.support[0] + apart / 4
+    second = TransferFunction(
+        tuple((value + moved, alpha) for value, alpha in second.opacity),
+        tuple((value + moved, *rgb) for value, *rgb in second.color),
+    )
+    both = combine({"b": second, "a": first})
+    ends = {value for tf in (first, second) for value, *_ in (*tf.opacity, *tf.color)}
+    values = np.array([v for v in np.arange(low - 1, second.support[1] + 1, 0.0625) if v not in ends])
+    for tf in (first, second):
+        inside = (values > tf.support[0]) & (values < tf.support[1])
+        np.testing.assert_allclose(both(values[inside]), tf(values[inside]), atol=1e-12)
+    if apart:
+        assert both(high)[3] == pytest.approx(first(high)[3], abs=1e-12), "also at its end"
+    outside = ~np.any([(values > tf.support[0]) & (values < tf.support[1]) for tf in (first, second)], axis=0)
+    assert (both(values[outside])[:, 3] == 0).all()
+
+
+def test_functions_that_overlap_are_not_combined():
+    with pytest.raises(ArgumentError, match="a and b: expected ranges of values that do not overlap"):
+        combine({"a": TENT, "b": TENT})
+    with pytest.raises(ArgumentError, match="transfer functions: expected at least one, got none"):
+        combine({})
+
+
+@pytest.mark.parametrize("value", [0.0, -0.0, 1e-45, -1e-40, 3e-33, 1.0, -255.0, 1e30])
+def test_what_is_just_above_a_value_is_so_for_the_caster(value):
+    """Which multiplies with the inverse of the difference, in single precision."""
+    difference = np.float32(just_above(value)) - np.float32(value)
+    assert 0 < difference <= max(1e-6 * abs(value), 2e-38)
+    assert np.isfinite(np.float32(1) / difference)

@@ -22,10 +22,10 @@ from texgs.core.camera import Camera
 from texgs.core.errors import NativeError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
-from texgs.volume.appearance import Appearance, image_data, volume_property
 from texgs.volume.grid import Grid
+from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
-from texgs.volume.vtk_camera import aim, point_light
+from texgs.volume.vtk_renderer import aim, image_data, point_light, volume_property
 
 BYTES = 200  # of memory for a pixel: VTK's image, the picture, and directions of rays in double precision
 FULL = 32767  # 1.0 in the mapper's fixed-point numbers

@@ -104,9 +104,9 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
     import numpy as np
 
     from texgs.core.io import read_json
-    from texgs.volume.basic_tfs import check_disjoint
     from texgs.volume.suggest import looks_like_labels, suggest
     from texgs.volume.tf_files import read_tf
+    from texgs.volume.transfer import check_disjoint
 
     summary = read_json(Path(config.results, config.dataset.name, "volume", "volume.json"))
     low, high = summary["minimum"], summary["maximum"]

@@ -12,8 +12,7 @@ from texgs.edit.closeness import Closeness, differentiated
 from texgs.fields.voxels.model import Voxels
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import Rays, Samples, camera_rays
-from texgs.volume.boxes import Box
-from texgs.volume.images import Images
+from texgs.volume.images import Box, Images
 
 if TYPE_CHECKING:
     from texgs.edit.methods.in2n import In2nKeys

@@ -10,8 +10,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.raster import Options
-from texgs.volume.boxes import Box
-from texgs.volume.images import Images, Target
+from texgs.volume.images import Box, Images, Target
 
 REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, below which nothing is drawn
 

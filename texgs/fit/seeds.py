@@ -19,9 +19,9 @@ from texgs.fit.settings import SEEDS, Seeds
 from texgs.fit.visible import CANDIDATES, most_seen
 from texgs.volume.grid import Grid
 from texgs.volume.images import Images
+from texgs.volume.isosurface import visible_voxels
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
-from texgs.volume.voxels import visible_voxels
 
 MARGIN = 0.02  # of the box around the data, relative to its longest side
 HALF_SIZE = 0.55  # of the cube around the origin where nothing else is known, world units

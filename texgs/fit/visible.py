@@ -12,8 +12,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.loop import Fit
 from texgs.fit.settings import Densify, Losses, Phase, Rates
-from texgs.volume.images import Images
-from texgs.volume.reduced import smaller
+from texgs.volume.images import Images, smaller
 
 PIXELS = 200  # of the longer side of the small images, about
 CANDIDATES = 2  # for each surfel that is kept

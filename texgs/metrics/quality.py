@@ -13,7 +13,7 @@ import torch
 from texgs.core.progress import progress
 from texgs.fields.field import Field
 from texgs.metrics.image import psnr, ssim
-from texgs.volume.reduced import over_white, smaller
+from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
 
 Item = TypeVar("Item")

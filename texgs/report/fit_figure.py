@@ -20,7 +20,7 @@ from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr
 from texgs.raster import rasterize
 from texgs.raster.shading import MATERIAL
-from texgs.volume.reduced import over_white, smaller
+from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
 
 VISIBLE = 2 / 255  # alpha

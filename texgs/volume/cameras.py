@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, atan2, degrees
+from itertools import combinations, product
+from math import asin, atan2, degrees, isqrt, sqrt
+
+import numpy as np
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
-from texgs.volume.geodesic import frequency_of, geodesic_vertices
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
 FRONT = -90.0  # azimuth of +z, degrees
 
 
 def icosphere(frequency: int, radius: float, fov_y: float, width: int, height: int) -> list[Camera]:
-    """Cameras on the vertices of a geodesic icosphere, looking at the origin: the paper's training views.
+    """Return cameras on a geodesic icosphere, looking at the origin: the paper's training views.
 
     From the bottom to the top (+y), and by azimuth from -180 to 180 degrees where several are at one
     height: the order of the views published with the paper.
@@ -39,29 +41,15 @@ def icosphere(frequency: int, radius: float, fov_y: float, width: int, height: i
 
 
 def icosphere_of(count: int, lens: Lens, where: str = "views") -> list[Camera]:
-    """The icosphere with so many cameras, 10 f^2 + 2 for some frequency f.
-
-    Raises:
-        ArgumentError: naming where the number comes from, if no icosphere has so many.
-    """
+    """Return the icosphere with so many cameras, 10 f^2 + 2 for some frequency f; see `frequency_of`."""
     return icosphere(frequency_of(count, where), *lens)
 
 
 def spiral(count: int, radius: float, fov_y: float, width: int, height: int) -> list[Camera]:
-    """Cameras on a spiral from below to above that turns once, looking at the origin: the paper's test views.
+    """Return cameras on a spiral from below to above that turns once, looking at the origin: the test views.
 
     View i is at azimuth -180 + 360 i / (count - 1) and polar angle -90 + 180 i / (count - 1) degrees, with
-    polar angles kept 0.01 degrees off the poles.
-
-    Args:
-        count: number of cameras, at least 2; the paper has 181.
-        radius: distance from the origin, world units.
-        fov_y: vertical field of view, degrees.
-        width: pixels.
-        height: pixels.
-
-    Raises:
-        ArgumentError: if an argument is out of range.
+    polar angles kept 0.01 degrees off the poles. The paper has 181 of them; the lens is that of `icosphere`.
     """
     if count < 2:
         raise ArgumentError(f"count: expected at least 2 cameras on a path from pole to pole, got {count}")
@@ -72,19 +60,10 @@ def spiral(count: int, radius: float, fov_y: float, width: int, height: int) -> 
 def orbit_path(
     count: int, polar: float, radius: float, fov_y: float, width: int, height: int, start: float = FRONT
 ) -> list[Camera]:
-    """Cameras on one turn around +y that does not repeat its start.
+    """Return cameras on one turn around +y that does not repeat its start.
 
-    Args:
-        count: number of cameras, at least 1.
-        polar: degrees above the horizon, -90 to 90.
-        radius: distance from the origin, world units.
-        fov_y: vertical field of view, degrees.
-        width: pixels.
-        height: pixels.
-        start: azimuth of the first camera, degrees; by default it is in front (+z, for polar 0).
-
-    Raises:
-        ArgumentError: if an argument is out of range.
+    They are `polar` degrees above the horizon, the first at the azimuth `start`: by default in front (+z, for
+    polar 0). The lens is that of `icosphere`.
     """
     if count < 1:
         raise ArgumentError(f"count: expected at least 1 camera, got {count}")
@@ -93,11 +72,66 @@ def orbit_path(
 
 
 def spread(cameras: Sequence[Camera], count: int) -> list[Camera]:
-    """So many cameras of a path, evenly spread over it and in its order; all, if it has no more."""
+    """Return so many cameras of a path, evenly spread over it and in its order; all, if it has no more."""
     count = min(count, len(cameras))
     return [cameras[index * len(cameras) // count] for index in range(count)]
 
 
 def _orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:
-    """Camera with +y up everywhere, as the paper has them at the poles."""
+    """Return a camera with +y up everywhere, as the paper has them at the poles."""
     return orbit(azimuth, max(-POLE, min(POLE, polar)), radius, fov_y, width, height)
+
+
+def frequency_of(count: int, where: str = "views") -> int:
+    """Return the frequency f of the icosphere that has so many vertices, 10 f^2 + 2.
+
+    Args:
+        count: of vertices.
+        where: the number comes from, for the message.
+
+    Raises:
+        ArgumentError: if no icosphere has so many.
+    """
+    frequency = isqrt(max(count - 2, 0) // 10)
+    if frequency < 1 or 10 * frequency**2 + 2 != count:
+        raise ArgumentError(f"{where}: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")
+    return frequency
+
+
+def geodesic_vertices(frequency: int) -> np.ndarray:
+    """Return unit vectors [10 f^2 + 2, 3]: the faces of an icosahedron split into f^2 triangles each.
+
+    Points are evenly spaced on the flat faces and then moved to the sphere. The edges nearest the poles
+    (+-y) run along z.
+    """
+    corners = _icosahedron()
+    # Neighbours are 2 apart, all others more than 3.
+    edges = [(a, b) for a, b in combinations(corners, 2) if np.linalg.norm(a - b) < 3]
+    faces = [
+        (a, b, c)
+        for a, b, c in combinations(corners, 3)
+        if max(np.linalg.norm(a - b), np.linalg.norm(b - c), np.linalg.norm(c - a)) < 3
+    ]
+    f = frequency
+    inner = [(i, j) for i, j in product(range(1, f), repeat=2) if i + j < f]
+    points = [
+        *corners,
+        *(i * a + (f - i) * b for a, b in edges for i in range(1, f)),
+        *(i * a + j * b + (f - i - j) * c for a, b, c in faces for i, j in inner),
+    ]
+    vertices = np.stack(points)
+    return vertices / np.linalg.norm(vertices, axis=1, keepdims=True)
+
+
+def _icosahedron() -> list[np.ndarray]:
+    """Return the 12 corners, edge length 2: three golden rectangles.
+
+    The lower half is the negative of the upper one down to the sign of zero: on the -x half plane that sign
+    decides between azimuth -180 and 180, and the published order of views follows from it.
+    """
+    golden = (1 + sqrt(5)) / 2
+    half = [
+        (0, golden, 1), (0, golden, -1), (golden, 1, 0), (-golden, 1, 0), (1, 0, golden), (-1, 0, golden)
+    ]  # fmt: skip
+    upper = [np.array(corner, dtype=np.float64) for corner in half]
+    return [*upper, *(-corner for corner in upper)]

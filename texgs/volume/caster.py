@@ -29,10 +29,9 @@ from texgs.core.light import Light
 from texgs.core.memory import require_memory
 from texgs.raster import native
 from texgs.raster.arguments import pinhole
-from texgs.volume.appearance import Appearance
 from texgs.volume.grid import Grid
-from texgs.volume.transfer import TransferFunction, right_limit
-from texgs.volume.vtk_camera import directions
+from texgs.volume.render import Appearance, directions
+from texgs.volume.transfer import TransferFunction, left_limit, right_limit
 
 TYPES = ("uint8", "int8", "uint16", "int16", "uint32", "int32", "uint64", "int64", "float32", "float64")
 OUTPUTS = ("depth", "median", "normal")
@@ -122,22 +121,18 @@ class Caster:
         self.missing = int(missing)
         self._prepared: tuple[TransferFunction, Tensor, Tensor] | None = None
 
-    def looking(self, appearance: Appearance) -> Caster:
-        """The same volume with another shading and sampling; nothing is read again."""
+    def with_appearance(self, appearance: Appearance) -> Caster:
+        """Return a caster of the same volume with another shading and sampling; nothing is read again."""
         other = copy(self)
         other._appearance = appearance
         return other
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
-        """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values.
-
-        Raises:
-            OutOfMemoryError: if the view needs more memory than there is.
-        """
+        """Return premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""
         return self.cast(tf, camera, light).rgba.cpu().numpy()
 
     def cast(self, tf: TransferFunction, camera: Camera, light: Light, outputs: Collection[str] = ()) -> Cast:
-        """A view, with what else is wanted of OUTPUTS, in one pass.
+        """Cast a view, with what else is wanted of OUTPUTS, in one pass.
 
         Raises:
             ArgumentError: if an output is unknown, the camera has skew or requires a gradient, or rays would
@@ -181,7 +176,7 @@ class Caster:
             )
 
     def _prepare(self, tf: TransferFunction) -> tuple[Tensor, Tensor]:
-        """Points of a transfer function, and how far each brick is from one in which it shows something."""
+        """Return points of a function, and how far each brick is from one in which it shows something."""
         prepared = self._prepared  # another thread may prepare another function
         if prepared is None or prepared[0] != tf:
             points = points_of(tf).to(self._device)
@@ -192,25 +187,26 @@ class Caster:
         return prepared[1:]
 
     def _call(self, name: str, *arguments: Any) -> None:
+        """Call the native library on the volume."""
         native.call(name, self._volume, *arguments, device=self._device)
 
 
 def bytes_of(values: NDArray[Any]) -> Tensor:
-    """An array as bytes [n], not copied: torch has not all types of samples."""
+    """Return an array as bytes [n], not copied: torch has not all types of samples."""
     with warnings.catch_warnings():  # torch dislikes maps of files, which cannot be written
         warnings.simplefilter("ignore", UserWarning)
         return torch.from_numpy(values.reshape(-1).view(np.uint8))
 
 
 def points_of(tf: TransferFunction) -> Tensor:
-    """Points [n, 5] of value, opacity, red, green and blue, as `texgs_transfer` has them."""
+    """Return points [n, 5] of value, opacity, red, green and blue, as `texgs_transfer` has them."""
     low, high = tf.opacity[0][0], tf.opacity[-1][0]
     inner = {value for value, *_ in (*tf.opacity, *tf.color) if low < value < high}
     rows = []
     for value in (low, *sorted(inner), high):
         before, at = (
-            np.concatenate([limit(table, value) for table in (tf.opacity, tf.color)])
-            for limit in (_left_limit, _right_limit)
+            np.concatenate([limit(table, np.array(value)) for table in (tf.opacity, tf.color)])
+            for limit in (left_limit, right_limit)
         )
         is_step = value > low and bool((before != at).any())
         rows += [[value, *before], [value, *at]] if is_step else [[value, *at]]
@@ -223,11 +219,3 @@ def points_of(tf: TransferFunction) -> Tensor:
             f"{low:.9g} to {high:.9g}; scale or shift the data"
         )
     return points
-
-
-def _right_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[np.float64]:
-    return right_limit(points, np.array(value))
-
-
-def _left_limit(points: tuple[tuple[float, ...], ...], value: float) -> NDArray[np.float64]:
-    return right_limit([(-at, *rest) for at, *rest in reversed(points)], np.array(-value))

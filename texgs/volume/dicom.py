@@ -36,20 +36,14 @@ class Slice(NamedTuple):
 
 
 def read_dicom(folder: Path, series: str | None) -> tuple[dict[str, Any], np.ndarray]:
-    """Read the lattice and the samples [Z, Y, X], rescaled by slope and intercept.
-
-    Args:
-        folder: with a file for each slice.
-        series: number or UID of one of several.
-    """
+    """Read lattice and samples [Z, Y, X], rescaled by slope and intercept, of a series in a folder."""
     sitk.ProcessObject.GlobalWarningDisplayOff()
     try:
         files = chosen_files(folder, series)
         slices = sorted((slice_of(Path(file)) for file in files), key=lambda each: each.height)
-        step = slice_distance(slices)
+        step, first = slice_distance(slices), slices[0]
         pixel_ids = {each.pixel_id for each in slices}
         pixel_id = sitk.sitkFloat64 if len(pixel_ids) > 1 else pixel_ids.pop()
-        first = slices[0]
         dims, dtype = require_volume([*first.sizes[:2], len(slices)], pixel_id, first.n_components)
         require_room(dims, dtype)
         reader = sitk.ImageSeriesReader()
@@ -69,45 +63,42 @@ def read_dicom(folder: Path, series: str | None) -> tuple[dict[str, Any], np.nda
 
 
 def chosen_files(folder: Path, series: str | None) -> list[str]:
-    """Return the files of the only series, or of the one that is asked for."""
-    files = {
-        uid: sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid)
-        for uid in sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder))
-    }
-    numbers, titles = {}, []
-    for uid, names in files.items():
-        reader = information(Path(names[0]))
-        numbers[uid] = tag(reader, NUMBER)
-        titles.append(f"{numbers[uid]} ({tag(reader, DESCRIPTION)}, {len(names)} files, UID {uid})")
-    if not files:
+    """Return the files of the only series, or of the one whose number or UID is asked for."""
+    found, titles = [], []
+    for uid in sitk.ImageSeriesReader.GetGDCMSeriesIDs(str(folder)):
+        files = list(sitk.ImageSeriesReader.GetGDCMSeriesFileNames(str(folder), uid))
+        reader = header(Path(files[0]))
+        number = tag(reader, NUMBER)
+        titles.append(f"{number} ({tag(reader, DESCRIPTION)}, {len(files)} files, UID {uid})")
+        if series is None or series in (uid, number):
+            found.append(files)
+    if not titles:
         raise ArgumentError("expected a folder of DICOM slices or TIFFs (.tif, .tiff), found none in it")
-    fitting = [uid for uid in files if series is None or series in (uid, numbers[uid])]
-    if len(fitting) != 1:
-        found = "several series" if series is None else f"{len(fitting)} series for {series!r}"
+    if len(found) != 1:
+        what = "several series" if series is None else f"{len(found)} series for {series!r}"
         raise ArgumentError(
-            f"expected one series of DICOM slices, got {found}; choose one by dataset.volume.series=NUMBER "
+            f"expected one series of DICOM slices, got {what}; choose one by dataset.volume.series=NUMBER "
             f"or UID, of {'; '.join(titles)}"
         )
-    return list(files[fitting[0]])
+    return found[0]
 
 
 def slice_of(path: Path) -> Slice:
     """Read the header of a slice."""
-    reader = information(path)
-    numbers = [
-        [float(number) for number in tag(reader, name).split("\\")] if tag(reader, name) else []
-        for name in (PLACE, ORIENTATION)
-    ]
-    if [len(each) for each in numbers] != [3, 6]:
+    reader = header(path)
+    place, axes = (
+        [float(number) for number in tag(reader, name).split("\\") if number] for name in (PLACE, ORIENTATION)
+    )
+    if (len(place), len(axes)) != (3, 6):
         raise ArgumentError(f"{path.name}: expected a slice with its position and orientation, found none")
     if len(reader.GetSize()) > 2 and reader.GetSize()[2] != 1:
         raise ArgumentError(f"{path.name}: expected one slice per file, got {reader.GetSize()[2]} frames")
-    row, column = np.reshape(numbers[1], (2, 3))
+    row, column = np.reshape(axes, (2, 3))
     directions = np.stack([row, column, np.cross(row, column)])
     if not np.allclose(directions @ directions.T, np.eye(3), atol=1e-3):
-        raise ArgumentError(f"{path.name}: expected rows and columns at right angles, got {numbers[1]}")
+        raise ArgumentError(f"{path.name}: expected rows and columns at right angles, got {axes}")
     kind = reader.GetPixelIDValue(), reader.GetNumberOfComponents()
-    return Slice(path, reader.GetSize(), reader.GetSpacing(), np.array(numbers[0]), directions, *kind)
+    return Slice(path, reader.GetSize(), reader.GetSpacing(), np.array(place), directions, *kind)
 
 
 def slice_distance(slices: list[Slice]) -> float:
@@ -122,10 +113,10 @@ def slice_distance(slices: list[Slice]) -> float:
                 f"{each.path.name}: expected the size, spacing and orientation of {first.path.name}, got "
                 "another"
             )
-        shift = first.directions[:2] @ (each.place - first.place)
-        if np.abs(shift).max() > TILT * (each.height - first.height) + ROUNDING:
+        shift = np.abs(first.directions[:2] @ (each.place - first.place)).max()
+        if shift > TILT * (each.height - first.height) + ROUNDING:
             raise ArgumentError(
-                f"{each.path.name}: expected slices behind each other, got one {np.abs(shift).max():.3g} mm "
+                f"{each.path.name}: expected slices behind each other, got one {shift:.3g} mm "
                 f"beside {first.path.name}; correct the tilt of the gantry first"
             )
     gaps = np.diff([each.height for each in slices])
@@ -145,7 +136,7 @@ def slice_distance(slices: list[Slice]) -> float:
     return float(slices[-1].height - first.height) / (len(slices) - 1)
 
 
-def information(path: Path) -> sitk.ImageFileReader:
+def header(path: Path) -> sitk.ImageFileReader:
     """Return a reader that has read a header."""
     reader = sitk.ImageFileReader()
     reader.SetFileName(str(path))

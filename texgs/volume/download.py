@@ -9,14 +9,9 @@ from texgs.core.errors import ArgumentError, first_line
 def download(url: str, sha256: str, path: Path) -> None:
     """Download a file with a line that says so and a progress bar, unless it is there and whole.
 
-    Args:
-        url: http or https address.
-        sha256: hexadecimal checksum of the file.
-        path: where it goes.
-
     Raises:
-        ArgumentError: if the address is none or does not answer, or the file differs from its checksum; then
-            nothing is kept.
+        ArgumentError: if the http or https address is none or does not answer, or the file differs from its
+            hexadecimal checksum; then nothing is kept.
     """
     import pooch
 
@@ -39,11 +34,7 @@ def download(url: str, sha256: str, path: Path) -> None:
 
 
 def require_whole(path: Path, sha256: str) -> None:
-    """Compare a downloaded file with its checksum.
-
-    Raises:
-        ArgumentError: if it has been damaged since.
-    """
+    """Require that a downloaded file has its checksum, and has not been damaged since."""
     import pooch
 
     if pooch.file_hash(str(path)) != sha256.lower():

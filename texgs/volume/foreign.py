@@ -1,4 +1,4 @@
-"""Formats that SimpleITK or PyVista reads, as sources; they do it in a process of their own.
+"""Formats that SimpleITK or PyVista reads, as sources; they do it in a process of their own: this module.
 
 Damaged files crash libraries that are written in C++, and make them print instead of raising.
 """
@@ -6,27 +6,30 @@ Damaged files crash libraries that are written in C++, and make them print inste
 from __future__ import annotations
 
 import json
+import os
+import re
 import subprocess
 import sys
-from dataclasses import replace
+import tempfile
 from pathlib import Path
 from threading import Timer
 from typing import IO, Any
 
 import numpy as np
 
-from texgs.core.errors import ArgumentError, OutOfMemoryError
+from texgs.core.errors import ArgumentError, OutOfMemoryError, TexgsError
 from texgs.core.io import reading_as
-from texgs.volume import foreign_reader  # imported here, so that it counts as code of a job
-from texgs.volume.grid import Grid, Triple, byte_count, require_room
-from texgs.volume.headers import METAIMAGE, NRRD, StoredSamples, stored_samples
-from texgs.volume.orientation import AS_STORED, closest, permuted_values
-from texgs.volume.packed import unpacked
+from texgs.core.memory import free_memory
+from texgs.volume.grid import AS_STORED, Grid, Triple, byte_count, closest, permuted_values, require_room
+from texgs.volume.headers import METAIMAGE, NRRD
+from texgs.volume.samples import stored_samples, unpacked
 from texgs.volume.slabs import ArraySource, RawSource, Source
 
+BY_VTK = (".vti", ".vtk", ".slc")
 TAIL = 1024  # bytes; more than the end tag and whatever blanks an editor left behind it
 SECONDS, RATE = 60.0, 1e6  # how long reading may take: at least, and bytes per second of a large file
 LONGEST_LINE = 1 << 20  # bytes of what the process says before the samples
+COMPLAINT = re.compile(r"error|fail|cannot|corrupt|unexpected", re.IGNORECASE)
 
 
 def open_foreign(
@@ -43,41 +46,35 @@ def open_foreign(
         series: of several in a folder, its number or UID.
     """
     suffix = path.suffix.lower()
-    what = "a folder of DICOM slices" if path.is_dir() else f"a {suffix} file"
-    with reading_as(what):
+    with reading_as(_kind(path)):
         if suffix == ".vti":
             _check_end(path)
         stored = stored_samples(path) if suffix in (*NRRD, *METAIMAGE) else None
-        said, values = _ask(path, what, series, is_header_only=stored is not None)
-        axes = closest(np.array(said["directions"]))
+        said, values = _ask(path, series, is_header_only=stored is not None)
+        nx, ny, nz = said["dims"]
+        dims, axes = (nx, ny, nz), closest(np.array(said["directions"]))
         dx, dy, dz = spacing or (said["spacing"][axis] for axis, _ in axes)
-        lengths = [
-            (said["dims"][axis] - 1) * step for (axis, _), step in zip(axes, (dx, dy, dz), strict=True)
-        ]
+        lengths = [(dims[axis] - 1) * step for (axis, _), step in zip(axes, (dx, dy, dz), strict=True)]
         x, y, z = origin or (
             place - (0.0 if sign > 0 else length)
             for place, (_, sign), length in zip(said["origin"], axes, lengths, strict=True)
         )
-        if stored is not None and stored.encoding == "raw":
-            source = _raw_source(stored, said)
-            if axes == AS_STORED:
-                return replace(source, spacing=(dx, dy, dz), origin=(x, y, z))
-            values = np.memmap(source.path, source.stored, "r", source.offset, source.dims[::-1])
-        elif stored is not None:
-            values = unpacked(stored, said["dims"], _dtype(stored, said))
+        if stored is not None:
+            dtype = np.dtype(said["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
+            if stored.encoding != "raw":
+                values = unpacked(stored, dims, dtype)
+            else:
+                first = stored.path.stat().st_size - byte_count(dims, dtype)
+                offset = stored.offset if stored.offset >= 0 else first
+                if axes == AS_STORED:
+                    return RawSource(stored.path, dims, dtype, offset, (dx, dy, dz), (x, y, z))
+                values = RawSource(stored.path, dims, dtype, offset).mapped()
         return ArraySource(Grid(permuted_values(values, axes), (dx, dy, dz), (x, y, z)), path.name)
 
 
-def _dtype(stored: StoredSamples, said: dict[str, Any]) -> np.dtype:
-    """Sample type with byte order."""
-    return np.dtype(said["dtype"]).newbyteorder(">" if stored.is_big_endian else "<")
-
-
-def _raw_source(stored: StoredSamples, said: dict[str, Any]) -> RawSource:
-    """Samples as they are in the file, of spacing 1."""
-    dims, dtype = (said["dims"][0], said["dims"][1], said["dims"][2]), _dtype(stored, said)
-    offset = stored.offset if stored.offset >= 0 else stored.path.stat().st_size - byte_count(dims, dtype)
-    return RawSource(stored.path, dims, dtype, offset)
+def _kind(path: Path) -> str:
+    """Return what a file should be, for messages."""
+    return "a folder of DICOM slices" if path.is_dir() else f"a {path.suffix.lower()} file"
 
 
 def _check_end(path: Path) -> None:
@@ -88,39 +85,34 @@ def _check_end(path: Path) -> None:
             raise ArgumentError("the file is cut off or no .vti file: expected </VTKFile> at its end")
 
 
-def _ask(
-    path: Path, what: str, series: str | None, is_header_only: bool
-) -> tuple[dict[str, Any], np.ndarray]:
+def _ask(path: Path, series: str | None, is_header_only: bool) -> tuple[dict[str, Any], np.ndarray]:
     """Let a process of its own read a file: what it says, and the samples [Z, Y, X]."""
     request = json.dumps({"path": str(path.absolute()), "series": series, "is_header_only": is_header_only})
-    command = [sys.executable, "-P", "-m", foreign_reader.__name__, request]
+    command = [sys.executable, "-P", "-m", "texgs.volume.foreign", request]
+    size = sum(each.stat().st_size for each in (path.iterdir() if path.is_dir() else [path]))
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(command, **pipes) as child:  # type: ignore[call-overload]
-        watchdog = Timer(SECONDS + _size(path) / RATE, child.kill)
+        watchdog = Timer(SECONDS + size / RATE, child.kill)
         watchdog.start()
         try:
-            said, values = _received(child.stdout)
+            said, values = _received(child.stdout, is_header_only)
         finally:
             watchdog.cancel()
             child.kill()
     if said is None:
         raise ArgumentError(
-            f"expected {what}, but its reader broke off; it is damaged, or claims more memory than there is"
+            f"expected {_kind(path)}, but its reader broke off; it is damaged, or claims more memory than "
+            "there is"
         )
     if "error" in said:
         raise (OutOfMemoryError if said["is_memory"] else ArgumentError)(said["error"])
     return said, values
 
 
-def _size(path: Path) -> int:
-    """Bytes of a file, or of all files of a folder."""
-    return sum(each.stat().st_size for each in path.iterdir()) if path.is_dir() else path.stat().st_size
-
-
-def _received(stream: IO[bytes]) -> tuple[dict[str, Any] | None, np.ndarray]:
-    """What the process says about a volume, None if it died, and the samples, none where it sends none."""
+def _received(stream: IO[bytes], is_header_only: bool) -> tuple[dict[str, Any] | None, np.ndarray]:
+    """Return what the process says about a volume, None if it died, and the samples where it sends some."""
     said, values = json.loads(stream.readline(LONGEST_LINE) or "null"), np.empty(0)
-    if said is None or "error" in said or said["is_header_only"]:
+    if said is None or "error" in said or is_header_only:
         return said, values
     dims, dtype = said["dims"], np.dtype(said["dtype"])
     require_room(dims, dtype)
@@ -132,3 +124,63 @@ def _received(stream: IO[bytes]) -> tuple[dict[str, Any] | None, np.ndarray]:
             return None, values
         rest = rest[count:]
     return said, values
+
+
+def answer(path: Path, series: str | None, is_header_only: bool) -> None:
+    """Print a line of JSON about a file, or what is wrong with it, and then the samples: all in the child."""
+    with os.fdopen(os.dup(1), "wb") as output, tempfile.TemporaryFile("w+", errors="replace") as printed:
+        os.dup2(printed.fileno(), 1)
+        os.dup2(printed.fileno(), 2)
+        limit_memory()
+        values = None
+        try:
+            with reading_as(_kind(path)):
+                said, values = image_of(path, series, is_header_only)
+            printed.seek(0)
+            complain(printed.read())
+        except TexgsError as error:
+            values, said = None, {"error": str(error), "is_memory": isinstance(error, OutOfMemoryError)}
+        output.write(json.dumps(said).encode() + b"\n")
+        if values is not None:
+            output.write(memoryview(np.ascontiguousarray(values).data).cast("B"))
+
+
+def limit_memory() -> None:
+    """Let this process have no more memory than there is; it would take the rest of the machine with it."""
+    if sys.platform == "linux":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        used = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+        _, most = resource.getrlimit(resource.RLIMIT_DATA)
+        limit = used + free_memory()
+        resource.setrlimit(resource.RLIMIT_DATA, (limit if most < 0 else min(limit, most), most))
+
+
+def image_of(
+    path: Path, series: str | None, is_header_only: bool
+) -> tuple[dict[str, Any], np.ndarray | None]:
+    """Read the lattice, and samples [Z, Y, X] unless only the header is asked for."""
+    if path.suffix.lower() in BY_VTK:
+        from texgs.volume.vtk_image import read_vtk
+
+        return read_vtk(path)
+    if path.is_dir():
+        from texgs.volume.dicom import read_dicom
+
+        return read_dicom(path, series)
+    from texgs.volume.itk_image import read_itk
+
+    return read_itk(path, is_header_only)
+
+
+def complain(printed: str) -> None:
+    """Raise what a library has printed instead of raising it."""
+    for line in printed.splitlines():
+        if COMPLAINT.search(line) and "warning" not in line.lower():
+            raise ArgumentError(f"the file is damaged or cut off, its reader says: {line.strip()}")
+
+
+if __name__ == "__main__":
+    request = json.loads(sys.argv[1])
+    answer(Path(request["path"]), request["series"], request["is_header_only"])

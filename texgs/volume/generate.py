@@ -1,16 +1,18 @@
 """Volumes made here, for examples and tests: a sphere, an orbital, decaying turbulence, and jets.
 
-All are cubes of float32 in [0, 1] with spacing 1, and the same everywhere for the same arguments up to
-rounding. Turbulence and jets are one flow for each seed, whatever the size they are sampled at.
+All are cubes of float32 in [0, 1] with spacing 1 and at least 16 samples along each side, and the same
+everywhere for the same arguments up to rounding. Turbulence and jets are one flow for each seed, whatever the
+size they are sampled at.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import pi
+from math import factorial, pi, sqrt
 
 import numpy as np
 import torch
+from scipy.special import eval_genlaguerre, lpmv
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
@@ -25,24 +27,23 @@ from texgs.volume.navier_stokes import (
     to_spectrum,
     wavevectors,
 )
-from texgs.volume.orbital import orbital_cube
 
+Array = np.ndarray
 SMALLEST = 16  # samples along each side
+ORBITAL = (4, 3, 0)  # quantum numbers n, l and m: 4f z^3
+FADED = 0.05  # of the largest amplitude along the radius of an orbital: what is farther out is cut off
+STEPS = 4096  # along the radius and the polar angle, where the largest amplitude is looked for
 TURBULENCE_RESOLUTION, JETS_RESOLUTION = 64, 48  # cells of the simulation along each side; even
+DURATION = 1.5  # of turbulence; an eddy turns over in about 1. Tubes have formed by 1, then they decay
+VISCOSITY = 0.01  # of turbulence, for a box 2 pi wide and an initial speed of 1 (root mean square, per axis)
 NOISE_RESOLUTION = 16  # of the random initial motion
 
 
 def sphere(size: int) -> Grid:
-    """A ball that fades outwards: 1 at the centre, falling smoothly (cosine) to 0 where it meets the faces.
+    """Make a ball that fades outwards: 1 at the centre, falling smoothly (cosine) to 0 at the faces.
 
     With a transfer function that is opaque at high values and faint at low ones it is the paper's synthetic
     sphere: an opaque centre in a low-opacity shell.
-
-    Args:
-        size: samples along each side, at least 16.
-
-    Raises:
-        ArgumentError: if `size` is too small.
     """
     _check_size(size)
     axis = torch.linspace(-1, 1, size)
@@ -50,40 +51,23 @@ def sphere(size: int) -> Grid:
     return _grid(0.5 + 0.5 * torch.cos(pi * distance.clamp_max(1)))
 
 
-def orbital(size: int, n: int = 4, degree: int = 3, order: int = 0) -> Grid:
-    """Wave function of the electron of a hydrogen atom: 0.5 where it is 0, on either side where it is not.
+def orbital(size: int) -> Grid:
+    """Sample the wave function of the electron of a hydrogen atom: 0.5 where it is 0.
 
-    By default 4f z^3: along +y a lobe and a ring, both positive, and their mirror image, negative.
-
-    Args:
-        size: samples along each side, at least 16.
-        n: principal quantum number.
-        degree: quantum number l.
-        order: quantum number m.
+    Along +y are a lobe and a ring, both above it, and their mirror image, below it.
     """
     _check_size(size)
-    return _grid(torch.from_numpy(0.5 + 0.5 * orbital_cube(size, n, degree, order)))
+    return _grid(torch.from_numpy(0.5 + 0.5 * orbital_cube(size, *ORBITAL)))
 
 
-def turbulence(size: int, seed: int = 0, duration: float = 1.5, viscosity: float = 0.01) -> Grid:
-    """Vorticity magnitude of decaying turbulence in a periodic box: thin, bright vortex tubes.
+def turbulence(size: int, seed: int = 0) -> Grid:
+    """Sample the vorticity magnitude of decaying turbulence in a periodic box: thin, bright vortex tubes.
 
     A direct numerical simulation from random solenoidal motion; see `navier_stokes.evolve`. Divided by the
     largest magnitude.
-
-    Args:
-        size: samples along each side, at least 16.
-        seed: of the initial motion.
-        duration: simulated time; an eddy turns over in about 1. Tubes have formed by 1, then they decay.
-        viscosity: kinematic, for a box 2 pi wide and an initial speed of 1 (root mean square, per axis).
     """
     _check_size(size)
-    if not (duration >= 0 and viscosity > 0):
-        raise ArgumentError(
-            f"turbulence: expected a duration of at least 0 and a viscosity above 0, got {duration} and "
-            f"{viscosity}"
-        )
-    (velocity,) = evolve(random_flow(TURBULENCE_RESOLUTION, 1.5, 2.5, seed), viscosity, [duration])
+    (velocity,) = evolve(random_flow(TURBULENCE_RESOLUTION, 1.5, 2.5, seed), VISCOSITY, [DURATION])
     vorticity = curl(velocity)
     place = _places(size)
     squared = torch.zeros(size, size, size)
@@ -94,14 +78,10 @@ def turbulence(size: int, seed: int = 0, duration: float = 1.5, viscosity: float
 
 
 def jets(size: int, seed: int = 0) -> Grid:
-    """Upward velocity of five jets that enter through the floor, roll up and break into puffs.
+    """Sample the upward velocity of five jets that enter through the floor, roll up and break into puffs.
 
     A stand-in for the five jets data set, not the data. The jets are simulated as they develop in time,
     moving along with their shear layers; height stands for time (Taylor's hypothesis).
-
-    Args:
-        size: samples along each side, at least 16.
-        seed: of the disturbance that breaks the jets.
     """
     _check_size(size)
     n_frames, speed = 48, 0.5  # snapshots; speed at which the shear layers rise
@@ -119,16 +99,10 @@ def jets(size: int, seed: int = 0) -> Grid:
 
 
 def random_flow(size: int, mean_energy: float, peak: float, seed: int) -> Tensor:
-    """Spectrum [3, size, size, size // 2 + 1], complex64, of random motion without divergence.
+    """Return a spectrum [3, size, size, size // 2 + 1], complex64, of random motion without divergence.
 
     Energy per wavenumber follows k^4 exp(-2 (k / peak)^2), with nothing at k >= 8, so the motion does not
-    depend on `size`.
-
-    Args:
-        size: even, at least 16.
-        mean_energy: mean of |v|^2 / 2.
-        peak: wavenumber with the most energy.
-        seed: of the random numbers.
+    depend on `size`, which is even. The mean of |v|^2 / 2 is `mean_energy`.
     """
     noise = np.random.default_rng(seed).standard_normal((3, *[NOISE_RESOLUTION] * 3))
     flow = to_spectrum(torch.from_numpy(noise))
@@ -140,7 +114,7 @@ def random_flow(size: int, mean_energy: float, peak: float, seed: int) -> Tensor
 
 
 def _five_jets(n: int) -> Tensor:
-    """Spectrum of round jets of speed 1 along +y, one in the middle, seen at half their speed."""
+    """Return the spectrum of round jets of speed 1 along +y, one in the middle, seen at half their speed."""
     radius, thickness, offset = 0.5, 0.11, 1.75
     z, x = torch.meshgrid(_places(n) - pi, _places(n) - pi, indexing="ij")
     corners = [(0.0, 0.0), *((i * offset, j * offset) for i in (-1, 1) for j in (-1, 1))]
@@ -154,17 +128,59 @@ def _five_jets(n: int) -> Tensor:
 
 
 def _places(size: int) -> Tensor:
-    """Where the samples of a periodic box lie along one axis, [size]."""
+    """Return where the samples of a periodic box lie along one axis, [size]."""
     return 2 * pi / size * torch.arange(size)
 
 
 def _check_size(size: int) -> None:
+    """Require enough samples."""
     if size < SMALLEST:
         raise ArgumentError(f"size: expected at least {SMALLEST} samples along each side, got {size}")
 
 
 def _grid(values: Tensor) -> Grid:
+    """Return values as a volume."""
     return Grid(values.float().clamp(0, 1).numpy())
+
+
+def orbital_cube(size: int, n: int, degree: int, order: int) -> Array:
+    """Sample a wave function in a cube [size, size, size] (z, y, x) around the nucleus, its axis along +y.
+
+    It is divided by the largest amplitude anywhere: between -1 and 1. The quantum numbers n, l and m are
+    called `n`, `degree` and `order`.
+    """
+    r = np.linspace(0, 4 * n * (n + 2), STEPS)
+    along_radius = np.abs(radial(n, degree, r))
+    reach = r[np.flatnonzero(along_radius > FADED * along_radius.max())[-1] + 1]
+    around = np.abs(angular(degree, abs(order), np.linspace(-1, 1, STEPS), np.zeros(1)))
+    axis = np.linspace(-reach, reach, size)
+    values = wave_function(n, degree, order, axis[:, None, None], axis, axis[:, None])
+    return values / (along_radius.max() * around.max())
+
+
+def wave_function(n: int, degree: int, order: int, x: Array, y: Array, z: Array) -> Array:
+    """Return the amplitude of a real orbital whose axis is z, at places in Bohr radii.
+
+    Its square is a density, and sums to 1 over space.
+    """
+    r = np.sqrt(x * x + y * y + z * z)
+    cosine = np.divide(z, r, out=np.ones_like(r), where=r > 0)
+    return radial(n, degree, r) * angular(degree, order, cosine, np.arctan2(y, x))
+
+
+def radial(n: int, degree: int, r: Array) -> Array:
+    """Return N rho^l exp(-rho / 2) L(rho) with rho = 2 r / n and an associated Laguerre polynomial L."""
+    rho = 2 * r / n
+    scale = sqrt((2 / n) ** 3 * factorial(n - degree - 1) / (2 * n * factorial(n + degree)))
+    return scale * rho**degree * np.exp(-rho / 2) * eval_genlaguerre(n - degree - 1, 2 * degree + 1, rho)
+
+
+def angular(degree: int, order: int, cosine: Array, azimuth: Array) -> Array:
+    """Return a real spherical harmonic: it turns as cos(m azimuth), as sin(-m azimuth) where m is below 0."""
+    m = abs(order)
+    scale = sqrt((2 - (m == 0)) * (2 * degree + 1) / (4 * pi) * factorial(degree - m) / factorial(degree + m))
+    turn = np.cos(m * azimuth) if order >= 0 else np.sin(m * azimuth)
+    return (-1) ** m * scale * lpmv(m, degree, cosine) * turn  # scipy's functions hold a sign (-1)^m
 
 
 GENERATORS: dict[str, Callable[..., Grid]] = {

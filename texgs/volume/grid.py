@@ -1,8 +1,9 @@
-"""A scalar field on a regular lattice, and where the lattice lies in the world."""
+"""A scalar field on a regular lattice: where it lies in the world, and its turns by right angles."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations
 from math import isfinite, prod
 
 import numpy as np
@@ -12,6 +13,20 @@ from texgs.core.memory import require_memory
 
 Triple = tuple[float, float, float]
 Dims = tuple[int, int, int]
+ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
+
+# Where the new axes x, y, z come from: (axis before, sign).
+AxisPermutation = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
+AS_STORED: AxisPermutation = ((0, 1), (1, 1), (2, 1))
+# By the axis of the volume that becomes +y: rotations, never a mirror.
+UPRIGHT: dict[str, AxisPermutation] = {
+    "+y": AS_STORED,  # (x, y, z)
+    "-y": ((0, 1), (1, -1), (2, -1)),  # (x, -y, -z)
+    "+z": ((0, 1), (2, 1), (1, -1)),  # (x, z, -y)
+    "-z": ((0, 1), (2, -1), (1, 1)),  # (x, -z, y)
+    "+x": ((1, -1), (0, 1), (2, 1)),  # (-y, x, z)
+    "-x": ((1, 1), (0, -1), (2, 1)),  # (y, -x, z)
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +40,8 @@ class Grid:
     """
 
     values: np.ndarray  # [Z, Y, X], real numbers, every axis at least 2; x is the fastest axis, as in VTK
-    spacing: Triple = (1.0, 1.0, 1.0)  # x, y, z; physical units, above 0
-    origin: Triple = (0.0, 0.0, 0.0)  # centre of the first sample, x, y, z; physical units
+    spacing: Triple = ONES  # x, y, z; physical units, above 0
+    origin: Triple = ZEROS  # centre of the first sample, x, y, z; physical units
 
     def __post_init__(self) -> None:
         check_lattice(dims_of(self.values.shape), self.values.dtype, self.spacing, self.origin)
@@ -37,19 +52,24 @@ class Grid:
         return dims_of(self.values.shape)
 
     @property
+    def sides(self) -> list[float]:
+        """Extent along x, y, z in physical units."""
+        return [(size - 1) * step for size, step in zip(self.dims, self.spacing, strict=True)]
+
+    @property
     def scale(self) -> float:
         """World units per physical unit: the longest side has length 1 in the world."""
-        return 1.0 / max(_sides(self.dims, self.spacing))
+        return 1.0 / max(self.sides)
 
     @property
     def aabb(self) -> tuple[Triple, Triple]:
         """Lowest and highest corner (x, y, z) in world units; the box is centred at the origin."""
-        x, y, z = (0.5 * self.scale * side for side in _sides(self.dims, self.spacing))
+        x, y, z = (0.5 * self.scale * side for side in self.sides)
         return (-x, -y, -z), (x, y, z)
 
 
 def dims_of(shape: tuple[int, ...]) -> Dims:
-    """Dims (x, y, z) of an array [Z, Y, X]."""
+    """Return the dims (x, y, z) of an array [Z, Y, X]."""
     if len(shape) != 3:
         components = f", {shape[-1]} components per sample?" if shape and shape[-1] in (2, 3, 4) else ""
         raise ShapeError(f"expected a scalar field [Z, Y, X], got the shape {list(shape)}{components}")
@@ -57,7 +77,7 @@ def dims_of(shape: tuple[int, ...]) -> Dims:
     return x, y, z
 
 
-def check_lattice(dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> None:
+def check_lattice(dims: Dims, dtype: np.dtype, spacing: Triple = ONES, origin: Triple = ZEROS) -> None:
     """Check what a lattice needs to be rendered: three axes with an extent, and real numbers."""
     if len(dims) != 3 or not all(size >= 2 for size in dims):
         raise ArgumentError(f"dims: expected at least 2 samples along x, y and z, got {list(dims)}")
@@ -73,26 +93,56 @@ def check_lattice(dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) 
 
 
 def byte_count(dims: Dims, dtype: np.dtype) -> int:
-    """Size of the samples in bytes."""
+    """Return the size of the samples in bytes."""
     return prod(dims) * dtype.itemsize
 
 
 def require_room(dims: Dims, dtype: np.dtype, beside: int = 0) -> None:
-    """Require that all samples fit into memory, for formats that are read as a whole.
-
-    Args:
-        dims: samples along x, y, z.
-        dtype: of a sample.
-        beside: bytes that reading takes besides.
-    """
-    what = f"{' x '.join(map(str, dims))} samples of {dtype.name}"
+    """Require that samples that are read as a whole, and bytes beside them, fit into memory."""
     require_memory(
         byte_count(dims, dtype) + beside,
-        what,
+        f"{' x '.join(map(str, dims))} samples of {dtype.name}",
         "is the header damaged? Else store it as .nrrd, not compressed",
     )
 
 
-def _sides(dims: Dims, spacing: Triple) -> list[float]:
-    """Extent along x, y, z in physical units."""
-    return [(size - 1) * step for size, step in zip(dims, spacing, strict=True)]
+def upright(up: str) -> AxisPermutation:
+    """Return the permutation that makes the volume's axis `up` the world's +y."""
+    if up not in UPRIGHT:
+        raise ArgumentError(f"up: expected one of {', '.join(UPRIGHT)}, got {up!r}")
+    return UPRIGHT[up]
+
+
+def closest(directions: np.ndarray) -> AxisPermutation:
+    """For each axis of space find the stored axis that runs along it most nearly, and its sign.
+
+    Args:
+        directions: [3, 3], rows of unit length. Where something is not finite, axes stay as they are stored.
+    """
+    if not np.isfinite(directions).all():
+        return AS_STORED
+    x, y, z = max(
+        permutations(range(3)),
+        key=lambda axes: sum(abs(directions[axis, along]) for along, axis in enumerate(axes)),
+    )
+    signs = [1 if directions[axis, along] >= 0 else -1 for along, axis in enumerate((x, y, z))]
+    return (x, signs[0]), (y, signs[1]), (z, signs[2])
+
+
+def permuted_values(values: np.ndarray, axes: AxisPermutation) -> np.ndarray:
+    """Return a view of an array [Z, Y, X] with other axes, again [Z, Y, X]."""
+    flips = tuple(slice(None, None, sign) for _, sign in reversed(axes))
+    return values.transpose([2 - axis for axis, _ in reversed(axes)])[flips]
+
+
+def permuted_lattice(
+    dims: Dims, spacing: Triple, origin: Triple, axes: AxisPermutation
+) -> tuple[Dims, Triple, Triple]:
+    """Return dims, spacing and origin after a rotation around the point (0, 0, 0) of physical space."""
+    lattice = []
+    for axis, sign in axes:
+        last = origin[axis] + (dims[axis] - 1) * spacing[axis]
+        # A flipped axis runs from the last sample to the first, and coordinates change sign.
+        lattice.append((dims[axis], spacing[axis], origin[axis] if sign > 0 else 0.0 - last))
+    (nx, dx, x), (ny, dy, y), (nz, dz, z) = lattice
+    return (nx, ny, nz), (dx, dy, dz), (x, y, z)

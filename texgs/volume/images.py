@@ -1,12 +1,15 @@
-"""The views of a split in memory, 8 bits per value, and one of them at a time as floats."""
+"""The views of a split in memory over white, 8 bits per value, and one of them at a time as floats."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
+import cv2
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -14,11 +17,36 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.core.memory import require_memory
-from texgs.volume.boxes import Box, content_box
-from texgs.volume.reduced import over_white, smaller
 from texgs.volume.view_set import View
 
 BYTES = 64  # of memory for a pixel of a view that is being read
+MARGIN = 11  # pixels: a window of SSIM, so that those of pixels near content end in white
+
+
+class Box(NamedTuple):
+    """The part of a view in which anything can be seen: pixels left <= x < right, top <= y < bottom.
+
+    It is all that a loss needs to look at. Outside of it image and target are white, and gradients have
+    nothing to add; nor have losses, but for the normal consistency, which is a constant there. An object in
+    the middle of the view fills a third of it, and a step takes a third of the memory traffic.
+    """
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    def union(self, other: Box) -> Box:
+        """Return the smallest box around both."""
+        low, high = map(min, self[:2], other[:2]), map(max, self[2:], other[2:])
+        return Box(*low, *high)
+
+    def within(self, width: int, height: int) -> Box:
+        """Return the box and a margin, as far as they are in the image; one pixel of it at least."""
+        left = min(max(self.left - MARGIN, 0), width - 1)
+        top = min(max(self.top - MARGIN, 0), height - 1)
+        right = max(min(self.right + MARGIN, width), left + 1)
+        return Box(left, top, right, max(min(self.bottom + MARGIN, height), top + 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,17 +73,17 @@ class Images:
 
     @cached_property
     def boxes(self) -> list[Box]:
-        """For each view the pixels that are not white."""
+        """Return for each view the pixels that are not white."""
         with ThreadPoolExecutor() as pool:
             return list(pool.map(content_box, self.planes.numpy()))
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
+        """Return width and height in pixels."""
         return self.planes.shape[3], self.planes.shape[2]
 
     def target(self, index: int, device: torch.device | str = "cpu", around: Box | None = None) -> Target:
-        """One view as floats on a device.
+        """Return one view as floats on a device.
 
         Args:
             index: of the view.
@@ -99,3 +127,37 @@ def load(views: Sequence[View], reduce: int = 1) -> Images:
     with ThreadPoolExecutor(threads) as pool:
         list(pool.map(read, range(len(views))))
     return Images(planes, [smaller(view.camera, reduce) for view in views], [view.light for view in views])
+
+
+def over_white(view: View, reduce: int = 1) -> Tensor:
+    """Return colour over white and alpha [4, H, W], float32.
+
+    On one thread, and without torch: views are read by several threads, or beside the work on another one.
+    """
+    planes = np.ascontiguousarray(view.load().numpy().transpose(2, 0, 1)).astype(np.float32)
+    planes /= 255
+    planes[:3] *= planes[3]
+    if reduce > 1:
+        height, width = planes.shape[1] // reduce, planes.shape[2] // reduce
+        planes = np.stack(
+            [cv2.resize(plane, (width, height), interpolation=cv2.INTER_AREA) for plane in planes]
+        )
+    planes[:3] += 1 - planes[3]
+    return torch.from_numpy(planes)
+
+
+def smaller(camera: Camera, reduce: int) -> Camera:
+    """Return the camera of an image reduced by averaging."""
+    K = camera.K.clone()
+    K[:2] /= reduce
+    return replace(camera, K=K, width=camera.width // reduce, height=camera.height // reduce)
+
+
+def content_box(planes: np.ndarray) -> Box:
+    """Return the pixels of an image over white and its alpha [4, H, W], uint8, that are not plain white."""
+    seen = (planes[:3].min(axis=0) < 255) | (planes[3] > 0)
+    if not seen.any():
+        middle_y, middle_x = (size // 2 for size in seen.shape)
+        return Box(middle_x, middle_y, middle_x, middle_y)
+    columns, rows = np.flatnonzero(seen.any(axis=0)), np.flatnonzero(seen.any(axis=1))
+    return Box(int(columns[0]), int(rows[0]), int(columns[-1]) + 1, int(rows[-1]) + 1)

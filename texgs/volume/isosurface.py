@@ -1,10 +1,10 @@
-"""Surfaces of scalar fields as triangles, by marching cubes."""
+"""What a transfer function shows of a volume as geometry: a surface of triangles, and points."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from math import ceil
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from texgs.volume.transfer import TransferFunction
 
 BYTES = 8  # of memory for a sample: what is opaque, in single precision, and the mesh
 FAR_OUTSIDE = 1000.0  # times the largest value, around a volume: its surface ends at the outermost samples
+MOST = 64_000_000  # samples to look at for points: a larger volume is looked at with a stride
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Mesh:
 
 
 def isosurface(values: np.ndarray, level: float, spacing: Triple, origin: Triple) -> Mesh:
-    """Where values on a lattice cross a level (flying edges, Schroeder et al. 2015); larger ones are inside.
+    """Find where values cross a level (flying edges, Schroeder et al. 2015); larger ones are inside.
 
     Args:
         values: [Z, Y, X], real numbers.
@@ -40,31 +41,18 @@ def isosurface(values: np.ndarray, level: float, spacing: Triple, origin: Triple
         spacing: x, y, z between samples, world units.
         origin: of the first sample, world units.
     """
-    from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-    from vtkmodules.vtkCommonDataModel import vtkImageData
-    from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+    import pyvista  # slow to import
 
-    image = vtkImageData()
-    image.SetDimensions(*values.shape[::-1])
-    image.SetSpacing(*spacing)
-    image.SetOrigin(*origin)
-    image.GetPointData().SetScalars(numpy_to_vtk(np.ascontiguousarray(values).ravel()))
-    contour: Any = vtkFlyingEdges3D()
-    contour.SetInputData(image)
-    contour.SetValue(0, level)
-    contour.ComputeNormalsOff()
-    contour.ComputeScalarsOff()
-    contour.Update()
-    surface = contour.GetOutput()
-    if not surface.GetNumberOfPolys():
+    image = pyvista.ImageData(dimensions=values.shape[::-1], spacing=spacing, origin=origin)
+    image["values"] = np.ascontiguousarray(values).ravel()
+    surface = image.contour([level], compute_normals=False, compute_scalars=False, method="flying_edges")
+    if not surface.n_cells:
         return Mesh(np.empty((0, 3), np.float32), np.empty((0, 3), np.int32))
-    corners = vtk_to_numpy(surface.GetPolys().GetConnectivityArray()).reshape(-1, 3)
-    places = vtk_to_numpy(surface.GetPoints().GetData())
-    return Mesh(places.astype(np.float32), corners.astype(np.int32))
+    return Mesh(np.asarray(surface.points, np.float32), surface.regular_faces.astype(np.int32))
 
 
 def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
-    """What a transfer function makes a surface of a volume: where its opacity rises to a value.
+    """Return what a transfer function makes a surface of a volume: where its opacity rises to a value.
 
     Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
     box, where what is opaque ends there.
@@ -102,7 +90,7 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
 
 
 def opaque_ranges(tf: TransferFunction, opacity: float) -> list[tuple[float, float]]:
-    """Ranges of values in which a transfer function is as opaque as that."""
+    """Return ranges of values in which a transfer function is as opaque as that."""
     points = [(tf.opacity[0][0], 0.0), *tf.opacity, (tf.opacity[-1][0], 0.0)]
     crossed = [
         low + (high - low) * (opacity - before) / (after - before)
@@ -110,3 +98,39 @@ def opaque_ranges(tf: TransferFunction, opacity: float) -> list[tuple[float, flo
         if (before < opacity) != (after < opacity)
     ]
     return list(zip(crossed[::2], crossed[1::2], strict=True))
+
+
+def visible_voxels(grid: Grid, tf: TransferFunction, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Draw samples with a probability that grows with their opacity, each moved at random within its cell.
+
+    One slice is in memory at a time (weighted reservoir sampling: Efraimidis and Spirakis 2006).
+
+    Returns:
+        `count` points [N, 3], fewer if fewer samples are visible, in world units, and their colours [N, 3] in
+        [0, 1], float32.
+
+    Raises:
+        ArgumentError: if no sample is visible.
+    """
+    random = np.random.default_rng(seed)
+    stride = ceil((grid.values.size / MOST) ** (1 / 3)) if grid.values.size > MOST else 1
+    keys, places, colors = np.empty(0), np.empty((0, 3)), np.empty((0, 3))
+    for z in range(0, grid.values.shape[0], stride):
+        rgba = tf(np.asarray(grid.values[z, ::stride, ::stride]))
+        y, x = np.nonzero(rgba[..., 3] > 0)
+        if not len(x):
+            continue
+        shown = rgba[y, x]
+        own = np.log(random.random(len(x))) / shown[:, 3]  # the largest keys are the sample
+        keys = np.concatenate([keys, own])
+        places = np.concatenate([places, np.stack([x * stride, y * stride, np.full(len(x), z)], axis=1)])
+        colors = np.concatenate([colors, shown[:, :3]])
+        if len(keys) > count:
+            best = np.argpartition(keys, -count)[-count:]
+            keys, places, colors = keys[best], places[best], colors[best]
+    if not len(keys):
+        raise ArgumentError("volume: expected samples that the transfer function shows, found none")
+    moved = places + stride * (random.random(places.shape) - 0.5)
+    cell = grid.scale * np.array(grid.spacing)
+    points = np.array(grid.aabb[0]) + cell * np.clip(moved, 0, np.array(grid.dims) - 1)
+    return points.astype(np.float32), colors.astype(np.float32)

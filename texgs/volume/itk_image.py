@@ -13,7 +13,6 @@ from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Dims, check_lattice, require_room
 from texgs.volume.headers import NRRD, read_fields
 
-ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 # ITK's space runs to the left and the back, that of these NRRD files to the right and the front.
 TO_RIGHT_FRONT = (-1.0, -1.0, 1.0)
 NRRD_SPACES = {
@@ -33,23 +32,27 @@ def read_itk(path: Path, is_header_only: bool) -> tuple[dict[str, Any], np.ndarr
     reader.SetFileName(str(path))
     try:
         reader.ReadImageInformation()
-        dims, dtype = require_volume(
-            list(reader.GetSize()), reader.GetPixelIDValue(), reader.GetNumberOfComponents()
-        )
+        sizes = list(reader.GetSize())
+        dims, dtype = require_volume(sizes, reader.GetPixelIDValue(), reader.GetNumberOfComponents())
         fields = read_fields(path)[0] if path.suffix.lower() in NRRD else {}
-        signs = NRRD_SPACES.get(fields.get("space", "").lower(), ONES)
-        said = lattice_of(reader, np.array(signs))
+        signs = np.array(NRRD_SPACES.get(fields.get("space", "").lower(), (1.0, 1.0, 1.0)))
+        said: dict[str, Any] = {
+            "dims": dims,
+            "dtype": dtype.name,
+            "spacing": reader.GetSpacing(),
+            "origin": (np.array(reader.GetOrigin()) * signs + 0.0).tolist(),
+            "directions": (np.reshape(reader.GetDirection(), (3, 3)).T * signs).tolist(),
+        }
         if {"axismins", "axismaxs"} <= fields.keys() and "spacedirections" not in fields:
-            said |= {"spacing": said["spacing"] if "spacings" in fields else _steps(fields, dims)}
-            said |= {"origin": np.nan_to_num(np.array(fields["axismins"].split(), float)).tolist()}
+            said["origin"] = np.nan_to_num(np.array(fields["axismins"].split(), float)).tolist()
+            if "spacings" not in fields:
+                said["spacing"] = _steps(fields, dims)
         if is_header_only:
-            return said | {"dims": dims, "dtype": dtype.name}, None
+            return said, None
         require_room(dims, dtype)
-        image = reader.Execute()
+        return said, sitk.GetArrayFromImage(reader.Execute())
     except RuntimeError as error:
         raise ArgumentError(sentence(error)) from error
-    values = sitk.GetArrayFromImage(image)
-    return said | {"dims": dims, "dtype": values.dtype.name}, values
 
 
 def require_volume(
@@ -62,18 +65,8 @@ def require_volume(
         raise ArgumentError(f"expected 3 axes, got {len(sizes)}: sizes {sizes}")
     dtype = sitk.GetArrayViewFromImage(sitk.Image([1, 1, 1], pixel_id)).dtype
     dims = (sizes[0], sizes[1], sizes[2])
-    check_lattice(dims, dtype, ONES, ZEROS)
+    check_lattice(dims, dtype)
     return dims, dtype
-
-
-def lattice_of(image: Any, signs: np.ndarray) -> dict[str, Any]:
-    """Return spacing, origin and directions of a volume."""
-    directions = np.reshape(image.GetDirection(), (3, 3)).T * signs
-    return {
-        "spacing": image.GetSpacing(),
-        "origin": (np.array(image.GetOrigin()) * signs + 0.0).tolist(),
-        "directions": directions.tolist(),
-    }
 
 
 def _steps(fields: dict[str, str], dims: Dims) -> list[float]:

@@ -17,18 +17,18 @@ COURANT = 1.2  # cells that the fastest fluid crosses per time step; Runge-Kutta
 
 
 def to_spectrum(field: Tensor) -> Tensor:
-    """Fourier coefficients of a field, scaled so that they do not depend on the resolution."""
+    """Return Fourier coefficients of a field, scaled so that they do not depend on the resolution."""
     return torch.fft.rfftn(field, dim=AXES, norm="forward")
 
 
 def to_field(spectrum: Tensor) -> Tensor:
-    """The inverse of `to_spectrum`."""
+    """Return the field of a spectrum."""
     n = spectrum.shape[-2]
     return torch.fft.irfftn(spectrum, s=(n, n, n), dim=AXES, norm="forward")
 
 
 def sample(spectrum: Tensor, z: Tensor, y: Tensor, x: Tensor) -> Tensor:
-    """Values [..., len(z), len(y), len(x)] of the field at any places, exactly; the box is 0 to 2 pi.
+    """Return values [..., len(z), len(y), len(x)] of the field at any places, exactly; the box is 0 to 2 pi.
 
     The highest wavenumber n / 2 has to be empty, as no real field has a unique one there.
     """
@@ -41,32 +41,32 @@ def sample(spectrum: Tensor, z: Tensor, y: Tensor, x: Tensor) -> Tensor:
 
 
 def wavevectors(spectrum: Tensor) -> Tensor:
-    """Wavevectors [3, n, n, n // 2 + 1] of the coefficients of a spectrum, components x, y, z."""
+    """Return wavevectors [3, n, n, n // 2 + 1] of the coefficients of a spectrum, components x, y, z."""
     full, half = _frequencies(spectrum)
     z, y, x = torch.meshgrid(full, full, half, indexing="ij")
     return torch.stack([x, y, z])
 
 
 def curl(vector: Tensor) -> Tensor:
-    """Spectrum of the curl of a vector field; of a velocity, the vorticity."""
+    """Return the spectrum of the curl of a vector field; of a velocity, the vorticity."""
     return 1j * _cross(wavevectors(vector), vector)
 
 
 def project(vector: Tensor) -> Tensor:
-    """The divergence-free part of a vector field."""
+    """Return the divergence-free part of a vector field."""
     k = wavevectors(vector)
     return vector - k * ((k * vector).sum(0) / (k * k).sum(0).clamp_min(1))
 
 
 def energy(vector: Tensor) -> float:
-    """Mean of |v|^2 / 2 over the box (Parseval's theorem)."""
+    """Return the mean of |v|^2 / 2 over the box (Parseval's theorem)."""
     weight = torch.full(vector.shape[-1:], 2.0, dtype=torch.float64, device=vector.device)
     weight[0] = weight[-1] = 1  # all other coefficients of a real field stand for k and -k
     return 0.5 * float((vector.abs().double().square() * weight).sum())
 
 
 def evolve(velocity: Tensor, viscosity: float, times: Iterable[float]) -> Iterator[Tensor]:
-    """Follow a flow that no force drives.
+    """Follow a flow that no force drives, and yield its spectrum at ascending times, from 0 on.
 
     dv/dt = v x curl(v) - grad(p + v^2 / 2) + viscosity laplace(v) with div v = 0.
     Products are formed on the grid and cut at 2/3 of the highest wavenumber, which keeps aliases out
@@ -75,10 +75,7 @@ def evolve(velocity: Tensor, viscosity: float, times: Iterable[float]) -> Iterat
     Args:
         velocity: divergence-free spectrum [3, ...] at time 0; it sets device and precision.
         viscosity: kinematic, at least 0.
-        times: ascending, from 0 on.
-
-    Yields:
-        The spectrum at each of the times.
+        times: in units of the velocity's.
     """
     k = wavevectors(velocity)
     n, damping = velocity.shape[-2], -viscosity * (k * k).sum(0)
@@ -95,7 +92,7 @@ def evolve(velocity: Tensor, viscosity: float, times: Iterable[float]) -> Iterat
 
 
 def _step(v: Tensor, step: float, decay: Tensor, dealias: Tensor) -> Tensor:
-    """One step of Runge-Kutta; `decay` is what viscosity leaves after half of it."""
+    """Do one step of Runge-Kutta; `decay` is what viscosity leaves after half of it."""
     a = _advection(v, dealias)
     b = _advection(decay * (v + 0.5 * step * a), dealias)
     c = _advection(decay * v + 0.5 * step * b, dealias)
@@ -104,24 +101,24 @@ def _step(v: Tensor, step: float, decay: Tensor, dealias: Tensor) -> Tensor:
 
 
 def _advection(v: Tensor, dealias: Tensor) -> Tensor:
-    """Divergence-free part of v x curl(v): the projection takes the gradients away."""
+    """Return the divergence-free part of v x curl(v): the projection takes the gradients away."""
     product = _cross(to_field(v), to_field(curl(v)))
     return project(to_spectrum(product)) * dealias
 
 
 def _cross(a: Tensor, b: Tensor) -> Tensor:
-    """Cross product along the first axis, several times as fast as torch's with that memory layout."""
+    """Return the cross product along the first axis, several times as fast as torch's in this layout."""
     return torch.stack([a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)])
 
 
 def _waves(places: Tensor, k: Tensor) -> Tensor:
-    """exp(i k place), [places, k]."""
+    """Return exp(i k place), [places, k]."""
     phase = places.to(k)[:, None] * k
     return torch.polar(torch.ones_like(phase), phase)
 
 
 def _frequencies(spectrum: Tensor) -> tuple[Tensor, Tensor]:
-    """Wavenumbers along z and y [n], and along x [n // 2 + 1]."""
+    """Return wavenumbers along z and y [n], and along x [n // 2 + 1]."""
     n, real, device = spectrum.shape[-2], spectrum.real.dtype, spectrum.device
     full = torch.fft.fftfreq(n, 1 / n, dtype=real, device=device)
     return full, torch.fft.rfftfreq(n, 1 / n, dtype=real, device=device)

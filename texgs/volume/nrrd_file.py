@@ -15,13 +15,7 @@ from texgs.volume.headers import read_fields
 from texgs.volume.slabs import RawSource
 
 ALIGNMENT = 64  # bytes; where the samples of a canonical file start: cache lines, and any vector type
-TYPES = {
-    "signed char": "int8",
-    "uchar": "uint8",
-    "short": "int16",
-    "ushort": "uint16",
-    "float": "float32",
-}  # NRRD's words for the types that are kept
+WORDS = {"int8": "signed char", "uint8": "uchar", "int16": "short", "uint16": "ushort", "float32": "float"}
 NUMBER = re.compile(r"[-+.\deE]+")
 
 
@@ -38,8 +32,7 @@ def open_grid(path: str | Path) -> Grid:
         source = open_prepared(path)
     except (ArgumentError, ShapeError) as error:
         raise type(error)(f"{path}: {error}") from error
-    values = np.memmap(source.path, source.stored, "r", source.offset, source.dims[::-1])
-    return Grid(values, source.spacing, source.origin)
+    return Grid(source.mapped(), source.spacing, source.origin)
 
 
 def open_prepared(path: Path) -> RawSource:
@@ -52,28 +45,20 @@ def open_prepared(path: Path) -> RawSource:
         nx, ny, nz = map(int, fields["sizes"].split())
         dx, _, _, _, dy, _, _, _, dz = map(float, NUMBER.findall(fields["spacedirections"]))
         x, y, z = map(float, NUMBER.findall(fields["spaceorigin"]))
-        stored = np.dtype(TYPES[fields["type"]]).newbyteorder("<")
+        stored = np.dtype({word: name for name, word in WORDS.items()}[fields["type"]]).newbyteorder("<")
         return RawSource(path, (nx, ny, nz), stored, offset, (dx, dy, dz), (x, y, z))
 
 
 def write_header(file: BinaryIO, dims: Dims, dtype: np.dtype, spacing: Triple, origin: Triple) -> int:
-    """Write the header of a canonical file: raw samples follow, little endian.
+    """Write the header of a canonical file, and return its length, a multiple of `ALIGNMENT` bytes.
 
-    Args:
-        file: at its start.
-        dims: samples along x, y, z.
-        dtype: one of those in `TYPES`.
-        spacing: x, y, z, physical units.
-        origin: x, y, z, physical units.
-
-    Returns:
-        Length of the header in bytes, a multiple of `ALIGNMENT`.
+    Raw samples follow, little endian, of one of the types in `WORDS`.
     """
     dx, dy, dz = spacing
     directions = " ".join(_vector(step) for step in ((dx, 0, 0), (0, dy, 0), (0, 0, dz)))
     lines = [
         "NRRD0004",
-        f"type: {next(word for word, name in TYPES.items() if name == dtype.name)}",
+        f"type: {WORDS[dtype.name]}",
         "dimension: 3",
         "space: 3D-right-handed",
         f"sizes: {dims[0]} {dims[1]} {dims[2]}",
@@ -90,5 +75,5 @@ def write_header(file: BinaryIO, dims: Dims, dtype: np.dtype, spacing: Triple, o
 
 
 def _vector(numbers: Triple) -> str:
-    """Numbers as NRRD writes a vector, exact to the last bit."""
+    """Return numbers as NRRD writes a vector, exact to the last bit."""
     return "(" + ",".join(repr(float(number)) for number in numbers) + ")"

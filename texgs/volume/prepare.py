@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from math import inf
+from dataclasses import dataclass
+from math import inf, prod
 from pathlib import Path
 from typing import BinaryIO
 
@@ -11,19 +12,32 @@ import numpy as np
 
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
-from texgs.volume.blocks import block_count, block_means, block_middles
-from texgs.volume.grid import Dims, Triple
-from texgs.volume.nrrd_file import open_prepared, write_header
-from texgs.volume.orientation import AxisPermutation, permuted_lattice, permuted_values, upright
+from texgs.volume.grid import AxisPermutation, Dims, Triple, permuted_lattice, permuted_values, upright
+from texgs.volume.nrrd_file import WORDS, open_prepared, write_header
 from texgs.volume.slabs import Source, slab_bounds
-from texgs.volume.summary import Summary, summarize
-
-__all__ = ["Summary", "prepare"]
 
 Bounds = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 Progress = Callable[[Iterable[tuple[int, int]], int], Iterable[tuple[int, int]]]
-KEPT_TYPES = ("uint8", "int8", "uint16", "int16", "float32")
-REDUCERS = {"mean": block_means, "sample": block_middles}
+KEPT_TYPES = tuple(WORDS)
+BINS = 256
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Lattice, range and histogram of a prepared volume; plain numbers, ready for JSON."""
+
+    dims: Dims  # x, y, z
+    dtype: str
+    spacing: Triple
+    origin: Triple
+    minimum: float
+    maximum: float
+    histogram: tuple[int, ...]  # counts in 256 equal bins over [minimum, maximum]
+
+    @property
+    def voxels(self) -> int:
+        """Number of samples."""
+        return prod(self.dims)
 
 
 def prepare(
@@ -70,18 +84,20 @@ def prepare(
         raise ArgumentError(f"nan_value: expected a finite float32, got {nan_value}")
     bounds, axes = _bounds(source.dims, crop), upright(up)
     dims, spacing, origin = permuted_lattice(*_reduced_lattice(source, bounds, reduce), axes)
-    dtype = _kept_type(source.dtype)
-    tally = _Tally(source.name)
+    kept = "uint8" if source.dtype.kind == "b" else source.dtype.name
+    dtype = np.dtype(kept if kept in KEPT_TYPES else "float32")
+    tally, ((x0, x1), (y0, y1), (z0, z1)) = _Tally(source.name), bounds
 
     def write(file: BinaryIO) -> None:
         offset = write_header(file, dims, dtype, spacing, origin)
-        steps = slab_bounds(source, *bounds[2], multiple=reduce)
+        steps = slab_bounds(source, z0, z1, multiple=reduce)
         for start, stop in steps if progress is None else progress(steps, len(steps)):
-            block = tally.finite(_read(source, bounds, start, stop), bounds, start, nan_value)
+            slab = source.slices(start, stop)[:, y0:y1, x0:x1]
+            block = tally.finite(slab, (x0, y0, start), nan_value)
             if reduce > 1:
                 block = REDUCERS[method](block, reduce)
             block = tally.extend(_convert(block, dtype, source.name))
-            _write_permuted(file, offset, dims, axes, block, (start - bounds[2][0]) // reduce)
+            _write_permuted(file, offset, dims, axes, block, (start - z0) // reduce)
         tally.check()
 
     write_atomic(target, write)
@@ -95,10 +111,10 @@ class _Tally:
         self.name = name
         self.minimum, self.maximum = inf, -inf
         self.n_bad = 0
-        self.first: tuple[int, int, int] | None = None  # x, y, z of the first bad sample, in the source
+        self.first: tuple[int, ...] = ()  # x, y, z of the first bad sample, in the source
 
-    def finite(self, slab: np.ndarray, bounds: Bounds, start: int, nan_value: float | None) -> np.ndarray:
-        """The slab with NaN and infinity replaced; counts them where no value was chosen."""
+    def finite(self, slab: np.ndarray, start: tuple[int, int, int], nan_value: float | None) -> np.ndarray:
+        """Return the slab with NaN and infinity replaced; count them where no value was chosen."""
         if slab.dtype.kind != "f":
             return slab
         bad = ~np.isfinite(slab)
@@ -106,9 +122,8 @@ class _Tally:
             return slab
         if nan_value is None:
             self.n_bad += int(bad.sum())
-            if self.first is None:
-                z, y, x = (int(place) for place in np.unravel_index(bad.argmax(), bad.shape))
-                self.first = x + bounds[0][0], y + bounds[1][0], z + start
+            place = np.unravel_index(bad.argmax(), bad.shape)
+            self.first = self.first or tuple(int(p) + s for p, s in zip(place[::-1], start, strict=True))
         return np.where(bad, np.float32(nan_value or 0.0), slab)
 
     def extend(self, block: np.ndarray) -> np.ndarray:
@@ -119,7 +134,7 @@ class _Tally:
 
     def check(self) -> None:
         """Refuse a volume with bad samples, or with one value only."""
-        if self.first is not None:
+        if self.first:
             raise ArgumentError(
                 f"{self.name}: expected finite samples, got {self.n_bad} that are NaN or infinite, the first "
                 f"at (x, y, z) = {self.first}; set nan_value to replace them"
@@ -132,7 +147,7 @@ class _Tally:
 
 
 def _bounds(dims: Dims, crop: tuple[int, ...] | None) -> Bounds:
-    """First sample and sample after the last, per axis."""
+    """Return first sample and sample after the last, per axis."""
     if crop is None:
         return (0, dims[0]), (0, dims[1]), (0, dims[2])
     if len(crop) != 6:
@@ -144,10 +159,10 @@ def _bounds(dims: Dims, crop: tuple[int, ...] | None) -> Bounds:
 
 
 def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims, Triple, Triple]:
-    """Dims, spacing and origin after crop and reduction."""
+    """Return dims, spacing and origin after crop and reduction."""
     if reduce < 1:
         raise ArgumentError(f"reduce: expected an integer of at least 1, got {reduce}")
-    nx, ny, nz = (block_count(high - low, reduce) for low, high in bounds)
+    nx, ny, nz = (-(-(high - low) // reduce) for low, high in bounds)
     if min(nx, ny, nz) < 2:
         raise ArgumentError(
             f"{source.name}: expected at least 2 samples along every axis, but crop and reduce leave "
@@ -161,21 +176,30 @@ def _reduced_lattice(source: Source, bounds: Bounds, reduce: int) -> tuple[Dims,
     return (nx, ny, nz), (dx * reduce, dy * reduce, dz * reduce), (x, y, z)
 
 
-def _kept_type(dtype: np.dtype) -> np.dtype:
-    """Sample type in the canonical file, in the byte order of this machine."""
-    if dtype.kind == "b":
-        return np.dtype("uint8")
-    return np.dtype(dtype.name if dtype.name in KEPT_TYPES else "float32")
+def block_means(values: np.ndarray, factor: int) -> np.ndarray:
+    """Return means of blocks of factor^3 samples, float64; incomplete blocks average what there is."""
+    z, y, x = (np.arange(0, size, factor) for size in values.shape)
+    # A row of blocks at a time: its sums stay in the cache, and there is no float copy of the whole.
+    rows = [[values[k : k + factor, j : j + factor].sum(axis=(0, 1), dtype=np.float64) for j in y] for k in z]
+    sums = np.add.reduceat(np.array(rows), x, axis=2)
+    edges = (np.minimum(factor, size - first) for first, size in zip((z, y, x), values.shape, strict=True))
+    return sums / np.einsum("i,j,k->ijk", *edges)
 
 
-def _read(source: Source, bounds: Bounds, start: int, stop: int) -> np.ndarray:
-    """Slab [stop - start, Y, X] within the crop."""
-    (x0, x1), (y0, y1), _ = bounds
-    return source.slices(start, stop)[:, y0:y1, x0:x1]
+def block_middles(values: np.ndarray, factor: int) -> np.ndarray:
+    """Return the sample in the middle of every block (the later of two); for labels, which have no mean."""
+    middles = []
+    for size in values.shape:
+        starts = np.arange(0, size, factor)
+        middles.append(starts + np.minimum(factor, size - starts) // 2)
+    return values[np.ix_(*middles)]
+
+
+REDUCERS = {"mean": block_means, "sample": block_middles}
 
 
 def _convert(block: np.ndarray, dtype: np.dtype, name: str) -> np.ndarray:
-    """The block as the type of the file."""
+    """Return the block as the type of the file."""
     if dtype.kind != "f":
         return (np.rint(block) if block.dtype.kind == "f" else block).astype(dtype, copy=False)
     with np.errstate(over="ignore"):
@@ -199,3 +223,25 @@ def _write_permuted(
     for k, plane in enumerate(permuted_values(block, axes)):
         file.seek(offset + ((z + k) * dims[1] + y) * dims[0] * little.itemsize)
         file.write(np.ascontiguousarray(plane, dtype=little).data)
+
+
+def summarize(source: Source, minimum: float, maximum: float) -> Summary:
+    """Summarize a volume whose range is known; reads it once."""
+    counts = np.zeros(BINS, dtype=np.int64)
+    for start, stop in slab_bounds(source, 0, source.dims[2]):
+        counts += histogram(source.slices(start, stop), minimum, maximum)
+    lattice = (source.dims, source.dtype.name, source.spacing, source.origin)
+    return Summary(*lattice, minimum, maximum, tuple(counts.tolist()))
+
+
+def histogram(values: np.ndarray, minimum: float, maximum: float) -> np.ndarray:
+    """Return counts [256] in equal bins over [minimum, maximum]; the last bin includes its end."""
+    if values.dtype.kind in "iu" and values.dtype.itemsize <= 2:
+        # Counting every level first is ten times as fast.
+        info = np.iinfo(values.dtype)
+        counts = np.bincount(values.ravel().astype(np.intp) - info.min, minlength=info.max - info.min + 1)
+        levels = np.arange(info.min, info.max + 1)
+        return np.histogram(levels, BINS, (minimum, maximum), weights=counts)[0]
+    # There may be fewer than 256 numbers of the samples' type in their range, but not in [0, 1].
+    fractions = (values.astype(np.float64) - minimum) / (float(maximum) - float(minimum))
+    return np.histogram(fractions, BINS, (0, 1))[0]

@@ -1,9 +1,11 @@
-"""Render many views of one volume into files; those already there are kept, so a killed run continues."""
+"""Volume rendering behind one interface, and the views of a volume as files that are made only once."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -12,25 +14,58 @@ import torch
 from numpy.typing import NDArray
 
 from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
 from texgs.core.image import write_png
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.core.progress import progress
-from texgs.volume.appearance import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import View
 
 
-class Mapper(Protocol):
-    """What renders a volume: `Caster` or `VtkMapper`."""
+@dataclass(frozen=True)
+class Appearance:
+    """How a volume looks besides its transfer function: Blinn-Phong factors, and sampling.
+
+    Raises:
+        ArgumentError: if a factor is negative, or a length is not above 0.
+    """
+
+    ambient: float = 0.3
+    diffuse: float = 0.7
+    specular: float = 0.3
+    shininess: float = 20.0
+    step: float = 0.25  # sample distance, voxels of the finest axis
+    opacity_unit: float = 0.005  # length over which a transfer function's opacity applies, world units
+
+    def __post_init__(self) -> None:
+        for name in ("ambient", "diffuse", "specular", "shininess"):
+            if not 0 <= getattr(self, name) < inf:
+                raise ArgumentError(f"{name}: expected at least 0, got {getattr(self, name)}")
+        for name in ("step", "opacity_unit"):
+            if not 0 < getattr(self, name) < inf:
+                raise ArgumentError(f"{name}: expected more than 0, got {getattr(self, name)}")
+
+
+class VolumeRenderer(Protocol):
+    """What renders one volume from any camera: `Caster` or `VtkRenderer`."""
 
     local_viewer: bool  # whether directions to viewer and headlight differ from point to point
 
-    def looking(self, appearance: Appearance) -> Mapper:
-        """The same volume with another shading."""
+    def with_appearance(self, appearance: Appearance) -> VolumeRenderer:
+        """Return a renderer of the same volume with another shading; nothing is read again."""
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
-        """Premultiplied RGBA [H, W, 4] in [0, 1]."""
+        """Return premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""
+
+
+def directions(camera: Camera, light: Light) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return unit vectors [3] to the viewer and to the light: both are distant, the same for all points.
+
+    A headlight shines along the optical axis.
+    """
+    to_viewer = -camera.viewmat.double().cpu().numpy()[2, :3]
+    return to_viewer, to_viewer if light.kind == "headlight" else light.direction(camera).numpy()
 
 
 class Times:
@@ -64,12 +99,16 @@ class Times:
 
 
 def render_views(
-    mapper: Mapper, tf: TransferFunction, views: Sequence[View], title: str, times: Times | None = None
+    renderer: VolumeRenderer,
+    tf: TransferFunction,
+    views: Sequence[View],
+    title: str,
+    times: Times | None = None,
 ) -> None:
-    """Render the views whose files are missing, as PNG with straight alpha.
+    """Render the views whose files are missing, as PNG with straight alpha; so a killed run continues.
 
     Args:
-        mapper: the volume.
+        renderer: of the volume.
         tf: in data values.
         views: cameras, lights and files.
         title: of the progress bar.
@@ -78,7 +117,7 @@ def render_views(
     missing = [view for view in views if not view.path.exists()]
     for view in progress(missing, title=title, unit="view"):
         start = time.perf_counter()
-        picture = mapper.render(tf, view.camera, view.light)
+        picture = renderer.render(tf, view.camera, view.light)
         seconds = time.perf_counter() - start
         if times is not None:
             times.add(view, 1e3 * seconds)  # before the image, which is not rendered again once it is there

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import prod
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.io import reading_as
 from texgs.volume.foreign import open_foreign
-from texgs.volume.grid import Dims, Grid, Triple, check_lattice, dims_of
-from texgs.volume.nifti import open_nifti
-from texgs.volume.slabs import ArraySource, RawSource, Source
+from texgs.volume.grid import (
+    ONES,
+    ZEROS,
+    Dims,
+    Grid,
+    Triple,
+    byte_count,
+    check_lattice,
+    dims_of,
+    require_room,
+)
+from texgs.volume.slabs import ArraySource, RawSource, Source, size_text
 from texgs.volume.tiff import open_tiff, tiffs_in
 
 __all__ = ["ArraySource", "RawSource", "Source", "open_source"]
 
-ONES, ZEROS = (1.0, 1.0, 1.0), (0.0, 0.0, 0.0)
 RAW_SUFFIXES = (".raw", ".bin", ".dat")
 # Tried in this order where the size of a plain file does not fit the type given.
 COMMON_TYPES = ("uint8", "uint16", "float32", "float64")
@@ -63,7 +71,7 @@ def open_source(
     try:
         _try_to_read(path)
         if path.is_file() and _suffix(path) in RAW_SUFFIXES:
-            return open_raw(path, dims, dtype, endian, skip, spacing, origin)
+            return _open_raw(path, dims, dtype, endian, skip, spacing, origin)
         if (dims, dtype, endian, skip) != (None, None, "little", 0):
             raise ArgumentError(
                 f"dims, dtype, endian and skip describe plain samples ({', '.join(RAW_SUFFIXES)}), but this "
@@ -91,7 +99,7 @@ def _try_to_read(path: Path) -> None:
 
 
 def _suffix(path: Path) -> str:
-    """Suffix in lower case; both where a file is compressed as a whole."""
+    """Return the suffix in lower case; both where a file is compressed as a whole."""
     suffixes = [suffix.lower() for suffix in path.suffixes]
     return "".join(suffixes[-2:] if suffixes[-1:] == [".gz"] else suffixes[-1:])
 
@@ -115,7 +123,7 @@ def _open_with_header(
     return opener(path, spacing, origin)
 
 
-def open_raw(
+def _open_raw(
     path: Path,
     dims: Dims | None,
     dtype: str | None,
@@ -136,22 +144,16 @@ def open_raw(
         stored = np.dtype(dtype).newbyteorder("<" if endian == "little" else ">")
     except TypeError as error:
         raise ArgumentError(f"dtype: expected a name such as uint8 or float32, got {dtype!r}") from error
-    check_lattice(dims, stored, spacing or ONES, origin or ZEROS)
+    check_lattice(dims, stored)
     size = path.stat().st_size
-    expected = skip + prod(dims) * stored.itemsize
-    if size != expected:
-        x, y, z = dims
-        skipped = f" + {skip} skipped" if skip else ""
-        fits = [name for name in COMMON_TYPES if size == skip + prod(dims) * np.dtype(name).itemsize]
+    if size != skip + byte_count(dims, stored):
+        fits = [name for name in COMMON_TYPES if size == skip + byte_count(dims, np.dtype(name))]
         advice = f"dtype {fits[0]} would fit" if fits else "correct dims, dtype or skip"
-        raise ArgumentError(
-            f"expected {x} x {y} x {z} x {stored.itemsize} ({stored.name}){skipped} = {expected} bytes, "
-            f"found {size}; {advice}"
-        )
+        raise ArgumentError(f"expected {size_text(dims, stored, skip)}, found {size}; {advice}")
     return RawSource(path, dims, stored, skip, spacing or ONES, origin or ZEROS)
 
 
-def open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+def _open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
     """Open a NumPy array [Z, Y, X]."""
     with reading_as("a .npy file"):
         values = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -163,12 +165,43 @@ def open_npy(path: Path, spacing: Triple | None, origin: Triple | None) -> Sourc
     return ArraySource(Grid(values, *lattice), path.name)
 
 
+def _open_nifti(path: Path, spacing: Triple | None, origin: Triple | None) -> Source:
+    """Open a NIfTI image, its axes permuted and flipped to the closest R, A, S; mapped if uncompressed.
+
+    By nibabel: ITK knows neither NIfTI-2 nor axes that are not at right angles.
+    """
+    import nibabel
+    from nibabel.imageglobals import LoggingOutputSuppressor
+
+    with reading_as("a NIfTI file"), LoggingOutputSuppressor():
+        image = nibabel.load(path)
+        if not isinstance(image, nibabel.Nifti1Image | nibabel.Nifti2Image):
+            raise ArgumentError(f"expected a NIfTI image, got {type(image).__name__}")
+        stored = image.get_data_dtype()
+        if stored.fields:
+            raise ArgumentError(f"expected a scalar volume, got {len(stored.fields)} components per sample")
+        shape = image.shape[:3] + tuple(size for size in image.shape[3:] if size != 1)
+        x, y, z = dims_of(shape)[::-1]
+        check_lattice((x, y, z), stored)
+        turn = nibabel.io_orientation(image.affine)
+        if np.isnan(turn).any():
+            raise ArgumentError("expected three independent axes, got a singular affine matrix")
+        proxy: Any = image.dataobj
+        is_scaled = (proxy.slope, proxy.inter) != (1, 0)
+        require_room((x, y, z), np.dtype(np.float32) if is_scaled else stored)
+        samples = np.asarray(proxy, np.float32) if is_scaled else np.asanyarray(proxy)
+        values = nibabel.apply_orientation(samples.reshape(shape, order="F"), turn)  # [X, Y, Z]
+        affine = image.affine @ nibabel.orientations.inv_ornt_aff(turn, shape)
+    dx, dy, dz = (float(step) for step in nibabel.affines.voxel_sizes(affine))
+    first = (float(affine[0, 3]), float(affine[1, 3]), float(affine[2, 3]))
+    return ArraySource(Grid(values.T, spacing or (dx, dy, dz), origin or first), path.name)
+
+
 # Suffix: function of the path, and of spacing and origin where they replace the file's.
 OPENERS: dict[str, Callable[[Path, Triple | None, Triple | None], Source]] = {
-    ".tif": open_tiff,
-    ".tiff": open_tiff,
-    ".npy": open_npy,
-    **dict.fromkeys((".nii", ".nii.gz"), open_nifti),
+    **dict.fromkeys((".tif", ".tiff"), open_tiff),
+    ".npy": _open_npy,
+    **dict.fromkeys((".nii", ".nii.gz"), _open_nifti),
     **dict.fromkeys((".nrrd", ".nhdr", ".mhd", ".mha", ".mrc", ".gipl"), open_foreign),  # by SimpleITK
     **dict.fromkeys((".vti", ".vtk", ".slc"), open_foreign),  # by VTK
 }

@@ -35,7 +35,7 @@ BELOW = 0.1  # of the foreground's voxels, that makes values below the backgroun
 def suggest(
     histogram: ArrayLike, minimum: float, maximum: float, count: int | None = None
 ) -> dict[str, TransferFunction]:
-    """Propose basic transfer functions with disjoint supports.
+    """Propose basic transfer functions with disjoint supports: TF01, TF02, ... in ascending order of value.
 
     The background, the most frequent value and what is around it, is left out. What remains is cut at the
     valleys of the smoothed log histogram; where it has too few, as in simulations whose histogram only
@@ -48,9 +48,6 @@ def suggest(
         maximum: largest value.
         count: number of functions, fewer where there are fewer values; by default as many as the histogram
             shows, at most 5.
-
-    Returns:
-        TF01, TF02, ... in ascending order of value.
 
     Raises:
         ArgumentError: if the histogram is no list of counts, holds one value only, or count is below 1.
@@ -72,11 +69,12 @@ def suggest(
 
 
 def looks_like_labels(counts: Array) -> bool:
-    """Whether so few bins of a histogram hold voxels that the values are taken for labels."""
+    """Return whether so few bins of a histogram hold voxels that the values are taken for labels."""
     return int(np.count_nonzero(counts)) <= FEW
 
 
 def _checked(histogram: ArrayLike, minimum: float, maximum: float, count: int | None) -> Array:
+    """Return the histogram as counts, once it is one."""
     counts = np.asarray(histogram, dtype=np.float64)
     if counts.ndim != 1 or not np.isfinite(counts).all() or (counts < 0).any() or not minimum < maximum:
         raise ArgumentError(
@@ -91,12 +89,12 @@ def _checked(histogram: ArrayLike, minimum: float, maximum: float, count: int | 
 
 
 def _labels(counts: Array, count: int | None) -> list[Class]:
-    """Every value but the lowest is a class; too many are grouped with their neighbours."""
+    """Return every value but the lowest as a class; too many are grouped with their neighbours."""
     return _divided([(1, len(counts))], np.sqrt(counts), count or MOST)
 
 
 def _materials(counts: Array, count: int | None) -> list[Class]:
-    """The basins of the log histogram, without the background."""
+    """Return the basins of the log histogram, without the background."""
     log = _smooth_log(counts)
     most, dip = count or MOST, DIP
     classes, tails = _classes(counts, log, dip)
@@ -112,7 +110,7 @@ def _materials(counts: Array, count: int | None) -> list[Class]:
 
 
 def _smooth_log(counts: Array) -> Array:
-    """Logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat."""
+    """Return the logarithm of the counts after a Gaussian filter; a floor below the rare keeps noise flat."""
     sigma = SMOOTHING * len(counts)
     radius = round(4 * sigma)
     kernel = np.exp(-0.5 * (np.arange(-radius, radius + 1) / sigma) ** 2)
@@ -121,7 +119,7 @@ def _smooth_log(counts: Array) -> Array:
 
 
 def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[Class]]:
-    """Classes that the histogram shows, and those among them that are only a tail of the background."""
+    """Return classes that the histogram shows, and those that are only a tail of the background."""
     mode = int(counts.argmax())
     basins = list(pairwise([0, *_valleys(log, dip), len(log)]))
     low, high = next(c for c in basins if c[0] <= mode < c[1])
@@ -144,7 +142,7 @@ def _classes(counts: Array, log: Array, dip: float) -> tuple[list[Class], list[C
 
 
 def _valleys(log: Array, dip: float) -> list[int]:
-    """Minima that lie at least `dip` below a maximum on either side."""
+    """Return minima that lie at least `dip` below a maximum on either side."""
     valleys: list[int] = []
     best = 0  # the highest bin since the last valley, or the lowest since the last peak
     falling = False
@@ -163,7 +161,7 @@ def _valleys(log: Array, dip: float) -> list[int]:
 
 
 def _foot(log: Array) -> int:
-    """Where a peak that starts at bin 0 ends: the point farthest below the line to its last bin.
+    """Find where a peak that starts at bin 0 ends: the point farthest below the line to its last bin.
 
     The triangle method (Zack et al. 1977). A peak that falls ever faster ends half way.
     """
@@ -186,7 +184,7 @@ def _divided(classes: Sequence[Class], weights: Array, count: int) -> list[Class
 
 
 def _variance(weights: Array) -> float:
-    """Weighted sum of squared distances from the mean bin."""
+    """Return the weighted sum of squared distances from the mean bin."""
     bins = np.arange(len(weights))
     return float(weights @ (bins - np.average(bins, weights=weights)) ** 2)
 
@@ -194,7 +192,7 @@ def _variance(weights: Array) -> float:
 def _trapezoid(
     low: float, high: float, opacity: float, i: int, data: tuple[float, float]
 ) -> TransferFunction:
-    """Opacity rises over a quarter of the range and falls over another, but not at the ends of the data."""
+    """Let opacity rise over a quarter of the range and fall over another, but not at the ends of the data."""
     ramp = (high - low) / 4
     rise = ((low, opacity),) if low <= data[0] else ((low, 0.0), (low + ramp, opacity))
     fall = ((high, opacity),) if high >= data[1] else ((high - ramp, opacity), (high, 0.0))

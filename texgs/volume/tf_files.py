@@ -33,9 +33,6 @@ def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
         path: the file.
         preset: name of one of ParaView's presets in the file; it may be left out where there is one.
 
-    Returns:
-        The transfer function, in the values of the file.
-
     Raises:
         ArgumentError: if the file is missing, no JSON, of neither format, or holds a wrong point.
     """
@@ -58,13 +55,7 @@ def read_tf(path: str | Path, preset: str | None = None) -> TransferFunction:
 
 
 def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
-    """Write a file of one preset that ParaView imports, colour and opacity, in one step.
-
-    Args:
-        path: the .json to write.
-        tf: steps become ramps a millionth of the range wide.
-        name: the preset's name in ParaView.
-    """
+    """Write a .json of one preset that ParaView imports, colour and opacity; steps become narrow ramps."""
     tf = tf.without_steps()
     # ParaView stretches colour and opacity to the data, each from its own range: give both the same.
     low = min(tf.opacity[0][0], tf.color[0][0])
@@ -79,6 +70,7 @@ def write_paraview(path: str | Path, tf: TransferFunction, name: str) -> Path:
 
 
 def _from_ours(data: dict[str, Any]) -> TransferFunction:
+    """Return the function of a file of ours."""
     if data.get("version") != VERSION:
         raise ArgumentError(
             f"version: expected {VERSION}, got {data.get('version')!r}; update texgs to read this file"
@@ -87,7 +79,7 @@ def _from_ours(data: dict[str, Any]) -> TransferFunction:
 
 
 def _chosen(presets: list[dict[str, Any]], name: str | None) -> dict[str, Any]:
-    """The preset of that name, or the only one."""
+    """Return the preset of that name, or the only one."""
     if name is None and len(presets) == 1:
         return presets[0]
     for preset in presets:
@@ -102,6 +94,7 @@ def _chosen(presets: list[dict[str, Any]], name: str | None) -> dict[str, Any]:
 
 
 def _from_preset(preset: dict[str, Any]) -> TransferFunction:
+    """Return the function of a preset of ParaView."""
     if "RGBPoints" not in preset:
         raise ArgumentError(
             f"preset {preset.get('Name')!r}: expected RGBPoints, got a categorical colour map; choose another"
@@ -123,7 +116,7 @@ def _from_preset(preset: dict[str, Any]) -> TransferFunction:
 
 
 def _fours(preset: dict[str, Any], key: str) -> list[Point]:
-    """A flat list as points of four numbers, sorted by value as ParaView does."""
+    """Return a flat list as points of four numbers, sorted by value as ParaView does."""
     numbers = preset[key]
     if not isinstance(numbers, list) or not all(map(is_number, numbers)):
         raise ArgumentError(f"{key}: expected a list of numbers, got {numbers!r:.60}")
@@ -134,6 +127,7 @@ def _fours(preset: dict[str, Any], key: str) -> list[Point]:
 
 
 def _sampled_color(points: Sequence[Point], space: int, wrap: bool) -> Any:
+    """Return points of colours that are not linear in RGB."""
     from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
 
     function = vtkColorTransferFunction()
@@ -146,6 +140,7 @@ def _sampled_color(points: Sequence[Point], space: int, wrap: bool) -> Any:
 
 
 def _sampled_opacity(nodes: Sequence[Point]) -> Any:
+    """Return points of opacities that have midpoints or sharpnesses."""
     from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
 
     function = vtkPiecewiseFunction()
@@ -157,7 +152,7 @@ def _sampled_opacity(nodes: Sequence[Point]) -> Any:
 
 
 def _sampled(function: Any, values: Sequence[float], channels: int) -> Any:
-    """Points of a VTK function between neighbouring values; at these the limits from inside."""
+    """Return points of a VTK function between neighbouring values; at these the limits from inside."""
     count = max(SAMPLES // len(values), 4)
     points: list[list[float]] = []
     for a, b in pairwise(values):
@@ -172,7 +167,7 @@ def _sampled(function: Any, values: Sequence[float], channels: int) -> Any:
 
 
 def _extended(points: Sequence[tuple[float, ...]], low: float, high: float) -> list[tuple[float, ...]]:
-    """The points with the first and the last continued to the ends of a range."""
+    """Return the points with the first and the last continued to the ends of a range."""
     first = [(low, *points[0][1:])] if points[0][0] > low else []
     last = [(high, *points[-1][1:])] if points[-1][0] < high else []
     return [*first, *points, *last]

@@ -28,20 +28,9 @@ def plot(
     basic: Mapping[str, TransferFunction],
     title: str = "",
 ) -> Path:
-    """Draw basic transfer functions over the volume's histogram as PNG, in one step.
+    """Draw basic transfer functions over a volume's histogram [n] over [minimum, maximum], as PNG.
 
     Opacity is the height of each coloured area; the grey area is the number of voxels, on a log axis.
-
-    Args:
-        path: the PNG to write, 1000 x 450 pixels.
-        histogram: [n] counts of voxels in equal bins over [minimum, maximum].
-        minimum: smallest value of the volume, data units.
-        maximum: largest value.
-        basic: transfer functions by name, in data units.
-        title: line above the plot.
-
-    Returns:
-        The path.
 
     Raises:
         ArgumentError: if the histogram is no list of counts, its range is empty, or the path is not writable.
@@ -61,14 +50,16 @@ def plot(
     voxels.set(yscale="log", ylim=(0.5, max(2 * counts.max(), 1.0)), ylabel="voxels")
     for name, tf in basic.items():
         _draw(opacity, name, tf)
-    low, high = _extent([(minimum, maximum), *(tf.support for tf in basic.values())])
-    opacity.set(xlim=(low, high), xlabel="value", title=words(title))
+    lows, highs = zip((minimum, maximum), *(tf.support for tf in basic.values()), strict=True)
+    low, high = min(lows), max(highs)
+    margin = 0.02 * (high - low)  # so that nothing lies on the frame
+    opacity.set(xlim=(low - margin, high + margin), xlabel="value", title=words(title))
     opacity.set(ylim=(0, 1.12), yticks=np.linspace(0, 1, 6), ylabel="opacity")
     return write_figure(path, figure)
 
 
 def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:
-    """One function: the area below its opacity, filled with its colours, and its name at the top."""
+    """Draw the area below a function's opacity, filled with its colours, and its name at the top."""
     low, high = tf.support
     inner = tf.without_steps()
     points = [value for value, _ in inner.opacity if low < value < high]
@@ -81,10 +72,3 @@ def _draw(axes: Axes, name: str, tf: TransferFunction) -> None:
     axes.imshow(colors, extent=(low, high, 0, 1), aspect="auto", alpha=0.85, zorder=2).set_clip_path(outline)
     center = values[alpha >= alpha.max() - 1e-9].mean()
     axes.text(center, alpha.max() + 0.015, words(name), ha="center", va="bottom", zorder=4)
-
-
-def _extent(ranges: list[tuple[float, float]]) -> tuple[float, float]:
-    """The union of ranges with a margin, so that nothing lies on the frame."""
-    low, high = min(low for low, _ in ranges), max(high for _, high in ranges)
-    margin = 0.02 * (high - low)
-    return low - margin, high + margin

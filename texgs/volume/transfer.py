@@ -1,8 +1,9 @@
-"""Transfer functions: what colour and opacity a scalar value has."""
+"""Transfer functions: what colour and opacity a scalar value has; and basic ones, which share a volume."""
 
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from numbers import Real
 from typing import Any
 
@@ -51,7 +52,7 @@ class TransferFunction:
 
     @property
     def support(self) -> tuple[float, float]:
-        """Smallest closed range of values outside which opacity is 0."""
+        """Return the smallest closed range of values outside which opacity is 0."""
         visible = [i for i, (_, opacity) in enumerate(self.opacity) if opacity > 0]
         if not visible:
             return (0.0, 0.0)
@@ -59,13 +60,9 @@ class TransferFunction:
         return self.opacity[first][0], self.opacity[last][0]
 
     def __call__(self, values: ArrayLike) -> Array:
-        """Colour and opacity of each value.
+        """Return r, g, b and opacity in [0, 1] [..., 4], straight alpha, of values [...] in data units.
 
-        Args:
-            values: [...] in data units; NaN is transparent.
-
-        Returns:
-            [..., 4] r, g, b and opacity in [0, 1], straight alpha.
+        NaN is transparent.
         """
         values = np.asarray(values, dtype=np.float64)
         opacity = right_limit(self.opacity, values)  # [..., 1]
@@ -74,11 +71,7 @@ class TransferFunction:
         return np.nan_to_num(np.concatenate([right_limit(self.color, values), opacity], axis=-1))
 
     def scaled(self, low: float, high: float) -> "TransferFunction":
-        """Map a function given on fractions of the data range to data values: 0 -> low, 1 -> high.
-
-        Raises:
-            ArgumentError: if the range is empty or a point lies outside [0, 1].
-        """
+        """Map a function given on fractions of the data range to data values: 0 -> low, 1 -> high."""
         check_range("range", (low, high))
         for name, points in (("opacity", self.opacity), ("color", self.color)):
             for i, (fraction, *_) in enumerate(points):
@@ -94,14 +87,11 @@ class TransferFunction:
         return TransferFunction(scale(self.opacity), scale(self.color))
 
     def without_steps(self, ramp: float | None = None) -> "TransferFunction":
-        """The same function with strictly ascending points and opacity 0 at both ends.
+        """Return the same function with strictly ascending points and opacity 0 at both ends.
 
         For programs that extend the end points to all values and know no steps, such as VTK. A step becomes
-        a ramp just below its value, so that it still holds at the value.
-
-        Args:
-            ramp: its width, data units; default a millionth of the range of the points. Never more than a
-                quarter of the distance between two points.
+        a ramp just below its value, so that it still holds at the value: as wide as `ramp`, by default a
+        millionth of the range of the points, and never more than a quarter of the distance between two.
         """
         values = np.unique([value for value, *_ in (*self.opacity, *self.color)])
         ramp = 1e-6 * float(values[-1] - values[0]) if ramp is None else ramp
@@ -122,16 +112,12 @@ class TransferFunction:
         return TransferFunction(ramps(opacity), ramps(self.color))
 
     def to_dict(self) -> dict[str, list[list[float]]]:
-        """The points as lists, ready for JSON or YAML."""
+        """Return the points as lists, ready for JSON or YAML."""
         return {"opacity": [list(p) for p in self.opacity], "color": [list(p) for p in self.color]}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> "TransferFunction":
-        """The inverse of `to_dict`.
-
-        Raises:
-            ArgumentError: if a key is missing or unknown, or a point is wrong.
-        """
+        """Return the function of such lists."""
         if not isinstance(data, Mapping) or set(data) != {"opacity", "color"}:
             keys = ", ".join(map(str, data)) if isinstance(data, Mapping) else type(data).__name__
             raise ArgumentError(f"transfer function: expected the keys opacity, color, got {keys or 'none'}")
@@ -152,8 +138,13 @@ def right_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
     return np.clip(np.stack(columns, axis=-1), 0, 1)  # rounding may leave [0, 1]
 
 
+def left_limit(points: Sequence[tuple[float, ...]], values: Array) -> Array:
+    """Interpolate as `right_limit` does, but at a step the first point holds: mirrored, it is the second."""
+    return right_limit([(-value, *rest) for value, *rest in reversed(points)], -values)
+
+
 def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[float, ...], ...]:
-    """Points as tuples of floats, checked one by one."""
+    """Return points as tuples of floats, checked one by one."""
     if not isinstance(points, Iterable):
         raise ArgumentError(f"{name}: expected a list of points (value, {channels}), got {points!r}")
     rows = [tuple(point) if isinstance(point, Iterable) else (point,) for point in points]
@@ -180,5 +171,60 @@ def _points(name: str, points: Any, channels: str, least: int) -> tuple[tuple[fl
 
 
 def row_text(row: Iterable[Any]) -> str:
-    """A point or range as people write it."""
+    """Return a point or range as people write it."""
     return f"({', '.join(f'{x:.9g}' if isinstance(x, float) else repr(x) for x in row)})"
+
+
+def combine(basic: Mapping[str, TransferFunction]) -> TransferFunction:
+    """Return one transfer function that shows what the basic ones show together.
+
+    Raises:
+        ArgumentError: if two of them overlap, or there is none.
+    """
+    if not basic:
+        raise ArgumentError("transfer functions: expected at least one, got none")
+    check_disjoint(basic)
+    opacity: list[tuple[float, ...]] = []
+    color: list[tuple[float, ...]] = []
+    end = 0.0  # of what the functions so far show
+    for tf in sorted(basic.values(), key=lambda each: each.support):
+        low, high = tf.support
+        points = _cut(tf.opacity, low, high)
+        if not opacity or opacity[-1][0] < low:  # transparent between two, also where one ends in a step
+            points = [(low, 0.0), *points] if points[0][1] > 0 else points
+            opacity += [(end, 0.0)] if opacity and opacity[-1][1] > 0 and end < low else []
+        opacity += points
+        end = just_above(high) if tf(high)[3] > 0 else high
+        color += _cut(tf.color, low, high)
+    return TransferFunction(tuple(opacity), tuple(color))  # type: ignore[arg-type]
+
+
+def just_above(value: float) -> float:
+    """Return the next number in single precision: a function whose opacity ends above 0 holds at its end.
+
+    Next to 0 it is one whose difference has a finite inverse, which the caster multiplies with.
+    """
+    single, least = np.float32(value), np.finfo(np.float32).tiny
+    return float(max(np.nextafter(single, np.float32(np.inf)), single + least))
+
+
+def check_disjoint(basic: Mapping[str, TransferFunction]) -> None:
+    """Require that no value is visible in two basic transfer functions; ranges may touch.
+
+    Raises:
+        ArgumentError: naming two that overlap, and where each is visible.
+    """
+    for (name, tf), (other, another) in combinations(basic.items(), 2):
+        one, two = tf.support, another.support
+        if max(one[0], two[0]) < min(one[1], two[1]):
+            raise ArgumentError(
+                f"{name} and {other}: expected ranges of values that do not overlap, got {row_text(one)} and "
+                f"{row_text(two)}; cut one of them"
+            )
+
+
+def _cut(points: Sequence[tuple[float, ...]], low: float, high: float) -> list[tuple[float, ...]]:
+    """Return the points between two values, and the limits at them from inside."""
+    inside = [point for point in points if low < point[0] < high]
+    start, end = right_limit(points, np.array(low)), left_limit(points, np.array(high))
+    return [(low, *start.tolist()), *inside, (high, *end.tolist())]

@@ -1,9 +1,13 @@
-"""Folders of views in the Blender layout: images with their cameras and lights, a training and a test set."""
+"""Folders of views in the Blender layout: images with their cameras and lights, a training and a test set.
+
+Files have OpenGL camera-to-world matrices, and one lens for all frames.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import atan, pi, tan
 from pathlib import Path
 from typing import Any, Literal
 
@@ -15,15 +19,11 @@ from texgs.core.errors import ArgumentError
 from texgs.core.image import open_picture, read_rgba
 from texgs.core.io import read_json, reading_as, write_json
 from texgs.core.light import Light
-from texgs.core.names import named_file
-from texgs.volume.transforms import (
-    LENS_KEYS,
-    camera_to_world,
-    lens_matrix,
-    lens_values,
-    number,
-    world_to_camera,
-)
+from texgs.core.names import is_number, named_file
+
+LENS_KEYS = ("camera_angle_x", "w", "h", "fl_x", "fl_y", "cx", "cy")
+OPENCV_FROM_OPENGL = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # its own inverse
+RIGID = 1e-4  # entries of R^T R may differ from the identity by this much
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class View:
     light: Light
 
     def load(self) -> Tensor:
-        """The pixels as stored: [H, W, 4] uint8, straight alpha; see `read_rgba`."""
+        """Return the pixels as stored: [H, W, 4] uint8, straight alpha."""
         return torch.from_numpy(read_rgba(self.path))
 
 
@@ -80,9 +80,6 @@ def write_transforms(
         views: at least one; all of one size and lens.
         metadata: further keys of the top level, such as volume, tf, aabb and shading.
 
-    Returns:
-        Path of the file.
-
     Raises:
         ArgumentError: if views differ in size or lens, an image is no PNG file in `folder`, or `metadata`
             has a key of the layout.
@@ -95,8 +92,8 @@ def write_transforms(
         raise ArgumentError(
             f"metadata: {', '.join(taken)} would overwrite what the views say; choose other keys"
         )
-    lens = lens_values(views[0].camera)
-    if other := next((view for view in views if lens_values(view.camera) != lens), None):
+    lens = _lens_values(views[0].camera)
+    if other := next((view for view in views if _lens_values(view.camera) != lens), None):
         raise ArgumentError(
             f"{other.path}: expected the size and lens of {views[0].path}; other lenses need another folder"
         )
@@ -105,7 +102,7 @@ def write_transforms(
 
 
 def _frame(folder: Path, view: View) -> dict[str, Any]:
-    """One entry of the list of frames."""
+    """Return one entry of the list of frames."""
     if not view.path.is_relative_to(folder) or view.path.suffix != ".png":
         raise ArgumentError(f"{view.path}: expected a .png file in {folder}")
     light: dict[str, Any] = {"kind": view.light.kind}
@@ -119,42 +116,41 @@ def _frame(folder: Path, view: View) -> dict[str, Any]:
 
 
 def _read_split(path: Path) -> tuple[list[View], dict[str, Any]]:
-    """Views and metadata of one transforms_*.json."""
+    """Read views and metadata of one transforms_*.json."""
     with reading_as("cameras of views", where=f"{path}: "):
-        return _split_of(path, read_json(path))
-
-
-def _split_of(path: Path, values: Any) -> tuple[list[View], dict[str, Any]]:
-    """The same, from the values of the file."""
-    frames = values.pop("frames", None) if isinstance(values, dict) else None
-    if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
-        raise ArgumentError(f"{path}: expected an object with a list of frames, at least one; found none")
-    images = [_image_path(path, index, frame) for index, frame in enumerate(frames)]
-    if missing := [image for image in images if not image.is_file()]:
-        raise ArgumentError(
-            f"{missing[0]}: no such image, of {len(missing)} missing of the {len(images)} in {path.name}; "
-            "copy them there"
-        )
-    width, height = _size(path, values, images)
-    K = lens_matrix(str(path), values, width, height)
-    views = []
-    for index, (frame, image) in enumerate(zip(frames, images, strict=True)):
-        where = f"{path}: frame {index} ({image.stem})"
-        viewmat = world_to_camera(where, frame.get("transform_matrix"))
-        views.append(View(Camera(viewmat.float(), K, width, height), image, _light(where, frame)))
-    return views, {key: value for key, value in values.items() if key not in LENS_KEYS}
+        values = read_json(path)
+        frames = values.pop("frames", None) if isinstance(values, dict) else None
+        if not isinstance(frames, list) or not frames or not all(isinstance(frame, dict) for frame in frames):
+            raise ArgumentError(f"{path}: expected an object with a list of frames, at least one; found none")
+        images = [_image_path(path, index, frame) for index, frame in enumerate(frames)]
+        if missing := [image for image in images if not image.is_file()]:
+            raise ArgumentError(
+                f"{missing[0]}: no such image, of {len(missing)} missing of the {len(images)} in "
+                f"{path.name}; copy them there"
+            )
+        width, height = _size(path, values, images)
+        K = _lens_matrix(str(path), values, width, height)
+        views = []
+        for index, (frame, image) in enumerate(zip(frames, images, strict=True)):
+            where = f"{path}: frame {index} ({image.stem})"
+            viewmat = world_to_camera(where, frame.get("transform_matrix"))
+            views.append(View(Camera(viewmat.float(), K, width, height), image, _light(where, frame)))
+        return views, {key: value for key, value in values.items() if key not in LENS_KEYS}
 
 
 def _image_path(path: Path, index: int, frame: Mapping[str, Any]) -> Path:
-    """Image of a frame; the layout leaves out the extension."""
+    """Return the image of a frame; the layout leaves out the extension."""
     image = named_file(f"{path}: frame {index}: file_path", path.parent, frame.get("file_path"), "an image")
     return image if image.suffix == ".png" else image.with_name(f"{image.name}.png")
 
 
 def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tuple[int, int]:
-    """Width and height that the file states, or of its first image; all images have it."""
-    sizes = [_png_size(image) for image in images]
-    stated = ("w" in values or "h" in values) and tuple(number(str(path), values, key) for key in ("w", "h"))
+    """Return width and height that the file states, or those of its first image; all have them."""
+    sizes = []
+    for image in images:
+        with open_picture(image) as picture:
+            sizes.append(picture.size)
+    stated = ("w" in values or "h" in values) and tuple(_number(str(path), values, key) for key in ("w", "h"))
     size = stated or sizes[0]
     for image, actual in zip(images, sizes, strict=True):
         if actual != size:
@@ -165,17 +161,87 @@ def _size(path: Path, values: Mapping[str, Any], images: Sequence[Path]) -> tupl
     return sizes[0]
 
 
-def _png_size(image: Path) -> tuple[int, int]:
-    """Width and height from the file's header."""
-    with open_picture(image) as picture:
-        return picture.size
-
-
 def _light(where: str, frame: Mapping[str, Any]) -> Light:
-    """Light of a frame."""
+    """Return the light of a frame."""
     light = frame.get("light", {"kind": "headlight"})
     if not isinstance(light, dict) or light.get("kind") not in ("headlight", "directional"):
         raise ArgumentError(f"{where}: light: expected the kind headlight or directional, got {light!r}")
     if light["kind"] == "headlight":
         return Light("headlight")
-    return Light("directional", number(where, light, "azimuth"), number(where, light, "polar"))
+    return Light("directional", _number(where, light, "azimuth"), _number(where, light, "polar"))
+
+
+def camera_to_world(viewmat: Tensor) -> Tensor:
+    """Return the camera-to-world matrix [4, 4] with OpenGL axes (y up, z back), float64."""
+    return torch.linalg.inv(viewmat.double()) @ OPENCV_FROM_OPENGL.to(viewmat.device)
+
+
+def world_to_camera(where: str, matrix: Any) -> Tensor:
+    """Return the world-to-camera matrix [4, 4] with OpenCV axes, float64, of a frame's `transform_matrix`.
+
+    Args:
+        where: file and frame, for messages.
+        matrix: four rows of four numbers; the last row is taken as 0 0 0 1.
+    """
+    try:
+        rigid = torch.tensor(matrix, dtype=torch.float64)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ArgumentError(f"{where}: transform_matrix: expected four rows of four numbers") from error
+    if rigid.shape != (4, 4):
+        raise ArgumentError(
+            f"{where}: transform_matrix: expected four rows of four numbers, got shape {list(rigid.shape)}"
+        )
+    rigid[3] = torch.tensor([0.0, 0.0, 0.0, 1.0])
+    R_wc = rigid[:3, :3]
+    defect = float((R_wc.T @ R_wc - torch.eye(3, dtype=torch.float64)).abs().max())
+    # Written so that NaN is refused as well.
+    if not (defect < RIGID and bool(rigid.isfinite().all()) and float(torch.linalg.det(R_wc)) > 0):
+        raise ArgumentError(
+            f"{where}: transform_matrix: expected a rotation and a position, got a matrix that is singular, "
+            "scaled, mirrored or not finite"
+        )
+    return torch.linalg.inv(rigid @ OPENCV_FROM_OPENGL)
+
+
+def _lens_values(camera: Camera) -> dict[str, float]:
+    """Return what the file says about size (pixels), focal lengths and principal point."""
+    K = camera.K.tolist()
+    return {
+        "camera_angle_x": 2 * atan(0.5 * camera.width / K[0][0]),
+        "w": camera.width,
+        "h": camera.height,
+        "fl_x": K[0][0],
+        "fl_y": K[1][1],
+        "cx": K[0][2],
+        "cy": K[1][2],
+    }
+
+
+def _lens_matrix(where: str, values: Mapping[str, Any], width: int, height: int) -> Tensor:
+    """Return K [3, 3], float32, from the top level of the file.
+
+    Focal lengths default to `camera_angle_x` (horizontal, radians) and square pixels, the principal point
+    to the middle.
+    """
+    if "fl_x" in values:
+        focal_x = _number(where, values, "fl_x")
+    else:
+        angle = _number(where, values, "camera_angle_x")
+        if not 0 < angle < pi:
+            raise ArgumentError(f"{where}: camera_angle_x: expected radians between 0 and pi, got {angle}")
+        focal_x = 0.5 * width / tan(0.5 * angle)
+    focal_y = _number(where, values, "fl_y", focal_x)
+    if not min(focal_x, focal_y) > 0:
+        raise ArgumentError(f"{where}: expected focal lengths above 0, got {focal_x} and {focal_y}")
+    cx, cy = _number(where, values, "cx", 0.5 * width), _number(where, values, "cy", 0.5 * height)
+    return torch.tensor([[focal_x, 0.0, cx], [0.0, focal_y, cy], [0.0, 0.0, 1.0]])
+
+
+def _number(where: str, values: Mapping[str, Any], key: str, default: float | None = None) -> float:
+    """Return the finite number at `key`."""
+    value = values.get(key, default)
+    if value is None:
+        raise ArgumentError(f"{where}: expected the key {key}, found {', '.join(values) or 'no keys'}")
+    if not is_number(value):
+        raise ArgumentError(f"{where}: {key}: expected a finite number, got {value!r:.100}")
+    return value

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -40,41 +41,35 @@ def read_vtk(path: Path) -> tuple[dict[str, Any], np.ndarray]:
         raise ArgumentError(
             f"expected image data of {list(shape)}, got {values.size} samples; is it damaged?"
         )
-    samples = np.asarray(values).reshape(shape)
     first = [0.0, 0.0, 0.0]
     image.TransformIndexToPhysicalPoint(list(image.extent[::2]), first)
     said = {
-        "dims": dims_of(samples.shape),
-        "dtype": samples.dtype.name,
+        "dims": dims_of(shape),
+        "dtype": values.dtype.name,
         "spacing": image.spacing,
         "origin": first,
         "directions": image.direction_matrix.T.tolist(),
     }
-    return said, samples
+    return said, np.asarray(values).reshape(shape)
 
 
 def check_claim(reader: Any) -> None:
     """Require that what a header claims fits into memory; only headers of XML are read before samples."""
     information = reader.GetOutputInformation(0)
     if information is not None and information.Has(Pipeline.WHOLE_EXTENT()):
-        extent = information.Get(Pipeline.WHOLE_EXTENT())
-        sizes = [int(high) - int(low) + 1 for low, high in zip(extent[::2], extent[1::2], strict=True)]
-        if min(sizes) > 0:
-            require_room((sizes[0], sizes[1], sizes[2]), np.dtype(np.uint8))  # a byte each at least
+        extent = np.array(information.Get(Pipeline.WHOLE_EXTENT()), np.int64)
+        x, y, z = (extent[1::2] - extent[::2] + 1).tolist()
+        if min(x, y, z) > 0:
+            require_room((x, y, z), np.dtype(np.uint8))  # a byte each at least
 
 
 def first_message(window: Any) -> str:
-    """Return the first error or warning that VTK has printed instead of raising it; empty for none."""
+    """Return the first error or warning that VTK has printed instead of raising it; empty for none.
+
+    Without the place in VTK's source, and the address of the object.
+    """
     output = window.GetOutput()  # bytes where a damaged file is quoted that is no text
     text = output.decode(errors="replace") if isinstance(output, bytes) else output
-    return next((sentence(message) for message in text.split("\n\n") if message.strip()), "")
-
-
-def sentence(text: str) -> str:
-    """Return a message without the place in VTK's source and the address of the object."""
-    lines = [
-        line
-        for line in text.strip().splitlines()
-        if not line.startswith(("ERROR: In", "Warning: In", "Generic Warning: In"))
-    ]
+    message = next((message for message in text.split("\n\n") if message.strip()), "").strip()
+    lines = [line for line in message.splitlines() if not re.match(r"(ERROR|(Generic )?Warning): In", line)]
     return " ".join(lines).split("): ", 1)[-1].strip(" .!")

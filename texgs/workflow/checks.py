@@ -124,8 +124,7 @@ def check_basic_tfs(dataset: Any) -> None:
     Raises:
         ArgumentError: naming the basic TF, or the two that overlap.
     """
-    from texgs.volume.basic_tfs import check_disjoint
-    from texgs.volume.transfer import TransferFunction
+    from texgs.volume.transfer import TransferFunction, check_disjoint
 
     basic = {}
     for name, points in dataset.basic_tfs.items():

@@ -87,7 +87,7 @@ def stylist(
     from texgs.edit.stylize import stylize
     from texgs.models.clip import Clip
     from texgs.models.vgg import Vgg
-    from texgs.volume.reduced import smaller
+    from texgs.volume.images import smaller
 
     vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
     network = Clip.load(task.settings.clip, task.device) if recipe.needs_clip else None

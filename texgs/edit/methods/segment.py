@@ -88,7 +88,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
 def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
     """Cameras of the views that vote on a model."""
     from texgs.volume.cameras import icosphere_of
-    from texgs.volume.reduced import smaller
+    from texgs.volume.images import smaller
 
     if task.settings.voters == "training":
         cameras = [smaller(view.camera, task.reduce) for view in task.training_views(model)]
@@ -148,7 +148,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
 
 def check(settings: SegmentKeys) -> None:
     """Require a name, clicks, and a number of views that an icosphere has."""
-    from texgs.volume.geodesic import frequency_of
+    from texgs.volume.cameras import frequency_of
 
     require_name(settings.name, "edit.segment.name")
     places_of(settings)

@@ -28,7 +28,7 @@ class StyleSplatKeys(FeatureKeys):
 def run(task: Task[StyleSplatKeys]) -> EditedScene:
     """Give the models the style; write style.png."""
     from texgs.edit.gaussian_style import stylize_gaussians
-    from texgs.volume.reduced import smaller
+    from texgs.volume.images import smaller
 
     recipe, look = recipe_of(task.settings, task.edit.seed), style.Look.of(task)
 

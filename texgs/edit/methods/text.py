@@ -44,7 +44,7 @@ def run(task: Task[TextKeys]) -> EditedScene:
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.fields.surfels.texels import untextured
-    from texgs.volume.reduced import smaller
+    from texgs.volume.images import smaller
 
     settings, guidance = task.settings, task.settings.opened(task.device)
     rows: dict[str, list[np.ndarray]] = {}

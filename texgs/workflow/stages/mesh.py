@@ -50,7 +50,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.metrics.surface import compare, sample, seen
     from texgs.report.mesh_figure import write_mesh_figure
     from texgs.scene.mesh import fuse, write_mesh
-    from texgs.volume.reduced import smaller
+    from texgs.volume.images import smaller
     from texgs.volume.view_set import read_views
 
     keys, views = settings.mesh, read_views(inputs["views"].parent)

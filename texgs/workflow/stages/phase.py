@@ -95,7 +95,7 @@ class FitJob:
         import torch
 
         from texgs.fit import checkpoint
-        from texgs.volume.reduced import smaller
+        from texgs.volume.images import smaller
 
         camera = smaller(self.views.train[0].camera, self.fit.reduce)
         scores: dict[str, Any] = {}

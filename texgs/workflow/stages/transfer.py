@@ -37,9 +37,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     import numpy as np
 
     from texgs.core.io import read_json
-    from texgs.volume.basic_tfs import check_disjoint
     from texgs.volume.tf_files import write_paraview
     from texgs.volume.tf_plot import plot
+    from texgs.volume.transfer import check_disjoint
 
     basic = basic_tfs_of(inputs["volume"], settings.basic_tfs, settings.tf_values)
     summary = read_json(inputs["volume"].with_name("volume.json"))

@@ -24,10 +24,9 @@ from texgs.workflow.stages.settings import OfTF, basic_tfs_of
 
 if TYPE_CHECKING:
     from texgs.core.camera import Camera
-    from texgs.volume.appearance import Appearance
     from texgs.volume.caster import Caster
     from texgs.volume.grid import Grid
-    from texgs.volume.render import Mapper, Times
+    from texgs.volume.render import Appearance, Times, VolumeRenderer
     from texgs.volume.transfer import TransferFunction
     from texgs.volume.view_set import View
 
@@ -61,41 +60,41 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     grid = open_grid(inputs["volume"])
     (tf,) = basic_tfs_of(inputs["volume"], {settings.tf: settings.points}, settings.tf_values).values()
     appearance = appearance_of(views)
-    mapper = mapper_for(views.mapper, grid, appearance)
+    renderer = renderer_for(views.mapper, grid, appearance)
     times, coverages = Times(output / TIMES), []
     shots = {split: views_of(views, split, output) for split in SPLITS}
     for split, shot in shots.items():
-        render_views(mapper, tf, shot, f"{title}: {split} views", times)
+        render_views(renderer, tf, shot, f"{title}: {split} views", times)
         coverages += [float((view.load()[..., 3] > 0).float().mean()) for view in shot]
         if not any(coverages):  # the training views come first
             raise ArgumentError(
                 f"basic TF {title}: expected to see something, but all views are empty; raise its opacity"
             )
-    turntable(mapper, tf, views, output, title)
+    turntable(renderer, tf, views, output, title)
     if views.geometry:
-        caster = mapper if isinstance(mapper, Caster) else Caster(grid, appearance)
+        caster = renderer if isinstance(renderer, Caster) else Caster(grid, appearance)
         write_geometry(caster, tf, shots["test"], output / "geometry", title)
     for split, shot in shots.items():
-        write_transforms(output, split, shot, describe(settings, tf, grid, mapper))
+        write_transforms(output, split, shot, describe(settings, tf, grid, renderer))
     return Outcome(result_of(shots, times, coverages), {"turntable.png": "One turn around the volume."})
 
 
 def appearance_of(views: ViewKeys) -> Appearance:
     """Return how the volume looks in views."""
-    from texgs.volume.appearance import Appearance
+    from texgs.volume.render import Appearance
 
     return Appearance(**asdict(views.shading), step=views.step, opacity_unit=views.opacity_unit)
 
 
-def mapper_for(kind: str, grid: Grid, appearance: Appearance) -> Mapper:
+def renderer_for(kind: str, grid: Grid, appearance: Appearance) -> VolumeRenderer:
     """Return the caster on the CPU or a GPU, or VTK."""
     from texgs.core.check import torch_device
     from texgs.volume.caster import Caster
 
     if kind == "vtk":
-        from texgs.volume.vtk_mapper import VtkMapper
+        from texgs.volume.vtk_renderer import VtkRenderer
 
-        return VtkMapper(grid, appearance)
+        return VtkRenderer(grid, appearance)
     return Caster(grid, appearance, torch_device("cuda" if kind == "gpu" else "cpu"))
 
 
@@ -127,7 +126,9 @@ def views_of(views: ViewKeys, split: Literal["train", "test"], output: Path) -> 
     ]
 
 
-def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Path, title: str) -> None:
+def turntable(
+    renderer: VolumeRenderer, tf: TransferFunction, views: ViewKeys, output: Path, title: str
+) -> None:
     """Write turntable.png, an animation of one turn under a headlight."""
     from PIL.Image import fromarray
 
@@ -144,7 +145,7 @@ def turntable(mapper: Mapper, tf: TransferFunction, views: ViewKeys, output: Pat
         View(camera, output / "turntable" / f"r_{index:04}.png", Light("headlight"))
         for index, camera in enumerate(around)
     ]
-    render_views(mapper, tf, shot, f"{title}: turntable")
+    render_views(renderer, tf, shot, f"{title}: turntable")
     write_animation(output / "turntable.png", [fromarray(view.load().numpy()) for view in shot])
 
 
@@ -165,14 +166,16 @@ def write_geometry(caster: Caster, tf: TransferFunction, shot: list[View], folde
         write_atomic(path, write)
 
 
-def describe(settings: Settings, tf: TransferFunction, grid: Grid, mapper: Mapper) -> dict[str, Any]:
+def describe(
+    settings: Settings, tf: TransferFunction, grid: Grid, renderer: VolumeRenderer
+) -> dict[str, Any]:
     """Return what transforms_*.json says about the images beside cameras and lights."""
     views = settings.views
     return {
         "volume": settings.dataset,
         "tf": {"name": settings.tf, **tf.to_dict()},
         "aabb": [list(corner) for corner in grid.aabb],
-        "shading": {"model": "blinn-phong", "local_viewer": mapper.local_viewer, **asdict(views.shading)},
+        "shading": {"model": "blinn-phong", "local_viewer": renderer.local_viewer, **asdict(views.shading)},
         "mapper": views.mapper,
         "step": views.step,
         "opacity_unit": views.opacity_unit,

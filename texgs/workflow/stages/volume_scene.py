@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.workflow.stages.settings import OfScene, basic_tfs_of
-from texgs.workflow.stages.views import appearance_of, mapper_for
+from texgs.workflow.stages.views import appearance_of, renderer_for
 
 if TYPE_CHECKING:
     import numpy as np
@@ -34,7 +34,7 @@ class VolumeScene:
         self.tfs = basic_tfs_of(volume, settings.basic_tfs, settings.tf_values)
         self.grid = open_grid(volume)
         self.look = appearance_of(settings.views)
-        self._mapper = mapper_for(settings.views.mapper, self.grid, self.look)
+        self._renderer = renderer_for(settings.views.mapper, self.grid, self.look)
 
     def render(self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]) -> np.ndarray:
         """Return premultiplied RGBA [H, W, 4] of the basic TFs of a scene's visible models, with their edits.
@@ -50,7 +50,7 @@ class VolumeScene:
         import numpy as np
 
         from texgs.raster.shading import MATERIAL
-        from texgs.volume.basic_tfs import combine
+        from texgs.volume.transfer import combine
 
         edits = [(name, model.edit) for name, model in scene.models.items()]
         shown, factors = {}, list[dict[str, float]]()
@@ -60,8 +60,8 @@ class VolumeScene:
                 factors.append({key: getattr(self.look, key) * getattr(edit, key) for key in MATERIAL})
         if not shown:
             return np.zeros((camera.height, camera.width, 4), dtype=np.float32)
-        self._mapper = self._mapper.looking(replace(self.look, **factors[0]))
-        return self._mapper.render(combine(shown), camera, scene.light)
+        self._renderer = self._renderer.with_appearance(replace(self.look, **factors[0]))
+        return self._renderer.render(combine(shown), camera, scene.light)
 
     def over_background(
         self, camera: Camera, scene: Scene, palettes: Sequence[tuple[float, ...]]
