@@ -128,7 +128,7 @@ def complaints_raised() -> Iterator[None]:
     """Raise what tifffile only logs: lost pages, for one. Warnings are about metadata and are dropped."""
     records: list[logging.LogRecord] = []
     collector = logging.Handler(logging.WARNING)
-    collector.emit = records.append  # type: ignore[method-assign]
+    collector.emit = records.append  # type: ignore[assignment,method-assign]
     logger = logging.getLogger("tifffile")
     propagates, logger.propagate = logger.propagate, False
     logger.addHandler(collector)

@@ -9,6 +9,7 @@ import os
 from copy import copy
 from dataclasses import replace
 from math import atan, degrees
+from typing import Any, cast
 
 import numpy as np
 import pyvista
@@ -60,7 +61,7 @@ class VtkRenderer:
         mapper.SetMaxMemoryInBytes(2**40)  # the driver knows better
         self._volume = vtkVolume()
         self._volume.SetMapper(mapper)
-        self._plotter = pyvista.Plotter(off_screen=True, lighting="none")
+        self._plotter = cast(Any, pyvista.Plotter(off_screen=True, lighting="none"))
         self._plotter.set_background("black")  # colour over black is premultiplied colour
         self._plotter.ren_win.SetMultiSamples(0)
         use_float_buffers(self._plotter.ren_win)
