@@ -9,7 +9,7 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
 from texgs.fields.files import open_field
-from texgs.fields.gaussians.composition import JoinedGaussians
+from texgs.fields.gaussians.model import JoinedGaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.scene.scene_file import read_scene
 

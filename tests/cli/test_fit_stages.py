@@ -108,7 +108,7 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
     def interrupted(fit):
         for done in run(fit):
             yield done
-            if done.iteration == 50:
+            if done == 50:
                 raise KeyboardInterrupt
 
     monkeypatch.setattr(checkpoint, "SAVED_EVERY", 0.0)

@@ -13,9 +13,9 @@ from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.test_composition import ball
 from tests.scene.balls import write_balls
 from texgs.cli.main import main
-from texgs.fields.gaussians.model_file import write_gaussians
+from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import write_texture
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment

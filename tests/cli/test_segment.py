@@ -13,7 +13,7 @@ from tests.edit.test_lift import pixel_of
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import write_texture
 from texgs.fit.texels import textured
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene

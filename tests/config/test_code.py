@@ -87,7 +87,7 @@ def test_stages_exist_and_differ():
     ("changed", "stages"),
     [
         ("texgs.fields.surfels.composition", {"compose", "timing", "edit_text", "edit_metrics"}),
-        ("texgs.fields.gaussians.composition", set()),
+        ("texgs.fields.gaussians.model", set()),
         ("texgs.edit.methods.text", {"edit_text", "edit_metrics"}),
     ],
 )

@@ -11,7 +11,7 @@ from tests.fields.surfels.samples import sample
 from tests.fields.voxels.test_voxels import ball
 from texgs.core.errors import ArgumentError
 from texgs.core.tensor_file import DTYPES, read_tensor_file, write_tensor_file, write_tensors
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import write_texture
 from texgs.fields.voxels.file import write_voxels
 from texgs.fields.voxels.model import Voxels
 from texgs.scene.segment_file import write_segment

@@ -4,7 +4,8 @@ import torch
 from kornia.geometry.conversions import rotation_matrix_to_quaternion
 from torch.nn.functional import normalize
 
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.raster import rasterize
 from texgs.volume.cameras import icosphere

@@ -8,7 +8,7 @@ from texgs.core.errors import ArgumentError
 from texgs.edit.parts import ScenePart, edit_parts, parts_with_surfels, surfels_of
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.segment import labels_of
+from texgs.fields.surfels.variants import labels_of
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.segment_file import write_segment
 

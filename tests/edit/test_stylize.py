@@ -12,8 +12,8 @@ from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import pixel_side, start_colors
 from texgs.edit.stylize import stylize
 from texgs.fields.part_edit import PartEdit
+from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.composition import Composition
-from texgs.fields.surfels.groups import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import owners
 from texgs.models.vgg import Vgg

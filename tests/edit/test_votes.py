@@ -6,7 +6,7 @@ from torch.nn.functional import interpolate
 
 from tests.edit.lift_scenes import cameras, nested, overlap, truth, two_balls
 from texgs.edit.votes import CentreVotes, ContributionVotes
-from texgs.fields.surfels.model import geometry
+from texgs.fields.splats import geometry
 from texgs.raster import Options
 from texgs.raster.reference import rasterize as reference
 

@@ -85,7 +85,7 @@ def new_fit(images=None, parameters=None, seed=0, **options):
 def run(fit, iterations=None):
     """Iterate, to the end unless told; return the fit."""
     for done in fit.run():
-        if done.iteration == iterations:
+        if done == iterations:
             break
     return fit
 

@@ -78,7 +78,7 @@ def test_an_interrupted_fit_goes_on_to_the_same_bits(tmp_path):
 
 def test_the_part_of_a_view_that_is_fitted_shows_all_gaussians(tmp_path):
     """The box of surfels is as good for Gaussians, whose filter is wider."""
-    from texgs.fields.bounds import screen_box
+    from texgs.fields.splats import screen_box
 
     for seed in range(20):
         generator = torch.Generator().manual_seed(seed)

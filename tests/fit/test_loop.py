@@ -4,14 +4,14 @@ import torch
 from texgs.core.camera import Camera, look_at, orbit
 from texgs.core.errors import FitError
 from texgs.core.image import write_png
-from texgs.fields.harmonics import split, zeroth
+from texgs.fields.splats import split, zeroth
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
 from texgs.fit import checkpoint
-from texgs.fit.loop import CHECKED_EVERY
+from texgs.fit.checkpoint import CHECKED_EVERY
 from texgs.fit.rates import extent
 from texgs.fit.seeds import seed_surfels
-from texgs.fit.settings import Densify, Losses, Rates
+from texgs.fit.settings import Densify, Losses, Rates, Seeds
 from texgs.metrics.quality import evaluate, mean
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import load
@@ -112,10 +112,11 @@ def test_a_rate_of_zero_keeps_a_parameter():
 
 
 def test_progress_is_told_after_every_iteration():
-    steps = list(new_fit(iterations=CHECKED_EVERY + 5, densify=Densify(stop=0)).run())
-    assert [done.iteration for done in steps] == list(range(1, CHECKED_EVERY + 6))
-    assert [done.iteration for done in steps if done.loss is not None] == [CHECKED_EVERY, CHECKED_EVERY + 5]
-    assert all(done.n_surfels == 80 for done in steps)
+    fit, losses = new_fit(iterations=CHECKED_EVERY + 5, densify=Densify(stop=0)), {}
+    for iteration, done in enumerate(fit.run(), 1):
+        assert iteration == done
+        losses.setdefault(len(fit.losses), done)
+    assert losses == {0: 1, 1: CHECKED_EVERY, 2: CHECKED_EVERY + 5}
 
 
 def test_the_extent_is_that_of_the_cameras_or_four_times_that_of_the_surfels():
@@ -172,7 +173,7 @@ def test_views_without_alpha_fit_from_files(tmp_path):
     write_transforms(tmp_path, "train", views, {"aabb": [[-0.4] * 3, [0.4] * 3]})
     view_set = read_views(tmp_path)
     images = load(view_set.train)
-    parameters, colors = seed_surfels(images, view_set, "auto", 80, 0.1, 0.55, 0)
+    parameters, colors = seed_surfels(images, view_set, Seeds(count=80, half_size=0.55), 0)
     start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
     fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
     assert is_finite(fit.state())
@@ -184,7 +185,9 @@ def test_cameras_inside_of_the_object_fit(tmp_path):
     targets = torch.tensor([[1.0, 0, 0], [0, 0, 1.0], [-1.0, 0, 0.1], [0.1, 0, -1.0]])
     views = [Camera(look_at(0.02 * t, t), K, SIZE, SIZE) for t in targets]
     images = flat_images([0.2, 0.5, 0.9], 1.0, views=views)
-    parameters, colors = seed_surfels(images, ViewSet(tmp_path, [], [], {}), "auto", 150, 0.1, 0.55, 0)
+    parameters, colors = seed_surfels(
+        images, ViewSet(tmp_path, [], [], {}), Seeds(count=150, half_size=0.55), 0
+    )
     start = {**parameters, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20, "bounded")}
     fit = run(new_fit(images=images, parameters=start, iterations=150, densify=DENSIFY))
     assert is_finite(fit.state())

@@ -5,7 +5,7 @@ import torch
 from torch.testing import assert_close
 
 from tests.fit.scenes import ball_images, ball_seeds, cameras, images_of, random_surfels
-from texgs.fields.bounds import visible_part
+from texgs.fields.splats import visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.losses import view_loss

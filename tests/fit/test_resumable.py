@@ -7,30 +7,26 @@ import torch
 
 from texgs.core.progress import curve_logger
 from texgs.fit import checkpoint
-from texgs.fit.checkpoint import run_to_end
+from texgs.fit.checkpoint import ResumableFit, run_to_end
 
 from .scenes import new_fit
 
 
-class Counter:
+class Counter(ResumableFit):
     """A fit that adds 1 to a tensor, and looks whether what it was restored from is still there."""
 
-    unit = "step"
-
     def __init__(self):
-        self.iteration, self.iterations, self.seconds = 0, 5, 0.0
-        self.rows, self.losses = torch.zeros(4), []
+        super().__init__(5)
+        self.rows = torch.zeros(4)
         self.read, self.was_kept = None, None
 
     def state(self):
-        return {"rows": self.rows, "iteration": torch.tensor(self.iteration)}
+        return {"rows": self.rows, **super().state()}
 
     def restore(self, state):
+        super().restore(state)
         self.read = weakref.ref(state["rows"])
-        self.rows, self.iteration = state["rows"].clone(), int(state["iteration"])
-
-    def psnr(self):
-        return None
+        self.rows = state["rows"].clone()
 
     def run(self):
         while self.iteration < self.iterations:
@@ -58,7 +54,7 @@ def test_curves_are_told_while_a_fit_runs_and_change_no_bit(tmp_path):
     run_to_end(fits[0], tmp_path / "unheard", "test")
     first = new_fit(iterations=210)
     for done in first.run():
-        if done.iteration == 150:
+        if done == 150:
             break
     checkpoint.save(tmp_path / "heard", first)
     told = []

@@ -8,8 +8,8 @@ from scipy.spatial.distance import cdist
 from tests.real_data import real_data
 from texgs.core.errors import ArgumentError
 from texgs.fit.hull import hull_points, mean_colors, project
-from texgs.fit.seeds import box_of, read_points, seed_surfels, surfels_at
-from texgs.fit.visible import shrunk
+from texgs.fit.seeds import box_of, read_points, seed_surfels, shrunk, surfels_at
+from texgs.fit.settings import Seeds
 from texgs.volume.grid import Grid
 from texgs.volume.images import load
 from texgs.volume.view_set import ViewSet, read_views
@@ -27,10 +27,9 @@ def view_set(folder=Path("views"), **metadata):
     return ViewSet(folder, [], [], metadata)
 
 
-def seeds(folder=Path("views"), images=None, metadata=None, **options):
-    defaults = {"kind": "auto", "count": 300, "opacity": 0.1, "half_size": None, "seed": 0}
+def seeds(folder=Path("views"), images=None, metadata=None, seed=0, volume=None, count=300, **options):
     views = view_set(folder, **metadata or {})
-    return seed_surfels(images or ball_images(), views, **{**defaults, **options})
+    return seed_surfels(images or ball_images(), views, Seeds(count=count, **options), seed, volume)
 
 
 def write_ply(path, columns):
@@ -259,13 +258,9 @@ def test_an_aabb_the_wrong_way_round_is_an_error(aabb):
 
 
 def test_arguments_out_of_range_are_named():
-    with pytest.raises(ArgumentError, match=r"seeds\.kind: expected one of auto, .*got 'grid'"):
-        seeds(kind="grid")
     for opacity in (0.0, 1.0, -1.0):
         with pytest.raises(ArgumentError, match=r"seeds\.opacity: expected a value between 0 and 1"):
             seeds(opacity=opacity)
-    with pytest.raises(ArgumentError, match=r"seeds\.half_size: expected more than 0, got 0"):
-        seeds(half_size=0)
 
 
 # --- real views -------------------------------------------------------------
@@ -274,7 +269,7 @@ def test_arguments_out_of_range_are_named():
 def test_points_published_with_the_paper_are_near_what_its_views_show():
     views = read_views(real_data("vortex/TF01"))
     images = load(views.train[:3], 8)
-    parameters, colors = seed_surfels(images, views, "auto", 1, 0.1, 0.55, 0)
+    parameters, colors = seed_surfels(images, views, Seeds(count=1, half_size=0.55), 0)
     assert len(parameters["means"]) == len(colors) > 9000
     assert (mean_colors(images, parameters["means"]) - colors).abs().mean() < 0.15
 

@@ -10,8 +10,17 @@ from tests.fit.scenes import HEADLIGHT, ball_images, ball_seeds, cameras, images
 from texgs.core.errors import ArgumentError
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
-from texgs.fit.texels import mean_color, textured, texturize
-from texgs.fit.texture_layout import Sight, look, offsets_of, sizes_for_budget, sizes_where_seen
+from texgs.fields.surfels.texels import offsets_of
+from texgs.fit.settings import TextureKeys
+from texgs.fit.texels import (
+    Sight,
+    look,
+    mean_color,
+    sizes_for_budget,
+    sizes_where_seen,
+    textured,
+    texturize,
+)
 from texgs.raster.arguments import check_texture
 from texgs.raster.types import Texture
 
@@ -103,15 +112,15 @@ def test_mean_color_of_nothing_is_finite():
 def test_an_empty_texture_renders_as_before(ball, images):
     p = {**ball.parameters, "colors": ball.parameters["colors"] * 1.5 - 0.2}
     plain = Surfels(p, ball.shading)
-    with_texels = texturize(plain, images, sweeps=0)
+    with_texels = texturize(plain, images, TextureKeys(sweeps=0))
     assert with_texels.stage == "texture"
     for view in cameras():
         assert_close(color(with_texels, view), color(plain, view), atol=1e-6, rtol=0)
 
 
 def test_texels_can_take_the_colors_over(ball, images):
-    with_offset = texturize(ball, images, texels=2000, sweeps=0)
-    without = texturize(ball, images, texels=2000, sweeps=0, has_offset=False)
+    with_offset = texturize(ball, images, TextureKeys(2000, sweeps=0))
+    without = texturize(ball, images, TextureKeys(2000, sweeps=0, has_offset=False))
     assert not without.parameters["colors"].any()
     p = with_offset.parameters
     for surfel, offset in enumerate(p["offsets"].tolist()):
@@ -120,14 +129,16 @@ def test_texels_can_take_the_colors_over(ball, images):
 
 
 def test_all_else_stays(ball, images):
-    fitted = texturize(ball, images, sweeps=1, iterations=2)
+    fitted = texturize(ball, images, TextureKeys(sweeps=1, iterations=2))
     for name in ("means", "quats", "scales", "opacities", "ambient", "diffuse", "specular", "shininess"):
         assert fitted.parameters[name] is ball.parameters[name]
     assert_close(fitted.parameters["colors"] + fitted.parameters["palette"], ball.parameters["colors"])
 
 
 def test_same_seed_same_texels(ball, images):
-    first, second, other = (texturize(ball, images, sweeps=1, iterations=3, seed=s) for s in (1, 1, 2))
+    first, second, other = (
+        texturize(ball, images, TextureKeys(sweeps=1, iterations=3), s) for s in (1, 1, 2)
+    )
     assert torch.equal(first.parameters["texels"], second.parameters["texels"])
     assert not torch.equal(first.parameters["texels"], other.parameters["texels"])
 
@@ -135,30 +146,14 @@ def test_same_seed_same_texels(ball, images):
 def test_a_model_of_another_stage_is_refused(ball, images):
     p = {name: ball.parameters[name] for name in ("means", "quats", "scales", "opacities")}
     with pytest.raises(ArgumentError, match="expected stage shading, got surfels"):
-        texturize(Surfels({**p, "sh": torch.zeros(len(ball), 1, 3)}), images)
+        texturize(Surfels({**p, "sh": torch.zeros(len(ball), 1, 3)}), images, TextureKeys())
     with pytest.raises(ArgumentError, match="expected stage shading, got texture"):
-        texturize(texturize(ball, images, sweeps=0), images)
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("sweeps", -1),
-        ("iterations", -1),
-        ("ridge", -0.1),
-        ("sparsity", math.nan),
-        ("palette_rate", -1),
-        ("final", -0.5),
-    ],
-)
-def test_numbers_out_of_range_are_named(ball, images, name, value):
-    with pytest.raises(ArgumentError, match=f"{name}: expected 0 or more, got {value}"):
-        texturize(ball, images, **{name: value})
+        texturize(texturize(ball, images, TextureKeys(sweeps=0)), images, TextureKeys())
 
 
 def test_a_budget_of_nothing_is_refused(ball, images):
     with pytest.raises(ArgumentError, match="texels: expected at least 1, got 0"):
-        texturize(ball, images, texels=0)
+        texturize(ball, images, TextureKeys(0))
 
 
 def test_a_texture_too_large_for_the_rasterizer_is_refused():

@@ -8,20 +8,24 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import HEADLIGHT, ball_seeds, cameras, images_of, new_fit, run, striped
 from texgs.core.errors import FitError
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
 from texgs.fields.surfels.texels import owners
-from texgs.fit.settings import Densify
-from texgs.fit.texels import textured, texturize, without_offset
-from texgs.fit.texture_adam import refine, texel_map
-from texgs.fit.texture_layout import sizes_for_budget
+from texgs.fit.settings import Densify, TextureKeys
+from texgs.fit.texels import sizes_for_budget, textured, texturize, without_offset
+from texgs.fit.texture_solve import refine, texel_map
 from texgs.raster import Texture, rasterize, reference
 from texgs.raster.losses import l1_dssim
 from texgs.raster.reference import shading
 from texgs.volume.images import Target
 
-PLAIN = {"rate": 0.0025, "palette_rate": 0.0, "final": 0.1, "sparsity": 0.0, "seed": 0, "title": ""}
-PAPER = PLAIN | {"rate": 0.025, "palette_rate": 0.01, "final": 1.0}
+PLAIN = TextureKeys()
+PAPER = TextureKeys(rate=0.025, palette_rate=0.01, final=1.0)
+
+
+def refined(model, images, iterations, keys=PLAIN, **changes):
+    return refine(model, images, replace(keys, iterations=iterations, **changes), 0, "")
 
 
 @pytest.fixture(scope="module")
@@ -84,14 +88,12 @@ def test_it_is_adam_on_texels_and_palette_with_rates_of_their_own(start, images,
     falls = [final ** (step / steps) for step in range(steps)]
     order = torch.randperm(6, generator=torch.Generator().manual_seed(0)).tolist()[::-1]
     expected = oracle(start, images, [(0.025 * f, 0.01 * f) for f in falls], sparsity, order)
-    refined = refine(
-        start, images, iterations=steps, **PAPER | {"final": final, "sparsity": sparsity}
-    ).parameters
+    found = refined(start, images, steps, PAPER, final=final, sparsity=sparsity).parameters
     # D-SSIM of the visible part differs by what its windows do not see beyond the border.
-    assert_close(refined["palette"], expected["palette"], atol=2e-4, rtol=0)
-    error = (refined["texels"] - expected["texels"]).abs()
+    assert_close(found["palette"], expected["palette"], atol=2e-4, rtol=0)
+    error = (found["texels"] - expected["texels"]).abs()
     assert float(error.mean()) < 2e-4
-    assert float((refined["texels"] - start.parameters["texels"]).abs().mean()) > 100 * float(error.mean())
+    assert float((found["texels"] - start.parameters["texels"]).abs().mean()) > 100 * float(error.mean())
 
 
 def test_gradients_of_palette_and_texels_are_those_of_the_definition(start, images):
@@ -154,14 +156,13 @@ def test_gradients_of_the_texel_map_are_the_weights_of_surfels(start, images):
 
 
 def test_adam_finds_detail(start, images):
-    refined = refine(start, images, iterations=120, **PLAIN)
-    assert squared(refined, images) < 0.95 * squared(start, images)
+    assert squared(refined(start, images, 120), images) < 0.95 * squared(start, images)
 
 
 def test_without_a_rate_the_palette_stays(start, images):
-    refined = refine(start, images, iterations=3, **PLAIN)
-    assert torch.equal(refined.parameters["palette"], start.parameters["palette"])
-    assert not torch.equal(refined.parameters["texels"], start.parameters["texels"])
+    found = refined(start, images, 3)
+    assert torch.equal(found.parameters["palette"], start.parameters["palette"])
+    assert not torch.equal(found.parameters["texels"], start.parameters["texels"])
 
 
 def test_the_palette_alone_finds_the_palette_of_the_images(start):
@@ -169,7 +170,7 @@ def test_the_palette_alone_finds_the_palette_of_the_images(start):
     views = cameras()
     planes = [changed(start, palette=known).render(view, HEADLIGHT) for view in views]
     images = images_of([torch.cat([r.color.permute(2, 0, 1), r.alpha[None]]) for r in planes], views)
-    model = refine(start, images, iterations=200, **PAPER | {"rate": 0.0, "final": 0.02})
+    model = refined(start, images, 200, PAPER, rate=0.0, final=0.02)
     assert torch.equal(model.parameters["texels"], start.parameters["texels"])
     assert_close(model.parameters["palette"], known, atol=0.01, rtol=0)  # images have 8 bits and are clamped
 
@@ -180,28 +181,28 @@ def test_sparsity_moves_what_texels_have_in_common_to_the_palette(start, images)
     )
     sizes, palettes = [], []
     for sparsity in (0.0, 3.0):
-        refined = refine(shifted, images, iterations=120, **PAPER | {"sparsity": sparsity, "rate": 0.01})
-        sizes.append(float(texel_map(refined, images.cameras[0]).abs().mean()))
-        palettes.append(refined.parameters["palette"])
+        found = refined(shifted, images, 120, PAPER, sparsity=sparsity, rate=0.01)
+        sizes.append(float(texel_map(found, images.cameras[0]).abs().mean()))
+        palettes.append(found.parameters["palette"])
     assert sizes[1] < 0.5 * sizes[0]
     assert (palettes[1] - palettes[0]).mean() > 0.02
 
 
 def test_the_palette_remains_a_colour(start, images):
     dark = changed(start, palette=torch.full((3,), 0.01), texels=start.parameters["texels"] + 0.8)
-    refined = refine(dark, images, iterations=5, **PAPER | {"palette_rate": 0.5})
-    assert ((refined.parameters["palette"] >= 0) & (refined.parameters["palette"] <= 1)).all()
+    palette = refined(dark, images, 5, PAPER, palette_rate=0.5).parameters["palette"]
+    assert ((palette >= 0) & (palette <= 1)).all()
 
 
 def test_the_paper_recipe_begins_with_the_mean_colour(plain, images):
-    values = {"texels": 2000, "sweeps": 0, "iterations": 1, "has_offset": False}
-    fitted = texturize(plain, images, **values, rate=0.025, palette_rate=0.01, final=1.0)
-    still = texturize(plain, images, **values, rate=0.025)
+    keys = replace(PAPER, texels=2000, sweeps=0, iterations=1, has_offset=False)
+    fitted = texturize(plain, images, keys)
+    still = texturize(plain, images, replace(keys, palette_rate=0.0))
     moved = (fitted.parameters["palette"] - still.parameters["palette"]).abs()
     assert_close(moved, torch.full((3,), 0.01))  # Adam's first step is its rate
 
 
 def test_numbers_that_are_not_finite_are_reported(start, images):
     model = changed(start, colors=start.parameters["colors"] * torch.nan)
-    with pytest.raises(FitError, match="texels are not finite after Adam"):
-        refine(model, images, iterations=2, **PLAIN)
+    with pytest.raises(FitError, match="texture: texels: expected finite values"):
+        refined(model, images, 2)

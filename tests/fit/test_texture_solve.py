@@ -1,7 +1,5 @@
 """Texels found from images: against least squares by brute force, and on views with detail of their own."""
 
-from dataclasses import replace
-
 import pytest
 import torch
 from torch.testing import assert_close
@@ -9,9 +7,8 @@ from torch.testing import assert_close
 from tests.fit.scenes import HEADLIGHT, ball_seeds, cameras, images_of, new_fit, run, striped
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel, raw_material
-from texgs.fit.settings import Densify
-from texgs.fit.texels import textured
-from texgs.fit.texture_layout import look, sizes_for_budget
+from texgs.fit.settings import Densify, TextureKeys
+from texgs.fit.texels import look, sizes_for_budget, textured
 from texgs.fit.texture_solve import curvature, sampled_error, solve
 
 
@@ -31,6 +28,10 @@ def start(images):
 def squared(model, images):
     targets = [images.target(i) for i in range(len(images))]
     return sum(float((model.render(t.camera, t.light).color - t.color).square().sum()) for t in targets)
+
+
+def solved_from(model, images, **keys):
+    return solve(model, images, look(model, images, "").curvature, TextureKeys(**keys), 0, "")
 
 
 def one_surfel():
@@ -71,7 +72,7 @@ def test_solve_agrees_with_dense_least_squares():
     wanted = torch.stack([images.target(i).color for i in range(len(images))])
     residual = (wanted - base).flatten(end_dim=2).double()
     exact = torch.linalg.lstsq(A, residual).solution
-    solved = solve(model, images, look(model, images, ""), sweeps=60, ridge=0.05, seed=0, title="")
+    solved = solved_from(model, images, sweeps=60, ridge=0.05)
     texels = solved.parameters["texels"].double()
     is_seen = A.sum(dim=0) > 0.05 * A.sum(dim=0).max()  # the corners hardly are
     assert int(is_seen.sum()) >= 12
@@ -109,7 +110,7 @@ def test_curvatures_of_texels_sum_to_those_of_surfels():
 
 
 def test_solve_finds_detail(start, images):
-    solved = solve(start, images, look(start, images, ""), sweeps=3, ridge=0.2, seed=0, title="")
+    solved = solved_from(start, images, sweeps=3, ridge=0.2)
     assert squared(solved, images) < 0.7 * squared(start, images)
 
 
@@ -119,9 +120,8 @@ def test_sampled_error_is_that_of_few_views(start, images):
 
 def test_texels_that_would_be_worse_are_not_kept(start, images):
     """A curvature far too small makes steps far too large."""
-    sight = look(start, images, "")
-    wild = replace(sight, curvature=sight.curvature * 1e-3)
-    assert solve(start, images, wild, sweeps=1, ridge=0.0, seed=0, title="") is start
+    wild = look(start, images, "").curvature * 1e-3
+    assert solve(start, images, wild, TextureKeys(sweeps=1, ridge=0.0), 0, "") is start
 
 
 def test_views_of_nothing_leave_the_texels_alone(start):
@@ -131,5 +131,5 @@ def test_views_of_nothing_leave_the_texels_alone(start):
     away = behind[0].viewmat.clone()
     away[2, 3] = -5.0
     blank = images_of([planes], [type(behind[0])(away, behind[0].K, 16, 16)])
-    solved = solve(start, blank, look(start, blank, ""), sweeps=2, ridge=0.2, seed=0, title="")
+    solved = solved_from(start, blank, sweeps=2, ridge=0.2)
     assert torch.equal(solved.parameters["texels"], start.parameters["texels"])

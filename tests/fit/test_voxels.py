@@ -13,9 +13,9 @@ from texgs.core.errors import ArgumentError, FitError
 from texgs.fields.voxels.rays import AROUND, curve, training_rays, widened
 from texgs.fit import checkpoint
 from texgs.fit.checkpoint import run_to_end
+from texgs.fit.hull import hull_box
 from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
-from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
-from texgs.fit.voxels import VoxelFit
+from texgs.fit.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
 from texgs.metrics.image import psnr
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays, render_view
@@ -54,8 +54,8 @@ def quality(fit, images):
 
 
 def test_the_ball_is_found(fit, images):
-    assert [done.step for done in fit.progress] == list(range(1, 121))
-    assert fit.progress[99].loss < 0.01
+    assert fit.progress == list(range(1, 121))
+    assert fit.losses[0] < 0.01
     assert quality(fit, images) > 25
     unseen = orbit(20, 10, 1.5, 50, 32, 32)
     assert quality(fit, images_of([ball_planes(unseen)], [unseen])) > 20
@@ -90,11 +90,11 @@ def test_a_resumed_run_is_as_if_it_had_never_stopped(images, optimizer, stop):
     settings = replace(SETTINGS, optimizer=optimizer, density=Decay(5.0, 1.0), occupy_every=15)
     whole = VoxelFit(images, settings)
     for done in whole.run():
-        if done.step == stop:
+        if done == stop:
             state = {name: x.clone() for name, x in whole.state().items()}
     resumed = VoxelFit(images, settings, seed=1)
     resumed.restore(state)
-    assert [done.step for done in resumed.run()] == list(range(stop + 1, 121))
+    assert list(resumed.run()) == list(range(stop + 1, 121))
     assert torch.equal(resumed.grid.rows, whole.grid.rows)
 
 

@@ -23,14 +23,14 @@ from texgs.core.image import read_png
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.edit.style_picture import read_style
-from texgs.fields.gaussians.model_file import read_gaussians, write_gaussians
-from texgs.fields.gaussians.ply import read_ply as read_gaussian_ply
-from texgs.fields.gaussians.ply import write_ply as write_gaussian_ply
+from texgs.fields.gaussians.files import read_gaussians, write_gaussians
+from texgs.fields.gaussians.files import read_ply as read_gaussian_ply
+from texgs.fields.gaussians.files import write_ply as write_gaussian_ply
 from texgs.fields.palette.file import read_palette, write_palette
 from texgs.fields.surfels.compact import open_model, write_compact
 from texgs.fields.surfels.model_file import read_model, write_model
 from texgs.fields.surfels.ply import read_ply, write_ply
-from texgs.fields.surfels.texture_file import with_texture, write_texture
+from texgs.fields.surfels.variants import with_texture, write_texture
 from texgs.fit.checkpoint import latest
 from texgs.models.networks import read_tensors
 from texgs.scene.scene import Scene, SceneModel, SceneSegment

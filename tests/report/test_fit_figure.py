@@ -12,7 +12,7 @@ from tests.fit.scenes import HEADLIGHT, ball_planes, ball_seeds, cameras
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import Scale
 from texgs.core.image import write_png
-from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fields.splats import GEOMETRY
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
 from texgs.report import fit_figure

@@ -8,7 +8,7 @@ from tests.fields.surfels.test_composition import CAMERA, ball
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import write_texture
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 from texgs.scene.segment_file import write_segment

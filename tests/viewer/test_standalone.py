@@ -19,7 +19,7 @@ from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.gaussians.model_file import write_gaussians
+from texgs.fields.gaussians.files import write_gaussians
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel

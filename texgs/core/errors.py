@@ -1,5 +1,8 @@
 """Errors a user can do something about. Each message is one sentence: what, where, got, what to do."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 LONGEST = 600  # letters of a message; a damaged file can be quoted at any length
 END = 250  # letters that are kept at the end, where it says what to do
 
@@ -42,6 +45,15 @@ class MissingDataError(ConfigError):
 
 class FitError(TexgsError, ArithmeticError):
     """A fit cannot go on."""
+
+
+@contextmanager
+def located(where: object) -> Iterator[None]:
+    """Put where it happened, such as a path, before the message of an error of texgs."""
+    try:
+        yield
+    except TexgsError as error:
+        raise type(error)(f"{where}: {error}") from error
 
 
 def printable(text: str) -> str:

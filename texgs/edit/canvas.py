@@ -10,8 +10,8 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.light import Light
-from texgs.fields.bounds import screen_box
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry, screen_box
+from texgs.fields.surfels.model import Surfels
 from texgs.raster import Render, Texture, rasterize
 
 VIEWS = 6  # that tell how translucent a scene is

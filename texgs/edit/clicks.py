@@ -11,8 +11,8 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
-from texgs.fields.bounds import REACH
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import REACH, geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.raster import rasterize
 
 FAINT = 0.05  # alpha below which a click is on the background

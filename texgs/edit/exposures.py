@@ -12,7 +12,8 @@ from torch.nn.functional import avg_pool2d
 from texgs.core.camera import Camera
 from texgs.core.light import Light
 from texgs.edit.target_views import light_on
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.models.guidance import EditViews
 from texgs.raster import Options, Texture, rasterize
 

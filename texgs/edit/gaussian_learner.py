@@ -11,9 +11,8 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.edit.closeness import Closeness, differentiated
 from texgs.fields.gaussians.model import Gaussians
-from texgs.fields.harmonics import join, split
 from texgs.fields.optimizer import Optimizer
-from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fields.splats import GEOMETRY, join, split
 from texgs.fit.rates import extent, rates
 from texgs.fit.settings import CommonRates, Rates
 from texgs.volume.images import Images

@@ -13,7 +13,7 @@ from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Painting, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
-from texgs.fields.harmonics import join, split
+from texgs.fields.splats import join, split
 from texgs.models.vgg import Vgg
 
 HIGHER = 1 / 20  # rate of the higher harmonics, against that of the zeroth

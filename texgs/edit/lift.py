@@ -15,7 +15,7 @@ from texgs.core.progress import progress
 from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, prompts_at
 from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
-from texgs.fields.bounds import screen_box
+from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
 

@@ -14,8 +14,7 @@ from texgs.core.names import part_file
 from texgs.fields.field import Field
 from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.segment import labels_of
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import labels_of, write_texture
 from texgs.scene.parts import replaced, with_textures
 from texgs.scene.scene import Scene, SceneModel
 

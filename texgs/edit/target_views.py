@@ -10,7 +10,8 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import light_direction, material, viewer
 from texgs.models.guidance import EditViews
 from texgs.raster import Texture, rasterize

@@ -9,7 +9,8 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.raster import Render, rasterize, splat
 
 Vote = Literal["contribution", "centre"]

@@ -10,6 +10,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.light import HEADLIGHT, Light
+from texgs.core.memory import MIB
 from texgs.fields.part_edit import PartEdit
 from texgs.raster import Render
 
@@ -24,7 +25,7 @@ class Field(Protocol):
     """Name of its kind, one of `texgs.fields.kinds.kinds()`."""
 
     def __len__(self) -> int:
-        """Primitives: surfels, Gaussians, voxels."""
+        """Return the number of primitives: surfels, Gaussians, voxels."""
         ...
 
     @property
@@ -38,11 +39,11 @@ class Field(Protocol):
         ...
 
     def to(self, device: torch.device | str) -> Self:
-        """The same field on another device."""
+        """Return the same field on another device."""
         ...
 
     def tensors(self, role: Role) -> Mapping[str, Tensor]:
-        """Raw parameters that decide where it is, or how it looks; what learns is among them."""
+        """Return raw parameters that decide where it is, or how it looks; what learns is among them."""
         ...
 
     def render(
@@ -53,7 +54,7 @@ class Field(Protocol):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """One view, over white by default; `depth` and `normal` where `outputs` asks for them.
+        """Render one view, over white by default; `depth` and `normal` where `outputs` asks for them.
 
         Raises:
             ArgumentError: for an output that fields of this kind do not have.
@@ -61,7 +62,7 @@ class Field(Protocol):
         ...
 
     def sizes(self) -> dict[str, float]:
-        """MiB by contents, and `total_mib`, as the paper's break-down counts; `stored_`, as in a file.
+        """Return MiB by contents, and `total_mib`, as the paper's break-down counts; `stored_`, as in a file.
 
         `files_mib` is the total as the paper's tables of edits count.
         """
@@ -72,7 +73,7 @@ class Composed(Protocol):
     """Fields of one kind as a scene. Edits are one for each field, behind it one for each of its segments."""
 
     def __len__(self) -> int:
-        """Primitives of all fields."""
+        """Return the number of primitives of all fields."""
         ...
 
     @property
@@ -95,9 +96,25 @@ class Composed(Protocol):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """One view with edits.
+        """Render one view with edits.
 
         Raises:
             ArgumentError: if there are not as many edits as parts, or fields of this kind cannot show one.
         """
         ...
+
+
+def sizes_in_mib(
+    counted: Mapping[str, int], stored: Mapping[str, int], n_files: int | None = None
+) -> dict[str, float]:
+    """Return sizes in MiB by contents, see `Field.sizes`.
+
+    Args:
+        counted: bytes of each group, as the paper counts them.
+        stored: bytes of the same groups in a file.
+        n_files: bytes as the paper's tables of edits count; by default all that is counted.
+    """
+    total = sum(counted.values())
+    sizes = {**counted, "total": total, "files": total if n_files is None else n_files}
+    sizes |= {f"stored_{group}": count for group, count in {**stored, "total": sum(stored.values())}.items()}
+    return {f"{group}_mib": count / MIB for group, count in sizes.items()}

@@ -25,13 +25,13 @@ def open_field(path: str | Path) -> Field:
 
 
 def kind_of(path: Path) -> Kind:
-    """The kind of the field in a file, by its header."""
+    """Return the kind of the field in a file, by its header."""
     names, known = formats(path), kinds()
     return next((kind for kind in known.values() if names & {*kind.formats}), known[FIRST])
 
 
 def formats(path: Path) -> set[str]:
-    """Entries of a file's header, one of which names its format; none where it has no header of ours.
+    """Return entries of a file's header, one of which names its format; none where it has no header of ours.
 
     Files of fields are safetensors with one entry of metadata, begin with a line of JSON, or are PLY files,
     which are told apart by their properties: 3D Gaussians have a third scale.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 
 import torch
 from torch import Tensor
@@ -20,7 +19,7 @@ class Rate:
     final: float  # relative to the start
 
     def at(self, progress: float) -> float:
-        """The rate at progress 0 to 1."""
+        """Return the rate at progress 0 to 1."""
         return self.start * self.final**progress
 
 
@@ -47,7 +46,7 @@ class Optimizer:
         self._adam = torch.optim.Adam(groups, betas=betas, eps=1e-15, fused=True)
 
     def step(self, progress: float) -> None:
-        """One step with the rates of now; forgets the gradients."""
+        """Take one step with the rates of now, and forget the gradients."""
         for group in self._adam.param_groups:
             group["lr"] = self._rates[group["name"]].at(progress)
         self._adam.step()
@@ -61,13 +60,14 @@ class Optimizer:
             keep: [n] bool.
             added: rows to append, by name; the same number each.
         """
+
+        def edited(moment: Tensor) -> Tensor:
+            return torch.cat([moment[keep], moment.new_zeros(count, *moment.shape[1:])])
+
         for name, old in self.parameters.items():
-            if len(old) != n or name not in added:
-                continue
-            with torch.no_grad():
-                new = torch.cat([old[keep], added[name]])
-            fresh = torch.zeros_like(added[name])
-            self._replace(name, new, partial(_edited, keep=keep, fresh=fresh))
+            if len(old) == n and name in added:
+                count = len(added[name])
+                self._replace(name, torch.cat([old.detach()[keep], added[name]]), edited)
 
     def reset(self, name: str, values: Tensor) -> None:
         """Give a parameter new values and zero moments."""
@@ -79,14 +79,13 @@ class Optimizer:
         for group in self._adam.param_groups:
             if group["name"] == name:
                 group["params"] = [leaf]
-                state = self._adam.state.pop(old, {})
-                if state:
+                if state := self._adam.state.pop(old, {}):
                     self._adam.state[leaf] = {
                         key: moment(value) if key in MOMENTS else value for key, value in state.items()
                     }
 
     def state(self) -> dict[str, Tensor]:
-        """All parameters and moments, for a checkpoint."""
+        """Return all parameters and moments, for a checkpoint."""
         state = {name: x.detach() for name, x in self.parameters.items()}
         for group in self._adam.param_groups:
             for key, value in self._adam.state.get(group["params"][0], {}).items():
@@ -107,8 +106,3 @@ class Optimizer:
             }
             if moments:
                 self._adam.state[leaf] = moments
-
-
-def _edited(moment: Tensor, keep: Tensor, fresh: Tensor) -> Tensor:
-    """A moment with the rows to keep, and fresh ones."""
-    return torch.cat([moment[keep], fresh])

@@ -58,12 +58,9 @@ def require_possible(edit: PartEdit, kind: str) -> None:
 
 
 def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> list[float]:
-    """Factors on the opacity of fields that can change nothing else: 0 for what is hidden; 1 without edits.
+    """Return a factor on the opacity of each of `count` fields of a kind that can change nothing else.
 
-    Args:
-        edits: one for each field.
-        count: of fields.
-        kind: of all of them.
+    It is 0 for what is hidden, and 1 without edits.
     """
     if edits is None:
         return [1.0] * count
@@ -75,7 +72,7 @@ def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> 
 
 
 def color(name: str, value: object) -> tuple[float, float, float]:
-    """Red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f".
+    """Return red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f".
 
     Raises:
         ArgumentError: naming the value.

@@ -15,7 +15,7 @@ from texgs.raster.shading import DEGREES
 
 
 def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[str, Tensor]:
-    """[N] values by property, in the order of 2DGS and 3DGS.
+    """Return [N] values by property, in the order of 2DGS and 3DGS.
 
     Args:
         p: raw `means`, `opacities`, `scales` [N, 2 or 3] and `quats`.
@@ -31,7 +31,7 @@ def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[
 
 
 def numbered(name: str, values: Tensor) -> dict[str, Tensor]:
-    """Columns of [N, k] as name_0, name_1, ..."""
+    """Name the columns of [N, k] name_0, name_1, ..."""
     return {f"{name}_{k}": column for k, column in enumerate(values.T)}
 
 
@@ -46,7 +46,7 @@ def write_columns(path: str | Path, columns: Mapping[str, Tensor]) -> Path:
 
 
 def take(vertices: np.ndarray, *names: str) -> Tensor:
-    """Properties as columns [N, k] float32."""
+    """Return properties as columns [N, k] float32."""
     given = vertices.dtype.names or ()
     for name in names:
         if name not in given or vertices.dtype[name].kind not in "iuf":
@@ -55,7 +55,7 @@ def take(vertices: np.ndarray, *names: str) -> Tensor:
 
 
 def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
-    """Raw means, quaternions, `axes` scales and opacities."""
+    """Return raw means, quaternions, `axes` scales and opacities."""
     scales = take(vertices, *(f"scale_{k}" for k in range(axes)))  # first: without, there is nothing to draw
     return {
         "means": take(vertices, "x", "y", "z"),
@@ -66,7 +66,7 @@ def take_geometry(vertices: np.ndarray, axes: int) -> dict[str, Tensor]:
 
 
 def take_harmonics(vertices: np.ndarray) -> Tensor:
-    """[N, K, 3] with as many coefficients as the file has."""
+    """Return harmonics [N, K, 3] with as many coefficients as the file has."""
     dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")[:, None]  # [N, 1, 3]
     n_rest = sum(name.startswith("f_rest_") for name in vertices.dtype.names or ())
     if n_rest % 3 or 1 + n_rest // 3 not in DEGREES:

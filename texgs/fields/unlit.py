@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
-from typing import Generic, TypeVar
+from collections.abc import Collection, Sequence
+from typing import ClassVar, Generic, TypeVar
 
 import torch
 from torch import Tensor
@@ -12,12 +12,42 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.core.memory import MIB
 from texgs.fields.field import Field, Look
 from texgs.fields.part_edit import PartEdit, opacity_factors
 from texgs.raster import Render
 
 F = TypeVar("F", bound=Field)
+
+
+class UnlitField(ABC):
+    """A field whose colours have the light of its views in them."""
+
+    kind: ClassVar[str]
+
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        *,
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+    ) -> Render:
+        """Render the field.
+
+        Args:
+            camera: on the field's device.
+            light: changes nothing.
+            background: [3]; white by default.
+            outputs: such as "depth".
+
+        Raises:
+            ArgumentError: for an output that fields of this kind do not have.
+        """
+        return self.draw(camera, background, outputs)
+
+    @abstractmethod
+    def draw(self, camera: Camera, background: Tensor | None, outputs: Collection[str]) -> Render:
+        """Render the field with the colours that it has."""
 
 
 class UnlitScene(ABC, Generic[F]):
@@ -36,7 +66,7 @@ class UnlitScene(ABC, Generic[F]):
             raise ArgumentError("models: expected at least one, got none")
         if any(segments):
             raise ArgumentError(f"segments: expected none of {fields[0].kind}, got some; remove them")
-        self.kind, self.device = fields[0].kind, fields[0].device
+        self.fields, self.kind, self.device = list(fields), fields[0].kind, fields[0].device
         self.counts = [len(field) for field in fields]
 
     def __len__(self) -> int:
@@ -62,7 +92,7 @@ class UnlitScene(ABC, Generic[F]):
 
         Args:
             camera: on the fields' device.
-            light: changes nothing: the colours are those of the views.
+            light: changes nothing.
             edits: one for each field, of opacity and visibility; by default nothing is changed.
             look: only "shaded".
             background: [3]; white by default.
@@ -82,17 +112,7 @@ class UnlitScene(ABC, Generic[F]):
         """Render all fields, each with a factor on its opacity."""
 
 
-def sizes_in_mib(
-    counted: Mapping[str, int], stored: Mapping[str, int], n_files: int | None = None
-) -> dict[str, float]:
-    """Return sizes in MiB by contents, see `Field.sizes`.
-
-    Args:
-        counted: bytes of each group, as the paper counts them.
-        stored: bytes of the same groups in a file.
-        n_files: bytes as the paper's tables of edits count; by default all that is counted.
-    """
-    total = sum(counted.values())
-    sizes = {**counted, "total": total, "files": total if n_files is None else n_files}
-    sizes |= {f"stored_{group}": count for group, count in {**stored, "total": sum(stored.values())}.items()}
-    return {f"{group}_mib": count / MIB for group, count in sizes.items()}
+def require_depth(outputs: Collection[str], kind: str) -> None:
+    """Require that no other output is asked for than the depth."""
+    if unknown := sorted(set(outputs) - {"depth"}):
+        raise ArgumentError(f"outputs: expected depth of {kind}, got {unknown[0]}")

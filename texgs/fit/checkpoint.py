@@ -1,63 +1,88 @@
-"""Checkpoints of a fit: one safetensors file, from which a run goes on as if it had never stopped."""
+"""Fits that go on from a checkpoint, one safetensors file, as if they had never stopped."""
 
 from __future__ import annotations
 
 import shutil
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Protocol
 
+import torch
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError
+from texgs.core import check
+from texgs.core.errors import ArgumentError, FitError
 from texgs.core.io import reading
 from texgs.core.progress import has_curve_logger, log_point, progress
 from texgs.core.tensor_file import write_tensors
-from texgs.fit.loop import CHECKED_EVERY, require_finite
 
 NAME = "checkpoint.safetensors"
 FOLDER = "checkpoint"  # beside the result, there until it is written
 SAVED_EVERY = 30.0  # seconds between checkpoints
+CHECKED_EVERY = 100  # iterations between looks at the loss and the parameters
 
 
-class Stateful(Protocol):
-    """A fit whose state is a number of iterations and tensors."""
+class ResumableFit(ABC):
+    """A fit that can stop between two iterations and go on."""
 
-    iteration: int  # done
+    unit = "step"  # what an iteration is, for the progress bar
 
-    def state(self) -> dict[str, Tensor]:
-        """Return everything a resumed run needs, as tensors, between two steps."""
-        ...
+    def __init__(self, iterations: int) -> None:
+        self.iterations = iterations  # of the whole fit
+        self.iteration = 0  # done
+        self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
+        self.losses: list[float] = []  # every CHECKED_EVERY iterations and at the end
 
+    @abstractmethod
+    def run(self) -> Iterator[int]:
+        """Iterate to the end, and yield how many iterations are done.
 
-class Resumable(Stateful, Protocol):
-    """A fit that can stop and go on."""
-
-    seconds: float  # that earlier runs have taken
-    unit: str  # what an iteration is of, for the progress bar
-    losses: list[float]  # every CHECKED_EVERY iterations and at the end
-
-    @property
-    def iterations(self) -> int:
-        """Iterations of the whole fit."""
-        ...
-
-    def run(self) -> Iterator[object]:
-        """Iterate to the end."""
-        ...
-
-    def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned."""
-        ...
+        Raises:
+            FitError: if the loss or a parameter is no longer finite.
+        """
 
     def psnr(self) -> float | None:
         """Return the PSNR in dB of training images as they are now, where it is known."""
-        ...
+        return None
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether the loss of the iteration that is done is looked at."""
+        return self.iteration % CHECKED_EVERY == 0 or self.iteration == self.iterations
+
+    def note(self, loss: Tensor, tensors: Mapping[str, Tensor]) -> None:
+        """Note the loss of the iteration that is done, and require finite tensors."""
+        require_finite(self.iteration, tensors)
+        self.losses.append(float(loss))
+
+    def state(self) -> dict[str, Tensor]:
+        """Return everything a resumed run needs, as tensors."""
+        return {
+            "iteration": torch.tensor(self.iteration),
+            "seconds": torch.tensor(self.seconds).double(),
+            "losses": torch.tensor(self.losses).double(),
+        }
+
+    def restore(self, state: Mapping[str, Tensor]) -> None:
+        """Go on from what `state` returned."""
+        self.iteration = int(state["iteration"])
+        self.seconds = float(state["seconds"])
+        self.losses = state["losses"].tolist()
 
 
-def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
-    """Run a fit from the last checkpoint in a folder, if there is one.
+def require_finite(iteration: int, tensors: Mapping[str, Tensor]) -> None:
+    """Stop a fit that has gone wrong; its loss alone does not tell: surfels with NaN are skipped."""
+    try:
+        check.finite(**tensors)
+    except ArgumentError as error:
+        raise FitError(
+            f"iteration {iteration}: {error}; start again with lower rates, the last checkpoint is kept"
+        ) from error
+
+
+def run_to_end(fit: ResumableFit, folder: Path, title: str) -> float:
+    """Run a fit from the last checkpoint in a folder, if there is one, and return the seconds of all runs.
 
     An interruption loses half a minute at most. Whoever has written the result removes the checkpoint, see
     `discard`.
@@ -66,9 +91,6 @@ def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
         fit: at its start.
         folder: of checkpoints.
         title: of the progress bar.
-
-    Returns:
-        The seconds of all runs together.
 
     Raises:
         FitError: if the loss or a parameter is no longer finite.
@@ -89,13 +111,13 @@ def run_to_end(fit: Resumable, folder: Path, title: str) -> float:
     return time.monotonic() - start
 
 
-def restore(fit: Resumable, folder: Path) -> None:
+def restore(fit: ResumableFit, folder: Path) -> None:
     """Go on from the last checkpoint, if there is one; only the fit's own copy of it stays in memory."""
     if (state := latest(folder)) is not None:
         fit.restore(state)
 
 
-def _tell(fit: Resumable, n_told: int) -> int:
+def _tell(fit: ResumableFit, n_told: int) -> int:
     """Tell who hears the losses from one on, with the PSNR of now at the last; return how many there are."""
     count = len(fit.losses)
     if count > n_told and has_curve_logger():
@@ -106,12 +128,12 @@ def _tell(fit: Resumable, n_told: int) -> int:
     return count
 
 
-def save(folder: str | Path, fit: Stateful) -> Path:
+def save(folder: str | Path, fit: ResumableFit) -> Path:
     """Write the state of a fit, and return the file; the one before stays until this one is complete.
 
     Args:
         folder: of the run, created where missing; it holds one checkpoint.
-        fit: between two steps.
+        fit: between two iterations.
 
     Raises:
         FitError: if a value is NaN or infinite; the last good checkpoint stays.

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
+from texgs.fields.voxels.rays import widened
 from texgs.volume.images import Images
 
 TRIED = 200_000  # points at a time
 ROUNDS = 20
+SEARCHED = 64  # voxels along a side of the cube that is searched for the object
 
 Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 
@@ -18,14 +22,8 @@ Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 def hull_points(images: Images, box: Box, count: int, generator: torch.Generator) -> Tensor:
     """Draw random points of the box that project onto something visible in every view.
 
-    Args:
-        images: views with alpha.
-        box: where to look, world units.
-        count: of points.
-        generator: of random numbers.
-
     Returns:
-        [count, 3], or fewer where the hull is but a tiny part of the box.
+        [count, 3] in world units, or fewer where the hull is but a tiny part of the box.
     """
     inside: list[Tensor] = []
     for _ in range(ROUNDS):
@@ -37,20 +35,25 @@ def hull_points(images: Images, box: Box, count: int, generator: torch.Generator
             break
     if any(map(len, inside)):
         return torch.cat(inside)[:count]
-    raise ArgumentError(
-        f"visual hull: expected points that every view shows, found none between {box[0].tolist()} and "
-        f"{box[1].tolist()}; do the views show anything there, and do their cameras agree?"
+    raise _empty(f"between {box[0].tolist()} and {box[1].tolist()}")
+
+
+def _empty(where: str) -> ArgumentError:
+    """Make the error of views that agree on nothing."""
+    return ArgumentError(
+        f"visual hull: expected points that every view shows, found none {where}; do the views show anything "
+        "there, and do their cameras agree?"
     )
 
 
 def random_points(box: Box, count: int, generator: torch.Generator) -> Tensor:
-    """Points [count, 3], uniform in the box."""
+    """Draw points [count, 3], uniform in the box."""
     low, high = box
     return low + (high - low) * torch.rand(count, 3, generator=generator)
 
 
 def is_covered(alpha: Tensor, camera: Camera, points: Tensor) -> Tensor:
-    """Whether points [n, 3] fall on pixels of an image [H, W] above 0; those outside of the view do."""
+    """Return whether points [n, 3] fall on pixels of an image [H, W] above 0; those outside of it do."""
     columns, rows, is_inside = project(camera, points)
     covered = torch.ones(len(points), dtype=torch.bool)
     covered[is_inside] = alpha[rows[is_inside], columns[is_inside]] > 0
@@ -58,7 +61,7 @@ def is_covered(alpha: Tensor, camera: Camera, points: Tensor) -> Tensor:
 
 
 def project(camera: Camera, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-    """Column and row [n] of the pixels that points fall on, and whether these are in the view."""
+    """Return column and row [n] of the pixels that points fall on, and whether these are in the view."""
     places, z = camera.project(points)
     columns, rows = places.floor().long().unbind(dim=1)
     on_image = (columns >= 0) & (columns < camera.width) & (rows >= 0) & (rows < camera.height)
@@ -66,7 +69,7 @@ def project(camera: Camera, points: Tensor) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def mean_colors(images: Images, points: Tensor) -> Tensor:
-    """Mean colour [n, 3] of the pixels that points project to, without the white behind; black if unseen."""
+    """Return mean colours [n, 3] of the pixels of points, without the white behind; black if unseen."""
     total, weight = torch.zeros(len(points), 3), torch.zeros(len(points), 1)
     for index, camera in enumerate(images.cameras):
         columns, rows, is_inside = project(camera, points)
@@ -74,3 +77,34 @@ def mean_colors(images: Images, points: Tensor) -> Tensor:
         total[is_inside] += pixels[:, :3] - (1 - pixels[:, 3:])  # premultiplied
         weight[is_inside] += pixels[:, 3:]
     return (total / weight.clamp_min(1e-3)).clamp(0, 1)
+
+
+def hull_box(images: Images, half_size: float) -> Box:
+    """Return the box around the visual hull in a cube around the origin."""
+    spacing = 2 * half_size / SEARCHED
+    low = torch.full((3,), -half_size + spacing / 2)
+    points = lattice([SEARCHED] * 3, low, spacing)
+    inside = points[in_hull(images, points, spacing)]
+    if not len(inside):
+        raise _empty(f"within {half_size} of the origin")
+    return inside.amin(0) - spacing, inside.amax(0) + spacing
+
+
+def lattice(size: list[int], low: Tensor, spacing: float) -> Tensor:
+    """Return world positions [X Y Z, 3] of all voxels."""
+    return low + spacing * torch.cartesian_prod(*map(torch.arange, size))
+
+
+def in_hull(images: Images, points: Tensor, spacing: float) -> Tensor:
+    """Return whether each of points [n, 3] is within about a spacing of something visible, in every view."""
+    left = torch.arange(len(points))
+    for index, camera in enumerate(images.cameras):
+        nearest = float((points[left] - camera.position).norm(dim=1).amin()) if len(left) else 1.0
+        pixels = min(
+            ceil(0.5 * float(camera.K[0, 0]) * spacing / max(nearest, spacing)), min(images.size) // 2
+        )
+        alpha = widened(images.planes[index, 3], pixels)
+        left = left[is_covered(alpha, camera, points[left])]
+    inside = torch.zeros(len(points), dtype=torch.bool)
+    inside[left] = True
+    return inside

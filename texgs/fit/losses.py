@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.light import Light
-from texgs.fields.surfels.model import geometry
+from texgs.fields.splats import geometry
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.settings import Losses
 from texgs.raster import Options, Render, Texture, rasterize
@@ -30,7 +30,7 @@ class Shading(Protocol):
         ...
 
     def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
-        """Colours [N, 3] in a view, or a texture; differentiable."""
+        """Return colours [N, 3] in a view, or a texture; differentiable."""
         ...
 
 
@@ -62,15 +62,8 @@ def view_loss(
     maps = material_maps(parameters, shading) if weights.smoothness > 0 else None
     has_normals = weights.normal > 0 and iteration > weights.normal_from
     features = colors if maps is None else torch.cat([colors, maps], dim=1)
-    render = rasterize(
-        *geometry(parameters),
-        *(camera.viewmat, camera.K, camera.width, camera.height),
-        features=features,
-        background=white(features),
-        shift=shift,
-        outputs=("normal", "depth") if has_normals else (),
-        options=shading.options,
-    )
+    outputs = ("normal", "depth") if has_normals else ()
+    render = draw(parameters, features, shading, camera, shift=shift, outputs=outputs)
     # Split as planes, as they lie in memory: the gradient of a slice would be a whole image of zeros.
     channels = [3] if maps is None else [3, SMOOTHED]
     color, *attributes = (x.permute(1, 2, 0) for x in render.color.permute(2, 0, 1).split(channels))
@@ -78,7 +71,8 @@ def view_loss(
     if weights.alpha > 0:
         loss = loss + weights.alpha * alpha_loss(render.alpha, target.alpha, weights)
     if has_normals:
-        loss = loss + weights.normal * consistency(render, target)
+        drawn = (render.normal, render.depth, render.alpha)
+        loss = loss + weights.normal * normal_consistency(*drawn, camera.viewmat, camera.K)  # type: ignore[arg-type]
     if attributes:
         smoothness = bilateral_smoothness(attributes[0], target.color, target.alpha)
         loss = loss + weights.smoothness * SMOOTHED * smoothness
@@ -87,40 +81,36 @@ def view_loss(
 
 def render_view(parameters: Mapping[str, Tensor], shading: Shading, target: Target) -> Tensor:
     """Render the colours [H, W, 3] of a view over white."""
-    camera = target.camera
-    colors = cast(Tensor, shading.colors(parameters, camera, target.light))
+    colors = cast(Tensor, shading.colors(parameters, target.camera, target.light))
+    return draw(parameters, colors, shading, target.camera).color
+
+
+def draw(
+    parameters: Mapping[str, Tensor], features: Tensor, shading: Shading, camera: Camera, **more: Any
+) -> Render:
+    """Render features [N, C] over white behind colours, and over 0 behind material."""
+    background = features.new_zeros(features.shape[1])
+    background[:3] = 1
     return rasterize(
         *geometry(parameters),
         *(camera.viewmat, camera.K, camera.width, camera.height),
-        features=colors,
-        background=white(colors),
+        features=features,
+        background=background,
         options=shading.options,
-    ).color
+        **more,
+    )
 
 
 def alpha_loss(alpha: Tensor, target: Tensor, weights: Losses) -> Tensor:
-    """L1 + D-SSIM of alpha [H, W], or D-SSIM alone at the same weight."""
+    """Compute L1 + D-SSIM of alpha [H, W], or D-SSIM alone at the same weight."""
     if weights.alpha_l1:
         return l1_dssim(alpha, target, weights.dssim)
     return weights.dssim * (1 - ssim(alpha, target))
 
 
 def material_maps(parameters: Mapping[str, Tensor], shading: Shading) -> Tensor | None:
-    """The material of each surfel as features [N, 4]; None where all share one, or there is none."""
+    """Return the material of each surfel as features [N, 4]; None where all share one, or there is none."""
     has_maps = "ambient" in parameters and len(parameters["ambient"]) > 1
     if not has_maps or not isinstance(shading, ShadingModel):
         return None
     return torch.stack(list(material(parameters, shading.material).values()), dim=1)
-
-
-def white(features: Tensor) -> Tensor:
-    """Background [C]: white behind colours, 0 behind material."""
-    background = features.new_zeros(features.shape[1])
-    background[:3] = 1
-    return background
-
-
-def consistency(render: Render, target: Target) -> Tensor:
-    """Normal consistency of 2DGS on the rendered normals and depth."""
-    camera = target.camera
-    return normal_consistency(render.normal, render.depth, render.alpha, camera.viewmat, camera.K)  # type: ignore[arg-type]

@@ -6,8 +6,8 @@ fit of a voxel grid, and for rays near the object over white in place of all ray
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 
 import torch
 from torch import Tensor
@@ -16,26 +16,20 @@ from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import new_networks
 from texgs.fields.palette.rendering import Geometry
+from texgs.fit.checkpoint import ResumableFit
 from texgs.fit.kinds.palette import PaletteKeys
-from texgs.fit.loop import require_finite
+from texgs.fit.palette_colors import object_palette
 from texgs.fit.palette_losses import base_loss, grid_loss, palette_loss
-from texgs.fit.palette_start import object_palette, places
 from texgs.fit.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
+from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
 from texgs.volume.images import Images
 
-CHECKED_EVERY = 100  # steps between looks at the loss
 NEIGHBOURS = 2  # rays of a step that follow each other
 BETAS = (0.9, 0.99)  # of Adam
 MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the last part
-
-
-@dataclass(frozen=True)
-class PaletteProgress:
-    """Where a fit is."""
-
-    step: int  # done, from 1
-    loss: float | None  # of the step, where it was looked at: in the end the mean squared error of its rays
+TRUSTED = 0.5  # of the grid's densities, for where rays may end
+LEAST_DENSITY = 0.1  # of its voxels, so that points of rays are there
 
 
 @dataclass(frozen=True)
@@ -46,10 +40,9 @@ class Part:
     end: int
     networks: tuple[str, ...]  # that learn
     last_rate: float  # of Adam at its end, relative to that at its start
-    loss: Callable[[Geometry], tuple[Tensor, Tensor]]  # what is made small, and what of it is reported
 
 
-class PaletteFit:
+class PaletteFit(ResumableFit):
     """Networks on one set of views.
 
     Args:
@@ -61,10 +54,9 @@ class PaletteFit:
         ArgumentError: if settings do not fit each other, or the views show nothing.
     """
 
-    unit = "step"
-
     def __init__(self, images: Images, settings: PaletteKeys, seed: int = 0) -> None:
         settings.check()
+        super().__init__(settings.steps)
         self.settings = settings
         self.voxels = VoxelFit(images, settings.voxels, seed)
         self.rays = self.voxels.rays
@@ -72,14 +64,6 @@ class PaletteFit:
         self.levels = HashLevels(**asdict(settings.hash))
         self.colors = object_palette(images, settings.colors, seed)  # [P, 3] at the start
         self.parameters: dict[str, Tensor] = {}
-        self.iteration = 0  # steps that are done
-        self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
-        self.losses: list[float] = []  # that were looked at
-
-    @property
-    def iterations(self) -> int:
-        """Steps of the grid and the networks."""
-        return self.settings.steps
 
     @property
     def own(self) -> int:
@@ -88,30 +72,31 @@ class PaletteFit:
 
     @property
     def parts(self) -> list[Part]:
-        """Of the fit of networks, one after the other."""
+        """The parts of the fit of networks, one after the other."""
         s = self.settings
         base, palette = s.seed_steps, s.seed_steps + s.base_steps
         return [
-            Part(0, base, ("density",), 1.0, self.grid_loss),
-            Part(base, palette, ("density", "trunk", "base"), s.last_rate, self.base_loss),
-            Part(palette, palette + s.palette_steps, MIXED, s.last_rate, self.palette_loss),
+            Part(0, base, ("density",), 1.0),
+            Part(base, palette, ("density", "trunk", "base"), s.last_rate),
+            Part(palette, palette + s.palette_steps, MIXED, s.last_rate),
         ]
 
-    def run(self) -> Iterator[PaletteProgress]:
-        """The grid and the networks, or what is left of them."""
+    def run(self) -> Iterator[int]:
+        """Fit the grid and the networks, or what is left of them."""
         for done in self.voxels.run():
-            self.iteration = done.step
-            yield PaletteProgress(done.step, done.loss)
+            self.iteration = done
+            yield done
         self.geometry = places(self.voxels, self.levels, self.settings.step)
         self.seeds = self.geometry.unit(self.geometry.grid.points())
         for part in self.parts:
             if self.own == part.start:
                 self.begin(part)
             while self.own < part.end:
-                yield self.step(part)
+                self.step(part)
+                yield self.iteration
 
     def field(self, metadata: Mapping[str, str]) -> PaletteField:
-        """What was fitted, when `run` is at its end; without the base colour."""
+        """Return what was fitted, when `run` is at its end; without the base colour."""
         kept = {name: x.detach() for name, x in self.parameters.items() if not name.startswith("base.")}
         return PaletteField(self.geometry, kept, metadata)
 
@@ -126,60 +111,54 @@ class PaletteFit:
         self.optimizer = Optimizer(parameters, dict.fromkeys(learned, rate), BETAS)
         self.parameters = self.optimizer.parameters
 
-    def step(self, part: Part) -> PaletteProgress:
-        """A loss, and a step of the optimiser."""
-        loss, error = part.loss(self.geometry)
+    def step(self, part: Part) -> None:
+        """Take a step of the optimiser."""
+        loss, error = self.loss_of(part)
         loss.backward()
         self.optimizer.step((self.own - part.start) / (part.end - part.start))
         self.iteration += 1
-        if self.iteration % CHECKED_EVERY and self.iteration != self.iterations:
-            return PaletteProgress(self.iteration, None)
-        require_finite(self.iteration, {"loss": loss.detach(), **self.parameters})
-        self.losses.append(error.item())
-        return PaletteProgress(self.iteration, self.losses[-1])
+        if self.is_checked:
+            self.note(error.detach(), {"loss": loss.detach(), **self.parameters})
 
-    def grid_loss(self, geometry: Geometry) -> tuple[Tensor, Tensor]:
-        """Of densities against those of the grid."""
-        loss = grid_loss(self.seeds, geometry, self.parameters, self.generator)
-        return loss, loss.detach()
-
-    def base_loss(self, geometry: Geometry) -> tuple[Tensor, Tensor]:
-        """Of random rays with base colours."""
-        rays, target = self.rays.draw(self.settings.rays, NEIGHBOURS, self.generator)
-        loss = base_loss(rays, target, geometry, self.parameters, self.settings.weight_min)
-        return loss, loss.detach()
-
-    def palette_loss(self, geometry: Geometry) -> tuple[Tensor, Tensor]:
-        """Of random rays with palette colours."""
-        rays, target = self.rays.draw(self.settings.rays, NEIGHBOURS, self.generator)
-        loss, error = palette_loss(rays, target, geometry, self.parameters, self.colors, self.settings)
-        return loss, error.detach()
-
-    def psnr(self) -> None:
-        """Return nothing: the losses of the parts are of other kinds than errors of images."""
+    def loss_of(self, part: Part) -> tuple[Tensor, Tensor]:
+        """Compute what a part makes small, and what of it is reported, of random voxels or rays."""
+        s, networks = self.settings, self.parameters
+        if "trunk" not in part.networks:
+            loss = grid_loss(self.seeds, self.geometry, networks, self.generator)
+            return loss, loss
+        rays, target = self.rays.draw(s.rays, NEIGHBOURS, self.generator)
+        if "base" in part.networks:
+            loss = base_loss(rays, target, self.geometry, networks, s.weight_min)
+            return loss, loss
+        return palette_loss(rays, target, self.geometry, networks, self.colors, s)
 
     def state(self) -> dict[str, Tensor]:
-        """Everything a resumed run needs, as tensors, between two steps."""
+        """Return everything a resumed run needs, as tensors."""
         grid = {f"voxels.{name}": x for name, x in self.voxels.state().items()}
         networks = {f"networks.{name}": x for name, x in self.optimizer.state().items()} if self.own else {}
-        clock = {"iteration": torch.tensor(self.iteration), "seconds": torch.tensor(self.seconds).double()}
-        told = {"losses": torch.tensor(self.losses).double(), "random": self.generator.get_state()}
-        return {**grid, **networks, **clock, **told}
+        return {**grid, **networks, "random": self.generator.get_state(), **super().state()}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned, as if the run had never stopped."""
+        """Go on from what `state` returned."""
+        super().restore(state)
         self.voxels.restore(_under("voxels.", state))
-        self.iteration = int(state["iteration"])
         for part in self.parts:
             if part.start < self.own:
                 self.begin(part)
         if self.own:
             self.optimizer.restore(_under("networks.", state))
-        self.seconds = float(state["seconds"])
-        self.losses = state["losses"].tolist()
         self.generator.set_state(state["random"])
 
 
+def places(fit: VoxelFit, levels: HashLevels, step: float) -> Geometry:
+    """Return the voxels that show in the training views: only cells next to them ask the networks."""
+    grid = fit.grid
+    around = voxel_grid(fit.seen(), grid.lower, grid.spacing, 0)
+    values = (TRUSTED * interpolate_rows(grid, around.points())[:, 3]).clamp_min(LEAST_DENSITY)
+    rows = torch.cat([around.rows[:1], pack_rows(values, torch.zeros(len(values), 1, 3))])
+    return Geometry(around.with_rows(rows), replace(fit.march, step=step), levels)
+
+
 def _under(prefix: str, state: Mapping[str, Tensor]) -> dict[str, Tensor]:
-    """Values whose names have a prefix, without it."""
+    """Return values whose names have a prefix, without it."""
     return {name.removeprefix(prefix): x for name, x in state.items() if name.startswith(prefix)}

@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import avg_pool2d, normalize
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
-from texgs.fields.harmonics import split, zeroth
+from texgs.fields.ply_columns import take
+from texgs.fields.splats import split, zeroth
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import ShadingModel, raw_material
 from texgs.fit.hull import Box, hull_points, mean_colors, random_points
-from texgs.fit.settings import SEEDS, Seeds
-from texgs.fit.visible import CANDIDATES, most_seen
+from texgs.fit.loop import Fit
+from texgs.fit.settings import Densify, Losses, Phase, Rates, Seeds
 from texgs.volume.grid import Grid
-from texgs.volume.images import Images
+from texgs.volume.images import Images, smaller
 from texgs.volume.isosurface import visible_voxels
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.view_set import ViewSet
@@ -27,47 +30,45 @@ MARGIN = 0.02  # of the box around the data, relative to its longest side
 HALF_SIZE = 0.55  # of the cube around the origin where nothing else is known, world units
 NEIGHBOURS = 3  # whose mean distance is a surfel's first scale
 SMALLEST = 1e-4  # scale, world units
+# A quick fit finds what is seen of more surfels than are kept.
+CANDIDATES = 2  # for each surfel that is kept
+PIXELS = 200  # of the longer side of its small images, about
+PHASE = Phase(
+    iterations=100,
+    rates=Rates(quats=0.016),
+    losses=Losses(dssim=0.0, alpha=0.0),
+    densify=Densify(start=0, stop=0),
+)
 
 
 def seed_surfels(
-    images: Images,
-    views: ViewSet,
-    kind: str,
-    count: int,
-    opacity: float,
-    half_size: float | None,
-    seed: int,
-    volume: Grid | None = None,
+    images: Images, views: ViewSet, seeds: Seeds, seed: int, volume: Grid | None = None
 ) -> tuple[dict[str, Tensor], Tensor]:
-    """Raw geometry of the first surfels, and their colours.
+    """Place the first surfels.
 
-    Surfels that opaque matter hides never show, and still count under the cap of density control: "visible"
-    starts without them.
+    Surfels that opaque matter hides never show, and still count under the cap of density control: seeds
+    "visible" start without them.
 
     Args:
         images: training views.
         views: the same with their folder and metadata.
-        kind: "points" in the folder's points3d.ply, all of them; "hull", points that no view sees through;
+        seeds: where. "points" are all in the folder's points3d.ply; "hull", points that no view sees through;
             "visible", those of them that a quick fit finds to be seen; "voxels", the same from the volume's
             samples that the views' transfer function shows; "random" in the box; "auto", points if there are
-            any, else visible.
-        count: of surfels; points are taken as they are.
-        opacity: of each, between 0 and 1; for "visible", before the quick fit.
-        half_size: half the side of the cube that seeds are in, in halves of the longest side of the data, the
-            views' `aabb`; in world units where they have none. By default the box of the data, or a cube.
+            any, else visible. Opacity is that before the quick fit. The half size is one of the box of the
+            data, or in world units where views have none.
         seed: of random numbers; the same one gives the same surfels.
         volume: that the views show; for "voxels".
 
     Returns:
-        `means`, `quats`, `scales` and `opacities` by name, and colours [N, 3] in [0, 1].
+        Raw `means`, `quats`, `scales` and `opacities` by name, and colours [N, 3] in [0, 1].
 
     Raises:
-        ArgumentError: if an argument is out of range, there are no points, or the views show nothing.
+        ArgumentError: if an opacity is out of range, there are no points, or the views show nothing.
     """
-    if kind not in SEEDS:
-        raise ArgumentError(f"seeds.kind: expected one of {', '.join(SEEDS)}, got {kind!r}")
-    if not 0 < opacity < 1:
-        raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {opacity}")
+    kind, count, half_size = seeds.kind, seeds.count, seeds.half_size
+    if not 0 < seeds.opacity < 1:
+        raise ArgumentError(f"seeds.opacity: expected a value between 0 and 1, got {seeds.opacity}")
     given = views.folder / POINTS
     if kind == "auto":
         kind = "points" if given.is_file() else "visible"
@@ -84,7 +85,7 @@ def seed_surfels(
         points = hull_points(images, box_of(views, half_size), candidates, generator)
     if colors is None:
         colors = mean_colors(images, points)
-    surfels = surfels_at(points, opacity, generator)
+    surfels = surfels_at(points, seeds.opacity, generator)
     if kind not in ("visible", "voxels"):
         return surfels, colors
     return most_seen(surfels, colors, images, count, seed)
@@ -93,16 +94,10 @@ def seed_surfels(
 def seed_gaussians(images: Images, views: ViewSet, seeds: Seeds, degree: int, seed: int) -> dict[str, Tensor]:
     """Return raw parameters of the first Gaussians: as surfels start, as thick as they are wide.
 
-    `sh` is apart from `sh_rest`, as they learn at different rates.
-
-    Args:
-        images: training views.
-        views: the same with their folder and metadata.
-        seeds: where; "voxels" needs a volume and is refused.
-        degree: of the spherical harmonics, those above the zeroth being zero.
-        seed: of random numbers.
+    `sh` is apart from `sh_rest`, as they learn at different rates; all but the zeroth harmonic are zero.
+    Seeds "voxels" need a volume and are refused.
     """
-    surfels, colors = seed_surfels(images, views, **asdict(seeds), seed=seed)
+    surfels, colors = seed_surfels(images, views, seeds, seed)
     thickness = surfels["scales"].amin(dim=1, keepdim=True)  # seeds of surfels are round, or nearly so
     zeros = torch.zeros(len(colors), (degree + 1) ** 2 - 1, 3)
     sh = torch.cat([zeroth(colors), zeros], dim=1)
@@ -110,7 +105,7 @@ def seed_gaussians(images: Images, views: ViewSet, seeds: Seeds, degree: int, se
 
 
 def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> tuple[Tensor, Tensor]:
-    """Points and colours [N, 3] of a volume where the views' transfer function shows it."""
+    """Return points and colours [N, 3] of a volume where the views' transfer function shows it."""
     if volume is None or "tf" not in views.metadata:
         raise ArgumentError(
             f"{views.folder}: seeds.kind=voxels needs a volume and views that name their transfer function; "
@@ -124,9 +119,7 @@ def shown_voxels(volume: Grid | None, views: ViewSet, count: int, seed: int) -> 
 
 
 def box_of(views: ViewSet, half_size: float | None) -> Box:
-    """The box of the data with a margin, or a cube around its middle, see `seed_surfels`."""
-    if half_size is not None and not half_size > 0:
-        raise ArgumentError(f"seeds.half_size: expected more than 0, got {half_size}")
+    """Return the box of the data with a margin, or a cube around its middle, see `seed_surfels`."""
     aabb = views.metadata.get("aabb")
     if aabb is None:
         corner = torch.full((3,), float(half_size or HALF_SIZE))
@@ -147,7 +140,7 @@ def box_of(views: ViewSet, half_size: float | None) -> Box:
 
 
 def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
-    """Points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file."""
+    """Read points [N, 3] and, where the file has them, colours [N, 3] in [0, 1] of a PLY file."""
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
     vertices = read_vertices(path)
@@ -156,12 +149,12 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
         raise ArgumentError(f"{path}: expected vertices with x, y and z, found no {', '.join(missing)}")
     if text := [name for name in names if vertices.dtype[name].kind not in "iuf"]:
         raise ArgumentError(f"{path}: expected vertices with numbers, got lists: {', '.join(text)}")
-    points = columns(vertices, ("x", "y", "z"))
+    points = take(vertices, "x", "y", "z")
     if not bool(points.isfinite().all()):
         raise ArgumentError(f"{path}: expected finite x, y and z, got NaN or infinity; remove those points")
     if not {"red", "green", "blue"} <= set(names):
         return points, None
-    colors = columns(vertices, ("red", "green", "blue"))
+    colors = take(vertices, "red", "green", "blue")
     most = 1.0 if vertices.dtype["red"].kind == "f" else 255.0
     if not bool(((colors >= 0) & (colors <= most)).all()):
         raise ArgumentError(
@@ -171,19 +164,8 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
     return points, colors / most
 
 
-def columns(vertices: np.ndarray, names: tuple[str, ...]) -> Tensor:
-    """Columns of a table as [N, names], float32."""
-    return torch.from_numpy(np.stack([vertices[name].astype(np.float32) for name in names], axis=1))
-
-
 def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> dict[str, Tensor]:
-    """Raw geometry of round surfels at points: sized by the distance to neighbours, turned at random.
-
-    Args:
-        points: [N, 3] world units, at least four.
-        opacity: of each.
-        generator: of random numbers.
-    """
+    """Return raw geometry of round surfels at points [N, 3], as far apart as large, turned at random."""
     from scipy.spatial import cKDTree
 
     if len(points) <= NEIGHBOURS:
@@ -193,7 +175,50 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
     scale = torch.from_numpy(np.sqrt(np.mean(distances[:, 1:] ** 2, axis=1))).float().clamp_min(SMALLEST)
     return {
         "means": points.float(),
-        "quats": torch.nn.functional.normalize(torch.randn(len(points), 4, generator=generator), dim=1),
+        "quats": normalize(torch.randn(len(points), 4, generator=generator), dim=1),
         "scales": scale.log()[:, None].repeat(1, 2),
         "opacities": torch.full((len(points),), opacity).logit(),
     }
+
+
+def most_seen(
+    surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
+) -> tuple[dict[str, Tensor], Tensor]:
+    """Fit surfels for a moment and keep those that contribute most to all views together.
+
+    Args:
+        surfels: raw geometry, of more surfels than are wanted.
+        colors: [N, 3] of the surfels.
+        images: training views.
+        count: of surfels to keep; all if there are not so many.
+        seed: of the order of views.
+
+    Returns:
+        Raw geometry as fitted, and colours in [0, 1].
+    """
+    small = shrunk(images, max(images.planes.shape[2:]) // PIXELS)
+    start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}
+    fit = Fit(start, ShadingModel(), small, PHASE, seed)
+    for _ in fit.run():
+        pass
+    fitted = {name: x.detach() for name, x in fit.parameters.items()}
+    best = shown(Surfels(fitted), small).topk(min(count, len(colors))).indices
+    return {name: fitted[name][best] for name in surfels}, fitted["colors"][best].clamp(0, 1)
+
+
+@torch.no_grad()
+def shown(model: Surfels, images: Images) -> Tensor:
+    """Sum the blending weights [N] of each surfel over all pixels of all views."""
+    total = torch.zeros(len(model))
+    for camera, light in zip(images.cameras, images.lights, strict=True):
+        statistics = model.render(camera, light, outputs=("statistics",)).statistics
+        total += statistics.weight_sum  # type: ignore[union-attr]
+    return total
+
+
+def shrunk(images: Images, factor: int) -> Images:
+    """Average factor x factor pixels; incomplete blocks at the right and bottom are cut off."""
+    if factor <= 1:
+        return images
+    planes = torch.stack([avg_pool2d(view.float(), factor).round().to(torch.uint8) for view in images.planes])
+    return Images(planes, [smaller(camera, factor) for camera in images.cameras], images.lights)

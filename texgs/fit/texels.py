@@ -2,49 +2,32 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import torch
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
+from texgs.core.progress import progress
+from texgs.fields.splats import geometry, visible_part
 from texgs.fields.surfels.model import Surfels
-from texgs.fit.texture_adam import refine
-from texgs.fit.texture_layout import look, offsets_of, sizes_for_budget, sizes_where_seen
-from texgs.fit.texture_solve import solve
+from texgs.fields.surfels.texels import EXTENT, offsets_of
+from texgs.fit.settings import TextureKeys
+from texgs.fit.texture_solve import refine, solve
+from texgs.raster import Texture, rasterize
+from texgs.raster.arguments import MOST_TEXELS
 from texgs.volume.images import Images
 
 
 def texturize(
-    model: Surfels,
-    images: Images,
-    *,
-    texels: int | None = None,
-    sweeps: int = 3,
-    iterations: int = 0,
-    rate: float = 0.0025,
-    palette_rate: float = 0.0,
-    final: float = 0.1,
-    ridge: float = 0.2,
-    sparsity: float = 0.0,
-    has_offset: bool = True,
-    seed: int = 0,
-    title: str = "texture",
+    model: Surfels, images: Images, keys: TextureKeys, seed: int = 0, title: str = "texture"
 ) -> Surfels:
     """Give the surfels of a relightable model textures (the paper's section Textured Gaussian Primitives).
 
     Args:
         model: of stage shading.
         images: training views.
-        texels: about how many, of one edge for all surfels; by default of about one pixel where they are
-            seen.
-        sweeps: of `solve` over all views.
-        iterations: of `refine` afterwards.
-        rate: of `refine` at the start, of texels.
-        palette_rate: the same of the palette, which starts at the mean colour of the images; at 0 it stays.
-        final: both at the end, relative to the start.
-        ridge: of `solve`, relative: how strongly texels that are hardly seen stay where they are.
-        sparsity: of `refine`, weight of the mean absolute value of the image of texels alone.
-        has_offset: whether surfels keep their colours, as offsets from the palette, and texels start at 0;
-            else texels take them over, as the paper has it.
+        keys: how many texels, and how they are found.
         seed: of the order of views; with the same one, machine and versions, results are the same.
         title: of the progress bars.
 
@@ -52,32 +35,29 @@ def texturize(
         A model of stage texture; all other parameters are those of the model.
 
     Raises:
-        ArgumentError: if the model is of another stage, or a number is out of range.
+        ArgumentError: if the model is of another stage, or asks for no texels or too many.
         FitError: if texels are no longer finite.
     """
-    rates = {"rate": rate, "palette_rate": palette_rate, "final": final, "sparsity": sparsity}
-    for name, value in {"sweeps": sweeps, "iterations": iterations, "ridge": ridge, **rates}.items():
-        if not value >= 0:
-            raise ArgumentError(f"{name}: expected 0 or more, got {value}")
     if model.stage != "shading":
         raise ArgumentError(f"model: expected stage shading, got {model.stage}; pass what that stage wrote")
     palette = mean_color(images).to(model.device)
     n, scales = len(model), model.parameters["scales"].exp()
     flat = textured(model, palette, torch.ones(n, 2, dtype=torch.int32, device=scales.device))
     sight = look(flat, images, title)
-    sizes = sizes_where_seen(scales, sight) if texels is None else sizes_for_budget(scales, texels)
+    budget = keys.texels
+    sizes = sizes_where_seen(scales, sight) if budget is None else sizes_for_budget(scales, budget)
     result = textured(model, palette, sizes)
-    if not has_offset:
+    if not keys.has_offset:
         result = without_offset(result)
-    if sweeps:
-        result = solve(result, images, sight, sweeps=sweeps, ridge=ridge, seed=seed, title=title)
-    if iterations:
-        result = refine(result, images, iterations=iterations, **rates, seed=seed, title=title)
+    if keys.sweeps:
+        result = solve(result, images, sight.curvature, keys, seed, title)
+    if keys.iterations:
+        result = refine(result, images, keys, seed, title)
     return result
 
 
 def textured(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
-    """The model with texels 0 and its colours as offsets from the palette: it looks as before.
+    """Return the model with texels 0 and its colours as offsets from the palette: it looks as before.
 
     Args:
         model: of stage shading.
@@ -87,22 +67,101 @@ def textured(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
     p = model.parameters
     texels = palette.new_zeros(int(sizes.long().prod(dim=1).sum()), 3)
     texture = {"palette": palette, "texels": texels, "sizes": sizes, "offsets": offsets_of(sizes)}
-    return Surfels({**p, "colors": p["colors"] - palette, **texture}, model.shading, model.metadata)
+    return replace(model, parameters={**p, "colors": p["colors"] - palette, **texture})
 
 
 def without_offset(model: Surfels) -> Surfels:
-    """The model with the offsets of its surfels added to their texels, one surfel after the other."""
+    """Add the offsets of surfels to their texels, which lie one surfel after the other."""
     p = model.parameters
     owners = torch.repeat_interleave(p["sizes"].long().prod(dim=1))
     moved = {"texels": p["texels"] + p["colors"][owners], "colors": torch.zeros_like(p["colors"])}
-    return Surfels({**p, **moved}, model.shading, model.metadata)
+    return replace(model, parameters={**p, **moved})
 
 
 def mean_color(images: Images) -> Tensor:
-    """Mean colour [3] in [0, 1] of what all images show, weighted by alpha; black where they show nothing."""
+    """Return the mean colour [3] of what images show, weighted by alpha; black where they show nothing."""
     total = images.planes.new_zeros(4, dtype=torch.float64)
     for planes in images.planes:
         total += planes.sum(dim=(1, 2), dtype=torch.int64)
     color, alpha = total[:3], total[3]
     premultiplied = color - (255.0 * images.planes[:, 3].numel() - alpha)  # without the white behind
     return (premultiplied / alpha.clamp_min(1)).clamp(0, 1).float()
+
+
+# -- how many texels a surfel gets ---
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What the training views see of each surfel."""
+
+    largest: Tensor
+    """[N] largest blending weight in any view, 0 where no view shows the surfel."""
+    pixel: Tensor
+    """[N] side of a pixel at the surfel in the nearest view that shows it, world units; else infinite."""
+    curvature: Tensor
+    """[N] sum of weight * gain^2 over the pixels of a view that shows it. It bounds the sum of the surfel's
+    rows of A'A 1, A being the weights of texels in pixels."""
+
+
+@torch.no_grad()
+def look(model: Surfels, images: Images, title: str) -> Sight:
+    """Gather what all views show of a textured model, whatever its texels.
+
+    A surfel seen by few views has a small mean curvature and still a large one where it is seen;
+    `curvature` is therefore the mean over views weighted by itself, sum c^2 / sum c.
+    """
+    means = model.parameters["means"]
+    n = len(means)
+    largest, total, squares = means.new_zeros(3, n)
+    pixel = means.new_full((n,), torch.inf)
+    for index in progress(range(len(images)), title=f"{title}, sight", unit="view"):
+        target = visible_part(images, index, model.parameters, model.shading.options)
+        camera = target.camera
+        texture = model.shading.colors(model.parameters, camera, target.light)
+        if not isinstance(texture, Texture):
+            raise ArgumentError(f"model: expected a texture, got stage {model.stage}; lay one out first")
+        seen = rasterize(
+            *geometry(model.parameters),
+            *(camera.viewmat, camera.K, camera.width, camera.height),
+            features=texture.gain[:, None],  # any: only the statistics count
+            outputs=("statistics",),
+            options=model.shading.options,
+        ).statistics
+        curvature = seen.weight_sum * texture.gain.square()  # type: ignore[union-attr]
+        total += curvature
+        squares += curvature.square()
+        largest = torch.maximum(largest, seen.weight_max)  # type: ignore[union-attr]
+        depth = means @ camera.viewmat[2, :3] + camera.viewmat[2, 3]
+        here = torch.where(seen.weight_max > 0, depth / camera.K[0, 0], torch.inf)  # type: ignore[union-attr]
+        pixel = torch.minimum(pixel, here)
+    return Sight(largest, pixel, squares / total.clamp_min(torch.finfo(total.dtype).tiny))
+
+
+def sizes_for_budget(scales: Tensor, texels: int) -> Tensor:
+    """Choose texels along u and v [N, 2], int32, of the same edge for all surfels, about `texels` in all.
+
+    edge = sqrt(36 sum(s_u s_v) / texels), U = ceil(6 s_u / edge), V likewise, for standard deviations [N, 2]
+    in world units. Rounding up adds a few, and a surfel has one at least.
+    """
+    if texels < 1:
+        raise ArgumentError(f"texels: expected at least 1, got {texels}")
+    edge = (EXTENT**2 * scales.prod(dim=1).sum(dtype=torch.float64) / texels).sqrt().to(scales)
+    return _sizes(scales, edge.expand(len(scales)))
+
+
+def sizes_where_seen(scales: Tensor, sight: Sight) -> Tensor:
+    """Choose texels along u and v [N, 2], int32, of about a pixel of the nearest view that fully sees them.
+
+    The area of a texel grows as the largest blending weight falls: what hides behind others, and what no view
+    shows, needs few. A surfel has one at least.
+    """
+    return _sizes(scales, sight.pixel / sight.largest.sqrt())
+
+
+def _sizes(scales: Tensor, edges: Tensor) -> Tensor:
+    counts = (EXTENT * scales / edges[:, None]).ceil().clamp_min(1)  # [N, 2]
+    most = int(counts.double().prod(dim=1).max()) if len(counts) else 0
+    if most > MOST_TEXELS:
+        raise ArgumentError(f"texels: expected at most 2^24 for one surfel, got {most}; lower texels")
+    return counts.int()

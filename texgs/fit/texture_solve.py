@@ -1,17 +1,22 @@
-"""Texels by preconditioned stochastic steps: with geometry and shading frozen, images are linear in them."""
+"""Texels from images by least squares or Adam: with geometry and shading frozen, images are linear."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import torch
 from torch import Tensor
 
 from texgs.core import check
+from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
-from texgs.fields.bounds import visible_part
+from texgs.fields.optimizer import Optimizer, Rate
+from texgs.fields.splats import geometry, visible_part
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import footprint
-from texgs.fit.texture_layout import Sight
+from texgs.fit.settings import TextureKeys
+from texgs.raster import Texture, rasterize
 from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images, Target
 
@@ -19,22 +24,23 @@ STEP = 0.6  # of a Newton step in a typical view: 2 is the limit of stability, a
 LAST_STEP = 0.06  # noise of single views averages out as steps fall
 CHECKED = 12  # views in which texels must have lowered the error
 STRUCTURE = 1e-3  # weight of D-SSIM against half the mean squared error
+DSSIM = 0.2  # share of D-SSIM in what Adam follows
 
 
 def solve(
-    model: Surfels, images: Images, sight: Sight, *, sweeps: int, ridge: float, seed: int, title: str
+    model: Surfels, images: Images, of_surfels: Tensor, keys: TextureKeys, seed: int, title: str
 ) -> Surfels:
     """Fit the texels to all views: least squares, with a little D-SSIM, one view per step.
 
     A step divides the gradient by an estimate of the row sums A'A 1 of the Hessian in one view, A being the
-    weights of texels in its pixels: by the row sums themselves, no eigenvalue would exceed 1.
+    weights of texels in its pixels: by the row sums themselves, no eigenvalue would exceed 1. To the estimate
+    `keys.ridge` times its median is added, which keeps texels that are hardly seen in place.
 
     Args:
         model: textured, texels where to start.
         images: training views.
-        sight: of the model with the texels where to start.
-        sweeps: passes over all views.
-        ridge: added to that estimate, relative to its median; it keeps texels that are hardly seen in place.
+        of_surfels: curvature [N] of the model, see `texels.Sight`.
+        keys: of the phase.
         seed: of the order of views.
         title: of the progress bar.
 
@@ -42,10 +48,10 @@ def solve(
         The model with new texels; the one given, if these would not lower the squared error.
     """
     texels = model.parameters["texels"].clone().requires_grad_()
-    moving = Surfels({**model.parameters, "texels": texels}, model.shading, model.metadata)
-    scale = _inverse(curvature(model.parameters["sizes"], sight.curvature), ridge)
+    moving = replace(model, parameters={**model.parameters, "texels": texels})
+    scale = _inverse(curvature(model.parameters["sizes"], of_surfels), keys.ridge)
     generator = torch.Generator().manual_seed(seed)
-    order = [i for _ in range(sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
+    order = [i for _ in range(keys.sweeps) for i in torch.randperm(len(images), generator=generator).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
         target = visible_part(images, index, model.parameters, model.shading.options)
         image = moving.render(target.camera, target.light).color
@@ -55,24 +61,19 @@ def solve(
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
             texels.addcmul_(gradient, scale, value=-rate)
-    try:
-        check.finite(texels=texels)
-    except ArgumentError as error:
-        raise FitError(
-            f"texture: {error}; the training views or the model of the phase before are damaged"
-        ) from error
-    solved = Surfels({**model.parameters, "texels": texels.detach()}, model.shading, model.metadata)
+    _require_finite("the training views or the model of the phase before are damaged", texels=texels)
+    solved = replace(model, parameters={**model.parameters, "texels": texels.detach()})
     return solved if sampled_error(solved, images) <= sampled_error(model, images) else model
 
 
 def squared_error(image: Tensor, target: Target) -> Tensor:
-    """Sum [] over pixels and channels."""
+    """Return the sum [] over pixels and channels."""
     return (image - target.color).square().sum()
 
 
 @torch.no_grad()
 def sampled_error(model: Surfels, images: Images) -> float:
-    """Squared error of some views, evenly spaced, with colours clamped as on a screen."""
+    """Return the squared error of some views, evenly spaced, with colours clamped as on a screen."""
     device = model.device
     targets = [images.target(i, device) for i in range(0, len(images), max(1, len(images) // CHECKED))]
     errors = [squared_error(model.render(t.camera, t.light).color.clamp(0, 1), t) for t in targets]
@@ -80,20 +81,75 @@ def sampled_error(model: Surfels, images: Images) -> float:
 
 
 def curvature(sizes: Tensor, of_surfels: Tensor) -> Tensor:
-    """Share [T, 1] of each texel in the curvature of its surfel.
-
-    Args:
-        sizes: texels along u and v [N, 2], one surfel after the other.
-        of_surfels: [N].
-    """
+    """Return the share [T, 1] of each texel in the curvature [N] of its surfel, in their order."""
     owner = torch.repeat_interleave(sizes.long().prod(dim=1))  # [T]
     return (footprint(sizes) * of_surfels[owner])[:, None]
 
 
 def _inverse(curvatures: Tensor, ridge: float) -> Tensor:
-    """1 / (curvature + ridge * median) [T, 1]; 0 where nothing is seen at all."""
+    """Return 1 / (curvature + ridge * median) [T, 1]; 0 where nothing is seen at all."""
     seen = curvatures[curvatures > 0]
     if not len(seen):
         return torch.zeros_like(curvatures)
     damped = curvatures + ridge * seen.median()
     return torch.where(damped > 0, 1 / damped, 0.0)
+
+
+def _require_finite(advice: str, **tensors: Tensor) -> None:
+    try:
+        check.finite(**tensors)
+    except ArgumentError as error:
+        raise FitError(f"texture: {error}; {advice}") from error
+
+
+def refine(model: Surfels, images: Images, keys: TextureKeys, seed: int, title: str) -> Surfels:
+    """Fit the texels, and the palette with them, to one view after the other by L1 + D-SSIM and sparsity.
+
+    As the paper fits them. A colour without light is palette + offset + texel. The palette has the gradients
+    of all colours together and takes up what they have in common; texels take up how they differ.
+
+    Args:
+        model: textured, texels and palette where to start.
+        images: training views.
+        keys: of the phase. The palette remains a colour in [0, 1]; without a rate it stays.
+        seed: of the order of views.
+        title: of the progress bar.
+    """
+    rates = {"texels": Rate(keys.rate, keys.final)}
+    if keys.palette_rate:
+        rates["palette"] = Rate(keys.palette_rate, keys.final)
+    optimizer = Optimizer({name: model.parameters[name] for name in ("texels", "palette")}, rates)
+    moving = replace(model, parameters={**model.parameters, **optimizer.parameters})
+    generator = torch.Generator().manual_seed(seed)
+    order: list[int] = []
+    for iteration in progress(range(keys.iterations), title=title, unit="iteration"):
+        if not order:
+            order = torch.randperm(len(images), generator=generator).tolist()
+        target = visible_part(images, order.pop(), model.parameters, model.shading.options)
+        image = moving.render(target.camera, target.light).color
+        loss = l1_dssim(image, target.color, DSSIM)
+        if keys.sparsity > 0:
+            loss = loss + keys.sparsity * texel_map(moving, target.camera).abs().mean()
+        (target.share * loss).backward()
+        optimizer.step(iteration / keys.iterations)
+        with torch.no_grad():
+            optimizer.parameters["palette"].clamp_(0, 1)
+    fitted = {name: x.detach() for name, x in optimizer.parameters.items()}
+    _require_finite("look for values that are not in the model before", **fitted)
+    return replace(model, parameters={**model.parameters, **fitted})
+
+
+def texel_map(model: Surfels, camera: Camera) -> Tensor:
+    """Render the texels alone, without palette, offsets and light, over 0 [H, W, 3].
+
+    The paper's rendered colour map of c_tex (section Recolorable Textures and PSE); differentiable in texels.
+    """
+    p = model.parameters
+    black = torch.zeros_like(p["means"])
+    seen = rasterize(
+        *geometry(p),
+        *(camera.viewmat, camera.K, camera.width, camera.height),
+        texture=Texture(black, torch.ones_like(p["opacities"]), p["texels"], p["sizes"], p["offsets"]),
+        options=model.shading.options,
+    )
+    return seen.color

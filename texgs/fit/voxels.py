@@ -2,36 +2,28 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import fields
+from math import ceil, log10
 
 import torch
 from torch import Tensor
 
 from texgs.core.errors import FitError
-from texgs.fields.voxels.rays import training_rays
+from texgs.fields.voxels.rays import TrainingRays, training_rays
+from texgs.fit.checkpoint import ResumableFit
+from texgs.fit.hull import hull_box, in_hull, lattice
 from texgs.fit.kinds.voxels import GridStage, VoxelKeys
-from texgs.fit.loop import require_finite
-from texgs.fit.voxel_shape import hull_grid, refined, seen_voxels
-from texgs.raster.voxel_grid import VoxelGrid
+from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, voxel_grid
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import March, Rays, Samples
 from texgs.volume.images import Images
 
-CHECKED_EVERY = 100  # steps between looks at the loss
+PIECE = 16_384  # rays at a time
+SIDE = 8  # voxels that the sides of the coarsest grid are multiples of
 
 
-@dataclass(frozen=True)
-class VoxelProgress:
-    """Where a fit is."""
-
-    step: int  # done, from 1
-    n_voxels: int
-    loss: float | None  # mean squared error of the step's rays, where it was looked at
-
-
-class VoxelFit:
+class VoxelFit(ResumableFit):
     """A grid on one set of views.
 
     Args:
@@ -43,81 +35,69 @@ class VoxelFit:
         ArgumentError: if settings do not fit each other, or the views show nothing.
     """
 
-    unit = "step"
-
     def __init__(self, images: Images, settings: VoxelKeys, seed: int = 0) -> None:
         settings.check()
-        self.settings = settings
+        super().__init__(settings.steps)
+        self.settings = s = settings
         self.march = March(step=settings.step, transmittance_min=settings.transmittance_min)
         self.rays = training_rays(images)
         self.generator = torch.Generator().manual_seed(seed)
-        self.iteration = 0  # steps that are done
-        self.seconds = 0.0  # that earlier runs have taken, kept by whoever times them
-        self.losses: list[float] = []  # that were looked at
-        self._begin(
-            hull_grid(
-                images, settings.stages[0].side, settings.half_size, settings.degree, settings.start_density
-            )
-        )
+        self._begin(hull_grid(images, s.stages[0].side, s.half_size, s.degree, s.start_density))
 
     def _begin(self, grid: VoxelGrid) -> None:
         """Go on with another grid; the optimiser starts anew."""
         self.grid = grid
         self.optimizer = VoxelOptimizer(grid, self.settings.optimizer)
 
-    @property
-    def iterations(self) -> int:
-        """Steps of all stages."""
-        return self.settings.steps
-
-    def run(self) -> Iterator[VoxelProgress]:
-        """All stages, or what is left of them."""
+    def run(self) -> Iterator[int]:
+        """Go through all stages, or what is left of them."""
         start = 0
         for index, stage in enumerate(self.settings.stages):
             if index and self.iteration == start:
                 self.refine()
             start += stage.steps
             while self.iteration < start:
-                yield self.step(stage)
+                self.step(stage)
+                yield self.iteration
         self.grid.refresh_occupancy()
 
     def refine(self) -> None:
         """Remove what no ray sees, and halve the spacing."""
-        s = self.settings
         self.grid.refresh_occupancy()
-        kept = seen_voxels(self.grid, self.rays, self.march, s.prune_weight, s.prune_share)
-        if not kept.any():
+        self._begin(refined(self.grid, self.seen()))
+
+    def seen(self) -> Tensor:
+        """Return the voxels [X, Y, Z] that show in the training views."""
+        s = self.settings
+        seen = seen_voxels(self.grid, self.rays, self.march, s.prune_weight, s.prune_share)
+        if not seen.any():
             raise FitError("voxels: expected some that show in the views, found none; lower prune_weight")
-        self._begin(refined(self.grid, kept))
+        return seen
 
     def state(self) -> dict[str, Tensor]:
-        """Everything a resumed run needs, as tensors, between two steps."""
+        """Return everything a resumed run needs, as tensors."""
         grid = {
             f"grid.{name}": torch.as_tensor(value, dtype=None if isinstance(value, Tensor) else torch.float64)
             for name, value in vars(self.grid).items()
         }
         moments = {"second": self.optimizer.second, "first": self.optimizer.first}
         kept = {f"optimizer.{name}": x for name, x in moments.items() if x is not None}
-        clock = {"iteration": torch.tensor(self.iteration), "seconds": torch.tensor(self.seconds).double()}
-        told = {"losses": torch.tensor(self.losses).double(), "random": self.generator.get_state()}
-        return {**grid, **kept, **clock, **told}
+        return {**grid, **kept, "random": self.generator.get_state(), **super().state()}
 
     def restore(self, state: Mapping[str, Tensor]) -> None:
-        """Go on from what `state` returned, as if the run had never stopped."""
+        """Go on from what `state` returned."""
+        super().restore(state)
         tensors = {f.name: state[f"grid.{f.name}"].clone() for f in fields(VoxelGrid)}
         lower, spacing = tensors.pop("lower").tolist(), tensors.pop("spacing").item()
         self._begin(VoxelGrid(tuple(lower), spacing, **tensors))
         self.optimizer.second.copy_(state["optimizer.second"])
         if self.optimizer.first is not None:
             self.optimizer.first.copy_(state["optimizer.first"])
-        self.iteration = int(state["iteration"])
-        self.seconds = float(state["seconds"])
-        self.losses = state["losses"].tolist()
         self.generator.set_state(state["random"])
 
     @torch.no_grad()
-    def step(self, stage: GridStage) -> VoxelProgress:
-        """Rays, their mean squared error, a step of the optimiser."""
+    def step(self, stage: GridStage) -> None:
+        """Draw rays, and take a step of the optimiser on their mean squared error."""
         s = self.settings
         if self.iteration % s.occupy_every == 0:
             self.grid.refresh_occupancy()
@@ -131,20 +111,66 @@ class VoxelFit:
             add_variation_of_some(self.grid, *variation)
         self.optimizer.step(self.rates())
         self.iteration += 1
-        is_looked_at = self.iteration % CHECKED_EVERY == 0 or self.iteration == s.steps
-        loss = error.square().mean() if is_looked_at else None
-        if loss is not None:
+        if self.is_checked:
             # Densities that are not finite show nothing, so that the loss alone does not tell.
-            require_finite(self.iteration, {"loss": loss, "density": self.grid.density})
-            self.losses.append(float(loss))
-        return VoxelProgress(self.iteration, len(self.grid), None if loss is None else float(loss))
+            loss = error.square().mean()
+            self.note(loss, {"loss": loss, "density": self.grid.density})
 
     def psnr(self) -> float:
         """Return the PSNR in dB of the training rays that were looked at last."""
-        return -10 * math.log10(max(self.losses[-1], 1e-10))
+        return -10 * log10(max(self.losses[-1], 1e-10))
 
     def rates(self) -> VoxelRates:
-        """Learning rates of the step to come."""
+        """Return the learning rates of the step to come."""
         s = self.settings
         sh = s.sh.at(self.iteration, s.steps)
         return VoxelRates(s.density.at(self.iteration, s.steps), sh, sh)
+
+
+def hull_grid(images: Images, side: int, half_size: float, degree: int, density: float) -> VoxelGrid:
+    """Make a grey grid that fills the visual hull, with `side` voxels along the longest side of its box.
+
+    It has spherical harmonics of a degree, and the same density, per world unit, in all voxels. The hull is
+    searched in a cube around the origin, `half_size` being half its side.
+    """
+    low, high = hull_box(images, half_size)
+    spacing = float((high - low).max()) / (side - 1)
+    size = [SIDE * ceil((float(extent) / spacing + 1) / SIDE) for extent in high - low]
+    mask = in_hull(images, lattice(size, low, spacing), spacing).reshape(size)
+    grid = voxel_grid(mask, low.tolist(), spacing, degree)
+    filled = pack_rows(torch.full((len(grid),), density), torch.zeros(len(grid), (degree + 1) ** 2, 3))
+    return grid.with_rows(torch.cat([grid.rows[:1], filled]))
+
+
+def seen_voxels(grid: VoxelGrid, rays: TrainingRays, march: March, weight: float, share: float) -> Tensor:
+    """Return voxels [X, Y, Z] next to which some training rays have a sample with a weight above `weight`."""
+    weights = torch.zeros(len(grid.rows))
+    every = max(round(1 / share), 1)
+    for start in range(0, len(rays), every * PIECE):  # runs of neighbours, spread over all views
+        ids = torch.arange(start, min(start + PIECE, len(rays)))
+        Samples(grid, march, rays.take(ids)[0]).mark(weights)
+    return (weights > weight)[grid.links().long()]
+
+
+def refined(grid: VoxelGrid, kept: Tensor) -> VoxelGrid:
+    """Make a grid with half the spacing, of the voxels around those to keep, [X, Y, Z] bool.
+
+    Its rows are interpolated; every other one is a row as it was.
+    """
+    mask = kept
+    for axis in range(3):
+        mask = mask.repeat_interleave(2, axis)
+    finer = voxel_grid(grown(mask), grid.lower, grid.spacing / 2, grid.degree)
+    finer.rows[0] = grid.rows[0]
+    interpolate_rows(grid, finer.points(), out=finer.rows[1:])
+    finer.refresh()
+    return finer
+
+
+def grown(mask: Tensor) -> Tensor:
+    """Add all 26 neighbours of what is in a mask [X, Y, Z]."""
+    for axis, side in enumerate(mask.shape):
+        before, mask = mask, mask.clone()
+        mask.narrow(axis, 0, side - 1).logical_or_(before.narrow(axis, 1, side - 1))
+        mask.narrow(axis, 1, side - 1).logical_or_(before.narrow(axis, 0, side - 1))
+    return mask

@@ -14,7 +14,8 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.figures import COLUMNS, Cell, Row, Scale, draw
 from texgs.fields.field import Field
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
 from texgs.fit.losses import material_maps
 from texgs.metrics.image import psnr

@@ -12,8 +12,9 @@ from torch import Tensor
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit
+from texgs.fields.splats import geometry
 from texgs.fields.surfels.composition import Part, by_part
-from texgs.fields.surfels.model import Surfels, geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.texels import mean_texels
 from texgs.raster.shading import Y00
 

@@ -15,9 +15,8 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 from texgs.fields import files
 from texgs.fields.field import Field, Look
-from texgs.fields.gaussians.composition import JoinedGaussians
-from texgs.fields.gaussians.model import Gaussians
-from texgs.fields.gaussians.ply import write_ply as write_gaussians
+from texgs.fields.gaussians.files import write_ply as write_gaussians
+from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
 from texgs.fields.kinds import Kind, kinds
 from texgs.fields.surfels.compact import seen_surfels, write_compact
 from texgs.fields.surfels.composition import Composition

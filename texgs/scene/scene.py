@@ -16,9 +16,8 @@ from texgs.fields.files import open_field
 from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.segment import labels_of, with_variants
 from texgs.fields.surfels.texels import lean
-from texgs.fields.surfels.texture_file import with_texture
+from texgs.fields.surfels.variants import labels_of, with_texture, with_variants
 from texgs.scene.segment_file import read_segment
 
 WHITE = (1.0, 1.0, 1.0)

@@ -14,7 +14,7 @@ from texgs.core.lens import Lens
 from texgs.core.light import Light
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
-from texgs.fields.gaussians.composition import JoinedGaussians
+from texgs.fields.gaussians.model import JoinedGaussians
 from texgs.fields.kinds import Kind
 from texgs.fields.part_edit import NEEDS, PartEdit
 from texgs.fields.surfels.composition import Composition

@@ -24,7 +24,7 @@ from texgs.core.names import part_file
 from texgs.edit.method import method_of
 from texgs.edit.task import EditedScene, Task
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import write_texture
 from texgs.models.weights import available
 from texgs.scene.scene import Scene
 from texgs.viewer.jobs import Jobs, Watch

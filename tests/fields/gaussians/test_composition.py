@@ -5,8 +5,7 @@ from torch.testing import assert_close
 from tests.fields.gaussians.samples import sample
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ConfigError
-from texgs.fields.gaussians.composition import JoinedGaussians
-from texgs.fields.gaussians.model import Gaussians
+from texgs.fields.gaussians.model import Gaussians, JoinedGaussians
 from texgs.fields.kinds import kinds
 from texgs.fields.part_edit import PartEdit
 

@@ -144,13 +144,9 @@ def test_what_half_precision_cannot_hold_stays(tmp_path):
     assert torch.equal(restored.parameters["colors"], colors)
 
 
-def test_no_surfels_are_a_model_and_the_same_model_gives_the_same_bytes(tmp_path):
+def test_no_surfels_are_a_model(tmp_path):
     model = sample(n=0)
     assert same(read_compact(write_compact(tmp_path / "m", model)), model)
-    assert (
-        write_compact(tmp_path / "a", sample()).read_bytes()
-        == write_compact(tmp_path / "b", sample()).read_bytes()
-    )
 
 
 def test_what_a_compact_file_holds_is_not_rounded_again(tmp_path):
@@ -177,15 +173,6 @@ def test_scenes_open_either_kind_of_file(tmp_path):
         open_model(tmp_path / "none")
 
 
-@pytest.mark.parametrize("kept", [0.0, 0.05, 0.5, 0.9, 0.999])
-def test_a_file_cut_anywhere_is_refused(tmp_path, kept):
-    path = write_compact(tmp_path / "m", sample())
-    data = path.read_bytes()
-    path.write_bytes(data[: int(kept * len(data))])
-    with pytest.raises(ArgumentError, match=f"{path}: expected"):
-        read_compact(path)
-
-
 @settings(max_examples=100, deadline=None)
 @given(place=st.floats(0, 1, exclude_max=True), value=st.integers(0, 255))
 def test_a_changed_byte_gives_a_model_or_a_sentence(tmp_path_factory, place, value):
@@ -210,14 +197,6 @@ def packed(path, data):
 
 
 def test_files_that_are_no_compact_model_are_named(tmp_path):
-    with pytest.raises(ArgumentError, match="none: no such file"):
-        read_compact(tmp_path / "none")
-    with pytest.raises(ArgumentError, match="got a folder"):
-        read_compact(tmp_path)
-    for content in (b"", b"ply\n", b'{"a":1}\n'):
-        (tmp_path / "m").write_bytes(content)
-        with pytest.raises(ArgumentError, match="expected a texgs-compact file, got one of another format"):
-            read_compact(tmp_path / "m")
     with pytest.raises(ArgumentError, match="another format"):
         read_compact(write_model(tmp_path / "m", sample()))
     with pytest.raises(ArgumentError, match="cut short or damaged"):

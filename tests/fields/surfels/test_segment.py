@@ -16,8 +16,7 @@ from texgs.fields.surfels.compact import write_compact
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import write_model
-from texgs.fields.surfels.segment import labels_of, with_variants
-from texgs.fields.surfels.texture_file import write_texture
+from texgs.fields.surfels.variants import labels_of, with_variants, write_texture
 from texgs.scene.export import joined
 from texgs.scene.scene import Scene, SceneModel, SceneSegment
 from texgs.scene.scene_file import read_scene, write_scene

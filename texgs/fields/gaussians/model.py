@@ -1,22 +1,23 @@
-"""A basic model of 3D Gaussians with spherical harmonics."""
+"""3D Gaussians with spherical harmonics: a basic model of them, and several as one scene."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
+from torch.nn.functional import pad
 
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Role
-from texgs.fields.surfels.groups import GEOMETRY
-from texgs.fields.surfels.model import geometry
-from texgs.fields.unlit import sizes_in_mib
+from texgs.fields.field import sizes_in_mib
+from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, opacity_factors
+from texgs.fields.splats import Splats, geometry
+from texgs.fields.unlit import UnlitField, UnlitScene
 from texgs.raster import Options, Render, rasterize
 from texgs.raster.shading import DEGREES, spherical_harmonics
 
@@ -36,13 +37,13 @@ class Baked:
         """For the rasterizer."""
         return Options(antialiased=self.antialiased)
 
-    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor:
-        """Colours [N, 3] in a view, whatever the light; differentiable."""
+    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light = HEADLIGHT) -> Tensor:
+        """Return colours [N, 3] in a view, whatever the light; differentiable."""
         return spherical_harmonics(parameters["sh"], parameters["means"], camera.position)
 
 
 @dataclass(frozen=True, eq=False)
-class Gaussians:
+class Gaussians(Splats, UnlitField):
     """Raw parameters by name, as 3DGS has them, all float32 on one device.
 
     `means` [N, 3] world units, `quats` [N, 4] wxyz of any length, `scales` [N, 3] natural logarithm,
@@ -54,7 +55,6 @@ class Gaussians:
 
     kind: ClassVar[str] = "gaussians"
 
-    parameters: Mapping[str, Tensor]
     shading: Baked = field(default_factory=Baked)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
@@ -67,23 +67,6 @@ class Gaussians:
         if sizes["K"] not in DEGREES:
             raise ShapeError(f"sh: expected 1, 4, 9 or 16 coefficients, [N, K, 3], got {sizes['K']}")
 
-    def __len__(self) -> int:
-        return len(self.parameters["means"])
-
-    @property
-    def device(self) -> torch.device:
-        """Where its tensors are."""
-        return self.parameters["means"].device
-
-    def to(self, device: torch.device | str) -> Gaussians:
-        """The same model on another device."""
-        return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
-
-    def tensors(self, role: Role) -> dict[str, Tensor]:
-        """Parameters of geometry, or the harmonics."""
-        is_geometry = role == "geometry"
-        return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
-
     def sizes(self) -> dict[str, float]:
         """Return sizes in MiB: as the paper counts, PLY files of 3DGS; `stored_` are those of the tensors."""
         n_geometry, n_shading = (
@@ -94,27 +77,14 @@ class Gaussians:
             {"geometry": n_geometry, "shading": n_shading, "texture": 0},
         )
 
-    def render(
+    def draw(
         self,
         camera: Camera,
-        light: Light = HEADLIGHT,
-        *,
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
+        background: Tensor | None,
+        outputs: Collection[str],
         opacity: Tensor | float = 1.0,
     ) -> Render:
-        """Render the Gaussians.
-
-        Args:
-            camera: on the model's device.
-            light: changes nothing: the colours are those of the views.
-            background: [3]; white by default.
-            outputs: of the rasterizer, without "normal".
-            opacity: factor on opacities, one or [N]; they stay at most 1.
-
-        Raises:
-            ArgumentError: if a normal is asked for.
-        """
+        """Render the Gaussians; `opacity`, one or [N], is a factor on opacities, which stay at most 1."""
         means, quats, scales, opacities = geometry(self.parameters)
         return rasterize(
             means,
@@ -125,8 +95,61 @@ class Gaussians:
             camera.K,
             camera.width,
             camera.height,
-            features=self.shading.colors(self.parameters, camera, light),
+            features=self.shading.colors(self.parameters, camera),
             background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
             outputs=outputs,
             options=self.shading.options,
         )
+
+
+class JoinedGaussians(UnlitScene[Gaussians]):
+    """Models as one scene on one device, see `UnlitScene`: joined once, sorted and blended together.
+
+    Raises:
+        ArgumentError: if there is no model, their filters differ, or there is a segment.
+    """
+
+    def __init__(self, models: Sequence[Gaussians], segments: Sequence[Sequence[Tensor]] = ()) -> None:
+        super().__init__(models, segments)
+        if len({model.shading for model in models}) > 1:
+            raise ArgumentError(
+                "models: expected all with the antialiased filter or none, got both; fit them by one recipe"
+            )
+        self.whole = joined(models)
+
+    def _blend(
+        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+    ) -> Render:
+        return self.whole.draw(camera, background, outputs, self._per_gaussian(factors))
+
+    def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
+        """Return what is visible as one model, opacities as edited.
+
+        Raises:
+            ArgumentError: as `render`; or if nothing is visible.
+        """
+        factors = self._per_gaussian(opacity_factors(edits, len(self.counts), self.kind))
+        shown = factors > 0
+        if not bool(shown.any()):
+            raise ArgumentError("models: expected at least one visible Gaussian, got none; show a model")
+        parameters = {name: x[shown] for name, x in self.whole.parameters.items()}
+        raw, factor = parameters["opacities"], factors[shown]
+        changed = (raw.sigmoid() * factor).clamp_max(MOST_OPAQUE).logit()
+        parameters["opacities"] = torch.where(factor == 1, raw, changed)
+        return replace(self.whole, parameters=parameters)
+
+    def _per_gaussian(self, factors: Sequence[float]) -> Tensor:
+        """Return the factor [N] of each Gaussian's opacity; 0 for what is hidden, which is not drawn."""
+        pairs = zip(factors, self.counts, strict=True)
+        return torch.cat([torch.full((n,), factor, device=self.device) for factor, n in pairs])
+
+
+def joined(models: Sequence[Gaussians]) -> Gaussians:
+    """Join models to one; harmonics that a model has not are zero."""
+    most = max(model.parameters["sh"].shape[1] for model in models)
+    several = [
+        {**model.parameters, "sh": pad(sh := model.parameters["sh"], (0, 0, 0, most - sh.shape[1]))}
+        for model in models
+    ]
+    parameters = {name: torch.cat([each[name] for each in several]) for name in SHAPES}
+    return Gaussians(parameters, models[0].shading)

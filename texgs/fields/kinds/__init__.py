@@ -30,11 +30,8 @@ class Functions(NamedTuple):
     """What is done with fields of one kind."""
 
     read: Callable[[Path], Any]
-    """Reads the `Field` in a file."""
     write: Callable[[Path, Any], Path]
-    """Writes the file of a `Field` in one step."""
     compose: Callable[[Sequence[Any], Sequence[Sequence[Any]]], Any]
-    """Makes one `Composed` of fields and the masks of their segments."""
 
 
 @dataclass(frozen=True)

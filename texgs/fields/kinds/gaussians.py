@@ -10,16 +10,10 @@ from texgs.fields.kinds import Functions, Kind
 
 def functions() -> Functions:
     """Import what reads (ours, or PLY of 3DGS), writes and joins Gaussians."""
-    from texgs.core.ply_file import is_ply
-    from texgs.fields.gaussians.composition import JoinedGaussians
-    from texgs.fields.gaussians.model_file import read_gaussians, write_gaussians
-    from texgs.fields.gaussians.ply import read_ply
+    from texgs.fields.gaussians.files import read_gaussians, write_gaussians
+    from texgs.fields.gaussians.model import JoinedGaussians
 
-    return Functions(
-        lambda path: read_ply(path) if is_ply(path) else read_gaussians(path),
-        write_gaussians,
-        JoinedGaussians,
-    )
+    return Functions(read_gaussians, write_gaussians, JoinedGaussians)
 
 
 FIELD = Kind(

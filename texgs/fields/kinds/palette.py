@@ -7,8 +7,8 @@ from texgs.fields.kinds import Functions, Kind
 
 def functions() -> Functions:
     """Import what reads, writes and composes fields of networks."""
-    from texgs.fields.palette.composition import PaletteScene
     from texgs.fields.palette.file import read_palette, write_palette
+    from texgs.fields.palette.model import PaletteScene
 
     return Functions(read_palette, write_palette, PaletteScene)
 

@@ -7,15 +7,11 @@ from texgs.fields.kinds import ALL, Functions, Kind
 
 def functions() -> Functions:
     """Import what reads (lossless, compact or PLY), writes (without loss) and joins surfels."""
-    from texgs.core.ply_file import is_ply
     from texgs.fields.surfels.compact import open_model
     from texgs.fields.surfels.composition import Composition
     from texgs.fields.surfels.model_file import write_model
-    from texgs.fields.surfels.ply import read_ply
 
-    return Functions(
-        lambda path: read_ply(path) if is_ply(path) else open_model(path), write_model, Composition
-    )
+    return Functions(open_model, write_model, Composition)
 
 
 FIELD = Kind(

@@ -7,8 +7,8 @@ from texgs.fields.kinds import Functions, Kind
 
 def functions() -> Functions:
     """Import what reads, writes and merges grids."""
-    from texgs.fields.voxels.composition import VoxelScene
     from texgs.fields.voxels.file import read_voxels, write_voxels
+    from texgs.fields.voxels.model import VoxelScene
 
     return Functions(read_voxels, write_voxels, VoxelScene)
 

@@ -11,14 +11,14 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, ShapeError, TexgsError
+from texgs.core.errors import ArgumentError, ShapeError, located
+from texgs.core.io import reading_as
 from texgs.core.tensor_file import read_tensor_file, write_tensor_file
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import network_shapes
 from texgs.fields.palette.rendering import Geometry
-from texgs.fields.voxels.file import grid_of
+from texgs.fields.voxels.file import grid_of, lattice, march_of
 from texgs.raster.hash_encoding import HashLevels
-from texgs.raster.voxels import March
 
 FORMAT = "texgs-palette"
 VERSION = 1
@@ -37,10 +37,7 @@ def write_palette(path: str | Path, field: PaletteField) -> Path:
     check.finite(**networks)
     description = {
         "version": VERSION,
-        "lower": geometry.grid.lower,
-        "spacing": geometry.grid.spacing,
-        "step": geometry.march.step,
-        "transmittance_min": geometry.march.transmittance_min,
+        **lattice(geometry.grid, geometry.march),
         "hash": asdict(geometry.levels),
         "metadata": dict(field.metadata),
     }
@@ -50,24 +47,19 @@ def write_palette(path: str | Path, field: PaletteField) -> Path:
 
 def read_palette(path: str | Path) -> PaletteField:
     """Read a file of a palette field as `write_palette` writes it, bit for bit. Nothing in it is executed."""
-    path = Path(path)
-    description, tensors = read_tensor_file(path, FORMAT, VERSION)
-    try:
+    description, tensors = read_tensor_file(Path(path), FORMAT, VERSION)
+    with located(path), reading_as("networks and a grid", "write it again"):
         networks = {name: x for name, x in tensors.items() if name not in GRID}
         check.finite(density=tensors["density"], **networks)
         geometry = _geometry(tensors, description)
         _check_networks(networks, geometry.levels)
         return PaletteField(geometry, networks, dict(description["metadata"]))
-    except TexgsError as error:
-        raise type(error)(f"{path}: {error}") from error
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise ArgumentError(f"{path}: expected networks and a grid, got others; write it again") from error
 
 
 def _geometry(tensors: Mapping[str, Tensor], description: Mapping[str, Any]) -> Geometry:
     grey = torch.zeros(len(tensors["density"]), 1, 3)
-    march = March(step=float(description["step"]), transmittance_min=float(description["transmittance_min"]))
-    return Geometry(grid_of({**tensors, "sh": grey}, description), march, HashLevels(**description["hash"]))
+    grid = grid_of({**tensors, "sh": grey}, description)
+    return Geometry(grid, march_of(description), HashLevels(**description["hash"]))
 
 
 def _check_networks(networks: Mapping[str, Tensor], levels: HashLevels) -> None:

@@ -14,22 +14,20 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError, DeviceError
-from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Role
+from texgs.core.errors import DeviceError
+from texgs.fields.field import Role, sizes_in_mib
 from texgs.fields.palette.networks import Parameters, free_color, light, palette_color
 from texgs.fields.palette.rendering import RAYS, Geometry, Points, merged, points_on, shown, view_harmonics
-from texgs.fields.unlit import sizes_in_mib
+from texgs.fields.unlit import UnlitField, UnlitScene, require_depth
 from texgs.raster import Render
 from texgs.raster.voxels import camera_rays
 
-OUTPUTS = ("depth",)
 LEAST_WEIGHT = 1e-4  # of points whose colours are looked at
 OCCUPIED = 128  # places along each side of the two lattices of the authors
 
 
 @dataclass(frozen=True, eq=False)
-class PaletteField:
+class PaletteField(UnlitField):
     """Networks on the CPU, lit as their views were: light does not change them."""
 
     kind: ClassVar[str] = "palette"
@@ -39,7 +37,7 @@ class PaletteField:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
-        """Rows of all hash grids."""
+        """Return the number of rows of all hash grids."""
         return sum(len(x) for name, x in self.parameters.items() if name.endswith(".table"))
 
     @property
@@ -53,7 +51,7 @@ class PaletteField:
         return self.parameters["palette.colors"]
 
     def to(self, device: torch.device | str) -> PaletteField:
-        """The same field, which is rendered on the CPU alone.
+        """Return the same field, which is rendered on the CPU alone.
 
         Raises:
             DeviceError: for another device.
@@ -63,14 +61,14 @@ class PaletteField:
         return self
 
     def tensors(self, role: Role) -> dict[str, Tensor]:
-        """Raw parameters by network and layer; those of geometry with the grid's densities."""
+        """Return raw parameters by network and layer, geometry with the grid's densities."""
         placed = {name: x for name, x in self.parameters.items() if name.startswith("density.")}
         if role == "geometry":
             return {"grid": self.geometry.grid.rows, **placed}
         return {name: x for name, x in self.parameters.items() if name not in placed}
 
     def color(self, points: Points, harmonics: Tensor) -> Tensor:
-        """Colours [n, 3] of points: free ones where there are any, else those of the palette, and light.
+        """Return colours [n, 3] of points: free ones or else those of the palette, and light.
 
         Args:
             points: in the unit cube, with their features.
@@ -82,26 +80,9 @@ class PaletteField:
             return free_color(points.at, parameters, levels) + lit
         return palette_color(points.at, parameters, levels).color + lit
 
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        *,
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
-    ) -> Render:
-        """Render the field.
-
-        Args:
-            camera: from where.
-            light: changes nothing.
-            background: [3]; white by default.
-            outputs: "depth", the expected one.
-
-        Raises:
-            ArgumentError: for another output.
-        """
-        return render_fields([self], [1.0], camera, background, outputs)
+    def draw(self, camera: Camera, background: Tensor | None, outputs: Collection[str]) -> Render:
+        """Render the field."""
+        return PaletteScene([self]).render(camera, background=background, outputs=outputs)
 
     def sizes(self) -> dict[str, float]:
         """Return sizes in MiB.
@@ -119,40 +100,35 @@ class PaletteField:
         return sizes_in_mib(counted, stored)
 
 
-@torch.no_grad()
-def render_fields(
-    fields: Sequence[PaletteField],
-    factors: Sequence[float],
-    camera: Camera,
-    background: Tensor | None = None,
-    outputs: Collection[str] = (),
-) -> Render:
-    """Render fields together, each with a factor on its densities."""
-    if unknown := sorted(set(outputs) - set(OUTPUTS)):
-        raise ArgumentError(f"outputs: expected {', '.join(OUTPUTS)} of palette fields, got {unknown[0]}")
-    rays = camera_rays(camera).flatten(0, 1)
-    blended = torch.cat([_blended(fields, factors, part) for part in rays.split(RAYS)])  # [N, 5]
-    color, alpha, depth = blended.split([3, 1, 1], dim=1)
-    behind = torch.ones(3) if background is None else background
-    color = (color + (1 - alpha) * behind).clamp(0, 1)
-    size = (camera.height, camera.width)
-    depth = (depth / alpha.clamp_min(1e-12)).reshape(size) if outputs else None
-    return Render(color.reshape(*size, 3), alpha.reshape(size), depth=depth)
+class PaletteScene(UnlitScene[PaletteField]):
+    """Fields that are drawn together, see `UnlitScene`; opacity is a factor on densities, which add up."""
 
+    def _blend(
+        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+    ) -> Render:
+        require_depth(outputs, "palette fields")
+        rays = camera_rays(camera).flatten(0, 1)
+        blended = torch.cat([self._sums(factors, part) for part in rays.split(RAYS)])  # [N, 5]
+        color, alpha, depth = blended.split([3, 1, 1], dim=1)
+        behind = torch.ones(3) if background is None else background
+        color = (color + (1 - alpha) * behind).clamp(0, 1)
+        size = (camera.height, camera.width)
+        depth = (depth / alpha.clamp_min(1e-12)).reshape(size) if outputs else None
+        return Render(color.reshape(*size, 3), alpha.reshape(size), depth=depth)
 
-def _blended(fields: Sequence[PaletteField], factors: Sequence[float], rays: Tensor) -> Tensor:
-    """Sums [N, 5] over rays [N, 6] of weight times colour, 1 and distance."""
-    several = []
-    for each, factor in zip(fields, factors, strict=True):
-        points = points_on(rays, each.geometry, each.parameters)
-        several.append(points._replace(depth=factor * points.depth))
-    points, owner = merged(several)
-    shows = shown(points, LEAST_WEIGHT)
-    owner, harmonics = owner[shows.chosen], view_harmonics(rays)
-    values = torch.ones(len(owner), 5)
-    values[:, 4] = shows.points.distance
-    for index, each in enumerate(fields):
-        own = owner == index
-        own_points = shows.points.take(own)
-        values[own, :3] = each.color(own_points, harmonics[own_points.ray])
-    return shows.blend(values, len(rays))
+    def _sums(self, factors: Sequence[float], rays: Tensor) -> Tensor:
+        """Return sums [N, 5] over rays [N, 6] of weight times colour, 1 and distance."""
+        several = []
+        for each, factor in zip(self.fields, factors, strict=True):
+            points = points_on(rays, each.geometry, each.parameters)
+            several.append(points._replace(depth=factor * points.depth))
+        points, owner = merged(several)
+        shows = shown(points, LEAST_WEIGHT)
+        owner, harmonics = owner[shows.chosen], view_harmonics(rays)
+        values = torch.ones(len(owner), 5)
+        values[:, 4] = shows.points.distance
+        for index, each in enumerate(self.fields):
+            own = owner == index
+            own_points = shows.points.take(own)
+            values[own, :3] = each.color(own_points, harmonics[own_points.ray])
+        return shows.blend(values, len(rays))

@@ -38,7 +38,7 @@ class PaletteColor(NamedTuple):
 
 
 def network_shapes(levels: HashLevels, colors: int) -> dict[str, tuple[int, int]]:
-    """Shapes of all tensors for so many palette colours, by network and layer."""
+    """Return the shapes of all tensors for so many palette colours, by network and layer."""
     table, features = (levels.rows, 2), levels.width
     widths = {
         "density": [features, HIDDEN, 1 + GEOMETRY],
@@ -60,7 +60,7 @@ def network_shapes(levels: HashLevels, colors: int) -> dict[str, tuple[int, int]
 def new_networks(
     names: Collection[str], levels: HashLevels, colors: int, generator: torch.Generator
 ) -> dict[str, Tensor]:
-    """Random networks: tables near 0, layers uniform up to in^-0.5 as of torch; no palette."""
+    """Make random networks: tables near 0, layers uniform up to in^-0.5 as of torch; no palette."""
     networks = {}
     for name, shape in network_shapes(levels, colors).items():
         network, part = name.split(".")
@@ -71,23 +71,23 @@ def new_networks(
 
 
 def density(points: Tensor, parameters: Parameters, levels: HashLevels) -> tuple[Tensor, Tensor]:
-    """Density [n], per world unit, and features [n, 15] for the networks of light."""
+    """Return the density [n], per world unit, and features [n, 15] for the networks of light."""
     out = perceptron(encode(points, parameters["density.table"], levels), parameters, "density")
     return out[:, 0].clamp_max(MOST_DENSITY).exp(), out[:, 1:]
 
 
 def base_color(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> Tensor:
-    """Colour [n, 3] from features of points and spherical harmonics [n, 16] of the direction."""
+    """Return the colour [n, 3] from features of points and spherical harmonics [n, 16] of the direction."""
     return perceptron(_trunk(geometry, harmonics, parameters), parameters, "base").sigmoid()
 
 
 def light(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> Tensor:
-    """What the direction adds to all three channels, [n, 1]."""
+    """Return what the direction adds to all three channels, [n, 1]."""
     return perceptron(_trunk(geometry, harmonics, parameters), parameters, "light")
 
 
 def palette_color(points: Tensor, parameters: Parameters, levels: HashLevels) -> PaletteColor:
-    """Mixtures of the palette: radiance times the sum of share times (colour + offset)."""
+    """Mix the palette: radiance times the sum of share times (colour + offset)."""
     features = encode(points, parameters["palette.table"], levels)
     features = F.elu(perceptron(features, parameters, "palette", F.elu))
     colors = parameters["palette.colors"]
@@ -101,12 +101,12 @@ def palette_color(points: Tensor, parameters: Parameters, levels: HashLevels) ->
 
 
 def free_color(points: Tensor, parameters: Parameters, levels: HashLevels) -> Tensor:
-    """Colours [n, 3] without light that can be anything; not bounded."""
+    """Return colours [n, 3] without light that can be anything; not bounded."""
     return perceptron(encode(points, parameters["free.table"], levels), parameters, "free", F.elu)
 
 
 def perceptron(x: Tensor, parameters: Parameters, name: str, activation: Activation = F.relu) -> Tensor:
-    """The layers NAME.0, NAME.1, ... with activations between them."""
+    """Apply the layers NAME.0, NAME.1, ... with activations between them."""
     for layer in count():
         x = x @ parameters[f"{name}.{layer}"].T
         if f"{name}.{layer + 1}" not in parameters:
@@ -116,5 +116,5 @@ def perceptron(x: Tensor, parameters: Parameters, name: str, activation: Activat
 
 
 def _trunk(geometry: Tensor, harmonics: Tensor, parameters: Parameters) -> Tensor:
-    """Features [n, 64] that the colour of the base fit and the light share."""
+    """Return features [n, 64] that the colour of the base fit and the light share."""
     return F.relu(perceptron(torch.cat([harmonics, geometry], dim=1), parameters, "trunk"))

@@ -31,11 +31,11 @@ class Geometry:
 
     @property
     def length(self) -> float:
-        """Between points on a ray, world units."""
+        """The distance between points on a ray, world units."""
         return self.march.step * self.grid.spacing
 
     def unit(self, points: Tensor) -> Tensor:
-        """World points [n, 3] in the cube around the grid's box, whose sides become 1."""
+        """Place world points [n, 3] in the cube around the grid's box, whose sides become 1."""
         side = self.grid.spacing * (max(self.grid.size) - 1)
         return (points - points.new_tensor(self.grid.lower)) / side
 
@@ -50,7 +50,7 @@ class Points(NamedTuple):
     features: Tensor  # [n, 15] of the density network
 
     def take(self, chosen: Tensor) -> Points:
-        """Some of them."""
+        """Return some of them."""
         return Points(*(x[chosen] for x in self))
 
 
@@ -62,13 +62,13 @@ class Shown(NamedTuple):
     chosen: Tensor  # bool, among all points
 
     def blend(self, values: Tensor, n_rays: int) -> Tensor:
-        """Weighted sums [N, C] of values [n, C] for each ray."""
+        """Return weighted sums [N, C] of values [n, C] for each ray."""
         weighted = self.weights[:, None] * values
         return values.new_zeros(n_rays, values.shape[1]).index_add_(0, self.points.ray, weighted)
 
 
 def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> Points:
-    """All points on rays [N, 6] that the grid lets through, with their densities."""
+    """Return all points on rays [N, 6] that the grid lets through, with their densities."""
     points, ray = ray_points(geometry.grid, rays, geometry.march)
     origin, direction = rays[ray].split(3, dim=1)
     distance = ((points - origin) * direction).sum(1) / direction.square().sum(1)
@@ -78,7 +78,7 @@ def points_on(rays: Tensor, geometry: Geometry, parameters: Parameters) -> Point
 
 
 def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
-    """Weights [n] of points with optical depths [n], in the order of their rays and front to back.
+    """Return weights [n] of points with optical depths [n], in the order of their rays and front to back.
 
     The weight is the light that all points before let through, times the share that this one stops. Sums are
     of float64: they run over all rays.
@@ -94,19 +94,19 @@ def blending_weights(depth: Tensor, ray: Tensor) -> Tensor:
 
 
 def shown(points: Points, weight_min: float) -> Shown:
-    """The points with a weight above `weight_min`."""
+    """Choose the points with a weight above `weight_min`."""
     weights = blending_weights(points.depth, points.ray)
     chosen = weights > weight_min
     return Shown(points.take(chosen), weights[chosen], chosen)
 
 
 def view_harmonics(rays: Tensor) -> Tensor:
-    """Spherical harmonics [N, 16] of the directions of rays [N, 6]."""
+    """Return spherical harmonics [N, 16] of the directions of rays [N, 6]."""
     return harmonics(normalize(rays[:, 3:], dim=1))
 
 
 def merged(several: list[Points]) -> tuple[Points, Tensor]:
-    """Points of several fields in the order of their rays, and the field [n] that each is of.
+    """Merge points of several fields in the order of their rays, and return the field [n] that each is of.
 
     Densities of fields add up: a ray meets the points of all of them, each with its own depth.
     """

@@ -19,9 +19,11 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.io import reading, write_bytes
 from texgs.core.memory import require_memory
+from texgs.core.ply_file import is_ply
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import describe, model_of, read_model
-from texgs.fields.surfels.texels import mean_texels, owners
+from texgs.fields.surfels.ply import read_ply
+from texgs.fields.surfels.texels import mean_texels, offsets_of, owners
 
 FORMAT = "texgs-compact"
 VERSION = 1
@@ -49,9 +51,6 @@ def write_compact(
         model: any stage, on any device.
         seen: [N] bool, surfels that keep their texture; others get one texel, the mean of it. All by default.
         step: of texels; each is off by half of it at most.
-
-    Returns:
-        The path.
 
     Raises:
         ArgumentError, ShapeError: if the model could not be read back, `seen` does not fit it, a texel is
@@ -83,8 +82,10 @@ def read_compact(path: str | Path) -> Surfels:
 
 
 def open_model(path: str | Path) -> Surfels:
-    """Read a model file of either kind, lossless or compact, told apart by how it begins."""
+    """Read a file of a model, lossless, compact or PLY, told apart by how it begins."""
     path = Path(path)
+    if is_ply(path):
+        return read_ply(path)
     try:
         with path.open("rb") as file:
             is_compact = file.read(len(MAGIC)) == MAGIC
@@ -95,7 +96,7 @@ def open_model(path: str | Path) -> Surfels:
 
 @torch.no_grad()
 def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
-    """Which surfels [N] bool are blended into a pixel of any view.
+    """Return which surfels [N] bool are blended into a pixel of any view.
 
     Edits that make a model more transparent can show others.
     """
@@ -110,11 +111,7 @@ def seen_surfels(model: Surfels, cameras: Sequence[Camera]) -> Tensor:
 
 
 def compact_tensors(path: str | Path, model: Surfels, step: float = STEP) -> dict[str, np.ndarray]:
-    """The tensors of a compact file, see `write_compact`, of a model on the CPU.
-
-    Raises:
-        ArgumentError: naming the file at `path`, if a texel is beyond 2^23 steps.
-    """
+    """Return the tensors of a compact file at `path`, see `write_compact`, of a model on the CPU."""
     stored = {name: _rounded(name, x.detach()) for name, x in model.parameters.items() if name not in LISTS}
     if model.stage == "texture":
         stored |= _texture(path, model.parameters, step)
@@ -122,7 +119,7 @@ def compact_tensors(path: str | Path, model: Surfels, step: float = STEP) -> dic
 
 
 def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
-    """The model with one texel, the mean, for each unseen surfel."""
+    """Give each unseen surfel one texel, the mean."""
     check.shape("seen", seen, "N", N=len(model))
     if seen.dtype != torch.bool:
         raise ArgumentError(f"seen: expected bool, got {seen.dtype}; compare it with a threshold")
@@ -130,18 +127,17 @@ def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
         return model
     p = model.parameters
     place, surfel = owners(p)
-    counts = p["sizes"].long().prod(1)  # [N]
-    first = counts.cumsum(0) - counts  # [N]
+    first = offsets_of(p["sizes"])  # [N]
     texels, kept = p["texels"][place], seen[surfel]
     texels[first[~seen]] = mean_texels(p)[~seen].to(texels)
     kept[first] = True
     sizes = torch.where(seen[:, None], p["sizes"], 1)
-    texture = {"texels": texels[kept], "sizes": sizes, "offsets": _offsets(sizes)}
+    texture = {"texels": texels[kept], "sizes": sizes, "offsets": offsets_of(sizes)}
     return replace(model, parameters={**p, **texture})
 
 
 def _rounded(name: str, values: Tensor) -> np.ndarray:
-    """Values in half precision where that can hold them."""
+    """Return values in half precision where that can hold them."""
     half = values.half()
     if name == "quats" and not torch.equal(half.float(), values):  # those of a compact file stay as they are
         half = normalize(values, dim=1).half()  # any length is the same rotation, but half has few of them
@@ -150,7 +146,7 @@ def _rounded(name: str, values: Tensor) -> np.ndarray:
 
 
 def _texture(path: str | Path, p: Mapping[str, Tensor], step: float) -> dict[str, np.ndarray]:
-    """Sizes, and texels in steps as green, red - green and blue - green, because channels are much alike.
+    """Return sizes, and texels in steps as green, red - green and blue - green: channels are much alike.
 
     `codes` [B, 3, T] uint8 are bytes of whole numbers whose last bit is the sign, from low to high: all
     planes but the first are nearly all zero.
@@ -170,17 +166,11 @@ def _texture(path: str | Path, p: Mapping[str, Tensor], step: float) -> dict[str
     return {"codes": torch.stack(planes).byte().numpy(), "sizes": p["sizes"].detach().contiguous().numpy()}
 
 
-def _offsets(sizes: Tensor) -> Tensor:
-    """Of textures [N] that lie surfel after surfel."""
-    counts = sizes.long().prod(1)
-    return counts.cumsum(0) - counts
-
-
 # -- reading ---
 
 
 def _header(path: Path, line: bytes) -> dict[str, Any]:
-    """The first line; its version is judged before the rest."""
+    """Read the first line; its version is judged before the rest."""
     if not line.startswith(MAGIC):
         raise ArgumentError(f"{path}: expected a {FORMAT} file, got one of another format; read_model reads "
                             "lossless ones")  # fmt: skip
@@ -200,7 +190,7 @@ def _header(path: Path, line: bytes) -> dict[str, Any]:
 
 
 def _unpacked(path: Path, packed: bytes) -> bytes:
-    """The safetensors file in an xz stream; its header says how long it is, and nothing more is unpacked."""
+    """Unpack the safetensors file in an xz stream: what its header says it is long, and nothing more."""
     stream = lzma.LZMADecompressor(lzma.FORMAT_XZ, MEMORY)
     start = _taken(stream, 8, packed)
     header = _taken(stream, min(int.from_bytes(start, "little"), LONGEST_HEADER))
@@ -216,7 +206,7 @@ def _unpacked(path: Path, packed: bytes) -> bytes:
 
 
 def _taken(stream: lzma.LZMADecompressor, count: int, packed: bytes = b"") -> bytes:
-    """The next bytes of a stream, fewer where it ends."""
+    """Take the next bytes of a stream, fewer where it ends."""
     unpacked = b"" if stream.eof else stream.decompress(packed, count)
     while len(unpacked) < count and not stream.eof and not stream.needs_input:
         unpacked += stream.decompress(b"", count - len(unpacked))
@@ -224,7 +214,7 @@ def _taken(stream: lzma.LZMADecompressor, count: int, packed: bytes = b"") -> by
 
 
 def _parameters(stored: dict[str, np.ndarray], step: float) -> dict[str, Tensor]:
-    """Tensors of a model, float32, as `write_compact` has stored them."""
+    """Return tensors of a model, float32, as `write_compact` has stored them."""
     codes = stored.pop("codes", None)
     parameters = {name: torch.from_numpy(x.copy()) for name, x in stored.items()}
     if codes is not None:
@@ -235,5 +225,5 @@ def _parameters(stored: dict[str, np.ndarray], step: float) -> dict[str, Tensor]
             signed |= torch.from_numpy(plane.astype(np.int32) << 8 * k)
         green, red, blue = (signed >> 1) ^ -(signed & 1)
         texels = torch.stack([green + red, green, green + blue], dim=1) * step
-        parameters |= {"texels": texels, "offsets": _offsets(parameters["sizes"])}
+        parameters |= {"texels": texels, "offsets": offsets_of(parameters["sizes"])}
     return {name: x.float() if x.dtype == torch.float16 else x for name, x in parameters.items()}

@@ -16,9 +16,10 @@ from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Look
 from texgs.fields.part_edit import PartEdit
-from texgs.fields.surfels.model import Surfels, geometry
-from texgs.fields.surfels.segment import labels_of
+from texgs.fields.splats import geometry
+from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import light_direction, material, viewer
+from texgs.fields.surfels.variants import labels_of
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL, blinn_phong_texture
 
@@ -52,7 +53,7 @@ class Part:
 
     @classmethod
     def of(cls, model: Surfels, masks: Sequence[Tensor] = ()) -> Part:
-        """The part of a relightable model.
+        """Return the part of a relightable model.
 
         Args:
             model: of stage shading or texture.
@@ -73,17 +74,13 @@ class Part:
         )
 
     def per_surfel(self, values: Sequence[float]) -> float | Tensor:
-        """The value of each surfel's edit [N]; a plain number where all are the same."""
+        """Return the value of each surfel's edit [N]; a plain number where all are the same."""
         if self.labels is None or all(value == values[0] for value in values):
             return values[0]
         return self.opacities.new_tensor(values)[self.labels]
 
     def colored(self, edits: Sequence[PartEdit]) -> Tensor:
-        """c_ind without texels [N, 3].
-
-        Raises:
-            ArgumentError: if a colour is given to a model without a palette.
-        """
+        """Return c_ind without texels [N, 3]."""
         if self.palette is None:
             if any(edit.palette is not None for edit in edits):
                 raise ArgumentError("palette: expected a model with a texture; fit its texture first")
@@ -95,11 +92,7 @@ class Part:
         return self.colors + torch.stack(palettes)[self.labels]
 
     def edited(self, edits: Sequence[PartEdit]) -> Edited:
-        """The model with its edits.
-
-        Raises:
-            ArgumentError: if one cannot be made.
-        """
+        """Return what edits make of the model."""
         a, d, s, b = (
             self.material[name] * self.per_surfel([getattr(edit, name) for edit in edits])
             for name in MATERIAL
@@ -107,7 +100,7 @@ class Part:
         return Edited(self.colored(edits), (a, d, s, b), self.opacity(edits))
 
     def look(self, edited: Edited, camera: Camera, light: Light, look: Look) -> tuple[Tensor, Tensor]:
-        """Base [N, 3] and gain [N]: colour of a fragment is base + gain * texel."""
+        """Return base [N, 3] and gain [N]: the colour of a fragment is base + gain * texel."""
         p, shading, n = self.model.parameters, self.model.shading, len(self.model)
         colors, (a, d, s, b) = edited.colors, edited.material
         if look == "unshaded":
@@ -124,7 +117,7 @@ class Part:
         return base.clamp_(0, 1), torch.zeros_like(gain) if look == "discs" else gain
 
     def opacity(self, edits: Sequence[PartEdit]) -> Tensor:
-        """Opacities [N] with the edits' factors; 0 where surfels are hidden, so that nothing is drawn."""
+        """Return opacities [N] with the edits' factors; 0 where surfels are hidden: nothing is drawn."""
         factor = self.per_surfel([edit.opacity if edit.visible else 0.0 for edit in edits])
         return (self.opacities * factor).clamp_max(1)
 
@@ -223,7 +216,7 @@ class Composition:
         )
 
     def _edited(self, edits: Sequence[PartEdit] | None) -> tuple[list[Edited], Tensor]:
-        """All models with their edits, and opacities [N] of the whole; kept while only the camera moves."""
+        """Return all models with their edits, and opacities [N]; kept while only the camera moves."""
         own = None if edits is None else list(edits)
         latest = self._latest  # another thread may put another one there
         if latest is None or latest[0] != own:
@@ -234,11 +227,7 @@ class Composition:
 
 
 def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Sequence[PartEdit]]:
-    """The edits of each part: of what no segment holds, and of each segment. None changes nothing.
-
-    Raises:
-        ArgumentError: if their number is not that of models and segments.
-    """
+    """Return the edits of each part: of what no segment holds, and of each segment. None changes nothing."""
     counts = [1 + part.segments for part in parts]
     edits = [PartEdit()] * sum(counts) if edits is None else edits
     if len(edits) != sum(counts):
@@ -249,18 +238,16 @@ def by_part(parts: Sequence[Part], edits: Sequence[PartEdit] | None) -> list[Seq
 
 
 def joined_textures(models: Sequence[Surfels]) -> tuple[Tensor, Tensor, Tensor]:
-    """Texels [T, 3], sizes [N, 2] and offsets [N] of all models; surfels without any get one texel of 0."""
-    texels, sizes, offsets, count = [], [], [], 0
+    """Join texels [T, 3], sizes [N, 2] and offsets [N] of models; surfels without any get one texel of 0."""
+    textures, count = [], 0
     for model in models:
         p, n = model.parameters, len(model)
-        if "texels" in p:
-            own = (p["texels"], p["sizes"], p["offsets"])
-        else:
-            means = p["means"]
-            places = torch.arange(n, device=means.device)
-            own = (torch.zeros_like(means), torch.ones(n, 2, dtype=torch.int32, device=means.device), places)
-        texels.append(own[0])
-        sizes.append(own[1])
-        offsets.append(own[2] + count)
-        count += len(own[0])
-    return torch.cat(texels), torch.cat(sizes), torch.cat(offsets)
+        texels, sizes, offsets = p.get("texels"), p.get("sizes"), p.get("offsets")
+        if texels is None or sizes is None or offsets is None:
+            texels = torch.zeros_like(p["means"])
+            sizes = torch.ones(n, 2, dtype=torch.int32, device=texels.device)
+            offsets = torch.arange(n, device=texels.device)
+        textures.append((texels, sizes, offsets + count))
+        count += len(texels)
+    texels, sizes, offsets = (torch.cat(each) for each in zip(*textures, strict=True))
+    return texels, sizes, offsets

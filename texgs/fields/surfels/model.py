@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
 import torch
@@ -13,16 +13,33 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Role
-from texgs.fields.surfels import groups
-from texgs.fields.surfels.groups import GEOMETRY
+from texgs.fields.field import sizes_in_mib
+from texgs.fields.splats import GEOMETRY, Splats, geometry
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL
 
+SHAPES = {
+    "means": "N 3",
+    "quats": "N 4",
+    "scales": "N 2",
+    "opacities": "N",
+    "sh": "N K 3",
+    "colors": "N 3",
+    "palette": "3",
+    "texels": "T 3",
+    "sizes": "N 2",
+    "offsets": "N",
+}
+TEXTURE = ("palette", "texels", "sizes", "offsets")
+# What the paper counts, and what we store; every tensor of a model is in one group.
+COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
+STORED = {"geometry": GEOMETRY, "shading": ("sh", "colors", *MATERIAL), "texture": TEXTURE}
+RELEASED = 100  # bytes of a surfel in the files of the authors' release, beside its texels
+
 
 @dataclass(frozen=True, eq=False)
-class Surfels:
+class Surfels(Splats):
     """Raw parameters by name, all float32 on one device.
 
     - geometry: `means` [N, 3] world units, `quats` [N, 4] wxyz of any length, `scales` [N, 2] natural
@@ -38,7 +55,6 @@ class Surfels:
 
     kind: ClassVar[str] = "surfels"
 
-    parameters: Mapping[str, Tensor]
     shading: ShadingModel = field(default_factory=ShadingModel)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
@@ -57,26 +73,22 @@ class Surfels:
             if name in given and given[name].shape not in ((n,), (1,)):
                 raise ArgumentError(f"{name}: expected [{n}] or [1], got {list(given[name].shape)}")
 
-    def __len__(self) -> int:
-        return len(self.parameters["means"])
-
-    def to(self, device: torch.device | str) -> Surfels:
-        """The same model on another device."""
-        return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
-
-    @property
-    def device(self) -> torch.device:
-        """Where its tensors are."""
-        return self.parameters["means"].device
-
-    def tensors(self, role: Role) -> dict[str, Tensor]:
-        """Parameters of geometry, or of colour, material and texture."""
-        is_geometry = role == "geometry"
-        return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
-
     def sizes(self) -> dict[str, float]:
-        """MiB of each group of parameters, see `groups.sizes`."""
-        return groups.sizes(self.parameters)
+        """Return sizes in MiB, see `Field.sizes`.
+
+        The paper's breakdown counts 10 floats of geometry per surfel, 4 of material (or 4 in all where
+        surfels share one) and 3 per texel. `stored_` counts the bytes of all tensors: colours and harmonics
+        as shading, palette and layout as texture. `files_mib` are the files of the authors' release: 20
+        floats and 5 numbers of the layout for a surfel, beside its texels.
+        """
+        counted, stored = (
+            {
+                group: sum(x.nbytes for x in map(self.parameters.get, names) if x is not None)
+                for group, names in by.items()
+            }
+            for by in (COUNTED, STORED)
+        )
+        return sizes_in_mib(counted, stored, RELEASED * len(self) + counted["texture"])
 
     @property
     def stage(self) -> Literal["surfels", "shading", "texture"]:
@@ -114,23 +126,3 @@ class Surfels:
             options=self.shading.options,
             **{kind: colored},  # type: ignore[arg-type]
         )
-
-
-SHAPES = {
-    "means": "N 3",
-    "quats": "N 4",
-    "scales": "N 2",
-    "opacities": "N",
-    "sh": "N K 3",
-    "colors": "N 3",
-    "palette": "3",
-    "texels": "T 3",
-    "sizes": "N 2",
-    "offsets": "N",
-}
-
-
-def geometry(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Means, quaternions, standard deviations and opacities as the rasterizer takes them; differentiable."""
-    p = parameters
-    return p["means"], p["quats"], p["scales"].exp(), p["opacities"].sigmoid()

@@ -12,10 +12,11 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.tensor_file import read_tensor_file, require_json, short, write_tensor_file
-from texgs.fields.surfels.groups import GEOMETRY, TEXTURE
-from texgs.fields.surfels.model import SHAPES, Surfels
+from texgs.core.errors import ArgumentError, located
+from texgs.core.io import reading_as
+from texgs.core.tensor_file import read_tensor_file, require_json, write_tensor_file
+from texgs.fields.splats import GEOMETRY
+from texgs.fields.surfels.model import SHAPES, TEXTURE, Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.raster import Texture
 from texgs.raster.arguments import check_texture
@@ -50,13 +51,10 @@ def write_model(path: str | Path, model: Surfels) -> Path:
 
 def describe(path: str | Path, model: Surfels) -> dict[str, Any]:
     """Describe a model for the JSON of a file at `path`, and check that its tensors can be written."""
-    _check(path, model, model.stage)
-    description = {
-        "version": VERSION,
-        "stage": model.stage,
-        "optics": asdict(model.shading),
-        "metadata": dict(model.metadata),
-    }
+    with located(path):
+        _check(model, model.stage)
+    optics, metadata = asdict(model.shading), dict(model.metadata)
+    description = {"version": VERSION, "stage": model.stage, "optics": optics, "metadata": metadata}
     require_json(path, description)
     return description
 
@@ -68,23 +66,15 @@ def read_model(path: str | Path) -> Surfels:
         ArgumentError, ShapeError: if the file is missing, no safetensors, cut short, of another program or a
             newer version, or a tensor is missing, unknown, not finite or of another type or shape.
     """
-    path = Path(path)
-    return model_of(path, *read_tensor_file(path, FORMAT, VERSION))
+    return model_of(path, *read_tensor_file(Path(path), FORMAT, VERSION))
 
 
 def model_of(path: str | Path, description: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> Surfels:
     """Make a model of the tensors of a file and its description (see `describe`)."""
-    try:
+    with located(path), reading_as("stage, optics and metadata in the header", "write the file again"):
         stage, shading = str(description["stage"]), _optics(description["optics"])
         model = Surfels(tensors, shading, dict(description["metadata"]))
-    except TexgsError as error:
-        raise type(error)(f"{path}: {error}") from error
-    except (KeyError, TypeError, ValueError) as error:
-        raise ArgumentError(
-            f"{path}: expected stage, optics and metadata in the header, got {short(description)}; "
-            "write the file again"
-        ) from error
-    _check(path, model, stage)
+        _check(model, stage)
     return model
 
 
@@ -97,24 +87,20 @@ def _optics(stored: dict[str, Any]) -> ShadingModel:
     return shading
 
 
-def _check(path: str | Path, model: Surfels, stage: str) -> None:
+def _check(model: Surfels, stage: str) -> None:
     """Require the tensors of a stage with finite values, of the right type, in a layout that can be drawn."""
     given = model.parameters
     if stage not in NEEDED:
-        raise ArgumentError(f"{path}: expected stage {', '.join(NEEDED)}, got {stage!r}")
+        raise ArgumentError(f"expected stage {', '.join(NEEDED)}, got {stage!r}")
     for name in NEEDED[stage]:
         if name not in given:
-            raise ArgumentError(f"{path}: expected tensor {name} at stage {stage}, got {', '.join(given)}")
+            raise ArgumentError(f"expected tensor {name} at stage {stage}, got {', '.join(given)}")
     for name, tensor in given.items():
         if name not in SHAPES and name not in MATERIAL:
-            raise ArgumentError(f"{path}: expected tensors of a texgs model, got {name}; remove it")
+            raise ArgumentError(f"expected tensors of a texgs model, got {name}; remove it")
         if tensor.dtype != (dtype := DTYPES.get(name, torch.float32)):
-            raise ArgumentError(f"{path}: {name}: expected {dtype}, got {tensor.dtype}; convert it")
-    try:
-        check.finite(**given)
-        if "texels" in given:
-            texels, sizes, offsets = (given[name] for name in TEXTURE[1:])
-            layout = Texture(given["colors"], given["opacities"], texels, sizes, offsets)
-            check_texture(layout, len(model))
-    except TexgsError as error:
-        raise type(error)(f"{path}: {error}") from error
+            raise ArgumentError(f"{name}: expected {dtype}, got {tensor.dtype}; convert it")
+    check.finite(**given)
+    if "texels" in given:
+        texels, sizes, offsets = (given[name] for name in TEXTURE[1:])
+        check_texture(Texture(given["colors"], given["opacities"], texels, sizes, offsets), len(model))

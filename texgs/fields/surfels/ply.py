@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -11,9 +12,12 @@ import torch
 from torch import Tensor
 
 from texgs.core import check
-from texgs.core.errors import ArgumentError, TexgsError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.geometry import quats_to_matrices
+from texgs.core.io import reading
+from texgs.core.memory import require_memory
 from texgs.core.ply_file import read_vertices
+from texgs.core.tensor_file import load_torch
 from texgs.fields.ply_columns import (
     numbered,
     splat_columns,
@@ -24,9 +28,10 @@ from texgs.fields.ply_columns import (
 )
 from texgs.fields.surfels.material import RANGES
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.release_texture import read_texture
 from texgs.fields.surfels.shading import ShadingModel, material
-from texgs.fields.surfels.texels import mean_texels
+from texgs.fields.surfels.texels import mean_texels, offsets_of
+from texgs.raster import Texture
+from texgs.raster.arguments import check_texture
 from texgs.raster.shading import Y00
 
 FLAVOURS = ("2dgs", "3dgs", "release")
@@ -38,6 +43,7 @@ RELEASE = {  # our name of a factor by the release's, in the order of its files
     "specular_factor": "specular",
 }
 (_, MOST_SPECULAR), (_, MOST_SHININESS) = RANGES["paper"].values()  # of the release
+BESIDE = "the release writes it beside the surfels"
 
 
 def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
@@ -73,11 +79,9 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
             f"{path}: release needs a model with shading, got stage surfels; use flavour 2dgs"
         )
     parameters = {name: x.detach().cpu() for name, x in model.parameters.items()}
-    try:
+    with located(path):
         check.finite(**parameters)
         columns = _columns(Surfels(parameters, model.shading), flavour)
-    except TexgsError as error:
-        raise type(error)(f"{path}: {error}") from error
     return write_columns(path, columns)
 
 
@@ -85,13 +89,13 @@ def read_ply(path: str | Path) -> Surfels:
     """Read surfels from a PLY file of 2DGS, of the paper's release, or of 3DGS where Gaussians are flat.
 
     Files are told apart by their properties. Those of the release become models of stage shading with
-    material "paper" and colours of at least 0, as it clamps them; its textured ones, of stage texture, see
-    `read_texture` of release_texture.py; all others, of stage surfels. The low-pass filter is that of 2DGS,
-    as no file says; `dataclasses.replace` gives a model another.
+    material "paper" and colours of at least 0, as it clamps them, or of stage texture where textures lie
+    beside them; all others, of stage surfels. The low-pass filter is that of 2DGS, as no file says;
+    `dataclasses.replace` gives a model another.
     """
     path = Path(path)
     vertices = read_vertices(path)
-    try:
+    with located(path):
         parameters = _geometry(vertices)
         if "ambient_factor" not in (vertices.dtype.names or ()):
             parameters["sh"] = take_harmonics(vertices)
@@ -101,15 +105,13 @@ def read_ply(path: str | Path) -> Surfels:
             shading = ShadingModel(low_pass=2.0, material="paper", facing=False)
         check.finite(**parameters)
         return Surfels(parameters, shading)
-    except TexgsError as error:
-        raise type(error)(f"{path}: {error}") from error
 
 
 # -- writing ---
 
 
 def _columns(model: Surfels, flavour: str) -> dict[str, Tensor]:
-    """[N] values by property, in the order of the flavour."""
+    """Return [N] values by property, in the order of the flavour."""
     p = model.parameters
     normals = quats_to_matrices(p["quats"])[..., 2]  # [N, 3]
     sh = p["sh"] if model.stage == "surfels" else ((_color(p) - 0.5) / Y00)[:, None]  # [N, K, 3]
@@ -126,14 +128,14 @@ def _columns(model: Surfels, flavour: str) -> dict[str, Tensor]:
 
 
 def _color(p: Mapping[str, Tensor]) -> Tensor:
-    """Colour of each surfel without light [N, 3]; in float64, so that harmonics of it are rounded once."""
+    """Return c_ind of each surfel [N, 3]; in float64, so that harmonics of it are rounded once."""
     if "texels" not in p:
         return p["colors"].double()
     return p["colors"].double() + p["palette"].double() + mean_texels(p)
 
 
 def _release_material(model: Surfels) -> dict[str, Tensor]:
-    """Raw material under the release's names and activations, [N] each."""
+    """Return raw material under the release's names and activations, [N] each."""
     raw = {name: model.parameters[name] for name in RELEASE.values()}
     if model.shading.material != "paper":
         raw = material({name: x.double() for name, x in raw.items()}, model.shading.material)
@@ -151,6 +153,7 @@ def _release_material(model: Surfels) -> dict[str, Tensor]:
 
 
 def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
+    """Take raw geometry, of flat Gaussians too."""
     geometry = take_geometry(vertices, 2)
     names = vertices.dtype.names or ()
     if "scale_2" in names and "ambient_factor" not in names:  # the release has one without meaning
@@ -165,10 +168,58 @@ def _geometry(vertices: np.ndarray) -> dict[str, Tensor]:
 
 
 def _appearance(vertices: np.ndarray, folder: Path) -> dict[str, Tensor]:
-    """Colour and material of the release's surfels, with their textures where the file has no colour."""
+    """Take colour and material of the release's surfels, and textures where the file has no colour."""
     factors = take(vertices, *RELEASE)
     parameters = {ours: factors[:, k].contiguous() for k, ours in enumerate(RELEASE.values())}
     if "mappings_0" in (vertices.dtype.names or ()):
-        return parameters | {"colors": torch.zeros(len(vertices), 3)} | read_texture(folder, len(vertices))
+        return parameters | {"colors": torch.zeros(len(vertices), 3)} | _textures(folder, len(vertices))
     dc = take(vertices, "f_dc_0", "f_dc_1", "f_dc_2")
     return parameters | {"colors": (0.5 + Y00 * dc.double()).clamp(min=0).float()}
+
+
+# -- textures of the release ---
+
+
+def _textures(folder: Path, n: int) -> dict[str, Tensor]:
+    """Read `texture.npz` and `palette_colors_chkpnt.pth` of one basic scene without executing anything.
+
+    The release clamps palette + texel before it interpolates; so are the texels here. It has texel i of U at
+    i / U of the texture's side, we at (i + 0.5) / U: the picture on each surfel moves by half a texel.
+    """
+    texels, dims = _arrays(folder / "texture.npz")
+    check.shape("texture_dims", dims, "N 3", N=n)
+    palette = _palette(folder / "palette_colors_chkpnt.pth")
+    sizes, starts = dims[:, :2].int(), dims[:, 2].long()
+    check_texture(Texture(texels, texels, texels, sizes, starts), n)
+    texels = (texels + palette).clamp(0, 1) - palette
+    offsets = offsets_of(sizes)
+    texels = texels[_transposed(sizes.long(), starts, offsets)]
+    return {"palette": palette, "texels": texels, "sizes": sizes, "offsets": offsets}
+
+
+def _transposed(sizes: Tensor, starts: Tensor, offsets: Tensor) -> Tensor:
+    """Find where the release has each of our texels [T]: its neighbours lie along v, ours along u."""
+    surfel = torch.repeat_interleave(sizes.prod(1))  # [T]
+    k = torch.arange(len(surfel)) - offsets[surfel]
+    n_u, n_v = sizes[surfel].unbind(1)
+    return starts[surfel] + (k % n_u) * n_v + k // n_u
+
+
+def _arrays(path: Path) -> tuple[Tensor, Tensor]:
+    """Read texels [T, 3] float32, and of each surfel texels along u, along v and its first [N, 3]."""
+    with reading(path, "texture_dc and texture_dims as npz", BESIDE):
+        with zipfile.ZipFile(path) as archive:
+            n_bytes = sum(entry.file_size for entry in archive.infolist())
+            require_memory(2 * n_bytes, f"{path}: arrays of {n_bytes} bytes", BESIDE)
+        with np.load(path, allow_pickle=False) as arrays:
+            texels, dims = arrays["texture_dc"], arrays["texture_dims"]
+        return torch.from_numpy(texels.astype(np.float32)), torch.from_numpy(dims.astype(np.int64))
+
+
+def _palette(path: Path) -> Tensor:
+    """Read [3], clamped as the release does when it reads it."""
+    with reading(path, "a palette as the release saves it, a list of one tensor and a number", BESIDE):
+        captured, _ = load_torch(path)
+        palette = captured[0].detach()
+        check.shape("palette", palette, "3")
+        return palette.float().clamp(0, 1)

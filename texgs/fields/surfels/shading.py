@@ -33,7 +33,7 @@ class ShadingModel:
         return Options(low_pass=self.low_pass)
 
     def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
-        """Colours [N, 3] of the surfels in a view, or their texture with base and gain; differentiable."""
+        """Return colours [N, 3] of the surfels in a view, or a texture with base and gain; differentiable."""
         p = parameters
         if "ambient" not in p:
             return spherical_harmonics(p["sh"], p["means"], camera.position)
@@ -46,7 +46,7 @@ class ShadingModel:
 
 
 def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
-    """Factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
+    """Return factors k_a, k_d, k_s and beta by name, [N] or [1]; differentiable.
 
     Those that have a range, see `RANGES`, go through a sigmoid; others are as they are.
     """
@@ -58,7 +58,7 @@ def material(parameters: Mapping[str, Tensor], kind: str) -> dict[str, Tensor]:
 
 
 def between(low: float, high: float, raw: Tensor) -> Tensor:
-    """Values in a range; without an operation for a range from 0, or of 1: these are done in each step."""
+    """Return values in a range; without an operation that one of 0 to 1 does not need."""
     values = raw.sigmoid()
     values = values if high - low == 1 else (high - low) * values
     return values if low == 0 else low + values
@@ -67,7 +67,7 @@ def between(low: float, high: float, raw: Tensor) -> Tensor:
 def raw_material(
     ambient: float, diffuse: float, specular: float, shininess: float, kind: str
 ) -> dict[str, Tensor]:
-    """The inverse of `material` for one material, [1] each.
+    """Invert `material` for one material, [1] each.
 
     Raises:
         ArgumentError: if a factor is outside what the kind can express.
@@ -81,14 +81,14 @@ def raw_material(
 
 
 def viewer(camera: Camera, shading: ShadingModel) -> Tensor:
-    """Place [3] that directions to the viewer lead to: the camera, or far behind it for a distant viewer."""
+    """Return the place [3] that directions to the viewer lead to: the camera, or far behind it."""
     if shading.local_viewer:
         return camera.position
     return -FAR * camera.viewmat[2, :3]
 
 
 def light_direction(light: Light, camera: Camera) -> Tensor | None:
-    """Direction to the light [3]; None for one at the viewer."""
+    """Return the direction to the light [3]; None for one at the viewer."""
     if light.kind == "headlight":
         return None
     return light.direction(camera).to(camera.viewmat)

@@ -15,16 +15,21 @@ EXTENT = 6.0  # standard deviations that a texture spans along each tangent
 
 
 def owners(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor]:
-    """Place in the list [T] and surfel [T] of all texels, sorted by surfel."""
+    """Return the place in the list [T] and the surfel [T] of all texels, sorted by surfel."""
     counts = parameters["sizes"].long().prod(1)  # [N]
     surfel = torch.repeat_interleave(counts)
-    first = counts.cumsum(0) - counts  # [N] in the new order
-    within = torch.arange(len(surfel), device=surfel.device) - first[surfel]
+    within = torch.arange(len(surfel), device=surfel.device) - offsets_of(parameters["sizes"])[surfel]
     return parameters["offsets"][surfel] + within, surfel
 
 
+def offsets_of(sizes: Tensor) -> Tensor:
+    """Return the index [N], int64, of each surfel's first texel, textures of sizes [N, 2] being in order."""
+    counts = sizes.long().prod(dim=1)
+    return counts.cumsum(dim=0) - counts
+
+
 def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
-    """Mean texel of each surfel [N, 3], float64."""
+    """Return the mean texel of each surfel [N, 3], float64."""
     texels = parameters["texels"].double()
     running = torch.cat([texels.new_zeros(1, 3), texels.cumsum(0)])  # [T + 1, 3]
     counts, offsets = parameters["sizes"].long().prod(1), parameters["offsets"]  # [N]
@@ -32,14 +37,13 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
 
 
 def footprint(sizes: Tensor) -> Tensor:
-    """Share [T] of each texel in its surfel, which falls off like the Gaussian.
+    """Return the share [T] of each texel in its surfel, which falls off like the Gaussian.
 
     Args:
         sizes: texels along u and v [N, 2], one surfel after the other.
     """
-    counts = sizes.long().prod(dim=1)
-    owner = torch.repeat_interleave(counts)  # [T]
-    place = torch.arange(len(owner), device=owner.device) - (counts.cumsum(dim=0) - counts)[owner]
+    owner = torch.repeat_interleave(sizes.long().prod(dim=1))  # [T]
+    place = torch.arange(len(owner), device=owner.device) - offsets_of(sizes)[owner]
     columns, rows = sizes.long().unbind(dim=1)
     u = EXTENT * ((place % columns[owner]) + 0.5) / columns[owner] - EXTENT / 2
     v = EXTENT * ((place // columns[owner]) + 0.5) / rows[owner] - EXTENT / 2
@@ -49,7 +53,7 @@ def footprint(sizes: Tensor) -> Tensor:
 
 
 def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
-    """The model with the mean colour under their Gaussians for some surfels [N] bool; for all by default."""
+    """Return the model with mean colours under their Gaussians for some surfels [N] bool, or for all."""
     p = model.parameters
     place, surfel = owners(p)
     texels, weights = p["texels"].clone(), footprint(p["sizes"])[:, None]
@@ -60,26 +64,24 @@ def untextured(model: Surfels, surfels: Tensor | None = None) -> Surfels:
 
 
 def lean(field: Field) -> Field:
-    """Surfels whose texels are all the same have one: they look as before. Other fields stay as they are."""
+    """Give surfels whose texels are all the same one: they look as before. Other fields stay as they are."""
     if not isinstance(field, Surfels) or field.stage != "texture":
         return field
     p = field.parameters
     place, surfel = owners(p)
-    counts = p["sizes"].long().prod(1)
-    first = counts.cumsum(0) - counts  # [N] in the order of surfels
+    first = offsets_of(p["sizes"])  # [N] in the order of surfels
     texels = p["texels"][place]
     differs = (texels != texels[first[surfel]]).any(1)
-    is_plain = torch.ones_like(counts, dtype=torch.bool).index_fill_(0, surfel[differs], False)
+    is_plain = torch.ones_like(first, dtype=torch.bool).index_fill_(0, surfel[differs], False)
     kept = ~is_plain[surfel]
     kept[first] = True
     sizes = torch.where(is_plain[:, None], 1, p["sizes"])
-    counts = sizes.long().prod(1)
-    offsets = (counts.cumsum(0) - counts).to(p["offsets"])
-    return replace(field, parameters={**p, "texels": texels[kept], "sizes": sizes, "offsets": offsets})
+    texture = {"texels": texels[kept], "sizes": sizes, "offsets": offsets_of(sizes).to(p["offsets"])}
+    return replace(field, parameters={**p, **texture})
 
 
 def bare_colors(model: Surfels) -> Tensor:
-    """c_ind of all texels [T, 3], each in its place in the list: palette + offset of its surfel + texel."""
+    """Return c_ind of all texels [T, 3], in their places: palette + offset of the surfel + texel."""
     p = model.parameters
     place, surfel = owners(p)
     offsets = torch.zeros_like(p["texels"])

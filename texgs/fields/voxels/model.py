@@ -1,28 +1,28 @@
-"""A field of voxels with density and view-dependent colour (Plenoxels, Fridovich-Keil et al. 2022)."""
+"""Sparse grids with density and view-dependent colour (Fridovich-Keil et al. 2022), and scenes of several."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from typing import Any, ClassVar
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import ArgumentError
-from texgs.core.light import HEADLIGHT, Light
-from texgs.fields.field import Role
-from texgs.fields.unlit import sizes_in_mib
+from texgs.fields.field import Role, sizes_in_mib
+from texgs.fields.unlit import UnlitField, UnlitScene, require_depth
 from texgs.raster import Render
-from texgs.raster.voxel_grid import VoxelGrid, unpack_rows
+from texgs.raster.voxel_grid import VoxelGrid, interpolate_rows, pack_rows, unpack_rows, voxel_grid
 from texgs.raster.voxels import March, render_view
 
-OUTPUTS = ("depth",)
+PIECE = 1 << 18  # voxels at a time
+SIDE = 8  # voxels that sides of a lattice are multiples of
 
 
 @dataclass(frozen=True, eq=False)
-class Voxels:
+class Voxels(UnlitField):
     """A sparse grid, lit as its views were: light does not change it."""
 
     kind: ClassVar[str] = "voxels"
@@ -40,35 +40,17 @@ class Voxels:
         return self.grid.rows.device
 
     def to(self, device: torch.device | str) -> Voxels:
-        """The same field on another device."""
+        """Return the same field on another device."""
         return replace(self, grid=self.grid.to(device))
 
     def tensors(self, role: Role) -> dict[str, Tensor]:
-        """Densities [n], or spherical harmonics [n, 1, 4 or 9, 3]."""
+        """Return densities [n], or spherical harmonics [n, 1, 4 or 9, 3]."""
         density, sh = unpack_rows(self.grid.rows)
         return {"density": density} if role == "geometry" else {"sh": sh}
 
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        *,
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
-    ) -> Render:
-        """Render the grid.
-
-        Args:
-            camera: from where.
-            light: changes nothing.
-            background: [3]; white by default.
-            outputs: "depth", the expected one.
-
-        Raises:
-            ArgumentError: for another output.
-        """
-        if unknown := sorted(set(outputs) - set(OUTPUTS)):
-            raise ArgumentError(f"outputs: expected {', '.join(OUTPUTS)} of voxels, got {unknown[0]}")
+    def draw(self, camera: Camera, background: Tensor | None, outputs: Collection[str]) -> Render:
+        """Render the grid."""
+        require_depth(outputs, self.kind)
         red, green, blue = (1.0, 1.0, 1.0) if background is None else background.tolist()
         view = render_view(self.grid, camera, replace(self.march, background=(red, green, blue)))
         return Render(view.color, view.alpha, depth=view.depth if outputs else None)
@@ -81,11 +63,90 @@ class Voxels:
         """
         grid, values = self.grid, 3 * (self.grid.degree + 1) ** 2
         x, y, z = grid.size
+        colors, blocks = values * len(grid), 8 * grid.masks.numel()
         return sizes_in_mib(
-            {"geometry": 4 * x * y * z + 4 * len(grid), "shading": 2 * values * len(grid), "texture": 0},
-            {
-                "geometry": 8 * grid.masks.numel() + 4 * len(grid),
-                "shading": 4 * values * len(grid),
-                "texture": 0,
-            },
+            {"geometry": 4 * x * y * z + 4 * len(grid), "shading": 2 * colors, "texture": 0},
+            {"geometry": blocks + 4 * len(grid), "shading": 4 * colors, "texture": 0},
         )
+
+
+class VoxelScene(UnlitScene[Voxels]):
+    """Grids that are drawn together, see `UnlitScene`; edits make another merged grid.
+
+    Opacity is a factor on densities.
+    """
+
+    def __init__(self, fields: Sequence[Voxels], segments: Sequence[Sequence[Tensor]] = ()) -> None:
+        super().__init__(fields, segments)
+        self._merged: tuple[tuple[float, ...], Voxels] | None = None
+
+    def _blend(
+        self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
+    ) -> Render:
+        key = tuple(factors)
+        if self._merged is None or self._merged[0] != key:
+            self._merged = (key, self._merge(key))
+        return self._merged[1].render(camera, background=background, outputs=outputs)
+
+    def _merge(self, factors: tuple[float, ...]) -> Voxels:
+        first, grids = self.fields[0], []
+        for each, factor in zip(self.fields, factors, strict=True):
+            density, sh = unpack_rows(each.grid.rows)
+            grids.append(each.grid.with_rows(pack_rows(density * factor, sh)))
+        return replace(first, grid=grids[0] if len(grids) == 1 else merged(grids))
+
+
+def merged(grids: Sequence[VoxelGrid]) -> VoxelGrid:
+    """Merge grids to one in which densities add up, and colours are means weighted by them.
+
+    It has the finest of their spacings. Grids that have another lattice are interpolated at its voxels, which
+    blurs them by less than one.
+    """
+    spacing = min(grid.spacing for grid in grids)
+    lower, upper = (torch.stack(ends) for ends in zip(*map(_bounds, grids), strict=True))  # [G, 3]
+    lower = lower.amin(0)
+    # Extents are whole numbers of voxels but for rounding, where lattices are the same.
+    extents = ((upper.amax(0) - lower) / spacing).tolist()
+    size = [SIDE * ceil((round(extent, 3) + 1) / SIDE) for extent in extents]
+    mask = torch.zeros(size, dtype=torch.bool, device=lower.device)
+    for grid in grids:
+        _mark(mask, (grid.points() - lower) / spacing)
+    degree = max(grid.degree for grid in grids)
+    whole = voxel_grid(mask, lower.tolist(), spacing, degree)
+    points = whole.points()
+    rows = [_blended(grids, piece, degree) for piece in points.split(PIECE)]
+    return whole.with_rows(torch.cat([whole.rows[:1], *rows]))
+
+
+def _bounds(grid: VoxelGrid) -> tuple[Tensor, Tensor]:
+    """Return the places of the first and the last voxel, [3] each."""
+    lower = grid.rows.new_tensor(grid.lower)
+    return lower, lower + grid.spacing * (grid.rows.new_tensor(grid.size) - 1)
+
+
+def _mark(mask: Tensor, places: Tensor) -> None:
+    """Set the eight voxels around places [n, 3] in a lattice."""
+    cell = places.floor().long()
+    most = cell.new_tensor(mask.shape) - 1
+    for offset in torch.cartesian_prod(*[cell.new_tensor([0, 1])] * 3):
+        x, y, z = (cell + offset).clamp_min(0).minimum(most).unbind(1)
+        mask[x, y, z] = True
+
+
+def _blended(grids: Sequence[VoxelGrid], points: Tensor, degree: int) -> Tensor:
+    """Return rows [m, K] at points [m, 3].
+
+    A negative density shows nothing at its voxel, but it thins what is interpolated between voxels. It stays
+    where no grid has a positive one.
+    """
+    rows = [unpack_rows(interpolate_rows(grid, points)) for grid in grids]
+    density = torch.stack([each for each, _ in rows])  # [G, m]
+    positive = density.clamp_min(0)
+    shows = positive.sum(0) > 0
+    total = torch.where(shows, positive.sum(0), density.amin(0))
+    weights = torch.where(shows, positive, -density.clamp_max(0))
+    weights = weights / weights.sum(0).clamp_min(1e-12)
+    color = points.new_zeros(len(points), (degree + 1) ** 2, 3)
+    for weight, (_, sh) in zip(weights, rows, strict=True):
+        color[:, : sh.shape[1]] += weight[:, None, None] * sh
+    return pack_rows(total, color)

@@ -28,18 +28,18 @@ class TrainingRays:
         return len(self.views)
 
     def take(self, ids: Tensor) -> tuple[Tensor, Tensor]:
-        """Rays [n, 6] and their colours [n, 3]."""
+        """Return rays [n, 6] and their colours [n, 3]."""
         origins = self.origins[self.views[ids].long()]
         return torch.cat([origins, self.directions[ids]], dim=1), self.colors[ids].float() / 255
 
     def draw(self, count: int, run: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
-        """About `count` random rays in runs of neighbours, and their colours."""
+        """Draw about `count` random rays in runs of neighbours, and their colours."""
         starts = torch.randint(max(len(self) - run, 0) + 1, (count // run,), generator=generator)
         return self.take((starts[:, None] + torch.arange(min(run, len(self)))).flatten())
 
 
 def training_rays(images: Images) -> TrainingRays:
-    """Rays through the pixels of all views that show something, or are next to it.
+    """Return rays through the pixels of all views that show something, or are next to it.
 
     Raises:
         ArgumentError: if no view shows anything.
@@ -60,7 +60,7 @@ def training_rays(images: Images) -> TrainingRays:
 
 
 def widened(alpha: Tensor, pixels: int) -> Tensor:
-    """Whether anything is visible within so many pixels along both axes, [H, W] of [H, W] uint8."""
+    """Return whether anything is visible within so many pixels along both axes, [H, W] of [H, W] uint8."""
     import cv2
 
     side = 2 * pixels + 1
@@ -68,6 +68,6 @@ def widened(alpha: Tensor, pixels: int) -> Tensor:
 
 
 def curve(width: int, height: int) -> Tensor:
-    """Places y * width + x of all pixels in the order of a Z curve."""
+    """Return the places y * width + x of all pixels in the order of a Z curve."""
     y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
     return z_order(torch.stack([x, y], dim=-1).flatten(0, 1))

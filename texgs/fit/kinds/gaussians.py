@@ -48,7 +48,7 @@ class GaussianKeys:
 def fit(task: FitTask[GaussianKeys]) -> Fitted:
     """Fit Gaussians to the views, from the last checkpoint if there is one."""
     from texgs.fields.gaussians.model import Baked, Gaussians
-    from texgs.fields.harmonics import join
+    from texgs.fields.splats import join
     from texgs.fit.checkpoint import FOLDER, run_to_end
     from texgs.fit.loop import Fit
     from texgs.fit.seeds import seed_gaussians

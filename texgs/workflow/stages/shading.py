@@ -38,7 +38,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
     It reads `model`, of the stage before, and `views`, the transforms_train.json.
     """
-    from texgs.fields.harmonics import base_color
+    from texgs.fields.splats import base_color
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import read_model, write_model
     from texgs.fields.surfels.shading import material, raw_material

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.fit.settings import Phase, Seeds
@@ -40,7 +40,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     import torch
 
-    from texgs.fields.harmonics import join, split, zeroth
+    from texgs.fields.splats import join, split, zeroth
     from texgs.fields.surfels.model import Surfels
     from texgs.fields.surfels.model_file import write_model
     from texgs.fields.surfels.shading import ShadingModel
@@ -52,9 +52,7 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     local_viewer = bool(rendered.get("local_viewer", True))
     shading = ShadingModel(fit.low_pass, fit.material_range, local_viewer, fit.facing)  # type: ignore[arg-type]
     volume = open_grid(inputs["volume"]) if "volume" in inputs else None
-    parameters, colors = seed_surfels(
-        job.images, job.views, **asdict(fit.seeds), seed=fit.seed, volume=volume
-    )
+    parameters, colors = seed_surfels(job.images, job.views, fit.seeds, fit.seed, volume)
     sh = zeroth(colors)
     if phase.iterations:
         sh = torch.cat([sh, torch.zeros(len(sh), (phase.sh_degree + 1) ** 2 - 1, 3)], dim=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from texgs.fit.settings import TextureKeys
@@ -28,9 +28,9 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
     from texgs.fit.texels import texturize
 
     job = FitJob.of(settings, inputs, output)
-    before, keys = read_model(inputs["model"]).to(job.device), asdict(settings.texture)
+    before = read_model(inputs["model"]).to(job.device)
     start = time.monotonic()
-    model = texturize(before, job.images, **keys, seed=settings.fit.seed, title=job.title)
+    model = texturize(before, job.images, settings.texture, settings.fit.seed, job.title)
     seconds = time.monotonic() - start
     write_model(output / "model.safetensors", model)
     notes = {"texels": len(model.parameters["texels"])}

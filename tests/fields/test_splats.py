@@ -8,7 +8,7 @@ from torch.testing import assert_close
 
 from tests.fit.scenes import cameras, images_of, random_surfels
 from texgs.core.camera import orbit
-from texgs.fields.bounds import screen_box
+from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import ShadingModel
 from texgs.volume.images import MARGIN, Box, content_box

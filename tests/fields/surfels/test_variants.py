@@ -1,11 +1,12 @@
 import pytest
 import torch
-from safetensors.torch import load_file, save_file
+from safetensors.torch import load_file
 
+from tests.fields.rewritten import rewritten
 from tests.fields.surfels.samples import same, sample
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import TexgsError
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texture_file import with_texture, write_texture
+from texgs.fields.surfels.variants import FORMAT, with_texture, write_texture
 
 
 def restyled(model):
@@ -21,20 +22,9 @@ def test_a_variant_brings_texels_and_colours_and_nothing_else(tmp_path):
     assert set(load_file(path)) == {"texels", "colors", "sizes"}
 
 
-def rewritten(path, **tensors):
-    """The file with other tensors; None takes one away."""
-    from safetensors import safe_open
-
-    with safe_open(path, framework="pt") as file:
-        header = file.metadata()
-    kept = {name: x for name, x in {**load_file(path), **tensors}.items() if x is not None}
-    save_file(kept, path, header)
-    return path
-
-
 def test_a_file_without_colours_keeps_those_of_the_model(tmp_path):
     model = sample()
-    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), colors=None)
+    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), FORMAT, {"colors": None})
     parameters = with_texture(model, path).parameters
     assert torch.equal(parameters["colors"], model.parameters["colors"])
     assert torch.equal(parameters["texels"], model.parameters["texels"] + 0.5)
@@ -50,6 +40,6 @@ def test_a_file_without_colours_keeps_those_of_the_model(tmp_path):
 )
 def test_tensors_of_another_model_are_refused(tmp_path, name, value, message):
     model = sample()
-    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), **{name: value})
-    with pytest.raises(ArgumentError, match=f"style.safetensors: {message}"):
+    path = rewritten(write_texture(tmp_path / "style.safetensors", restyled(model)), FORMAT, {name: value})
+    with pytest.raises(TexgsError, match=f"style.safetensors: {message}"):
         with_texture(model, path)

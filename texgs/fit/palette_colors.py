@@ -12,19 +12,17 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from texgs.volume.images import Images
+
 DRAWN = 50_000  # colours that are clustered
+OPAQUE = 128  # of 255: alpha from which a pixel tells a colour
 
 
 def cluster_colors(colors: Tensor, count: int, seed: int = 0) -> Tensor:
-    """Mean colours [count, 3] of clusters of colours [n, 3], the largest cluster first.
+    """Return mean colours [count, 3] of clusters of colours [n, 3], the largest cluster first.
 
     Clusters are of red, green and blue relative to their sum, so that light and shadow on one material are
     one cluster. Where there are fewer, the last colours are those of the largest cluster.
-
-    Args:
-        colors: in [0, 1], at least one.
-        count: of clusters.
-        seed: of the draw of colours and the start.
     """
     from scipy.cluster.vq import kmeans2
 
@@ -39,3 +37,12 @@ def cluster_colors(colors: Tensor, count: int, seed: int = 0) -> Tensor:
     members = [colors[torch.from_numpy(labels == label)] for label in range(count)]
     members.sort(key=len, reverse=True)
     return torch.stack([(each if len(each) else members[0]).mean(0) for each in members]).float()
+
+
+def object_palette(images: Images, count: int, seed: int) -> Tensor:
+    """Cluster the colours of all pixels that are opaque enough, or of the most opaque ones, [count, 3]."""
+    alpha = images.planes[:, 3]
+    opaque = alpha >= min(int(alpha.max()), OPAQUE)
+    share = alpha[opaque, None].float() / 255
+    colors = images.planes.permute(0, 2, 3, 1)[opaque][:, :3].float() / 255
+    return cluster_colors(((colors - 1 + share) / share).clamp(0, 1), count, seed)

@@ -1,0 +1,113 @@
+"""What surfels and 3D Gaussians have in common: raw parameters by name, and what they cover on screen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import ceil, floor, isfinite
+from typing import Self
+
+import torch
+from torch import Tensor
+
+from texgs.core.camera import Camera
+from texgs.fields.field import Role
+from texgs.raster import Options
+from texgs.raster.shading import Y00
+from texgs.volume.images import Box, Images, Target
+
+GEOMETRY = ("means", "quats", "scales", "opacities")
+REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, below which nothing is drawn
+
+
+@dataclass(frozen=True, eq=False)
+class Splats:
+    """Raw parameters by name, all float32 on one device."""
+
+    parameters: Mapping[str, Tensor]
+
+    def __len__(self) -> int:
+        return len(self.parameters["means"])
+
+    @property
+    def device(self) -> torch.device:
+        """Where the tensors are."""
+        return self.parameters["means"].device
+
+    def to(self, device: torch.device | str) -> Self:
+        """Return the same model on another device."""
+        return replace(self, parameters={name: x.to(device) for name, x in self.parameters.items()})
+
+    def tensors(self, role: Role) -> dict[str, Tensor]:
+        """Return the parameters of geometry, or all others, which are of colour, material and texture."""
+        is_geometry = role == "geometry"
+        return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
+
+
+def geometry(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return means, quaternions, standard deviations and opacities for the rasterizer; differentiable."""
+    p = parameters
+    return p["means"], p["quats"], p["scales"].exp(), p["opacities"].sigmoid()
+
+
+def zeroth(colors: Tensor) -> Tensor:
+    """Return coefficients [N, 1, 3] that show a colour [N, 3] from everywhere."""
+    return ((colors - 0.5) / Y00)[:, None]
+
+
+def base_color(sh: Tensor) -> Tensor:
+    """Return the colour [N, 3] without the direction: c_ind of the paper's section Relightable 2DGS."""
+    return (0.5 + Y00 * sh[:, 0]).clamp_min(0)
+
+
+def split(sh: Tensor) -> dict[str, Tensor]:
+    """Return `sh` [N, 1, 3] and, where there are more, `sh_rest` [N, K - 1, 3]; they learn at other rates."""
+    return {"sh": sh[:, :1]} | ({"sh_rest": sh[:, 1:]} if sh.shape[1] > 1 else {})
+
+
+def join(parameters: Mapping[str, Tensor], degree: int | None = None) -> dict[str, Tensor]:
+    """Return the parameters with one `sh` again, up to a degree."""
+    joined = {name: x for name, x in parameters.items() if name != "sh_rest"}
+    if "sh_rest" in parameters:
+        count = parameters["sh_rest"].shape[1] if degree is None else (degree + 1) ** 2 - 1
+        joined["sh"] = torch.cat([parameters["sh"], parameters["sh_rest"][:, :count]], dim=1)
+    return joined
+
+
+@torch.no_grad()
+def screen_box(parameters: Mapping[str, Tensor], options: Options, camera: Camera) -> Box:
+    """Return a box around the projected bounding spheres of all splats. Waits for a GPU once.
+
+    It is the whole image where a sphere reaches behind the camera, or a value is not finite.
+    """
+    whole = Box(0, 0, camera.width, camera.height)
+    means = parameters["means"]
+    if not len(means):
+        return Box(camera.width // 2, camera.height // 2, camera.width // 2, camera.height // 2)
+    viewmat = camera.viewmat.to(means.device)
+    x, y, z = (means @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(dim=1)
+    reach = REACH * parameters["scales"].amax(dim=1).exp()
+    near, far = z - reach, z + reach
+    bounds = [near.min()]
+    for at in (x, y):
+        low, high = at - reach, at + reach
+        bounds += [torch.minimum(low / near, low / far).min(), torch.maximum(high / near, high / far).max()]
+    nearest, left, right, top, bottom = torch.stack(bounds).tolist()
+    if not isfinite(sum((nearest, left, right, top, bottom))) or nearest <= 0:
+        return whole
+    (fx, cx), (fy, cy) = camera.K[0, ::2].tolist(), camera.K[1, 1:].tolist()
+    is_flat = parameters["scales"].shape[1] == 2
+    variance = 1 / max(options.low_pass, 1e-6) if is_flat else options.dilation
+    disc = REACH * variance**0.5  # of the low-pass filter, pixels
+    return Box(
+        floor(fx * left + cx - disc),
+        floor(fy * top + cy - disc),
+        ceil(fx * right + cx + disc),
+        ceil(fy * bottom + cy + disc),
+    )
+
+
+def visible_part(images: Images, index: int, parameters: Mapping[str, Tensor], options: Options) -> Target:
+    """Return the part of a view in which it or the splats show anything, on the splats' device."""
+    around = screen_box(parameters, options, images.cameras[index])
+    return images.target(index, parameters["means"].device, around)
