@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from texgs.cli.main import main
-from texgs.core.image import read_png
 from texgs.volume.view_set import read_views
 from texgs.workflow.result import METRICS
 from texgs.workflow.stages import views as views_stage
@@ -67,8 +66,8 @@ def test_views_makes_what_it_needs_first(folder, capsys):
     assert views.metadata["tf"]["name"] == tf
     assert views.metadata["shading"]["local_viewer"] is False
     assert views.metadata["aabb"] == [[-0.5] * 3, [0.5] * 3]
-    alpha = np.stack([read_png(view.path)[1].numpy() for view in views.train])
-    assert alpha.max() > 0.5
+    alpha = np.stack([view.load()[..., 3].numpy() for view in views.train])
+    assert alpha.max() > 127
     assert alpha[:, 0].max() == 0, "the sphere touches the border of the view"
 
 

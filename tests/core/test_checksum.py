@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from texgs.core import checksum
+from texgs.core.cache import keep
 from texgs.core.checksum import Checksums, combined, of_folders, sha256
 from texgs.core.errors import ArgumentError
 
@@ -46,14 +47,14 @@ def test_a_file_is_read_once_while_its_size_and_time_stay(tmp_path, monkeypatch)
     assert len(read) == 3
 
 
-@pytest.mark.parametrize("content", ["", "[1]", '{"a": 3}', "{", "\x00"])
+@pytest.mark.parametrize("content", ["", "[1]", '{"a": 3}', '{"key": "checksums.json", "value": 3}'])
 def test_a_damaged_cache_is_an_empty_one(tmp_path, cache, content):
     path = tmp_path / "data"
     path.write_bytes(b"one")
     cache.parent.mkdir()
     cache.write_text(content)
     assert Checksums.load().of(path) == sha256(path)
-    cache.write_text(f'{{"{path}": "not a list"}}')
+    keep(cache, checksum.CACHE, {str(path): "not a list"})
     assert Checksums.load().of(path) == sha256(path)
 
 
@@ -64,7 +65,7 @@ def test_the_latest_files_are_kept(tmp_path, cache, monkeypatch):
         (tmp_path / name).write_text(name)
         checksums.of(tmp_path / name)
     checksums.save()
-    assert [Path(path).name for path in json.loads(cache.read_text())] == ["b", "c"]
+    assert [Path(path).name for path in json.loads(cache.read_text())["value"]] == ["b", "c"]
 
 
 def test_a_cache_that_cannot_be_written_costs_time_only(tmp_path, cache):

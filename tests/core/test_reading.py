@@ -9,7 +9,7 @@ import torch
 
 from texgs.core import memory
 from texgs.core.errors import LONGEST, ArgumentError, OutOfMemoryError, TexgsError, printable
-from texgs.core.image import read_png
+from texgs.core.image import read_rgba
 from texgs.core.io import read_json, reading, reading_as, write_bytes
 
 
@@ -100,7 +100,7 @@ def test_a_named_pipe_a_folder_and_a_device_are_no_files(tmp_path):
         (tmp_path, "a folder"),
         ("/dev/zero", "a device"),
     ):
-        for read in (read_json, read_png):
+        for read in (read_json, read_rgba):
             with pytest.raises(ArgumentError, match=rf"expected .*, got {kind}"):
                 read(path)
     with pytest.raises(ArgumentError, match="got a device or a named pipe"):

@@ -19,7 +19,6 @@ from tests.fields.surfels.samples import sample
 from tests.study.studies import study
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.camera import orbit
-from texgs.core.image import read_png
 from texgs.core.io import read_json, write_json
 from texgs.core.light import Light
 from texgs.edit.style_picture import read_style
@@ -125,7 +124,6 @@ def views(folder: Path) -> Path:
 def read_view_set(folder: Path) -> None:
     for view in read_views(folder).train:
         view.load()
-        read_png(view.path)
 
 
 def model(folder: Path) -> Path:

@@ -43,5 +43,5 @@ def recall(path: Path, key: str) -> Any | None:
 
 def keep(path: Path, key: str, value: Any) -> None:
     """Write a value that JSON can hold and the key of all it depends on, where that can be written."""
-    with suppress(ArgumentError):
+    with suppress(ArgumentError, OSError):
         write_bytes(path, json.dumps({"key": key, "value": value}).encode())

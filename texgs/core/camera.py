@@ -15,11 +15,7 @@ from texgs.core.errors import ArgumentError
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """One view: where the camera is and how it maps points to pixels.
-
-    Raises:
-        ShapeError, ArgumentError: if a matrix or the size is not as said below.
-    """
+    """One view: where the camera is and how it maps points to pixels."""
 
     viewmat: Tensor  # [4, 4] world to camera
     K: Tensor  # [3, 3] focal lengths and principal point, pixels
@@ -35,16 +31,16 @@ class Camera:
 
     @property
     def position(self) -> Tensor:
-        """Camera centre in the world, [3]."""
+        """Return the camera centre in the world, [3]."""
         R_cw, t_cw = self.viewmat[:3, :3], self.viewmat[:3, 3]
         return -R_cw.T @ t_cw
 
     def rays(self) -> Tensor:
-        """World directions [H, W, 3] through the pixel centres, of length 1 along the camera's axis."""
+        """Return world directions [H, W, 3] through the pixel centres, of length 1 along the view axis."""
         return self._rays_in_camera() @ self.viewmat[:3, :3]
 
     def project(self, points: Tensor) -> tuple[Tensor, Tensor]:
-        """Pixels [..., 2] and camera z [...] of world points [..., 3]; behind it pixels mean nothing."""
+        """Return pixels [..., 2] and camera z [...] of world points [..., 3]; behind it pixels are void."""
         viewmat, K = self.viewmat.to(points), self.K.to(points)
         x, y, z = (points @ viewmat[:3, :3].T + viewmat[:3, 3]).unbind(-1)
         return torch.stack([K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]], dim=-1), z
@@ -56,6 +52,7 @@ class Camera:
         return (self._rays_in_camera() * depth[..., None] - t_cw) @ R_cw
 
     def _rays_in_camera(self) -> Tensor:
+        """Return directions [H, W, 3] through the pixel centres in the camera's axes, z = 1."""
         K = self.K
         sides = (torch.arange(side, device=K.device) for side in (self.height, self.width))
         y, x = torch.meshgrid(*sides, indexing="ij")
@@ -84,17 +81,10 @@ class Camera:
 
 
 def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tensor:
-    """Return World-to-camera matrix of a camera at `position` that looks at `target`.
+    """Return the viewmat [4, 4] of a camera at `position` [3] that looks at `target` [3].
 
-    Differentiable in `position` and `target`.
-
-    Args:
-        position: [3] world units.
-        target: [3] world units.
-        up: [3] direction that points up in the image; default the world's +y.
-
-    Returns:
-        viewmat [4, 4], dtype and device of `position`.
+    Differentiable in both; dtype and device are those of `position`. The direction `up` [3], by default the
+    world's +y, points up in the image.
     """
     for name, vector in (("position", position), ("target", target)):
         check.shape(name, vector, "3")
@@ -103,8 +93,9 @@ def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tenso
     view = target - position
     distance = float(view.detach().norm())
     if not isfinite(distance) or distance == 0:
-        raise ArgumentError("look_at: expected position and target to differ and be finite, got a distance "
-                            f"of {distance}")  # fmt: skip
+        raise ArgumentError(
+            f"look_at: expected position and target to differ and be finite, got a distance of {distance}"
+        )
     forward = view / view.norm()
     right = torch.linalg.cross(forward, up)
     sine = float(right.detach().norm() / up.norm())
@@ -117,13 +108,7 @@ def look_at(position: Tensor, target: Tensor, up: Tensor | None = None) -> Tenso
 
 
 def intrinsics(fov_y: float, width: int, height: int) -> Tensor:
-    """Return K [3, 3], float32: square pixels, principal point in the middle.
-
-    Args:
-        fov_y: vertical field of view, degrees, above 0 and below 180.
-        width: pixels.
-        height: pixels.
-    """
+    """Return K [3, 3], float32, of square pixels around the principal point; `fov_y` is vertical, degrees."""
     if not 0 < fov_y < 180:
         raise ArgumentError(f"fov_y: expected degrees between 0 and 180, got {fov_y}")
     focal = 0.5 * height / tan(radians(0.5 * fov_y))
@@ -159,9 +144,6 @@ def orbit(
         width: pixels.
         height: pixels.
         target: [3] world units.
-
-    Raises:
-        ArgumentError: if an argument is out of range.
     """
     if not isfinite(azimuth):
         raise ArgumentError(f"azimuth: expected degrees, got {azimuth}")

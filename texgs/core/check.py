@@ -16,13 +16,6 @@ def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
             occurs twice or is in `known`. An empty spec is a scalar.
         known: sizes of names that are bound already.
 
-    Returns:
-        The sizes of all names in `spec`.
-
-    Raises:
-        ArgumentError: if `tensor` is no tensor.
-        ShapeError: if the shape does not fit.
-
     Example:
         >>> shape("means", torch.zeros(5, 3), "N 3")
         {'N': 5}
@@ -32,9 +25,8 @@ def shape(name: str, tensor: Tensor, spec: str, **known: int) -> dict[str, int]:
     sizes = bind(tensor.shape, spec, known)
     if sizes is None:
         expected = ", ".join(str(known.get(token, token)) for token in spec.split())
-        raise ShapeError(
-            f"{name}: expected [{expected}], got {list(tensor.shape)}{_hint(tensor, spec, known)}"
-        )
+        hint = _hint(tuple(tensor.shape), spec, known)
+        raise ShapeError(f"{name}: expected [{expected}], got {list(tensor.shape)}{hint}")
     return sizes
 
 
@@ -53,40 +45,27 @@ def bind(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> dict[str,
     return sizes
 
 
-def _hint(tensor: Tensor, spec: str, known: dict[str, int]) -> str:
+def _hint(actual: tuple[int, ...], spec: str, known: dict[str, int]) -> str:
     """Return what a user most likely did: a transpose, or a missing or superfluous axis."""
-    if tensor.ndim == 2 and bind(tensor.shape[::-1], spec, known) is not None:
-        return "; did you transpose?"
-    if (
-        tensor.ndim
-        and tensor.ndim + 1 == len(spec.split())
-        and bind((*tensor.shape, 1), spec, known) is not None
-    ):
-        return "; add the last axis with unsqueeze(-1)"
-    if tensor.ndim and tensor.shape[-1] == 1 and bind(tensor.shape[:-1], spec, known) is not None:
-        return "; drop the last axis with squeeze(-1)"
-    if tensor.ndim and tensor.shape[0] == 1 and bind(tensor.shape[1:], spec, known) is not None:
-        return "; batches are not supported, pass one element"
-    return ""
+    remedies = (
+        (len(actual) == 2, actual[::-1], "did you transpose?"),
+        (len(actual) > 0, (*actual, 1), "add the last axis with unsqueeze(-1)"),
+        (actual[-1:] == (1,), actual[:-1], "drop the last axis with squeeze(-1)"),
+        (actual[:1] == (1,), actual[1:], "batches are not supported, pass one element"),
+    )
+    hints = (hint for applies, other, hint in remedies if applies and bind(other, spec, known) is not None)
+    return "".join(f"; {hint}" for hint in [*hints][:1])
 
 
 def floating(name: str, tensor: Tensor) -> None:
-    """Require float32.
-
-    Raises:
-        ArgumentError: naming the dtype found.
-    """
+    """Require float32."""
     if tensor.dtype != torch.float32:
         dtype = str(tensor.dtype).removeprefix("torch.")
         raise ArgumentError(f"{name}: expected float32, got {dtype}; convert it with .float()")
 
 
 def same_device(**tensors: Tensor | None) -> torch.device:
-    """Require that all tensors (None is skipped) are on one device, and return it.
-
-    Raises:
-        DeviceError: naming two tensors that differ.
-    """
+    """Require that all tensors (None is skipped) are on one device, and return it."""
     present = {name: tensor for name, tensor in tensors.items() if tensor is not None}
     if not present:
         raise ArgumentError("same_device: expected at least one tensor, got none")
@@ -100,11 +79,7 @@ def same_device(**tensors: Tensor | None) -> torch.device:
 
 
 def finite(**tensors: Tensor | None) -> None:
-    """Require that no tensor (None is skipped) holds NaN or infinity. Waits for the device.
-
-    Raises:
-        ArgumentError: naming the tensor, the number of bad values and the index of the first.
-    """
+    """Require that no tensor (None is skipped) holds NaN or infinity. Waits for the device."""
     for name, tensor in tensors.items():
         if tensor is None or bool(torch.isfinite(tensor).all()):
             continue
@@ -117,13 +92,7 @@ def finite(**tensors: Tensor | None) -> None:
 
 
 def constant(**tensors: Tensor | None) -> None:
-    """Refuse tensors (None is skipped) that expect a gradient where none is computed.
-
-    Under `torch.no_grad()` everything is constant.
-
-    Raises:
-        ArgumentError: naming the tensor.
-    """
+    """Refuse tensors (None is skipped) that expect a gradient where none is computed."""
     for name, tensor in tensors.items():
         if tensor is not None and tensor.requires_grad and torch.is_grad_enabled():
             raise ArgumentError(
@@ -132,11 +101,7 @@ def constant(**tensors: Tensor | None) -> None:
 
 
 def torch_device(name: str) -> torch.device:
-    """Return a device of torch by its name.
-
-    Raises:
-        DeviceError: if it is a GPU and torch sees none.
-    """
+    """Return a device of torch by its name; refuse a GPU where torch sees none."""
     if name == "cuda" and not torch.cuda.is_available():
         raise DeviceError("device=cuda: torch sees no GPU; leave it out to work on the CPU, see texgs doctor")
     return torch.device(name)

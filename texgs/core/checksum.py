@@ -1,25 +1,19 @@
 """SHA-256 of files, remembered for as long as a file keeps its size and time."""
 
-import contextlib
 import hashlib
 import json
 from collections.abc import Iterable
 from pathlib import Path
 
-from texgs.core.cache import cache_folder
+from texgs.core.cache import cache_folder, keep, recall
 from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
 
 CACHE = "checksums.json"  # in the cache folder
 MOST = 20_000  # files in it, the latest ones
 
 
 def sha256(path: str | Path) -> str:
-    """Return the checksum of a file's contents as they are now.
-
-    Raises:
-        ArgumentError: if it cannot be read.
-    """
+    """Return the checksum of a file's contents as they are now."""
     try:
         with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
@@ -39,13 +33,12 @@ def combined(parts: Iterable[tuple[str, str]]) -> str:
 
 def of_folders(*folders: Path) -> str:
     """Return one checksum of the names and contents of all files below folders, without compiled Python."""
-    total = hashlib.sha256()
-    for folder in folders:
-        for path in sorted(folder.rglob("*")):
-            if "__pycache__" not in path.parts and path.is_file():
-                total.update(f"{path.relative_to(folder).as_posix()}\0".encode())
-                total.update(hashlib.sha256(path.read_bytes()).digest())
-    return total.hexdigest()
+    return combined(
+        (f"{index} {path.relative_to(folder).as_posix()}", sha256(path))
+        for index, folder in enumerate(folders)
+        for path in folder.rglob("*")
+        if path.is_file() and "__pycache__" not in path.parts
+    )
 
 
 class Checksums:
@@ -60,27 +53,21 @@ class Checksums:
 
     @classmethod
     def load(cls) -> "Checksums":
-        """What earlier processes have computed, from the cache folder; a damaged cache is an empty one."""
+        """Return what earlier processes have computed, from the cache folder."""
         checksums = cls()
-        with contextlib.suppress(OSError, ValueError):
-            known = json.loads((cache_folder() / CACHE).read_text())
-            checksums._known = known if isinstance(known, dict) else {}
+        known = recall(cache_folder() / CACHE, CACHE)
+        checksums._known = known if isinstance(known, dict) else {}
         return checksums
 
     def save(self) -> None:
         """Keep them for later processes; where the cache cannot be written, they will compute them again."""
         if self._is_new:
             self._known = dict(list(self._known.items())[-MOST:])
-            with contextlib.suppress(ArgumentError, OSError):
-                write_bytes(cache_folder() / CACHE, json.dumps(self._known).encode())
+            keep(cache_folder() / CACHE, CACHE, self._known)
             self._is_new = False
 
     def of(self, path: Path) -> str:
-        """Return the checksum of a file.
-
-        Raises:
-            ArgumentError: if it cannot be read.
-        """
+        """Return the checksum of a file."""
         try:
             status = path.stat()
         except OSError as error:

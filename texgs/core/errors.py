@@ -11,7 +11,7 @@ class TexgsError(Exception):
     """A user's mistake or a limit of the machine; the command line prints it without a traceback."""
 
     def __str__(self) -> str:
-        """The message as a terminal can show it."""
+        """Return the message as a terminal can show it."""
         return printable(super().__str__())
 
 

@@ -54,12 +54,7 @@ def as_picture(figure: Figure) -> Image.Image:
 
 
 def words(text: str) -> str:
-    r"""Return a text that Matplotlib shows letter by letter: between dollar signs it expects mathematics.
-
-    Example:
-        >>> words("$x_{")
-        '\\$x_{'
-    """
+    """Return a text that Matplotlib shows letter by letter: between dollar signs it expects mathematics."""
     return text.replace("$", r"\$")
 
 
@@ -126,12 +121,6 @@ def write_grid(
             A place with None stays empty.
         titles: of the columns.
         below: words under the pictures of each row; by default there are none.
-
-    Returns:
-        The path.
-
-    Raises:
-        ArgumentError: if a row has another number of pictures.
     """
     return draw(path, grid_rows(rows, titles, below), columns=len(titles))
 
@@ -146,11 +135,10 @@ def grid_rows(
         if len(pictures) != len(titles) or not titles:
             raise ArgumentError(f"{name}: expected {len(titles)} pictures, got {len(pictures)}")
     none = [""] * len(titles)
-    notes = below or dict.fromkeys(rows, none)
     box = content([picture for pictures in rows.values() for picture in pictures if picture is not None])
     grid = []
     for index, (name, pictures) in enumerate(rows.items()):
-        cells = zip(none if index else titles, pictures, notes[name], strict=True)
+        cells = zip(none if index else titles, pictures, below[name] if below else none, strict=True)
         grid.append(Row(name, [Cell(t, None if p is None else p[box], n) for t, p, n in cells]))
     return grid
 
@@ -170,10 +158,8 @@ def lay_out(rows: Sequence[Row], title: str = "", columns: int = COLUMNS) -> Fig
     """
     height, width = next(x.pixels.shape[:2] for row in rows for x in row.cells if x.pixels is not None)
     columns = min(columns, max(len(row.cells) for row in rows))
-    across, widths = columns * (CELL + GAP), [CELL] * len(rows)
-    for index, row in enumerate(rows):
-        if len(row.cells) > columns:
-            widths[index] = across / len(row.cells) - GAP
+    across = columns * (CELL + GAP)
+    widths = [across / len(row.cells) - GAP if len(row.cells) > columns else CELL for row in rows]
     heights = [wide * height / width for wide in widths]
     top = TOP if title else GAP
     page = top + sum(heights) + sum(row.head + row.foot for row in rows)
@@ -204,8 +190,8 @@ def draw_row(figure: Figure, row: Row, top: float, wide: float, tall: float) -> 
             fill(axes_at(left, top, wide, tall), cell, size)
         if cell.scale is not None:
             fill_bar(axes_at(left + 0.33 * wide, top + tall + 0.07, 0.34 * wide, 0.1), cell.scale)
-    place = 0.5 * LEFT / page_width, 1 - (top + 0.5 * tall) / page
-    figure.text(*place, words(row.name), rotation=90, fontsize=fitting([row.name], tall), **CENTERED)
+    x, y = 0.5 * LEFT / page_width, 1 - (top + 0.5 * tall) / page
+    figure.text(x, y, words(row.name), rotation=90, fontsize=fitting([row.name], tall), **CENTERED)
 
 
 def fitting(texts: Iterable[str], inches: float) -> float:
@@ -219,9 +205,8 @@ def fill(axes: Axes, cell: Cell, size: float) -> None:
     axes.set_title(words(cell.title), fontsize=size, pad=4)
     if cell.pixels is None:
         axes.set_frame_on(bool(cell.words))
-        axes.text(
-            *(0.5, 0.5, cell.words), transform=axes.transAxes, family="monospace", fontsize=MEDIUM, **CENTERED
-        )
+        place = {"transform": axes.transAxes, **CENTERED}
+        axes.text(0.5, 0.5, cell.words, family="monospace", fontsize=MEDIUM, **place)
         return
     axes.imshow(np.asarray(cell.pixels), aspect="auto")
     axes.set_xlabel(words(cell.words), fontsize=SMALL, labelpad=4)

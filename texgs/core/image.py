@@ -23,12 +23,7 @@ BYTES = 32  # of memory for a pixel: as it is stored, in RGBA, and as floats
 
 @contextmanager
 def open_picture(path: str | Path, what: str = "an image") -> Iterator[Image.Image]:
-    """An image file; its header is read now, its pixels when they are used.
-
-    Raises:
-        ArgumentError: if the file is missing, damaged or no image, or so large that Pillow refuses it.
-        OutOfMemoryError: if its pixels would not fit into memory.
-    """
+    """Open an image file that fits into memory; its header is read now, its pixels when they are used."""
     with reading(path, what), Image.open(path, formats=FORMATS) as picture:
         width, height = picture.size
         require_memory(BYTES * width * height, f"{path}: {what} of {width} x {height} pixels", "reduce it")
@@ -74,28 +69,13 @@ def write_png(path: str | Path, color: Tensor, alpha: Tensor | None = None) -> P
 
 
 def with_eight_bits(picture: Image.Image) -> Image.Image:
-    """The picture, its grey values of 16 bits rounded to 8: Pillow's conversion would clip them instead."""
+    """Return the picture, its grey values of 16 bits rounded to 8: Pillow's conversion would clip them."""
     if not picture.mode.startswith("I"):
         return picture
     return Image.fromarray((np.asarray(picture) / 257).round().clip(0, 255).astype(np.uint8))
 
 
 def read_rgba(path: str | Path) -> np.ndarray:
-    """Return the pixels of an image as stored: [H, W, 4] uint8, straight alpha; 255 in a file without alpha.
-
-    Raises:
-        ArgumentError: if the file is missing or no image.
-    """
+    """Return the pixels of an image as stored: [H, W, 4] uint8, straight alpha; 255 where it has none."""
     with open_picture(path) as picture:
         return np.array(with_eight_bits(picture).convert("RGBA"))
-
-
-def read_png(path: str | Path) -> tuple[Tensor, Tensor]:
-    """Read an image with 8 bits; one with more is taken with 8.
-
-    Returns:
-        Premultiplied colour [H, W, 3] and alpha [H, W], float32 in [0, 1]; alpha is 1 in a file without it.
-    """
-    image = torch.from_numpy(read_rgba(path).astype(np.float32) / 255)
-    alpha = image[..., 3]
-    return image[..., :3] * alpha[..., None], alpha

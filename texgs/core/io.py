@@ -4,8 +4,7 @@ import errno
 import json
 import os
 import re
-import tempfile
-import threading
+import secrets
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,19 +15,15 @@ from texgs.core.errors import ArgumentError, OutOfMemoryError, TexgsError
 from texgs.core.memory import is_out_of_memory
 
 ADVICE = "is the file damaged or cut off?"
-ASKING = threading.Lock()
-SCRATCH = re.compile(r"\..+\.[a-z0-9_]{8}")  # files beside a target, as mkstemp names them
+SCRATCH = re.compile(r"\..+\.[0-9a-z_]{8}")  # files beside a target, until they are whole
 
 
 def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
-    """Create or replace a file in one step; folders on the way are created.
+    """Create or replace a file in one step and return its path; folders on the way are created.
 
     Args:
         path: target file.
         write: gets a binary file opened for writing. If it raises, the target is left as it was.
-
-    Returns:
-        The path.
 
     Raises:
         ArgumentError: if the folder cannot be created or written to, or the disk is full.
@@ -36,20 +31,19 @@ def write_atomic(path: str | Path, write: Callable[[BinaryIO], object]) -> Path:
     path = Path(path)
     if is_there(path) and not path.is_file() and not path.is_dir():  # it would be replaced by a file
         raise ArgumentError(f"{path}: expected the name of a file, got a device or a named pipe")
+    scratch = path.parent / f".{path.name}.{secrets.token_hex(4)}"
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        scratch = Path(name)
+        file = scratch.open("xb")
     except OSError as error:
         raise ArgumentError(
             f"{path}: cannot write there ({error.strerror}); choose another folder"
         ) from error
     try:
-        with os.fdopen(handle, "wb") as file:
+        with file:
             write(file)
             file.flush()
             os.fsync(file.fileno())
-        scratch.chmod(0o666 & ~_umask())
         scratch.replace(path)
     except BaseException as error:
         scratch.unlink(missing_ok=True)
@@ -90,21 +84,9 @@ def write_json(path: str | Path, value: Any) -> Path:
 
 
 def read_json(path: str | Path) -> Any:
-    """Read a JSON file.
-
-    Raises:
-        ArgumentError: if the file is missing or no JSON, with the line.
-    """
-    with reading(path, "JSON"):
-        return json.loads(Path(path).read_text(encoding="utf-8"))
-
-
-def _umask() -> int:
-    """Return the process's file mode mask; mkstemp ignores it and makes private files."""
-    with ASKING:  # there is no way but to change it for a moment
-        mask = os.umask(0)
-        os.umask(mask)
-    return mask
+    """Return the contents of a JSON file."""
+    with reading(path, "JSON") as path:
+        return json.loads(path.read_text(encoding="utf-8"))
 
 
 def require_file(path: str | Path, what: str = "a file") -> Path:
@@ -125,11 +107,7 @@ def require_file(path: str | Path, what: str = "a file") -> Path:
 
 
 def is_there(path: str | Path) -> bool:
-    """Return whether there is a file or a folder of this name.
-
-    Raises:
-        ArgumentError: if that cannot be told: others may not look there, or the name is too long.
-    """
+    """Return whether there is a file or a folder of this name; it is an error where that cannot be told."""
     try:
         return Path(path).exists()
     except OSError as error:
@@ -156,7 +134,7 @@ def reading(path: str | Path, what: str, advice: str = ADVICE) -> Iterator[Path]
 
 @contextmanager
 def reading_as(what: str, advice: str = ADVICE, where: str = "") -> Iterator[None]:
-    """As `reading`, for a part of a file, or where the border around it names the file.
+    """Do as `reading` for a part of a file, or where the border around it names the file.
 
     Readers of foreign formats raise what they happen to trip over in a damaged file, of any class.
     """
@@ -164,11 +142,9 @@ def reading_as(what: str, advice: str = ADVICE, where: str = "") -> Iterator[Non
         yield
     except TexgsError:
         raise
-    except OSError as error:
-        if error.errno is None:  # of a library, about the contents
-            raise ArgumentError(f"{where}expected {what}, got {reason(error)}; {advice}") from error
-        raise ArgumentError(f"{where}cannot be read ({error.strerror})") from error
     except Exception as error:
+        if isinstance(error, OSError) and error.errno is not None:  # without: a library's, about the contents
+            raise ArgumentError(f"{where}cannot be read ({error.strerror})") from error
         if is_out_of_memory(error):
             raise OutOfMemoryError(
                 f"{where}{what} needs more memory than there is ({reason(error)}); {advice}"

@@ -4,13 +4,21 @@ import typing
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass
 from functools import cache
+from operator import ge, gt, le, lt
 from types import NoneType, UnionType
 from typing import Any, TypeVar, cast
 
 from texgs.core.names import close, is_number
 
+T = TypeVar("T")
 LARGEST = 2**63 - 1
 REQUIRED = "???"  # the default of a key that has none, in Hydra's words
+BOOLEANS = {
+    **dict.fromkeys(("true", "yes", "on", "y", "1"), True),
+    **dict.fromkeys(("false", "no", "off", "n", "0"), False),
+}
+EXPECTED = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
+LONGEST = 60  # letters of a value in a sentence
 
 
 @dataclass(frozen=True)
@@ -23,47 +31,36 @@ class Bounds:
     below: float | None = None
 
     def complaint(self, value: float) -> str | None:
-        """What was expected of a number that is not allowed; None for one that is."""
+        """Return what was expected of a number that is not allowed; None for one that is."""
         if isinstance(value, int) and abs(value) > LARGEST:
             return "an integer of 64 bits"
         if not is_number(value):
             return "a finite number"
-        if self.least is not None and value < self.least:
-            return f"at least {self.least:g}"
-        if self.most is not None and value > self.most:
-            return f"at most {self.most:g}"
-        if self.above is not None and value <= self.above:
-            return f"more than {self.above:g}"
-        if self.below is not None and value >= self.below:
-            return f"less than {self.below:g}"
+        limits = (
+            (self.least, ge, "at least"),
+            (self.most, le, "at most"),
+            (self.above, gt, "more than"),
+            (self.below, lt, "less than"),
+        )
+        for limit, holds, words in limits:
+            if limit is not None and not holds(value, limit):
+                return f"{words} {limit:g}"
         return None
 
 
 def key(
-    default: Any,
-    help: str,
-    unit: str = "",
-    *,
-    choices: tuple[str, ...] = (),
-    least: float | None = None,
-    most: float | None = None,
-    above: float | None = None,
-    below: float | None = None,
+    default: Any, help: str, unit: str = "", *, choices: tuple[str, ...] = (), **bounds: float | None
 ) -> Any:
-    """A dataclass field that `--help` and the checks can read.
+    """Return a dataclass field that `--help` and the checks can read.
 
     Args:
         default: a value, a class (one instance each), or a list (a copy each).
         help: what the key means.
         unit: of its numbers.
         choices: the only values allowed, where these are few.
-        least: the smallest number allowed.
-        most: the largest number allowed.
-        above: numbers must be larger.
-        below: numbers must be smaller.
+        bounds: of its numbers, by the names of `Bounds`: least, most, above, below.
     """
-    bounds = Bounds(least, most, above, below)
-    metadata = {"help": help, "unit": unit, "choices": choices, "bounds": bounds}
+    metadata = {"help": help, "unit": unit, "choices": choices, "bounds": Bounds(**bounds)}
     if isinstance(default, type):
         return field(default_factory=default, metadata=metadata)
     if isinstance(default, list):
@@ -72,21 +69,12 @@ def key(
 
 
 def numbers(value: Any) -> Iterator[int | float]:
-    """The numbers in a value: itself, or those of a list of lists, however deep."""
+    """Yield the numbers in a value: itself, or those of a list of lists, however deep."""
     if isinstance(value, Sequence) and not isinstance(value, str):
         for item in value:
             yield from numbers(item)
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield value
-
-
-T = TypeVar("T")
-BOOLEANS = {
-    **dict.fromkeys(("true", "yes", "on", "y", "1"), True),
-    **dict.fromkeys(("false", "no", "off", "n", "0"), False),
-}
-EXPECTED = {int: "an integer", float: "a number", bool: "true or false", str: "text"}
-LONGEST = 60  # letters of a value in a sentence
 
 
 class ValueMismatch(ValueError):
@@ -117,14 +105,12 @@ def typed(kind: type[T], values: Mapping[str, Any], key: str = "") -> T:
         ValueMismatch: for a name that is unknown or missing, a value of another type, and one that its field
             does not allow.
     """
-    if not isinstance(values, Mapping):
-        raise mismatch(key, "keys with values", values)
     known = _fields(cast(Any, kind))
     made = {}
-    for name, value in values.items():
-        at = f"{key}.{name}" if key else str(name)
+    for name, value in _table(values, key).items():
+        at = f"{key}.{name}" if key else name
         if name not in known:
-            raise UnknownKey(at, f"no such key{close(str(name), known)}", value)
+            raise UnknownKey(at, f"no such key{close(name, known)}", value)
         hint, field = known[name]
         made[name] = _value(hint, value, at)
         _check(field, made[name], value, at)
@@ -152,29 +138,39 @@ def mismatch(key: str, expected: str, value: Any) -> ValueMismatch:
 
 @cache
 def _fields(kind: Any) -> dict[str, tuple[Any, Field[Any]]]:
+    """Return the types and fields of a dataclass by name."""
     hints = typing.get_type_hints(kind)
     return {field.name: (hints[field.name], field) for field in fields(kind) if field.init}
 
 
+def _table(value: Any, key: str) -> dict[str, Any]:
+    """Require keys with values."""
+    if not isinstance(value, Mapping):
+        raise mismatch(key, "keys with values", value)
+    return {str(name): each for name, each in value.items()}
+
+
 def _value(hint: Any, value: Any, key: str) -> Any:
-    """Return a value as the type that is asked for."""
-    if hint is Any:
-        return _plain(value, key)
+    """Return a value as the type that is asked for; tables and lists as copies."""
     if isinstance(hint, UnionType):
         inner = next(each for each in hint.__args__ if each is not NoneType)
         return None if value is None else _value(inner, value, key)
     if is_dataclass(hint):
         return value if isinstance(value, hint) else typed(hint, value, key)  # type: ignore[arg-type]
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if origin is list:
-        if not isinstance(value, Sequence) or isinstance(value, str):
-            raise mismatch(key, "a list", value)
-        return [_value(arguments[0], each, f"{key}.{index}") for index, each in enumerate(value)]
-    if origin is dict:
-        if not isinstance(value, Mapping):
-            raise mismatch(key, "keys with values", value)
-        return {str(name): _value(arguments[1], each, f"{key}.{name}") for name, each in value.items()}
-    return _single(hint, value, key)
+    is_list = isinstance(value, Sequence) and not isinstance(value, str)
+    if origin is list and not is_list:
+        raise mismatch(key, "a list", value)
+    if origin is list or (hint is Any and is_list):
+        return [_value((*arguments, Any)[0], each, f"{key}.{index}") for index, each in enumerate(value)]
+    if origin is dict or (hint is Any and isinstance(value, Mapping)):
+        inner = arguments[1] if arguments else Any
+        return {name: _value(inner, each, f"{key}.{name}") for name, each in _table(value, key).items()}
+    if hint is not Any:
+        return _single(hint, value, key)
+    if value is None or isinstance(value, str | int | float):
+        return value
+    raise mismatch(key, "text, a number, a list or keys with values", value)
 
 
 def _single(hint: type, value: Any, key: str) -> Any:
@@ -193,17 +189,6 @@ def _single(hint: type, value: Any, key: str) -> Any:
         except ValueError:
             pass  # told below
     raise mismatch(key, EXPECTED[hint], value)
-
-
-def _plain(value: Any, key: str) -> Any:
-    """Return a value of any kind that files of configurations can hold; tables and lists as copies."""
-    if isinstance(value, Mapping):
-        return {str(name): _plain(each, f"{key}.{name}") for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each, f"{key}.{index}") for index, each in enumerate(value)]
-    if value is None or isinstance(value, str | int | float):
-        return value
-    raise mismatch(key, "text, a number, a list or keys with values", value)
 
 
 def _check(field: Field[Any], value: Any, given: Any, key: str) -> None:

@@ -13,11 +13,7 @@ from texgs.core.errors import ArgumentError
 
 @dataclass(frozen=True)
 class Light:
-    """White light from one direction: from the camera, or fixed in the world.
-
-    Raises:
-        ArgumentError: if the kind is unknown.
-    """
+    """White light from one direction: from the camera, or fixed in the world."""
 
     kind: Literal["headlight", "directional"]
     azimuth: float = 0.0  # degrees, of a directional light; see orbit_direction
@@ -28,7 +24,7 @@ class Light:
             raise ArgumentError(f"light: expected headlight or directional, got {self.kind!r}")
 
     def direction(self, camera: Camera) -> Tensor:
-        """Return unit vector [3], float64, from the origin to the light; for a headlight, to the camera."""
+        """Return the unit vector [3], float64, from the origin to the light or headlight."""
         if self.kind == "directional":
             return orbit_direction(self.azimuth, self.polar)
         position: Tensor = camera.position.double().cpu()

@@ -10,28 +10,21 @@ from texgs.core.errors import OutOfMemoryError
 
 STATUS = Path("/proc/self/status")
 CGROUP, GROUP = Path("/sys/fs/cgroup"), Path("/proc/self/cgroup")
-CONTAINERS = (  # for each version of cgroups the line that names a group, its root, and the files with what
-    # it may have, what it has, and which kinds
-    (r"^0::/(.*)$", "", ("memory.max", "memory.current", "memory.stat")),
-    (
-        r"^\d+:(?:.*,)?memory(?:,.*)?:/(.*)$",
-        "memory",
-        ("memory.limit_in_bytes", "memory.usage_in_bytes", "memory.stat"),
-    ),
+CONTAINERS = (  # for versions 2 and 1 of cgroups: the line that names a group, its root, limit and use
+    (r"^0::/(.*)$", "", "memory.max", "memory.current"),
+    (r"^\d+:(?:.*,)?memory(?:,.*)?:/(.*)$", "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
 )
 MIB, GIB = 1 << 20, 1 << 30
 SMALL = 64 << 20  # bytes that are there without asking
 
 
 def peak_memory() -> int:
-    """Return most bytes of memory that this process had resident so far.
+    """Return the most bytes of memory that this process had resident so far.
 
     Linux tells it for the program that runs; elsewhere the peak may be that of the process that started it.
     """
-    if STATUS.exists():
-        peak = re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())
-        if peak:
-            return 1024 * int(peak[1])
+    if STATUS.exists() and (peak := re.search(r"VmHWM:\s+(\d+) kB", STATUS.read_text())):
+        return 1024 * int(peak[1])
     if sys.platform == "win32":
         import psutil
 
@@ -43,7 +36,7 @@ def peak_memory() -> int:
 
 
 def free_memory() -> int:
-    """Bytes that this process may still have: of the machine, of its container, and by its own limits."""
+    """Return the bytes that this process may still have, by the machine, its container and its own limits."""
     import psutil
 
     limits = [int(psutil.virtual_memory().available), *container_limits()]
@@ -64,12 +57,12 @@ def container_limits() -> Iterator[int]:
         groups = GROUP.read_text()
     except OSError:  # no Linux
         return
-    for line, root, names in CONTAINERS:
+    for line, root, *names in CONTAINERS:
         own = re.search(line, groups, re.MULTILINE)
         group = CGROUP / root / (own[1] if own else "")
         for folder in (group, *group.parents):
             try:
-                most, used, kinds = ((folder / name).read_text() for name in names)
+                most, used, kinds = ((folder / name).read_text() for name in (*names, "memory.stat"))
                 cached = re.findall(r"^(?:in)?active_file (\d+)", kinds, re.MULTILINE)  # given back on demand
                 yield int(most) - int(used) + sum(map(int, cached))
             except (OSError, ValueError):  # no such group, or one without a limit: "max"
@@ -87,9 +80,6 @@ def require_memory(n_bytes: int, what: str, advice: str) -> None:
         n_bytes: that the work needs.
         what: the work or the thing, for the message.
         advice: what to do without so much memory.
-
-    Raises:
-        OutOfMemoryError: naming how much is wanted and how much there is.
     """
     if n_bytes <= SMALL:
         return
@@ -107,11 +97,7 @@ def _gib(n_bytes: int) -> str:
 
 @contextmanager
 def as_out_of_memory() -> Iterator[None]:
-    """Turn what Python, NumPy or torch raise where memory ends into one sentence.
-
-    Raises:
-        OutOfMemoryError: in place of theirs; it says how much was wanted, where they do.
-    """
+    """Turn what Python, NumPy or torch raise where memory ends into one sentence with what was wanted."""
     try:
         yield
     except OutOfMemoryError:
@@ -127,7 +113,7 @@ def as_out_of_memory() -> Iterator[None]:
 
 
 def is_out_of_memory(error: BaseException) -> bool:
-    """Whether an error says that memory could not be had: Python's, NumPy's, or torch's on any device."""
+    """Return whether an error says that memory could not be had, of Python, NumPy, or torch on any device."""
     return (
         isinstance(error, MemoryError)
         or type(error).__name__ == "OutOfMemoryError"

@@ -7,7 +7,7 @@ from fractions import Fraction
 from functools import partial
 from itertools import chain, pairwise
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 import numpy as np
 from PIL import Image
@@ -23,21 +23,14 @@ FINE = 18  # constant rate factor of H.264 that looks like the frames
 
 
 def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25.0, crf: int = FINE) -> Path:
-    """Write frames as they come; the file appears when it is complete.
+    """Write frames as they come and return the path; the file appears when it is complete.
 
     Args:
         path: ends in .png for one frame, .gif or .mp4 for several; without an ending it is a folder, which
-            receives one PNG a frame.
+            receives one PNG a frame and must not have pictures of another film.
         frames: [H, W, 3] uint8, of one size.
         fps: frames per second.
         crf: constant rate factor of H.264 in MP4, 0 to 51: the higher, the smaller and the coarser.
-
-    Returns:
-        The path.
-
-    Raises:
-        ArgumentError: if the ending is another one, the folder has pictures of another film, frames follow
-            each other too fast or too slowly, there is no frame, or several where one is expected.
     """
     path = Path(path)
     if path.suffix not in ("", *KINDS):
@@ -57,9 +50,8 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
     first = next(left, None)
     if first is None:
         raise ArgumentError(f"{path}: expected at least one frame, got none")
-    every = chain([first], left)
     if path.suffix == "":
-        for number, frame in enumerate(every):
+        for number, frame in enumerate(chain([first], left)):
             _write_png(path / f"{number:04}.png", frame)
     elif path.suffix == ".png":
         if next(left, None) is not None:
@@ -67,7 +59,7 @@ def write_frames(path: str | Path, frames: Iterable[np.ndarray], fps: float = 25
         _write_png(path, first)
     else:
         write = _write_gif if path.suffix == ".gif" else partial(_write_mp4, crf=crf)
-        write_atomic(path, lambda file: write(file, chain([first], left), fps))
+        write_atomic(path, lambda file: write(file, first, left, fps))
     return path
 
 
@@ -75,41 +67,33 @@ def _write_png(path: Path, frame: np.ndarray) -> None:
     write_atomic(path, lambda file: Image.fromarray(frame).save(file, format="PNG"))
 
 
-def _write_gif(file: IO[bytes], frames: Iterator[np.ndarray], fps: float) -> None:
+def _write_gif(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float) -> None:
     kept, n_bytes = [], 0
-    for frame in frames:
+    for frame in chain([first], left):
         n_bytes += frame.nbytes
         require_memory(n_bytes, "GIF: a copy of all frames, which Pillow makes,", "write an MP4 film")
         kept.append(Image.fromarray(frame))
-    first, *rest = kept
     ends = [round(100 * index / fps) for index in range(len(kept) + 1)]  # in hundredths of a second
     durations = [10 * (end - start) for start, end in pairwise(ends)]
-    first.save(file, format="GIF", save_all=True, append_images=rest, duration=durations, loop=0)
+    kept[0].save(file, format="GIF", save_all=True, append_images=kept[1:], duration=durations, loop=0)
 
 
-def _write_mp4(file: IO[bytes], frames: Iterator[np.ndarray], fps: float, crf: int) -> None:
-    """H.264 with colours at half resolution, which every browser and slide program plays; sizes are even."""
+def _write_mp4(file: IO[bytes], first: np.ndarray, left: Iterator[np.ndarray], fps: float, crf: int) -> None:
+    """Write H.264 with colours at half resolution, which every browser and slide program plays."""
     import av
 
-    first = next(frames)
+    height, width = first.shape[:2]
+    to_even = ((0, height % 2), (0, width % 2), (0, 0))
     try:
-        _encode(av, file, chain([first], frames), fps, crf)
+        with av.open(file, "w", format="mp4") as container:
+            stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
+            stream.height, stream.width = height + height % 2, width + width % 2
+            stream.pix_fmt, stream.options = "yuv420p", {"crf": str(crf)}
+            for frame in chain([first], left):
+                even = np.pad(frame, to_even, mode="edge")
+                container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
+            container.mux(stream.encode())
     except av.error.FFmpegError as error:
-        height, width = first.shape[:2]
         raise ArgumentError(
             f"MP4: {width} x {height} pixels cannot be encoded ({error.strerror}); write a folder of pictures"
         ) from error
-
-
-def _encode(av: Any, file: IO[bytes], frames: Iterator[np.ndarray], fps: float, crf: int) -> None:
-    with av.open(file, "w", format="mp4") as container:
-        stream: Any = None
-        for frame in frames:
-            height, width = frame.shape[:2]
-            even = np.pad(frame, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
-            if stream is None:
-                stream = container.add_stream("libx264", rate=Fraction(fps).limit_denominator(1000))
-                stream.height, stream.width = even.shape[:2]
-                stream.pix_fmt, stream.options = "yuv420p", {"crf": str(crf)}
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(even, format="rgb24")))
-        container.mux(stream.encode())

@@ -29,9 +29,6 @@ def label(where: str, name: object) -> str:
     Args:
         where: the name comes from, for the message.
         name: text, or a number that YAML has read in its place.
-
-    Raises:
-        ArgumentError: if it is empty, too long, or has control characters.
     """
     text = str(name)
     if not text.strip() or len(text) > LONGEST or not text.isprintable():
@@ -42,25 +39,16 @@ def label(where: str, name: object) -> str:
 
 
 def require_name(name: str | None, where: str) -> None:
-    """Require a name that a segment can have.
-
-    Raises:
-        ArgumentError: naming where it comes from.
-    """
+    """Require a name that a segment can have."""
     if not name or any(mark in label(where, name) for mark in RESERVED):
         raise ArgumentError(f"{where}: expected a name without {' '.join(RESERVED)}, got {name}")
 
 
 def file_name(where: str, name: str) -> str:
-    """A name that is one file or folder, and no way to another folder. Every name that is written goes here.
+    """Return a name, with its ending, that is one file or folder, and no way to another folder.
 
-    Args:
-        where: the name comes from, for the message.
-        name: of the file, with its ending.
-
-    Raises:
-        ArgumentError: if it has a separator or a control character, begins with a dot, or is empty or too
-            long.
+    Every name that is written goes through here. Separators, control characters, a dot at the start, and a
+    name that is empty or too long are refused.
     """
     is_plain = name.isprintable() and not SEPARATORS & set(name) and not name.startswith(".")
     if not is_plain or not name or len(name.encode()) > LONGEST_FILE:
@@ -72,20 +60,12 @@ def file_name(where: str, name: str) -> str:
 
 
 def part_file(where: str, *names: str) -> str:
-    """Name of the safetensors file of a part of a scene, whose names may have slashes.
-
-    Raises:
-        ArgumentError: as `file_name`.
-    """
+    """Return the name of the safetensors file of a part of a scene, whose names may have slashes."""
     return file_name(where, f"{'-'.join(names)}.safetensors".replace("/", "-"))
 
 
 def new_part_file(where: str, folder: Path, *names: str) -> Path:
-    """The file of a part, with a number where there is one already: scenes that were saved may name it.
-
-    Raises:
-        ArgumentError: as `file_name`.
-    """
+    """Return the file of a part, with a number where there is one already: saved scenes may name that."""
     files = (folder / part_file(where, *names, *([str(n)] if n > 1 else [])) for n in count(1))
     return next(file for file in files if not file.exists())
 
@@ -96,11 +76,8 @@ def named_file(where: str, folder: Path, path: object, kind: str = "a file") -> 
     Args:
         where: the path comes from, for the message.
         folder: that the path is relative to.
-        path: text.
+        path: text, not too long and without control characters.
         kind: of file, such as "a model".
-
-    Raises:
-        ArgumentError: if it is no text, empty, too long, or has control characters.
     """
     is_path = isinstance(path, str) and 0 < len(path) <= LONGEST_PATH
     if not is_path or not all(each.isprintable() or category(each) == SPACES for each in str(path)):

@@ -41,7 +41,7 @@ def essence(path: Path) -> str:
 
 @cache
 def library_sources(folder: Path = RASTER) -> str:
-    """Digest of the native sources: those of the source tree, else those that the library was built from."""
+    """Return the digest of the native sources: of the source tree, else those that the library has in it."""
     if (folder / "csrc").is_dir():
         return native_digest(folder / "csrc")
     library = folder / "_native" / f"libtexgs{SUFFIX}"

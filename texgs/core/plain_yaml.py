@@ -43,8 +43,7 @@ def parse_yaml(text: str) -> Any:
 
     Raises:
         ArgumentError: if it is no YAML, or has aliases, tags, or values in one another without end.
-        yaml.YAMLError: if it has characters that no text has.
-        ValueError: if a value is none, such as the date 2001-99-99.
+        yaml.YAMLError, ValueError: if it has characters that no text has, or a value such as 2001-99-99.
     """
     try:
         return yaml.load(text, PlainLoader)

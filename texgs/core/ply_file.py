@@ -18,11 +18,7 @@ ELEMENT = re.compile(rb"^element[ \t]+\S+[ \t]+(\d+)", re.MULTILINE)
 
 
 def read_vertices(path: str | Path) -> np.ndarray:
-    """Return the vertices of a PLY file as a structured array [N].
-
-    Raises:
-        ArgumentError: if the file is missing, damaged, no PLY file, or has no vertices.
-    """
+    """Return the vertices of a PLY file as a structured array [N]."""
     from plyfile import PlyData
 
     with reading(path, "a whole PLY file") as path:
@@ -43,15 +39,12 @@ def is_ply(path: Path) -> bool:
 
 
 def properties(path: Path) -> set[str]:
-    """Return the names of the properties that the header of a PLY file has.
-
-    Raises:
-        OSError: if it cannot be read.
-    """
+    """Return the names of the properties that the header of a PLY file has."""
     return {name.decode() for name in PROPERTY.findall(_header(path))}
 
 
 def _header(path: Path) -> bytes:
+    """Return the start of a PLY file up to its last line of the header."""
     with path.open("rb") as file:
         return file.read(LONGEST_HEADER).partition(b"end_header")[0]
 

@@ -40,10 +40,7 @@ def keep_freed_memory() -> bool:
 
     A training step asks for the same images again and again; pages that were handed back are zeroed by the
     kernel each time, which takes as long as rendering. For programs, not for libraries to call: it holds for
-    the whole process.
-
-    Returns:
-        Whether it does; only glibc can be told.
+    the whole process. Return whether it does; only glibc can be told.
     """
     os.environ.setdefault("THP_MEM_ALLOC_ENABLE", "1")  # torch: large pages, where it was not used before
     try:

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from operator import length_hint
 from time import monotonic
@@ -19,33 +19,30 @@ _log: ContextVar[LogPoint | None] = ContextVar("log", default=None)
 
 
 @contextmanager
-def watched(watch: Watch) -> Iterator[None]:
+def _within(variable: ContextVar[T], value: T) -> Iterator[None]:
+    """Give a variable of this thread a value within the block."""
+    before = variable.set(value)
+    try:
+        yield
+    finally:
+        variable.reset(before)
+
+
+def watched(watch: Watch) -> AbstractContextManager[None]:
     """Call a function for each item that a loop of this thread has done within the block.
 
-    Args:
-        watch: is called with the title of the loop, the number of items done and their total, where that is
-            known. What it raises ends the loop.
+    It gets the title of the loop, the number of items done and their total, where that is known. What it
+    raises ends the loop.
     """
-    before = _watch.set(watch)
-    try:
-        yield
-    finally:
-        _watch.reset(before)
+    return _within(_watch, watch)
 
 
-@contextmanager
-def curve_logger(log: LogPoint | None) -> Iterator[None]:
-    """Call a function with the points of all curves of this thread within the block.
+def curve_logger(log: LogPoint | None) -> AbstractContextManager[None]:
+    """Call a function with the points of all curves of this thread within the block; None: nobody is told.
 
-    Args:
-        log: is called with values by names, and the step of the loop; None: nobody is. No result depends
-            on it.
+    It gets values by names, and the step of the loop. No result depends on it.
     """
-    before = _log.set(log)
-    try:
-        yield
-    finally:
-        _log.reset(before)
+    return _within(_log, log)
 
 
 def has_curve_logger() -> bool:
@@ -72,9 +69,6 @@ def progress(iterable: Iterable[T], total: int | None = None, *, title: str, uni
         title: what is being done, at the start of each line.
         unit: name of one item, such as "view".
 
-    Yields:
-        The items, unchanged.
-
     Example:
         >>> list(progress("ab", title="letters", unit="letter"))
         ['a', 'b']
@@ -92,7 +86,7 @@ def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
     """Return the items, in a bar or with plain lines."""
     if not sys.stderr.isatty():
         return _lines(iterable, total, title, unit)
-    from tqdm import tqdm
+    from tqdm import tqdm  # slow to import
 
     bar: Iterable[T] = tqdm(iterable, desc=title, total=total, unit=unit, dynamic_ncols=True)
     return bar
@@ -101,8 +95,7 @@ def _shown(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
 def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> Iterator[T]:
     """Yield the items and write the plain lines."""
     start = last = monotonic()
-    done = 0
-    outcome = "stopped after"
+    done, outcome = 0, "stopped after"
     try:
         for item in iterable:
             yield item
@@ -110,18 +103,14 @@ def _lines(iterable: Iterable[T], total: int | None, title: str, unit: str) -> I
             now = monotonic()
             if now - last >= SECONDS_BETWEEN_LINES and done != total:
                 left = f", {_duration((total - done) * (now - start) / done)} left" if total else ""
-                _write(f"{title}: {_state(done, total, unit, now - start)}{left}")
+                print(f"{title}: {_state(done, total, unit, now - start)}{left}", file=sys.stderr, flush=True)
                 last = now
         outcome = "took"
     finally:
         seconds = monotonic() - start
         if done or outcome != "took":  # else there was nothing to do
-            _write(f"{title}: {_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}")
-
-
-def _write(line: str) -> None:
-    sys.stderr.write(f"{line}\n")
-    sys.stderr.flush()
+            state = f"{_state(done, total, unit, seconds)}, {outcome} {_duration(seconds)}"
+            print(f"{title}: {state}", file=sys.stderr, flush=True)
 
 
 def _state(done: int, total: int | None, unit: str, seconds: float) -> str:

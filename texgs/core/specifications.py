@@ -10,11 +10,8 @@ from typing import Any
 def specifications(package: str, attribute: str) -> dict[str, Any]:
     """Return what the modules of a package define under one name, by the names of the specifications.
 
-    The modules are imported, so they must stay light: what they run imports the rest when it is called.
-
-    Args:
-        package: such as texgs.edit.methods.
-        attribute: such as METHOD; modules without it are helpers of others.
+    The modules are imported, so they must stay light: what they run imports the rest when it is called. A
+    module without the name, such as METHOD, is a helper of others.
     """
     folder = import_module(package).__path__
     modules = (import_module(f"{package}.{entry.name}") for entry in pkgutil.iter_modules(folder))

@@ -1,4 +1,4 @@
-"""Files of tensors as safetensors, with what belongs to them as JSON in the header.
+"""Files of tensors: safetensors with what belongs to them as JSON in the header, and torch's, to read.
 
 The header has one entry, whose name is that of the format: safetensors keeps no order of entries. Files are
 written in one step and without a copy of the tensors in memory: the library writes either to bytes, which for
@@ -12,9 +12,10 @@ import json
 import pickle
 import pickletools
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from itertools import repeat
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any, BinaryIO
 from zipfile import ZipFile, is_zipfile
 
 import torch
@@ -48,9 +49,6 @@ def write_tensor_file(
         format: entry of the header, such as "texgs-model".
         description: JSON with a `version`, and `metadata` of the caller's.
         tensors: by name, on any device.
-
-    Raises:
-        ArgumentError: if the description is no JSON, or the file cannot be written.
     """
     require_json(path, description)
     return write_tensors(path, tensors, {format: json.dumps(description)})
@@ -59,16 +57,7 @@ def write_tensor_file(
 def write_tensors(
     path: str | Path, tensors: Mapping[str, Tensor], metadata: Mapping[str, str] | None = None
 ) -> Path:
-    """Create or replace a safetensors file in one step; the same tensors give the same bytes.
-
-    Args:
-        path: target.
-        tensors: on any device, of a type in `DTYPES`.
-        metadata: of the header.
-
-    Raises:
-        ArgumentError: if the file cannot be written, or the disk is full.
-    """
+    """Create or replace a safetensors file of tensors of `DTYPES`; the same tensors give the same bytes."""
     # Large elements first, so that all lie at multiples of their size, as readers want it.
     ordered = sorted(tensors.items(), key=lambda item: (-item[1].element_size(), item[0]))
     header: dict[str, object] = {"__metadata__": dict(metadata)} if metadata else {}
@@ -88,11 +77,7 @@ def write_tensors(
 
 
 def require_json(path: str | Path, description: Mapping[str, Any]) -> None:
-    """Require a description that JSON can hold.
-
-    Raises:
-        ArgumentError: naming the file; all but the metadata is ours.
-    """
+    """Require a description that JSON can hold; all but the metadata is ours."""
     try:
         json.dumps(description, allow_nan=False)
     except (TypeError, ValueError) as error:
@@ -108,10 +93,6 @@ def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, A
         path: of the file.
         format: entry of its header.
         version: the newest that can be read.
-
-    Raises:
-        ArgumentError: if the file is missing, no safetensors, cut short, of another program or a newer
-            version.
     """
     from safetensors import SafetensorError, safe_open
 
@@ -122,7 +103,10 @@ def read_tensor_file(path: Path, format: str, version: int) -> tuple[dict[str, A
                 # A copy is aligned in memory and does not depend on the file any more.
                 return description, {name: file.get_tensor(name).clone() for name in file.keys()}  # noqa: SIM118
         except SafetensorError as error:
-            raise ArgumentError(f"{path}: {_damage(path, format)}") from error
+            raise ArgumentError(
+                f"{path}: expected a {format} file, got one cut short or damaged, or of another format; "
+                "check the path, or copy or write it again"
+            ) from error
 
 
 def short(value: object) -> str:
@@ -130,16 +114,8 @@ def short(value: object) -> str:
     return text if len(text := repr(value)) < 120 else f"{text[:120]} ..."
 
 
-def _damage(path: Path, format: str) -> str:
-    """What is wrong with a file that safetensors cannot open; a good one begins with a length and JSON."""
-    with path.open("rb") as file:
-        start = file.read(9)
-    if start[8:] == b"{":
-        return "expected a whole safetensors file, got one cut short or damaged; copy or write it again"
-    return f"expected a {format} file, got one of another format; check the path"
-
-
 def _description(path: Path, format: str, newest: int, header: dict[str, str]) -> dict[str, Any]:
+    """Return the description in a header, of a version that can be read."""
     if format not in header:
         raise ArgumentError(f"{path}: expected a {format} file, got safetensors of another program")
     try:
@@ -158,14 +134,17 @@ def _description(path: Path, format: str, newest: int, header: dict[str, str]) -
 
 
 def load_torch(path: Path) -> Any:
-    """Return what torch.load makes of a file, on the CPU.
+    """Return what torch.load makes of a file, on the CPU, without running anything that it may hold.
 
     Raises:
         ValueError: if it holds more than tensors, lists, tables, numbers and text; torch raises other errors
             over files that are damaged.
     """
     is_zip = is_zipfile(path)
-    _check_words(path, is_zip)
+    for pickled in _pickles(path, is_zip):
+        for _, argument, _ in pickletools.genops(pickled):
+            if isinstance(argument, str | bytes) and len(argument) > LONGEST_WORD:
+                raise ValueError(f"a text of {len(argument)} letters")  # that no name of a tensor has
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # of unusual pickles
@@ -174,21 +153,14 @@ def load_torch(path: Path) -> Any:
         raise ValueError("what torch cannot read without running code in it") from error
 
 
-def _check_words(path: Path, is_zip: bool) -> None:
-    """Refuse texts of a length that no name of a tensor has."""
-    if is_zip:
-        with ZipFile(path) as archive:
-            for name in archive.namelist():
-                if name.endswith("data.pkl"):
-                    with archive.open(name) as file:
-                        _check_pickle(file)
+def _pickles(path: Path, is_zip: bool) -> Iterator[IO[bytes]]:
+    """Yield the pickles in a file of torch, each at its start."""
+    if not is_zip:
+        with path.open("rb") as file:
+            yield from repeat(file, OLD_PICKLES)
         return
-    with path.open("rb") as file:
-        for _ in range(OLD_PICKLES):
-            _check_pickle(file)
-
-
-def _check_pickle(file: Any) -> None:
-    for _, argument, _ in pickletools.genops(file):
-        if isinstance(argument, str | bytes) and len(argument) > LONGEST_WORD:
-            raise ValueError(f"a text of {len(argument)} letters")
+    with ZipFile(path) as archive:
+        for name in archive.namelist():
+            if name.endswith("data.pkl"):
+                with archive.open(name) as file:
+                    yield file
