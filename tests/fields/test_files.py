@@ -63,7 +63,7 @@ def test_files_that_are_no_field_are_named(tmp_path, format):
         read(tmp_path)
     for content in (b"", b"\x80\x04K\x01.", bytes(100), b'{"a":1}\n'):
         (tmp_path / "m").write_bytes(content)
-        with pytest.raises(ArgumentError, match=f"expected a {format} file, got one of another format|whole"):
+        with pytest.raises(ArgumentError, match=rf"expected a {format} file, got .*another format|whole"):
             read(tmp_path / "m")
     for header in (None, {"format": "pt"}):
         (tmp_path / "m").write_bytes(save({"weight": torch.zeros(3)}, header))
