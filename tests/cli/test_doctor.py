@@ -13,8 +13,8 @@ def test_report_has_a_line_per_probe_and_all_is_well_here(capsys):
 
 
 def test_only_a_required_thing_fails(capsys):
-    optional = Finding("weights", "missing", "none", "download them")
-    required = Finding("torch", "missing", "not installed", "pip install torch", is_required=True)
+    optional = ("weights", Finding("missing", "none", "download them"))
+    required = ("torch", Finding("missing", "not installed", "pip install torch"))
     assert show([optional]) == 0
     assert "weights          none -> download them" in capsys.readouterr().out
     assert show([optional, required]) == 1
@@ -28,7 +28,7 @@ def test_a_broken_probe_does_not_stop_the_others():
     finding = examine(broken)
     assert finding.state == "missing"
     assert "AttributeError: undefined symbol" in finding.found
-    assert finding.is_required
+    assert show([("weights", finding)]) == 1
 
 
 def test_a_crash_of_the_opengl_probe_is_a_finding(monkeypatch):
@@ -72,13 +72,13 @@ def test_weights_are_listed(monkeypatch, tmp_path):
 def test_a_machine_on_which_no_stage_can_run_is_broken(monkeypatch, tmp_path):
     monkeypatch.setattr("texgs.config.project.ROOT", tmp_path)
     finding = examine(doctor.configuration)
-    assert (finding.state, finding.is_required) == ("missing", True)
+    assert finding.state == "missing"
     assert "no configuration there" in finding.found
     monkeypatch.setattr(
         "importlib.metadata.requires", lambda name: ["no-such-package>=1", "torch>=99", "x; extra=='y'"]
     )
     finding = doctor.packages()
-    assert (finding.state, finding.is_required) == ("missing", True)
+    assert finding.state == "missing"
     assert finding.found.startswith("no no-such-package, torch 2.")
 
 

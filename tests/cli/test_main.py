@@ -17,6 +17,10 @@ def test_help_lists_every_verb(capsys):
     assert stop.value.code == 0
     out = capsys.readouterr().out
     assert all(verb in out for verb in VERBS)
+    for verb in set(VERBS) - set(STAGE_VERBS) | {"views"}:
+        with pytest.raises(SystemExit, match="0"):
+            main([verb, "--help"])
+        assert capsys.readouterr().out.startswith(f"usage: texgs {verb} [-h]")
 
 
 def test_version(capsys):
@@ -54,7 +58,7 @@ def test_a_wrong_word_is_told_below_the_usage_of_its_verb(capsys, words, message
 def test_the_command_line_starts_without_heavy_imports():
     """Help must answer at once: torch alone takes seconds to import."""
     code = (
-        "import sys; import texgs.cli.main as m; m.parser();"
+        "import sys; import texgs.cli.main as m; m.overview(); [m.parser(verb) for verb in m.VERBS];"
         "heavy = {'torch', 'kornia', 'numpy', 'PIL', 'tqdm', 'omegaconf', 'mlflow'};"
         "print(*(heavy & {name.split('.')[0] for name in sys.modules}))"
     )

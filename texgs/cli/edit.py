@@ -1,11 +1,26 @@
 """Edit a scene by words such as TF01.palette=#ff8800 and write it to a new file; nothing is trained."""
 
+from __future__ import annotations
+
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from texgs.cli.render import add_lens, lens_of
+from texgs.core.errors import ArgumentError
+from texgs.core.lens import Lens
+from texgs.core.names import SCENES, new_part_file, require_name
+
+if TYPE_CHECKING:
+    import torch
+
+    from texgs.edit.clicks import Clicks
+
+KEPT = ("view", "point", "other", "masks", "vote", "connected")  # arguments that a segment's file says
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The scene, the edits, the new file."""
+    """Add the scene, the edits, and the new file."""
     parser.add_argument("scene", type=Path, help="scene.yaml")
     parser.add_argument(
         "overrides",
@@ -30,3 +45,117 @@ def run(arguments: argparse.Namespace) -> int:
         _ = session.composition  # which the new model may not go into
     print(session.save(arguments.output))
     return 0
+
+
+def add_segment_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what is clicked on, and how masks are found and lifted."""
+    parser.add_argument("scene", type=Path, help="scene.yaml")
+    parser.add_argument("--model", help="name of the model; may be left out where there is one")
+    parser.add_argument("--name", help="of the new segment")
+    add_clicks(parser)
+    parser.add_argument("--output", type=Path, help="the new scene.yaml; the segment's file is put beside it")
+    parser.add_argument("--preview", type=Path, metavar="PNG", help="write the view with the mask, no scene")
+    parser.add_argument(
+        "--masks",
+        default="mobile_sam",
+        help="mobile_sam, sam_vit_h, a folder with a SAM of transformers, or grabcut, which needs no weights "
+        "(%(default)s)",
+    )
+    parser.add_argument(
+        "--vote", choices=("contribution", "centre"), default="contribution", help="(%(default)s)"
+    )
+    parser.add_argument("--threshold", type=float, help="of votes; default 0.5, of vote centre 0.7")
+    parser.add_argument(
+        "--connected", action="store_true", help="keep only the connected pieces that hold a point"
+    )
+    parser.add_argument(
+        "--views",
+        type=int,
+        default=42,
+        help="number of views that vote, 10 f^2 + 2: 12, 42, 92, 162, ... (%(default)s)",
+    )
+    parser.add_argument("--size", type=int, default=512, help="of these views, pixels (%(default)s)")
+    add_lens(parser, "of the view clicked on (%(default)s)", "default the width")
+    parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+
+
+def add_clicks(parser: argparse.ArgumentParser) -> None:
+    """Add the view that is clicked on, and where."""
+    parser.add_argument(
+        "--view",
+        type=numbers,
+        default=(30.0, 20.0),
+        metavar="AZIMUTH,POLAR",
+        help="degrees, of the view clicked on (30,20): what texgs render shows of the model alone",
+    )
+    pixels: dict[str, Any] = {"action": "append", "type": numbers, "default": [], "metavar": "X,Y"}
+    seen, other = "pixel on the object, counted from 0,0", "pixel that is not of the object"
+    parser.add_argument("--point", **pixels, help=f"{seen}; repeat for several")
+    parser.add_argument("--not", dest="other", **pixels, help=f"{other}; repeat for several")
+
+
+def numbers(text: str) -> tuple[float, float]:
+    """Return two numbers with a comma between them."""
+    first, _, second = text.partition(",")
+    return float(first), float(second)
+
+
+def run_segment(arguments: argparse.Namespace) -> int:
+    """Segment a model of a scene by clicks on a view of it, so that the segment can be edited on its own."""
+    from texgs.core.check import torch_device
+    from texgs.core.image import write_png
+    from texgs.edit.new_segment import clicked_model, model_name, new_segment
+    from texgs.edit.preview import preview
+    from texgs.models.masks import mask_model
+    from texgs.scene.scene_file import read_scene, write_scene
+    from texgs.volume.cameras import icosphere_of
+
+    scene, device = read_scene(arguments.scene), torch_device(arguments.device)
+    name = model_name(scene, arguments.model, "--model")
+    require_output(arguments)
+    clicks, masks = clicks_of(arguments, device), mask_model(arguments.masks, device)
+    if arguments.preview:
+        model = clicked_model(scene, name, device)
+        print(write_png(arguments.preview, preview(model, clicks, masks, scene.light)[1]))
+        return 0
+    lens = Lens(arguments.radius, arguments.fov).square(arguments.size)
+    output = arguments.output
+    file = new_part_file("--name", output.parent, output.stem, name, arguments.name)
+    made = new_segment(
+        *(scene, f"{name}/{arguments.name}", clicks),
+        [camera.to(device) for camera in icosphere_of(arguments.views, lens)],
+        *(masks, file, {key: getattr(arguments, key) for key in KEPT}),
+        vote=arguments.vote,
+        threshold=arguments.threshold,
+        connected=arguments.connected,
+        title=f"segment {arguments.name}",
+    )
+    print(write_scene(arguments.output, made.scene), file, sep="\n")
+    return 0
+
+
+def clicks_of(arguments: argparse.Namespace, device: torch.device) -> Clicks:
+    """Return the clicks, each in the middle of its pixel."""
+    import torch
+
+    from texgs.core.camera import orbit
+    from texgs.edit.clicks import Clicks
+
+    if not arguments.point:
+        raise ArgumentError("--point: expected one at least, got none; name a pixel on the object")
+    azimuth, polar = arguments.view
+    camera = orbit(azimuth, polar, *lens_of(arguments)).to(device)
+    pixels = torch.tensor([*arguments.point, *arguments.other], device=device)
+    positive = torch.arange(len(pixels), device=device) < len(arguments.point)
+    return Clicks(camera, pixels + 0.5, positive)
+
+
+def require_output(arguments: argparse.Namespace) -> None:
+    """Require a name and a file for the segment and its scene, unless there is a preview only."""
+    if arguments.preview:
+        return
+    require_name(arguments.name, "--name")
+    if not arguments.output:
+        raise ArgumentError("--output: expected the new scene.yaml, or --preview and a PNG file; got neither")
+    if arguments.output.suffix not in SCENES or arguments.output.is_dir():
+        raise ArgumentError(f"--output: expected a file that ends in .yaml, got {arguments.output}")

@@ -1,10 +1,13 @@
 """Export a scene or a model: Gaussians, points or a mesh, a compact model file, or a page for a browser."""
 
+from __future__ import annotations
+
 import argparse
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.core.errors import ArgumentError
 from texgs.core.names import SCENES
 
 if TYPE_CHECKING:
@@ -17,7 +20,7 @@ NUMBERS = ("opacity", "voxel", "views", "size", "drop_unseen", "device")  # argu
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to export, and where to."""
+    """Add what to export, and where to."""
     parser.add_argument("source", type=Path, help="scene.yaml or a model file")
     parser.add_argument("--to", type=Path, required=True, metavar="FILE", help=".ply, .texgs or .html")
     parser.add_argument(
@@ -59,8 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     if kind == "html":
         print(of_page(arguments, scene))
         return 0
-    numbers = {name: getattr(arguments, name) for name in NUMBERS}
-    export = Export(kind, **numbers)
+    export = Export(kind, **{name: getattr(arguments, name) for name in NUMBERS})
     if scene is not None and arguments.model is None:
         print(export_scene(arguments.to, scene, export))
         return 0
@@ -69,18 +71,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def chosen(scene: "Scene", name: str) -> "SceneModel":
-    """The model of a scene that has a name."""
-    from texgs.core.errors import ArgumentError
-
+def chosen(scene: Scene, name: str) -> SceneModel:
+    """Return the model of a scene that has a name."""
     if name not in scene.models:
         raise ArgumentError(f"--model: expected one of {', '.join(scene.models)}, got {name}")
     return scene.models[name]
 
 
 def kind_of(arguments: argparse.Namespace) -> str:
-    """What to export."""
-    from texgs.core.errors import ArgumentError
+    """Return what to export."""
     from texgs.scene.export_file import OF_MODELS
 
     ending = arguments.to.suffix
@@ -101,7 +100,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
     return kind
 
 
-def of_page(arguments: argparse.Namespace, scene: "Scene | None") -> Path:
+def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     """Export a scene, one model of it or a model file as a web page."""
     from texgs.fields import files
     from texgs.scene.export_file import require_export

@@ -19,7 +19,7 @@ from texgs.workflow.stage_table import STAGES
 NUMBERS = re.compile(r"-[\d.][-\d.,eE]*")  # such as -90,20
 # Verb: what `texgs --help` says. Its module texgs.cli.VERB has `add_arguments(parser)` and `run(arguments)`.
 # Verbs in the module of another have `add_VERB_arguments` and `run_VERB` there; those of stages share one.
-SHARED = {"votes": "study", "download": "weights"}
+SHARED = {"init": "new", "segment": "edit", "report": "tables", "votes": "study", "download": "weights"}
 STAGE_VERBS = {stage.name: stage.help for stage in STAGES.values()}
 VERBS = {
     "init": "start a folder with configurations of your own",
@@ -41,50 +41,54 @@ VERBS = {
 }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The parser of all verbs. Their modules are imported here and must stay light: no torch at the top."""
+def overview() -> argparse.ArgumentParser:
+    """Return the parser that lists the verbs."""
     top = argparse.ArgumentParser(
         prog="texgs",
         description="Editable 3D scenes of textured 2D Gaussians from scientific volumes.",
     )
     top.add_argument("--version", action="version", version=f"texgs {__version__}")
-    verbs = top.add_subparsers(dest="verb", metavar="VERB", required=True)
+    verbs = top.add_subparsers(metavar="VERB", required=True)
     for name, summary in VERBS.items():
-        home = "stage" if name in STAGE_VERBS else SHARED.get(name, name)
-        module = importlib.import_module(f"texgs.cli.{home}")
-        about = module.__doc__ if name == home else f"{summary[0].upper()}{summary[1:]}."
-        verb = verbs.add_parser(name, help=summary, description=about, conflict_handler="resolve")
-        add, run = (f"add_{name}_arguments", f"run_{name}") if name in SHARED else ("add_arguments", "run")
-        getattr(module, add)(verb)
-        verb.set_defaults(run=getattr(module, run), refuse=verb.error)
+        verbs.add_parser(name, help=summary, add_help=False)
     return top
 
 
+def parser(verb: str) -> argparse.ArgumentParser:
+    """Return the parser of a verb. Its module is imported here and must stay light: no torch at the top."""
+    home = "stage" if verb in STAGE_VERBS else SHARED.get(verb, verb)
+    module = importlib.import_module(f"texgs.cli.{home}")
+    add, run = (f"add_{verb}_arguments", f"run_{verb}") if verb in SHARED else ("add_arguments", "run")
+    about = getattr(module, run).__doc__ if verb in SHARED else module.__doc__
+    if verb in STAGE_VERBS:
+        about = f"{VERBS[verb][0].upper()}{VERBS[verb][1:]}."
+    made = argparse.ArgumentParser(prog=f"texgs {verb}", description=about, conflict_handler="resolve")
+    getattr(module, add)(made)
+    made.set_defaults(verb=verb, run=getattr(module, run))
+    return made
+
+
 def parse(argv: Sequence[str]) -> argparse.Namespace:
-    """The arguments; KEY=VALUE may stand anywhere, also behind options, where argparse alone gives up."""
-    top = parser()
-    if argv and not argv[0].startswith("-") and argv[0] not in VERBS:
-        top.error(f"no verb {argv[0]}{close(argv[0], VERBS) or '; texgs --help lists all'}")
-    if argv[:1] == ["run"] and argv[1:2] not in (["-h"], ["--help"]):
-        argv = ["run", "--", *argv[1:]]  # its options are those of snakemake
-    arguments, rest = top.parse_known_args(joined(argv))
-    overrides: list[str] | None = getattr(arguments, "overrides", None)
-    if rest and (overrides is None or any(word.startswith("-") for word in rest)):
-        arguments.refuse(f"unrecognized arguments: {' '.join(rest)}")
-    if rest:
-        arguments.overrides = [*(overrides or ()), *rest]
-    return arguments
+    """Return the arguments; KEY=VALUE may stand anywhere, also between and behind options."""
+    verb, *words = argv or ["-"]
+    if verb not in VERBS:
+        if not verb.startswith("-"):
+            overview().error(f"no verb {verb}{close(verb, VERBS) or '; texgs --help lists all'}")
+        return overview().parse_args(argv)
+    if verb == "run" and words[:1] not in (["-h"], ["--help"]):
+        return parser(verb).parse_args(["--", *words])  # its options are those of snakemake
+    return parser(verb).parse_intermixed_args(joined(words))
 
 
-def joined(argv: Sequence[str]) -> list[str]:
-    """Options with negative numbers as one word: argparse takes --view -90,20 for two options."""
-    words: list[str] = []
-    for word in argv:
-        if NUMBERS.fullmatch(word) and words and words[-1].startswith("--") and "=" not in words[-1]:
-            words[-1] += f"={word}"
+def joined(words: Sequence[str]) -> list[str]:
+    """Join options with negative numbers to one word: argparse takes --view -90,20 for two options."""
+    made: list[str] = []
+    for word in words:
+        if NUMBERS.fullmatch(word) and made and made[-1].startswith("--") and "=" not in made[-1]:
+            made[-1] += f"={word}"
         else:
-            words.append(word)
-    return words
+            made.append(word)
+    return made
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -112,7 +116,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         print(f"texgs {verb}: {error}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print(f"texgs {verb}: interrupted; {again(verb)}", file=sys.stderr)
+        goes_on = verb in STAGE_VERBS or verb == "run"
+        end = "goes on where it stopped" if goes_on else "starts again"
+        print(f"texgs {verb}: interrupted; the same command {end}", file=sys.stderr)
         return 130
     except BrokenPipeError:  # as `| head` leaves it; what is still in the buffer goes nowhere
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -128,13 +134,6 @@ def own_process() -> None:
     os.environ.update(waiting())
     keep_freed_memory()
     collect_rarely()
-
-
-def again(verb: str) -> str:
-    """What the same command does after an interruption."""
-    if verb in STAGE_VERBS or verb == "run":
-        return "the same command goes on where it stopped"
-    return "the same command starts again"
 
 
 if __name__ == "__main__":

@@ -11,16 +11,52 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.core.errors import ArgumentError
-from texgs.core.io import write_bytes
+from texgs.core.errors import ArgumentError, ConfigError
+from texgs.core.io import is_there, read_json, write_bytes
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
     from texgs.volume.transfer import TransferFunction
 
+README = """\
+# A project of texgs
+
+Run all commands in this folder:
+
+    texgs new VOLUME --name NAME       # writes conf/dataset/NAME.yaml, with suggested transfer functions
+    texgs run dataset=NAME fit=quick   # from the volume to results/report.html
+    texgs run experiment=demo          # the same with a small generated volume
+    texgs views --help                 # all data sets, recipes and keys
+
+`conf/` holds what is yours. A file there comes before the file of texgs with the same name:
+
+    conf/dataset/NAME.yaml       a volume and its transfer functions    dataset=NAME
+    conf/edit/NAME.yaml          a new look                             edit=NAME
+    conf/experiment/NAME.yaml    values of any keys; see example.yaml   experiment=NAME
+
+`texgs run` makes its own files in `results/` again. Before you remove the folder, copy what only you have:
+`results/study`, `results/mlflow.db`, and scenes and looks that you saved there.
+"""
+EXAMPLE = """\
+# @package _global_
+# Values that belong together: texgs run experiment=example
+defaults:
+  - override /dataset: turbulence # a file of conf/dataset: yours, or one of texgs
+  - override /views: small
+  - override /fit: demo
+edits: [gold] # files of conf/edit
+"""
+FILES = {
+    "README.md": README,
+    "conf/dataset/README.md": "Data sets: `texgs new VOLUME --name NAME` writes NAME.yaml here.\n",
+    "conf/edit/README.md": "New looks: NAME.yaml is chosen with `edit=NAME`.\n",
+    "conf/experiment/example.yaml": EXAMPLE,
+    ".gitignore": "/results/\n/.snakemake/\n",
+}
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The file, how to read it, and where transfer functions come from."""
+    """Add the file, how to read it, and where transfer functions come from."""
     parser.add_argument("file", type=Path, help="volume, or folder of TIFF or DICOM slices")
     parser.add_argument(
         "overrides",
@@ -77,12 +113,12 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def changed(overrides: list[str]) -> list[str]:
-    """Names of the keys that were given."""
+    """Return the names of the keys that were given."""
     return [word.partition("=")[0].lstrip("+").split(".")[0] for word in overrides]
 
 
 def configuration(name: str, file: Path, overrides: list[str]) -> Config:
-    """The configuration as it will be with the new data set, but without basic TFs and tracking."""
+    """Return the configuration as it will be with the new data set, but without basic TFs and tracking."""
     from texgs.config.compose import compose
     from texgs.config.dataset import Dataset, Volume
 
@@ -91,19 +127,16 @@ def configuration(name: str, file: Path, overrides: list[str]) -> Config:
         raise ArgumentError(f"{path}: expected a path without ${{, which stands for another key; rename it")
     if any("\ud800" <= letter <= "\udfff" for letter in path):
         raise ArgumentError(f"{path!r}: expected a path in UTF-8; rename it")
-    words = [f"dataset.volume.{word}" for word in overrides]
-    blank = "dataset.volume.generator=null"
-    config = compose(("tracking=none", blank, *words))
+    words = [f"dataset.volume.{word}" for word in ("generator=null", *overrides)]
+    config = compose(("tracking=none", *words))
     given = {key: getattr(config.dataset.volume, key) for key in changed(overrides)}
-    dataset = Dataset(name=name, title=name, volume=Volume(**{**given, "file": path}))
-    return replace(config, dataset=dataset)
+    return replace(config, dataset=Dataset(name=name, title=name, volume=Volume(**{**given, "file": path})))
 
 
 def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> dict[str, TransferFunction]:
-    """TFs from files, or suggested from the volume's histogram."""
+    """Return TFs from files, or suggested from the volume's histogram."""
     import numpy as np
 
-    from texgs.core.io import read_json
     from texgs.volume.suggest import looks_like_labels, suggest
     from texgs.volume.tf_files import read_tf
     from texgs.volume.transfer import check_disjoint
@@ -133,7 +166,7 @@ def basic_tfs(config: Config, files: list[Path] | None, count: int | None) -> di
 
 
 def rounded(tf: TransferFunction, low: float, high: float) -> TransferFunction:
-    """A TF with numbers that are short to read and keep a millionth of the range of the data."""
+    """Return a TF with numbers that are short to read and keep a millionth of the range of the data."""
     from texgs.volume.transfer import TransferFunction
 
     digits = 6 + math.ceil(math.log10(max(max(abs(low), abs(high)) / (high - low), 1)))
@@ -145,12 +178,7 @@ def rounded(tf: TransferFunction, low: float, high: float) -> TransferFunction:
 
 
 def document(config: Config, keys: list[str]) -> str:
-    """The YAML of a data set, a line per list of points.
-
-    Args:
-        config: with the data set.
-        keys: of its volume that are written.
-    """
+    """Return the YAML of a data set, with some keys of its volume; a line per list of points."""
     import yaml
 
     class Dumper(yaml.SafeDumper):
@@ -160,12 +188,8 @@ def document(config: Config, keys: list[str]) -> str:
         list, lambda dumper, items: dumper.represent_sequence("tag:yaml.org,2002:seq", items, flow_style=True)
     )
     dataset = asdict(config.dataset)
-    written = {
-        "name": dataset["name"],
-        "title": dataset["title"],
-        "volume": {key: dataset["volume"][key] for key in keys},
-        "basic_tfs": dataset["basic_tfs"],
-    }
+    written = {key: dataset[key] for key in ("name", "title", "volume", "basic_tfs")}
+    written["volume"] = {key: dataset["volume"][key] for key in keys}
     note = "# Points are [value, opacity] and [value, r, g, b]; the ranges of basic TFs must not overlap.\n"
     return note + yaml.dump(written, Dumper=Dumper, sort_keys=False, allow_unicode=True, width=10**6)
 
@@ -173,7 +197,6 @@ def document(config: Config, keys: list[str]) -> str:
 def check_document(text: str, config: Config) -> None:
     """Require that the configuration reads a document as the data set that it was written for."""
     from texgs.config.compose import compose
-    from texgs.core.errors import ConfigError
     from texgs.workflow.checks import check_basic_tfs
 
     name = config.dataset.name
@@ -185,3 +208,26 @@ def check_document(text: str, config: Config) -> None:
         raise ConfigError(
             f"{name}: expected to read {config.dataset} from the new file, got {read}; nothing was written"
         )
+
+
+def add_init_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the folder."""
+    parser.add_argument("folder", type=Path, help="new or empty")
+
+
+def run_init(arguments: argparse.Namespace) -> int:
+    """Start a project: a folder with your own configurations, in which `texgs new` and `texgs run` work."""
+    folder: Path = arguments.folder
+    if is_there(folder / "conf" / "dataset"):
+        print(f"{folder}: is a project already")
+        return 0
+    if folder.exists() and not folder.is_dir():
+        raise ArgumentError(f"{folder}: expected a new or empty folder, got a file; choose another name")
+    if folder.is_dir() and (names := sorted(path.name for path in folder.iterdir())):
+        raise ArgumentError(
+            f"{folder}: expected a new or empty folder, got one with {', '.join(names[:3])}; choose another"
+        )
+    for name, text in FILES.items():
+        write_bytes(folder / name, text.encode())
+    print(f"{folder}: a new project, see {folder / 'README.md'}")
+    return 0

@@ -1,10 +1,13 @@
 """Render a scene to PNG, GIF or MP4: one view, the paper's test path, an orbit, or a light that moves."""
 
+from __future__ import annotations
+
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
+from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 
 if TYPE_CHECKING:
@@ -17,7 +20,7 @@ PATHS = {"view": 1, "test": 181, "orbit": 72, "light": 61}  # frames by default
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to show, from where, and where to."""
+    """Add what to show, from where, and where to."""
     parser.add_argument("scene", type=Path, help="scene.yaml")
     parser.add_argument(
         "--output",
@@ -32,8 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--path", choices=PATHS, default="view", help="camera or light path (%(default)s)")
     parser.add_argument("--frames", type=int, help="default test 181, orbit 72, light 61")
-    parser.add_argument("--width", type=int, default=LENS.width, help="pixels (%(default)s)")
-    parser.add_argument("--height", type=int, help="pixels; default the width")
+    add_lens(parser, "pixels (%(default)s)", "pixels; default the width")
     parser.add_argument(
         "--azimuth",
         type=float,
@@ -46,20 +48,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=20.0,
         help="angle above the horizon, degrees (%(default)s); not for path test",
     )
-    parser.add_argument(
-        "--radius", type=float, default=LENS.radius, help="distance, world units (%(default)s)"
-    )
-    parser.add_argument(
-        "--fov", type=float, default=LENS.fov_y, help="vertical field of view, degrees (%(default)s)"
-    )
     parser.add_argument("--fps", type=float, default=25.0, help="frames per second (%(default)s)")
     parser.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(%(default)s)")
+
+
+def add_lens(parser: argparse.ArgumentParser, width: str, height: str) -> None:
+    """Add the size of pictures, whose help is given, and the distance and field of view of the camera."""
+    parser.add_argument("--width", type=int, default=LENS.width, help=width)
+    parser.add_argument("--height", type=int, help=height)
+    distance, fov = "distance, world units (%(default)s)", "vertical field of view, degrees (%(default)s)"
+    parser.add_argument("--radius", type=float, default=LENS.radius, help=distance)
+    parser.add_argument("--fov", type=float, default=LENS.fov_y, help=fov)
+
+
+def lens_of(arguments: argparse.Namespace) -> Lens:
+    """Return what `add_lens` has added; pictures are square by default."""
+    height = arguments.width if arguments.height is None else arguments.height
+    return Lens(arguments.radius, arguments.fov, arguments.width, height)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Render and write."""
     from texgs.core.check import torch_device
-    from texgs.core.errors import ArgumentError
     from texgs.core.movie import write_frames
     from texgs.core.progress import progress
     from texgs.scene.frame import Mode, frame
@@ -82,9 +92,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def frames_of(arguments: argparse.Namespace) -> int:
-    """How many frames to render."""
-    from texgs.core.errors import ArgumentError
-
+    """Return how many frames to render."""
     count = PATHS[arguments.path] if arguments.frames is None else int(arguments.frames)
     if not 1 <= count <= MOST_FRAMES:
         bound = "at least 1" if count < 1 else f"at most {MOST_FRAMES}"
@@ -92,14 +100,13 @@ def frames_of(arguments: argparse.Namespace) -> int:
     return count
 
 
-def shots_of(arguments: argparse.Namespace, light: "Light", count: int) -> "Iterator[tuple[Camera, Light]]":
-    """Camera and light of each frame, of so many."""
+def shots_of(arguments: argparse.Namespace, light: Light, count: int) -> Iterator[tuple[Camera, Light]]:
+    """Return camera and light of each frame, of so many."""
     from texgs.core.camera import orbit
     from texgs.core.light import Light
     from texgs.volume.cameras import orbit_path, spiral
 
-    height = arguments.width if arguments.height is None else arguments.height
-    lens = (arguments.radius, arguments.fov, arguments.width, height)
+    lens = lens_of(arguments)
     if arguments.path == "test":
         return ((camera, light) for camera in spiral(count, *lens))
     if arguments.path == "orbit":

@@ -7,14 +7,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
+from texgs.workflow.stage import Stage, for_tf
+from texgs.workflow.stage_table import STAGES, jobs
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
-    from texgs.workflow.stage import Stage
 
 
 class HelpWithKeys(argparse.Action):
-    """`--help` that also lists every key of the configuration; read only now, because it takes a moment."""
+    """List every key of the configuration below the help; read only now, because it takes a moment."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_rest: object) -> None:
         """Print the help and exit."""
@@ -29,7 +30,7 @@ class HelpWithKeys(argparse.Action):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Overrides of the configuration; or the files of one job."""
+    """Add overrides of the configuration, and the files of one job."""
     parser.add_argument("-h", "--help", action=HelpWithKeys, nargs=0, help="show this, and all keys")
     parser.add_argument(
         "overrides", nargs="*", metavar="KEY=VALUE", help="such as dataset=engine tf=TF01 views.width=400"
@@ -58,7 +59,6 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.config.compose import compose
     from texgs.workflow.checks import check_basic_tfs, require_base, require_edit, require_fit, require_fits
     from texgs.workflow.locate import tf_names
-    from texgs.workflow.stage_table import STAGES
 
     words = tuple(arguments.overrides)
     config, stage = compose(words), STAGES[arguments.verb]
@@ -69,20 +69,10 @@ def run(arguments: argparse.Namespace) -> int:
         require_base(words)
     if stage.name == "comparison":
         require_fits(words)
-    chosen = [compose((*words, f"tf={name}")) for name in tf_names(config)] if stage.per_tf else [config]
     known = makers(words)
-    for each in chosen:
+    for each in [for_tf(config, name) for name in tf_names(config)] if stage.per_tf else [config]:
         ensure(stage, each, known, force=arguments.force)
     return 0
-
-
-def fetch_weights(config: Config) -> None:
-    """Download the weights that an edit works with, where they are not on this machine."""
-    from texgs.models.weights import locate
-    from texgs.workflow.weights import needed
-
-    for name in needed(config):
-        locate(name)
 
 
 def fetch_volume(config: Config) -> None:
@@ -99,7 +89,6 @@ def makers(words: tuple[str, ...]) -> dict[Path, tuple[Stage, Config]]:
     """Return the jobs that can make what a stage reads, by their folders."""
     from texgs.config.compose import compose
     from texgs.edit.method import NO_METHOD
-    from texgs.workflow.stage_table import jobs
 
     config = compose(words)
     fits = [(*words, f"fit={recipe}") for recipe in config.fits] or [words]
@@ -117,15 +106,14 @@ def ensure(
 ) -> None:
     """Run a stage, and before it the jobs whose files it reads, unless their results are there already.
 
-    Args:
-        stage: to run.
-        config: of one job.
-        known: jobs by their folders, of which those that were run are taken out; none for a stage alone.
-        force: whether to do the stage again even if nothing has changed.
+    Those jobs are `known` by their folders, of which those that were run are taken out; `force` runs the
+    stage itself in any case.
     """
     from texgs.core.checksum import Checksums
+    from texgs.models.weights import locate
     from texgs.workflow.job import Job, execute
     from texgs.workflow.tracked import Tracking
+    from texgs.workflow.weights import needed
 
     if stage.name == "volume":
         fetch_volume(config)
@@ -137,7 +125,8 @@ def ensure(
     checksums = Checksums.load()
     job = Job.of(stage, config, checksums)
     if stage.place == "edit" and (force or not job.is_done()):
-        fetch_weights(config)
+        for name in needed(config):
+            locate(name)
         job = Job.of(stage, config, checksums)  # with what was downloaded
     has_run = execute(job, Tracking(config.tracking.uri, config.tracking.experiment), force=force)
     checksums.save()
@@ -149,7 +138,6 @@ def run_settings(arguments: argparse.Namespace) -> int:
     import yaml
 
     from texgs.workflow.job import Job, execute
-    from texgs.workflow.stage_table import STAGES
     from texgs.workflow.tracked import of_workflow
 
     if arguments.overrides or arguments.force or arguments.output is None:

@@ -1,9 +1,15 @@
 """Make a user study of edited scenes: one HTML page for voters, and the key that tells what they saw."""
 
+from __future__ import annotations
+
 import argparse
 import sys
+from hashlib import sha256
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
+
+from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
     import torch
@@ -16,7 +22,7 @@ KEY, PAGE = "key.json", "ballot.html"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what to compare, how to show it, and where to."""
-    parser.add_argument("results", nargs="?", type=Path, default=Path("results"), help="folder (%(default)s)")
+    parser.add_argument("results", nargs="?", type=Path, default=Path("results"), help="folder (results)")
     parser.add_argument(
         "--edits", nargs="+", default=[], metavar="EDIT", help="edits to compare; default all with a new look"
     )
@@ -33,10 +39,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Write ballot.html, then key.json; print the questions."""
-    from hashlib import sha256
-
     from texgs.core.check import torch_device
-    from texgs.core.errors import ArgumentError
     from texgs.core.io import write_bytes
     from texgs.report.metrics_files import below, read_known
     from texgs.study.ballot_page import ballot_page
@@ -67,10 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def films_of(questions: "list[Question]", size: int, frames: int, device: "torch.device") -> list[bytes]:
+def films_of(questions: list[Question], size: int, frames: int, device: torch.device) -> list[bytes]:
     """Draw the film of each question, MP4."""
-    from tempfile import TemporaryDirectory
-
     from texgs.scene.scene_file import read_scene
     from texgs.study.film import write_film
 
@@ -98,8 +99,7 @@ def add_votes_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run_votes(arguments: argparse.Namespace) -> int:
-    """Write the table and its figure, and print the table."""
-    from texgs.core.errors import ArgumentError
+    """Count the ballots of a user study: write the table and its figure, and print the table."""
     from texgs.report.table import write_table
     from texgs.report.tables import STUDY
     from texgs.study.ballots import read_votes

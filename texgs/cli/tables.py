@@ -1,9 +1,13 @@
 """Write the tables that some metrics files hold, as CSV, Markdown and LaTeX."""
 
+from __future__ import annotations
+
 import argparse
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from texgs.core.errors import ArgumentError
 
 if TYPE_CHECKING:
     from texgs.report.metrics_files import LeftOut, Record
@@ -43,9 +47,28 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def records_of(arguments: argparse.Namespace, verb: str) -> "tuple[list[Record[Any]], list[LeftOut]]":
+def add_report_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add where the numbers are, and where the report goes."""
+    add_arguments(parser, "results/report.html")
+
+
+def run_report(arguments: argparse.Namespace) -> int:
+    """Write one HTML file with the pictures, tables and provenance of all jobs."""
+    from texgs.report.html import write_report
+    from texgs.report.metrics_files import read_left_out
+    from texgs.study.ballots import votes_beside
+    from texgs.study.votes_figure import shown
+
+    records, old = records_of(arguments, "report")
+    left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(arguments.study)
+    given = given_tables(records, votes)
+    more = {} if given["user_study"].is_empty else {"study": [shown(votes)]}
+    print(write_report(arguments.output, records, left_out, given, more))
+    return 0
+
+
+def records_of(arguments: argparse.Namespace, verb: str) -> tuple[list[Record[Any]], list[LeftOut]]:
     """Read the metrics files that are given, by default all, and tell of those of other versions of texgs."""
-    from texgs.core.errors import ArgumentError
     from texgs.report.metrics_files import below, read_known
 
     if not (paths := arguments.metrics or below("results")):
@@ -53,7 +76,7 @@ def records_of(arguments: argparse.Namespace, verb: str) -> "tuple[list[Record[A
     return read_known(paths)
 
 
-def given_tables(records: "list[Record[Any]]", votes: "Votes | None") -> "dict[str, Table]":
+def given_tables(records: list[Record[Any]], votes: Votes | None) -> dict[str, Table]:
     """Make the tables that need more than metrics files: votes, and the configuration."""
     from texgs.study.votes import study_table
     from texgs.workflow.differences import differences_of

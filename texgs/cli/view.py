@@ -1,5 +1,7 @@
 """Look at a scene and edit it in the browser; Ctrl-C ends it."""
 
+from __future__ import annotations
+
 import argparse
 import socket
 import sys
@@ -7,6 +9,8 @@ import threading
 import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from texgs.core.errors import ArgumentError, TexgsError
 
 if TYPE_CHECKING:
     from texgs.viewer.shared_edits import SharedEdits
@@ -17,7 +21,7 @@ TOKEN = "viewer-token"  # file in the cache folder
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to show, and where to serve it."""
+    """Add what to show, and where to serve it."""
     parser.add_argument("scene", type=Path, help="scene.yaml, a folder with one, or a model file")
     parser.add_argument(
         "--folder",
@@ -63,9 +67,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def listen(host: str, port: int | None) -> socket.socket:
-    """A socket that listens; on any port where none is asked for and the usual one is taken."""
-    from texgs.core.errors import ArgumentError
-
+    """Return a socket that listens; on any port where none is asked for and the usual one is taken."""
     if port is not None and not 0 <= port <= 65535:
         raise ArgumentError(f"--port: expected 0 to 65535, got {port}")
     try:
@@ -81,16 +83,14 @@ def listen(host: str, port: int | None) -> socket.socket:
 
 
 def name_of(host: str) -> str:
-    """What stands for a host in an address: the machine's name for all of its interfaces."""
+    """Return what stands for a host in an address: the machine's name for all of its interfaces."""
     if host in ("0.0.0.0", "::"):
         return socket.gethostname()
     return f"[{host}]" if ":" in host else host
 
 
-def ask_to_save(edits: "SharedEdits") -> None:
+def ask_to_save(edits: SharedEdits) -> None:
     """Offer to save what would be lost, or say that it is, where nobody can be asked."""
-    from texgs.core.errors import TexgsError
-
     if edits.is_saved:
         return
     if not sys.stdin.isatty():
@@ -110,7 +110,7 @@ def ask_to_save(edits: "SharedEdits") -> None:
 
 
 def answer(question: str) -> str:
-    """What somebody types; nothing at the end of the input."""
+    """Return what somebody types; nothing at the end of the input."""
     try:
         return input(question).strip()
     except EOFError:

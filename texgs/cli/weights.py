@@ -7,7 +7,7 @@ from pathlib import Path
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Which weights."""
+    """Add which weights."""
     parser.add_argument(
         "names",
         nargs="*",
@@ -30,14 +30,14 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def add_download_arguments(parser: argparse.ArgumentParser) -> None:
-    """Where from, what, and where to."""
+    """Add where from, what, and where to."""
     parser.add_argument("url", help="http or https address")
     parser.add_argument("--sha256", required=True, help="checksum of the file, hexadecimal")
     parser.add_argument("--output", type=Path, required=True, metavar="FILE", help="where it goes")
 
 
 def run_download(arguments: argparse.Namespace) -> int:
-    """Download it."""
+    """Download a file and compare it with its checksum."""
     from texgs.volume.download import download
 
     download(arguments.url, arguments.sha256, arguments.output)

@@ -29,7 +29,7 @@ rule report:
         "<logs>/report.log",
     params:
         **BESIDE,
-        code=code_digest("texgs.cli.report"),
+        code=code_digest("texgs.cli.tables"),
     shell:
         "texgs report {input.metrics:q} {params.earlier:q} --missing {params.left_out:q} "
         "--study {params.study:q} --output {output:q} 2>&1 | tee {log:q}"
