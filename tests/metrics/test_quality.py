@@ -1,4 +1,7 @@
-from pathlib import Path
+"""PSNR and SSIM of images and of models, and views that are read ahead: order, errors, and how far."""
+
+import math
+import threading
 
 import pytest
 import torch
@@ -8,7 +11,8 @@ from texgs.core.image import write_png
 from texgs.core.light import Light
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
-from texgs.metrics.quality import evaluate, mean
+from texgs.metrics.quality import evaluate, mean, psnr, read_ahead, ssim
+from texgs.raster.reference.losses import ssim as reference_ssim
 from texgs.volume.view_set import View
 
 
@@ -27,7 +31,7 @@ def ball():
     )
 
 
-def test_a_model_is_almost_its_own_pictures(tmp_path: Path):
+def test_a_model_is_almost_its_own_pictures(tmp_path):
     model, light = ball(), Light("headlight")
     views = []
     for index in range(3):
@@ -45,3 +49,49 @@ def test_a_model_is_almost_its_own_pictures(tmp_path: Path):
 
 def test_mean():
     assert mean({"psnr": [1.0, 3.0], "ssim": []}) == {"psnr": pytest.approx(2.0)}
+
+
+def test_psnr_is_of_clamped_values_over_all_pixels_and_channels():
+    target = torch.full((4, 5, 3), 0.5)
+    assert psnr(target + 0.1, target) == pytest.approx(20, abs=1e-4)
+    assert psnr(target, target) == 100
+    assert math.isnan(psnr(target * math.nan, target)), "not the best value"
+    white = torch.ones(3, 3, 3)
+    assert psnr(white + 7, white) == 100
+    assert psnr(torch.full_like(white, -3.0), white) == pytest.approx(0, abs=1e-6)
+    target = torch.zeros(10, 10, 3)
+    image = target.clone()
+    image[0, 0, 0] = 1
+    assert psnr(image, target) == pytest.approx(10 * math.log10(300), abs=1e-4)
+
+
+def test_ssim_is_the_reference():
+    generator = torch.Generator().manual_seed(0)
+    image, target = torch.rand(2, 20, 24, 3, generator=generator)
+    expected = reference_ssim(image.double(), target.double())
+    assert ssim(image, target) == pytest.approx(float(expected), abs=1e-5)
+    assert ssim(target, target) == 1
+
+
+def test_items_come_in_order_with_what_is_read_of_them():
+    assert list(read_ahead(str, range(5))) == [(index, str(index)) for index in range(5)]
+    assert list(read_ahead(str, [])) == []
+
+
+def test_the_next_one_is_read_meanwhile_and_no_other():
+    begun = [threading.Event() for _ in range(4)]
+
+    def read(index):
+        begun[index].set()
+        return index
+
+    for index, _ in read_ahead(read, range(4)):
+        assert index == 3 or begun[index + 1].wait(10)
+        assert not any(event.is_set() for event in begun[index + 2 :])
+
+
+def test_an_error_comes_in_its_place():
+    items = read_ahead(lambda x: 1 / x, [1, 2, 0, 4])
+    assert [next(items), next(items)] == [(1, 1), (2, 0.5)]
+    with pytest.raises(ZeroDivisionError):
+        next(items)

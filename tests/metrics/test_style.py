@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from tests.edit.scenes import ball, views
+from tests.models.networks import vgg  # noqa: F401  a fixture
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
 from texgs.metrics.style import gram, style_similarity
@@ -17,7 +18,7 @@ def test_gram_matrices_are_mean_products():
     torch.testing.assert_close(gram(features).double(), expected, rtol=1e-5, atol=1e-6)
 
 
-def test_a_view_is_like_itself_and_less_like_noise(vgg):
+def test_a_view_is_like_itself_and_less_like_noise(vgg):  # noqa: F811
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0]).color.permute(2, 0, 1)
     itself = style_similarity(ball(), cameras, lights, shown, vgg)
@@ -28,7 +29,7 @@ def test_a_view_is_like_itself_and_less_like_noise(vgg):
     assert other.gram > itself.gram
 
 
-def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):
+def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):  # noqa: F811
     cameras, lights = views(1)
     shown = Composition([ball()]).render(cameras[0], lights[0])
     inside = style_similarity(ball(), cameras, lights, shown.color.permute(2, 0, 1), vgg, shown.alpha > 0.9)
@@ -37,7 +38,7 @@ def test_a_region_that_is_the_object_has_its_gram_matrix_and_colour(vgg):
     assert max(abs(x) for x in inside.color) < 1e-5
 
 
-def test_colours_are_those_of_opaque_pixels(vgg):
+def test_colours_are_those_of_opaque_pixels(vgg):  # noqa: F811
     cameras, lights = views(2)
     color = torch.tensor([0.1, 0.5, 0.9])
     p = ball().parameters
@@ -51,7 +52,7 @@ def test_colours_are_those_of_opaque_pixels(vgg):
     assert list(scores.color) == pytest.approx(expected, abs=1e-5)
 
 
-def test_nothing_to_see_is_no_number(vgg):
+def test_nothing_to_see_is_no_number(vgg):  # noqa: F811
     cameras, lights = views(1)
     faint = ball(opacity=-9.0)
     scores = style_similarity(faint, cameras, lights, torch.rand(3, 64, 64), vgg)

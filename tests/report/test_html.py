@@ -24,8 +24,7 @@ from texgs.report.results import (
 )
 from texgs.report.sections import SECTIONS
 from texgs.study.ballots import Ballot, Votes
-from texgs.study.votes import study_table
-from texgs.study.votes_figure import shown
+from texgs.study.votes import shown, study_table
 from texgs.workflow.differences import differences_of
 
 VOID = {"meta", "img", "br"}

@@ -104,8 +104,7 @@ def run_votes(arguments: argparse.Namespace) -> int:
     from texgs.report.tables import STUDY
     from texgs.study.ballots import read_votes
     from texgs.study.questions import read_key
-    from texgs.study.votes import user_study
-    from texgs.study.votes_figure import write_votes
+    from texgs.study.votes import user_study, write_votes
 
     study, folder = read_key(arguments.key), arguments.key.parent / "votes"
     ballots = arguments.ballots or sorted(folder.glob("*.csv"))

@@ -44,31 +44,22 @@ def clip_scores(
             f"{len(before)}"
         )
     now, then = torch.stack(after), torch.stack(before)
-    return ClipScores(
-        clip.name,
-        similarity(now, captions[1]).mean().item(),
-        direction(then, now, *captions).mean().item(),
-    )
+    similar, along = similarity(now, captions[1]), direction(then, now, *captions)
+    return ClipScores(clip.name, similar.mean().item(), along.mean().item())
 
 
 def similarity(images: Tensor, text: Tensor) -> Tensor:
-    """Cosine [V] between features of images [V, D] and of a text [D]; differentiable."""
+    """Return the cosines [V] between features of images [V, D] and of a text [D]; differentiable."""
     size = check.shape("images", images, "V D")["D"]
     check.shape("text", text, "D", D=size)
     return torch.cosine_similarity(images, text[None], dim=1)
 
 
 def direction(originals: Tensor, edited: Tensor, source: Tensor, target: Tensor) -> Tensor:
-    """Cosine [V] between what changed in images and in captions; differentiable.
+    """Return the cosines [V] between what changed in images and in captions; differentiable.
 
-    cos(f(edited) - f(original), g(target) - g(source)) with unit features f and g. An edit that changes
-    nothing scores 0.
-
-    Args:
-        originals: features [V, D] of unit length.
-        edited: [V, D] of the same views.
-        source: features [D] of the caption of the original.
-        target: [D] of the caption of the edit.
+    cos(f(edited) - f(original), g(target) - g(source)) with unit features f [V, D] of views and g [D] of
+    captions. An edit that changes nothing scores 0.
     """
     sizes = check.shape("originals", originals, "V D")
     check.shape("edited", edited, "V D", **sizes)

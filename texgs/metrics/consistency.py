@@ -58,7 +58,7 @@ class ViewConsistency:
 
     @classmethod
     def of(cls, pairs: Sequence[Difference]) -> ViewConsistency:
-        """The means of one pair or more."""
+        """Return the means of one pair or more."""
         squares, shares, distances = zip(*pairs, strict=True)
         mean_distance = None if distances[0] is None else fmean(distances)
         return cls(sqrt(fmean(squares)), mean_distance, fmean(shares), len(pairs))
@@ -70,7 +70,7 @@ def consistency(
     perceptual: Perceptual | None = None,
     tolerance: float = TOLERANCE,
 ) -> dict[int, ViewConsistency]:
-    """Compare views with those some views later, warped into them.
+    """Compare views along a path with those some views later, warped into them.
 
     What depends on the place of the viewer counts as inconsistent, highlights and headlights too: render
     without light to measure textures alone.
@@ -118,11 +118,11 @@ def frames_of(
     depth: Literal["median", "depth"] = "median",
     look: Look = "shaded",
 ) -> Iterator[SeenFrame]:
-    """Views of a scene with what `consistency` needs.
+    """Yield views of a scene along a path of cameras with what `consistency` needs.
 
     Args:
         scene: to show.
-        cameras: along a path, on the scene's device.
+        cameras: on the scene's device.
         light: shines on it.
         edits: as for `Composition.render`.
         geometry: scene whose depth and alpha say where surfaces are; by default this one. Different edits of
@@ -138,18 +138,11 @@ def frames_of(
 
 @torch.no_grad()
 def warp(source: SeenFrame, target: SeenFrame, tolerance: float = TOLERANCE) -> tuple[Tensor, Tensor]:
-    """Colours of one view at the pixels of another, and where both see the same point.
+    """Return colours [H, W, 3] of one view at the pixels of another, and where [H, W] both see one point.
 
     A pixel of the target is compared where it is opaque, its point is inside of the source, and the four
-    pixels there are opaque and as far away as the point is.
-
-    Args:
-        source: view that colours come from.
-        target: view that they are warped to.
-        tolerance: of depths, relative.
-
-    Returns:
-        Colours [H, W, 3], interpolated bilinearly, and [H, W] bool.
+    pixels there are opaque and as far away as the point is, but for the relative tolerance. Colours are
+    interpolated bilinearly.
     """
     from kornia.geometry import remap
 

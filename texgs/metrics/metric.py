@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -55,11 +54,6 @@ class Metric:
     is_in_paper: bool = True
     """Whether the tables that are as in the paper have its columns, not only those of all measures."""
 
-    @property
-    def keys(self) -> set[str]:
-        """The names that its values may have."""
-        return {*(measure.name for measure in self.measures), *(self.notes or {})}
-
 
 @dataclass(frozen=True, eq=False)
 class StyledModel:
@@ -96,13 +90,6 @@ class MeasuredScene:
     def shown(self) -> Composed:
         """Return the edited scene, opened."""
         return self.compositions[1]
-
-    @cached_property
-    def geometry(self) -> Scene:
-        """Read the scene whose depth says where surfaces are."""
-        from texgs.scene.scene_file import read_scene
-
-        return read_scene(self.geometry_file)
 
 
 def metrics() -> dict[str, Metric]:

@@ -1,4 +1,4 @@
-"""PSNR and SSIM of a model on views."""
+"""PSNR and SSIM, as the tables define them, of images and of a model on views."""
 
 from __future__ import annotations
 
@@ -9,28 +9,43 @@ from statistics import fmean
 from typing import TypeVar
 
 import torch
+from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.fields.field import Field
-from texgs.metrics.image import psnr, ssim
+<<<<<<< HEAD
+from texgs.metrics.quality import psnr, ssim
 from texgs.volume.images import over_white, smaller
+=======
+from texgs.raster.losses import ssim as structural_similarity
+from texgs.volume.reduced import over_white, smaller
+>>>>>>> c1cf28b (PSNR is with the quality of models, times of frames with their metric; scipy's tests of votes are used as they are, and the figure of a study is with its table)
 from texgs.volume.view_set import View
 
+BEST = 100.0  # dB, of equal images
 Item = TypeVar("Item")
 Read = TypeVar("Read")
+
+
+def psnr(image: Tensor, target: Tensor) -> float:
+    """Return the PSNR in dB of an image [H, W, C], clamped to [0, 1], over all pixels; 100 if equal."""
+    from kornia.metrics import psnr as of_unit_range
+
+    return min(of_unit_range(image.clamp(0, 1), target, 1.0).item(), BEST)  # NaN stays NaN
+
+
+def ssim(image: Tensor, target: Tensor) -> float:
+    """Return the structural similarity; see `texgs.raster.losses.ssim`."""
+    return structural_similarity(image.clamp(0, 1), target).item()
 
 
 @torch.no_grad()
 def evaluate(
     model: Field, views: Sequence[View], reduce: int = 1, title: str = "evaluate"
 ) -> dict[str, list[float]]:
-    """PSNR in dB and SSIM of each view over white, full frame, against the exact image.
+    """Return PSNR in dB and SSIM of each view over white, full frame, against the exact image.
 
-    Args:
-        model: any stage.
-        views: to compare with.
-        reduce: of the images, as in `images.load`.
-        title: of the progress bar.
+    The images are reduced as in `images.load`.
     """
     measured: dict[str, list[float]] = {"psnr": [], "ssim": []}
     device = model.device
@@ -44,18 +59,14 @@ def evaluate(
 
 
 def mean(measured: dict[str, list[float]]) -> dict[str, float]:
-    """Mean of each metric over the views."""
+    """Return the mean of each metric over the views."""
     return {name: fmean(values) for name, values in measured.items() if values}
 
 
 def read_ahead(read: Callable[[Item], Read], items: Iterable[Item]) -> Iterator[tuple[Item, Read]]:
-    """Yield each item with what `read` makes of it, in order; the next one is read meanwhile.
+    """Yield each item with what `read` makes of it, in order; another thread reads the next one meanwhile.
 
     An error of `read` is raised where its item would come.
-
-    Args:
-        read: called in one other thread, one item after the other.
-        items: iterated in the caller's thread.
     """
     with ThreadPoolExecutor(1) as pool:
         before: tuple[Item, Future[Read]] | None = None

@@ -40,11 +40,11 @@ def style_similarity(
     region: Tensor | None = None,
     title: str = "style",
 ) -> StyleSimilarity:
-    """Compare views over white with a style.
+    """Compare views over white, not trained on, with a style.
 
     Args:
         model: any stage.
-        cameras: of views not trained on.
+        cameras: of the views.
         lights: one for each camera.
         style: [3, h, w] in [0, 1], its longer side that of the views.
         vgg: whose features are compared.
@@ -77,11 +77,11 @@ def style_similarity(
 
 
 def gram(features: Tensor) -> Tensor:
-    """Mean products [C, C] of all channels of features [C, ...], float32: which of them occur together."""
+    """Return the mean products [C, C] of all channels of features [C, ...], float32: which occur together."""
     rows = features.flatten(1).float()
     return rows @ rows.T / rows.shape[1]
 
 
 def mean(values: Sequence[float]) -> float:
-    """Of numbers; NaN of none."""
+    """Return the mean of numbers; NaN of none."""
     return sum(values) / len(values) if values else float("nan")

@@ -25,7 +25,7 @@ class Points:
     normals: Tensor  # [N, 3] unit length, outwards
 
     def __getitem__(self, kept: Tensor) -> Points:
-        """Some of them, by a mask [N] or indices."""
+        """Return some of them, by a mask [N] or indices."""
         return Points(self.places[kept], self.normals[kept])
 
 
@@ -41,21 +41,17 @@ class SurfaceErrors:
 
     @property
     def chamfer(self) -> float:
-        """Mean of both distances, world units."""
+        """Return the mean of both distances, world units."""
         return (self.accuracy + self.completeness) / 2
 
     @property
     def f_score(self) -> float:
-        """Harmonic mean of precision and recall, in [0, 1]."""
+        """Return the harmonic mean of precision and recall, in [0, 1]."""
         return 2 * self.precision * self.recall / max(self.precision + self.recall, 1e-12)
 
 
 def sample(mesh: Mesh, count: int, seed: int = 0) -> Points:
-    """Random places on a mesh, as many on equal areas.
-
-    Raises:
-        ArgumentError: if it has no area.
-    """
+    """Return random places on a mesh, as many on equal areas."""
     a, b, c = mesh.corners.transpose(1, 0, 2)
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1)
@@ -70,11 +66,9 @@ def sample(mesh: Mesh, count: int, seed: int = 0) -> Points:
 
 
 def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
-    """Which of many points [N, 3] each pixel of a view shows.
+    """Return which of many points [N, 3] each pixel of a view shows [H * W], -1 where there is none.
 
-    Returns:
-        [H * W] the nearest point of each pixel, -1 where there is none; [N] the pixel of each point, -1
-        outside of the image; [N] their camera z.
+    With it come the pixel of each point [N], -1 outside of the image, and their camera z [N].
     """
     places, z = camera.project(points)
     u, v = places.floor().long().unbind(1)
@@ -88,7 +82,7 @@ def nearest(points: Tensor, camera: Camera) -> tuple[Tensor, Tensor, Tensor]:
 
 
 def seen(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
-    """Which points [N] bool a camera sees: nothing is nearer in their pixel by more than the tolerance."""
+    """Return which points [N] bool a camera sees: nothing is nearer in their pixel, but for the tolerance."""
     is_seen = torch.zeros(len(points.places), dtype=torch.bool)
     for camera in cameras:
         first, pixel, z = nearest(points.places, camera)
@@ -103,15 +97,9 @@ def seen(points: Points, cameras: Sequence[Camera], tolerance: float) -> Tensor:
 
 
 def compare(mesh: Points, surface: Points, tolerance: float) -> SurfaceErrors:
-    """Errors of a mesh, by points on it and on the surface that it should be.
+    """Return the errors of a mesh, by points on it and on what can be seen of the surface that it should be.
 
-    Args:
-        mesh: points of the mesh.
-        surface: points of the surface, of what can be seen of it.
-        tolerance: distance below which a point counts as right, world units.
-
-    Raises:
-        ArgumentError: if there is no point on one of them.
+    Points closer than the tolerance, world units, count as right.
     """
     for name, points in (("mesh", mesh), ("surface", surface)):
         if not len(points.places):
@@ -128,7 +116,7 @@ def compare(mesh: Points, surface: Points, tolerance: float) -> SurfaceErrors:
 
 
 def distances(points: Points, others: Points) -> tuple[Tensor, Tensor]:
-    """Distance to the nearest of others, world units, and the angle between the normals there, degrees."""
+    """Return the distances to the nearest of others, world units, and the angles between normals, degrees."""
     from scipy.spatial import cKDTree
 
     distance, index = cKDTree(others.places.numpy()).query(points.places.numpy(), workers=-1)

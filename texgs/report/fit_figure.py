@@ -18,7 +18,7 @@ from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import material
 from texgs.fit.losses import material_maps
-from texgs.metrics.image import psnr
+from texgs.metrics.quality import psnr
 from texgs.raster import rasterize
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import over_white, smaller

@@ -62,16 +62,14 @@ def votes_beside(key: str | Path) -> Votes | None:
 def read_ballot(study: Study, path: Path) -> Ballot:
     """Read one ballot."""
     rows = rows_of(path)
-    expected = {
-        "study": (study.study, "count it with the key of its study"),
-        "ballot": (rows[0]["ballot"], ADVICE),
-    }
-    for column, (name, advice) in expected.items():
-        for row in rows:
-            if row[column] != name:
-                raise ArgumentError(f"{path}: expected {column} {name}, got {row[column]}; {advice}")
+    own = rows[0]["ballot"]
     given: dict[str, dict[str, str]] = defaultdict(dict)
     for row in rows:
+        if row["study"] != study.study:
+            advice = "count it with the key of its study"
+            raise ArgumentError(f"{path}: expected study {study.study}, got {row['study']}; {advice}")
+        if row["ballot"] != own:
+            raise ArgumentError(f"{path}: expected ballot {own}, got {row['ballot']}; {ADVICE}")
         if row["option"] in given[row["question"]]:
             raise ArgumentError(
                 f"{path}: question {row['question']}: expected one rank of {row['option']}, got two; {ADVICE}"
@@ -87,7 +85,7 @@ def read_ballot(study: Study, path: Path) -> Ballot:
         ranks_of(f"{path}: question {number}", question, given[number])
         for number, question in zip(numbers, study.questions, strict=True)
     ]
-    return Ballot(rows[0]["ballot"], ranks)
+    return Ballot(own, ranks)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:

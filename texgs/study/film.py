@@ -33,18 +33,9 @@ def cell(index: int, count: int) -> tuple[int, int]:
 def write_film(
     path: str | Path, scenes: Sequence[Scene], size: int, frames: int, device: torch.device, title: str
 ) -> Path:
-    """Write one turn around scenes as MP4: the same cameras, background and size for all.
+    """Write one turn around scenes as MP4: the same cameras, background and size, pixels of a cell, for all.
 
-    Args:
-        path: target, .mp4.
-        scenes: at least one; the first one fills its cell.
-        size: of a cell, pixels.
-        frames: of the turn.
-        device: that renders.
-        title: of the progress bar.
-
-    Returns:
-        The path.
+    The first scene fills its cell.
     """
     compositions = [scene.open(device) for scene in scenes]
 
@@ -61,7 +52,7 @@ def write_film(
 
 
 def extent(picture: np.ndarray) -> float:
-    """How far from its centre a square picture [H, W, 3] shows something, as a share of what it could."""
+    """Return how far from its centre a square picture [H, W, 3] shows something, as a share of its half."""
     size = len(picture)
     places = np.argwhere(picture.min(axis=2) < SEEN) + 0.5
     return float(np.abs(2 * places / size - 1).max(initial=0)) + 1 / size

@@ -33,17 +33,14 @@ class Compared:
 
 
 @dataclass(frozen=True)
-class Option:
+class Option(Compared):
     """One clip of a question."""
 
-    recipe: str
-    edit: str
-    method: str
     scene: str  # file
 
     @property
     def compared(self) -> Compared:
-        """What its votes are for."""
+        """Return what its votes are for."""
         return Compared(self.recipe, self.edit, self.method)
 
 
@@ -60,7 +57,7 @@ class Question:
 
     @property
     def letters(self) -> str:
-        """Names of the options."""
+        """Return the names of the options."""
         return LETTERS[: len(self.options)]
 
 
@@ -76,13 +73,7 @@ class Study:
 def questions_of(records: Iterable[Record[Any]], edits: Sequence[str], seed: int) -> list[Question]:
     """Return all questions that edited scenes give, those by pictures first, with options in random order.
 
-    Args:
-        records: of all jobs.
-        edits: names of the edits to compare; none: all.
-        seed: of the order of options.
-
-    Raises:
-        ArgumentError: if there is no edited scene, an edit has none, or nothing can be compared.
+    Without names of edits all are compared.
     """
     records = list(records)
     looks = [record for record in of(EditResult, records) if record.result.follows]
@@ -162,7 +153,7 @@ def fit_of(record: Record[Any]) -> str:
 
 
 def rank_name(rank: int, count: int) -> str:
-    """What voters read: with four options best, second-best, second-worst and worst, as in the paper."""
+    """Return what voters read: of four best, second-best, second-worst and worst, as in the paper."""
     if rank in (1, count):
         return "best" if rank == 1 else "worst"
     if rank == 2:

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from texgs.study.questions import Compared
+
+if TYPE_CHECKING:
+    from scipy.stats._result_classes import BinomTestResult
 
 CONFIDENCE = 0.95  # of intervals
 
@@ -28,12 +32,12 @@ class Rankings:
 
     @property
     def number(self) -> int:
-        """Of rankings."""
+        """Return how many rankings there are."""
         return int(self.counts[0].sum())
 
     @property
     def means(self) -> np.ndarray:
-        """Mean rank of each method, [M]."""
+        """Return the mean rank of each method, [M]."""
         return self.counts @ np.arange(1, len(self.methods) + 1) / self.number
 
     def sorted(self, methods: Sequence[Compared]) -> Rankings:
@@ -49,45 +53,27 @@ def together(several: Sequence[Rankings]) -> Rankings:
     return Rankings(several[0].methods, np.sum([each.counts for each in several], axis=0), ranks)
 
 
-@dataclass(frozen=True)
-class Share:
-    """How often a method was the best."""
-
-    share: float
-    low: float  # of the exact (Clopper-Pearson) interval
-    high: float
-    p: float  # of the exact two-sided binomial test that it is as often the best as each other method
-
-
-def firsts(votes: Rankings) -> list[Share]:
-    """Return the share of first ranks of each method."""
+def firsts(votes: Rankings) -> list[BinomTestResult]:
+    """Test the share of first ranks of each method exactly, against being as often the best as each other."""
     from scipy.stats import binomtest  # slow to import
 
-    shares = []
-    for first in votes.counts[:, 0].tolist():
-        test = binomtest(first, votes.number, 1 / len(votes.methods))
-        interval = test.proportion_ci(CONFIDENCE, method="exact")
-        shares.append(Share(test.statistic, float(interval.low), float(interval.high), float(test.pvalue)))
-    return shares
+    return [binomtest(first, votes.number, 1 / len(votes.methods)) for first in votes.counts[:, 0].tolist()]
 
 
-@dataclass(frozen=True)
-class Friedman:
-    """Friedman's test of whether all methods are ranked alike; p by its chi-squared approximation."""
-
-    statistic: float
-    p: float
+def interval(first: BinomTestResult) -> tuple[float, float]:
+    """Return the exact (Clopper-Pearson) interval of a share."""
+    low, high = first.proportion_ci(CONFIDENCE, method="exact")
+    return float(low), float(high)
 
 
-def friedman(votes: Rankings) -> Friedman | None:
-    """Compare three methods or more; None for two, whose shares of first ranks say the same.
+def friedman(votes: Rankings) -> tuple[float, float] | None:
+    """Return Friedman's statistic and p, by its chi-squared approximation, for methods that are ranked alike.
 
-    Args:
-        votes: with their ranks, each ranking a block.
+    Each ranking is a block. Two methods have none: their shares of first ranks say the same.
     """
     from scipy.stats import friedmanchisquare  # slow to import
 
     if votes.ranks is None or len(votes.methods) < 3:
         return None
-    test = friedmanchisquare(*votes.ranks.T)
-    return Friedman(float(test.statistic), float(test.pvalue))
+    statistic, p = friedmanchisquare(*votes.ranks.T)
+    return float(statistic), float(p)

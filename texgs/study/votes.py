@@ -1,22 +1,30 @@
-"""Table `user_study`: how people rank methods, beside the votes in the paper's appendix."""
+"""Table and figure of a user study: how people rank methods, beside the votes in the paper's appendix."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, astuple, dataclass, replace
-from typing import Any
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from PIL import Image
 
+from texgs.core.figures import new_figure, words, write_figure
 from texgs.report.edit_tables import words_of
 from texgs.report.metrics_files import Record, of
 from texgs.report.published import meant, paper, volumes
 from texgs.report.results import EditResult
+from texgs.report.sections import Figure, data_uri
 from texgs.report.table import UNPUBLISHED, Column, Table
 from texgs.study.ballots import Votes
-from texgs.study.questions import KINDS, Compared
-from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, together
+from texgs.study.questions import KINDS, Compared, rank_name
+from texgs.study.rankings import CONFIDENCE, Rankings, firsts, friedman, interval, together
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 METHODS = {"style": "image_npse", "instruction": "text_npse"}  # the paper's files that name those of a kind
 PUBLISHED = ("best", "second_best", "second_worst", "worst")  # columns of the paper's file
@@ -33,6 +41,8 @@ AFTER = (
 THE_PAPER = "the paper"  # in place of an edit
 NO_BALLOTS = "only counts are published"
 TWO = "needs three methods"
+WIDTH, DPI = 5.0, 150  # inches of a chart
+BAR, AROUND = 0.35, 1.0  # inches of a bar, and of what is above and below all of a chart
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +75,7 @@ def user_study(votes: Votes | None) -> Table:
 
 
 def compared(votes: Votes | None) -> list[tuple[str, list[Panel]]]:
-    """Kinds of questions, each with all questions that compare the same methods; the paper's follow ours."""
+    """Return kinds of questions, each with all that compare the same methods; the paper's follow ours."""
     ours, theirs = counted(votes) if votes else {}, published()
     return [
         (KINDS[follows], panels)
@@ -88,9 +98,8 @@ def counted(votes: Votes) -> dict[str, list[Panel]]:
 
 def published() -> dict[str, list[Panel]]:
     """Return the paper's votes, by what its methods follow."""
-    votes = paper(
-        "user_study", {"dataset": "dataset", "method": "method"}, {rank: rank for rank in PUBLISHED}
-    )
+    keys, counted = ({name: name for name in names} for names in (("dataset", "method"), PUBLISHED))
+    votes = paper("user_study", keys, counted)
     panels: dict[str, list[Panel]] = {follows: [] for follows in METHODS}
     for follows, table in METHODS.items():
         known = set(paper(table, {"method": "method"}, {})["method"])
@@ -122,15 +131,16 @@ def rows_of(kind: str, panels: Sequence[Panel]) -> list[dict[str, Any]]:
         names = {"kind": kind, "data set": panel.dataset, "follows": panel.followed}
         rows += [{**names, **row} for row in method_rows(panel.votes)]
     votes, every = total(panels), {"kind": kind, "data set": f"all {len(panels)}"}
-    for row, share in zip(method_rows(votes), firsts(votes), strict=True):
-        tested = {"from": share.low, "to": share.high, "p (binomial)": f"{share.p:.2g}"}
+    for row, first in zip(method_rows(votes), firsts(votes), strict=True):
+        low, high = interval(first)
+        tested = {"from": low, "to": high, "p (binomial)": f"{first.pvalue:.2g}"}
         rows.append({**every, "follows": "-", **row, **tested})
     test, edits = friedman(votes), {method.edit for method in votes.methods}
     rows.append({**every, "follows": "-", "recipe": "-", "method": "all"})
     rows[-1]["edit"] = edits.pop() if len(edits) == 1 else "-"
     rows[-1]["p (Friedman)"] = NO_BALLOTS if votes.ranks is None else TWO
     if test is not None:
-        rows[-1] |= {"chi2 (Friedman)": test.statistic, "p (Friedman)": f"{test.p:.2g}"}
+        rows[-1] |= {"chi2 (Friedman)": test[0], "p (Friedman)": f"{test[1]:.2g}"}
     return rows
 
 
@@ -160,3 +170,47 @@ def caption(votes: Votes | None) -> str:
         "binomial test against chance. Friedman's test takes each answer of each ballot as a block. "
         "The paper: ten participants; the same numbers from its counts of votes."
     )
+
+
+def write_votes(path: str | Path, votes: Votes | None) -> Path:
+    """Write a PNG with a chart for each kind of question, ours and the paper's below each other."""
+    charts = compared(votes)
+    heights = [AROUND + BAR * len(panels[0].votes.methods) for _, panels in charts]
+    figure = new_figure(WIDTH, sum(heights), DPI)
+    places = figure.subplots(len(charts), squeeze=False, height_ratios=heights)[:, 0]
+    for axes, (kind, panels) in zip(places, charts, strict=True):
+        draw(axes, kind, panels)
+    return write_figure(path, figure)
+
+
+def shown(votes: Votes | None) -> Figure:
+    """Return the figure as a report has it."""
+    with TemporaryDirectory() as folder, Image.open(write_votes(Path(folder, "votes.png"), votes)) as picture:
+        command = "texgs votes" if votes else ""
+        return Figure("votes", "", "Votes for each rank.", data_uri(picture), command, is_narrow=True)
+
+
+def draw(axes: Axes, kind: str, panels: Sequence[Panel]) -> None:
+    """Draw a bar for each method, of its votes from the best rank to the worst."""
+    from matplotlib import colormaps  # slow to import
+
+    votes = total(panels)
+    names, count = [words(name_of(method)) for method in votes.methods], len(votes.methods)
+    starts = np.zeros(count)
+    for rank, column in enumerate(votes.counts.T, start=1):
+        color = colormaps["viridis"](1 - (rank - 0.5) / count)
+        axes.barh(names, column, left=starts, height=0.7, color=color, label=rank_name(rank, count))
+        starts += column
+    axes.invert_yaxis()
+    axes.set_xlim(0, votes.number)
+    axes.set_xlabel("votes", fontsize=8)
+    axes.tick_params(labelsize=8)
+    axes.spines[["top", "right"]].set_visible(False)
+    source = f", {THE_PAPER}" if votes.methods[0].edit == THE_PAPER else ""
+    axes.set_title(f"{kind}{source}: {votes.number} rankings of {len(panels)} questions", fontsize=9)
+    axes.legend(fontsize=7, ncols=count, loc="upper center", bbox_to_anchor=(0.5, -0.25), frameon=False)
+
+
+def name_of(method: Compared) -> str:
+    """Return what a bar is called."""
+    return method.method if method.edit == THE_PAPER else f"{method.edit}\n{method.recipe}"

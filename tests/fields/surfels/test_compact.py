@@ -16,7 +16,7 @@ from texgs.core.errors import ArgumentError, ShapeError, TexgsError
 from texgs.core.geometry import quats_to_matrices
 from texgs.fields.surfels.compact import STEP, open_model, read_compact, seen_surfels, write_compact
 from texgs.fields.surfels.model_file import write_model
-from texgs.metrics.image import psnr
+from texgs.metrics.quality import psnr
 from texgs.scene.scene import Scene, SceneModel
 
 

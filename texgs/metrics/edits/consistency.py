@@ -22,11 +22,12 @@ def run(measured: MeasuredScene) -> dict[str, Any]:
     from texgs.fields.kinds import kinds
     from texgs.metrics.consistency import LONG, SHORT, consistency, frames_of
     from texgs.models.lpips import Lpips
+    from texgs.scene.scene_file import read_scene
 
     scene, composition, count = measured.after, measured.shown, len(measured.some)
     start = max(0, (len(measured.cameras) - count - LONG) // 2)
     cameras = measured.cameras[start : start + count + LONG]
-    surfaces = without_hidden(measured.geometry, scene)
+    surfaces = without_hidden(read_scene(measured.geometry_file), scene)
     depth = kinds()[next(iter(surfaces.models.values())).open()[0].kind].depth or "median"
     with torch.no_grad():
         opened = surfaces.open(composition.device)

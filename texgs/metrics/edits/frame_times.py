@@ -2,14 +2,40 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Callable, Sequence
 from statistics import fmean
+from typing import TYPE_CHECKING
 
 from texgs.metrics.metric import Measure, MeasuredScene, Metric
+
+if TYPE_CHECKING:
+    from texgs.core.camera import Camera
+
+WARM = 3  # frames before those that count
+FRAMES = 61  # spread over a path: more say the same
+
+
+def milliseconds(render: Callable[[Camera], object], cameras: Sequence[Camera], title: str) -> list[float]:
+    """Measure the milliseconds of each frame after some that are not counted."""
+    import torch
+
+    from texgs.core.progress import progress
+
+    def milliseconds_of(camera: Camera) -> float:
+        start = time.perf_counter()
+        render(camera)
+        if torch.cuda.is_initialized():
+            torch.cuda.synchronize()
+        return 1e3 * (time.perf_counter() - start)
+
+    for camera in cameras[:WARM]:
+        milliseconds_of(camera)
+    return [milliseconds_of(camera) for camera in progress(cameras, title=title, unit="frame")]
 
 
 def run(measured: MeasuredScene) -> dict[str, float]:
     """Render frames that are spread over the test path."""
-    from texgs.metrics.timing import FRAMES, milliseconds
     from texgs.volume.cameras import spread
 
     scene, composition = measured.after, measured.shown

@@ -151,7 +151,7 @@ class GalleryRenderer:
         import torch
 
         from texgs.core.light import Light
-        from texgs.metrics.image import psnr
+        from texgs.metrics.quality import psnr
         from texgs.report.fit_figure import ERROR, signed_error
         from texgs.scene.changes import apply_all
 

@@ -116,7 +116,7 @@ def compared(
     """Return PSNR and SSIM against the volume over some views, and all pictures [H, W, 3] of the first."""
     import torch
 
-    from texgs.metrics.image import psnr, ssim
+    from texgs.metrics.quality import psnr, ssim
     from texgs.report.fit_figure import ERROR, signed_error
 
     scores: dict[str, list[float]] = {"psnr": [], "ssim": []}

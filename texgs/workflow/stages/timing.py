@@ -23,7 +23,7 @@ def work(settings: OfScene, inputs: dict[str, Path], output: Path) -> Outcome:
     import torch
 
     from texgs.core.check import torch_device
-    from texgs.metrics.timing import FRAMES, milliseconds
+    from texgs.metrics.edits.frame_times import FRAMES, milliseconds
     from texgs.scene.scene_file import read_scene
     from texgs.volume.cameras import spiral, spread
     from texgs.workflow.stages.volume_scene import VolumeScene

@@ -1,3 +1,0 @@
-from tests.models.networks import vgg
-
-__all__ = ["vgg"]
