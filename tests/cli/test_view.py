@@ -17,8 +17,8 @@ from texgs.cli.main import main
 from texgs.core.errors import ArgumentError
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.messages import Edit
-from texgs.viewer.opening import open_scene
 from texgs.viewer.server import Server
+from texgs.viewer.shared_edits import open_scene
 
 
 def test_it_serves_until_it_is_interrupted(scene_file, tmp_path):  # noqa: F811
@@ -81,7 +81,7 @@ def test_unsaved_edits_are_asked_about(scene_file, monkeypatch, capsys, stdin, i
     edits = Server(open_scene(scene_file)).edits
     view.ask_to_save(edits)
     assert capsys.readouterr().out == "", "nothing is unsaved"
-    edits.edit(Edit("TF01", "visible", False, 0), author=1)
+    edits.change(Edit("TF01", "visible", False, 0), author=1)
     monkeypatch.setattr("sys.stdin", stdin)
     view.ask_to_save(edits)
     assert "Edits are not saved. Write them to" in capsys.readouterr().out
@@ -94,7 +94,7 @@ def test_another_file_is_not_replaced_without_a_word(scene_file, monkeypatch, ca
     (scene_file.parent / "metrics.json").write_text("{}")
     (scene_file.parent / "edited.yaml").write_text("mine")
     edits = Server(open_scene(scene_file)).edits
-    edits.edit(Edit("TF01", "visible", False, 0), author=1)
+    edits.change(Edit("TF01", "visible", False, 0), author=1)
     monkeypatch.setattr("sys.stdin", Terminal("n\n"))
     view.ask_to_save(edits)
     assert "edited.yaml? The file there is replaced. [y/N]" in capsys.readouterr().out
@@ -108,7 +108,7 @@ def test_another_file_is_not_replaced_without_a_word(scene_file, monkeypatch, ca
 
 def test_unsaved_edits_are_told_where_nobody_can_be_asked(scene_file, monkeypatch, capsys):  # noqa: F811
     edits = Server(open_scene(scene_file)).edits
-    edits.edit(Edit("TF01", "visible", False, 0), author=1)
+    edits.change(Edit("TF01", "visible", False, 0), author=1)
     monkeypatch.setattr("sys.stdin", io.StringIO())
     view.ask_to_save(edits)
     assert capsys.readouterr().err == "Edits were not saved.\n"

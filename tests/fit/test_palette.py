@@ -17,12 +17,7 @@ from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
 from texgs.fit.palette import PaletteFit
 from texgs.fit.palette_colors import object_palette
 from texgs.fit.palette_losses import base_loss
-<<<<<<< HEAD
 from texgs.metrics.quality import psnr
-=======
-from texgs.fit.palette_start import object_palette
-from texgs.metrics.quality import psnr
->>>>>>> c1cf28b (PSNR is with the quality of models, times of frames with their metric; scipy's tests of votes are used as they are, and the figure of a study is with its table)
 
 VOXELS = VoxelKeys(
     stages=[GridStage(16, 30), GridStage(32, 30)],

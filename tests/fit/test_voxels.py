@@ -15,14 +15,8 @@ from texgs.fit import checkpoint
 from texgs.fit.checkpoint import run_to_end
 from texgs.fit.hull import hull_box
 from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
-<<<<<<< HEAD
 from texgs.fit.voxels import VoxelFit, grown, hull_grid, refined, seen_voxels
 from texgs.metrics.quality import psnr
-=======
-from texgs.fit.voxel_shape import grown, hull_box, hull_grid, refined, seen_voxels
-from texgs.fit.voxels import VoxelFit
-from texgs.metrics.quality import psnr
->>>>>>> c1cf28b (PSNR is with the quality of models, times of frames with their metric; scipy's tests of votes are used as they are, and the figure of a study is with its table)
 from texgs.raster.voxel_grid import interpolate_rows
 from texgs.raster.voxels import March, camera_rays, render_view
 from texgs.volume.images import load

@@ -13,8 +13,8 @@ from aiohttp import WSMsgType
 from aiohttp.test_utils import TestClient, TestServer
 from PIL import Image
 
-from texgs.viewer.opening import open_scene
 from texgs.viewer.server import Server
+from texgs.viewer.shared_edits import open_scene
 
 TOKEN = "t" * 43
 WAIT = 30  # seconds, on a busy machine

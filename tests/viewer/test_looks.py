@@ -4,6 +4,7 @@ import asyncio
 import json
 import threading
 from dataclasses import asdict
+from functools import partial
 
 import numpy as np
 import pytest
@@ -16,9 +17,8 @@ from tests.viewer.test_segments import FRONT, ended
 from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
 from texgs.viewer.jobs import Jobs, Stopped, Watch
-from texgs.viewer.looks import Looks, ScratchFolders, ThrottledPreview
+from texgs.viewer.looks import Looks, ScratchFolders, Styles, ThrottledPreview
 from texgs.viewer.messages import Look
-from texgs.viewer.styles import Styles
 
 SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
 
@@ -117,16 +117,15 @@ def test_the_newest_texture_of_each_part_stays(tmp_path, monkeypatch):
 def test_a_look_that_fails_leaves_folders_that_were_there(scene_file, tmp_path):
     (tmp_path / "here").mkdir()
     jobs, styles = Jobs(), Styles()
-    looks = Looks(jobs, styles)
+    looks = Looks(styles)
     edit = looks.edit_of(Look(parts=("TF01",), style="dots", instruction="", preview=False))
-    stop = threading.Event()
-    stop.set()
-    watch = Watch(lambda *_: None, stop)
+    watch = Watch()
+    watch.stop.set()
     for folder in ("here", "not"):
+        output = tmp_path / folder / "look"
+        make = partial(looks.make, read_scene(scene_file), edit, output, lambda *_: None)
         with pytest.raises(Stopped):
-            asyncio.run(
-                looks.make(read_scene(scene_file), edit, tmp_path / folder / "look", watch, lambda *_: None)
-            )
+            asyncio.run(jobs.run(make, watch))
     assert [path.name for path in tmp_path.iterdir() if path.name in ("here", "not")] == ["here"]
     looks.close(), styles.close(), jobs.close()
 
@@ -228,7 +227,7 @@ async def test_words_of_a_page_are_no_references_to_anything(browser, monkeypatc
 
 @on_page
 async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, monkeypatch):
-    reached, go_on, run = threading.Event(), threading.Event(), Looks._make
+    reached, go_on, run = threading.Event(), threading.Event(), Looks.make
 
     def slow(*words):
         result = run(*words)
@@ -236,7 +235,7 @@ async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, monk
         go_on.wait(30)
         return result
 
-    monkeypatch.setattr(Looks, "_make", slow)
+    monkeypatch.setattr(Looks, "make", slow)
     before = await picture(browser)
     await browser.send(**look(style="glass", preview=True))
     await asyncio.to_thread(reached.wait, 30)

@@ -14,7 +14,7 @@ from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.segment_file import write_segment
 from texgs.scene.session import Session
 from texgs.viewer.description import describe
-from texgs.viewer.opening import open_scene
+from texgs.viewer.shared_edits import open_scene
 
 
 def test_a_scene_is_saved_in_its_place(scene_file, tmp_path):

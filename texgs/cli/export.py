@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the file."""
     from texgs.fields.files import open_field
-    from texgs.scene.export_file import Export, export_model, export_scene
+    from texgs.scene.export import Export, export_model, export_scene
     from texgs.scene.scene_file import read_scene
 
     kind = kind_of(arguments)
@@ -80,7 +80,7 @@ def chosen(scene: Scene, name: str) -> SceneModel:
 
 def kind_of(arguments: argparse.Namespace) -> str:
     """Return what to export."""
-    from texgs.scene.export_file import OF_MODELS
+    from texgs.scene.export import OF_MODELS
 
     ending = arguments.to.suffix
     kind: str | None = arguments.kind or DEFAULTS.get(ending)
@@ -103,7 +103,7 @@ def kind_of(arguments: argparse.Namespace) -> str:
 def of_page(arguments: argparse.Namespace, scene: Scene | None) -> Path:
     """Export a scene, one model of it or a model file as a web page."""
     from texgs.fields import files
-    from texgs.scene.export_file import require_export
+    from texgs.scene.export import require_export
     from texgs.scene.scene import Scene, SceneModel
     from texgs.viewer.standalone import write_page
 

@@ -57,7 +57,7 @@ def run_report(arguments: argparse.Namespace) -> int:
     from texgs.report.html import write_report
     from texgs.report.metrics_files import read_left_out
     from texgs.study.ballots import votes_beside
-    from texgs.study.votes_figure import shown
+    from texgs.study.votes import shown
 
     records, old = records_of(arguments, "report")
     left_out, votes = [*read_left_out(arguments.missing), *old], votes_beside(arguments.study)

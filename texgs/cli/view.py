@@ -45,8 +45,8 @@ def run(arguments: argparse.Namespace) -> int:
     from texgs.core.cache import cache_folder
     from texgs.core.check import torch_device
     from texgs.viewer.guard import is_loopback, kept_token
-    from texgs.viewer.opening import open_scene
     from texgs.viewer.server import Server
+    from texgs.viewer.shared_edits import open_scene
 
     server = Server(open_scene(arguments.scene, arguments.folder), torch_device(arguments.device))
     listening = listen(arguments.host, arguments.port)

@@ -13,13 +13,8 @@ from torch import Tensor
 
 from texgs.core.progress import progress
 from texgs.fields.field import Field
-<<<<<<< HEAD
-from texgs.metrics.quality import psnr, ssim
-from texgs.volume.images import over_white, smaller
-=======
 from texgs.raster.losses import ssim as structural_similarity
-from texgs.volume.reduced import over_white, smaller
->>>>>>> c1cf28b (PSNR is with the quality of models, times of frames with their metric; scipy's tests of votes are used as they are, and the figure of a study is with its table)
+from texgs.volume.images import over_white, smaller
 from texgs.volume.view_set import View
 
 BEST = 100.0  # dB, of equal images

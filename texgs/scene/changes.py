@@ -9,20 +9,14 @@ from typing import Any
 import yaml
 
 from texgs.core.errors import ArgumentError, TexgsError
-from texgs.core.light import HEADLIGHT
 from texgs.core.plain_yaml import parse_yaml
 from texgs.scene.parts import entry_of, key_path
-from texgs.scene.scene import WHITE
-from texgs.scene.scene_file import SEGMENT_KEYS, known, light_of
-from texgs.scene.session import Session
+from texgs.scene.scene_file import SEGMENT_KEYS, known
+from texgs.scene.session import SCENE_KEYS, Session
 
 
 def apply_all(session: Session, words: Sequence[str]) -> None:
-    """Make the changes that words ask for, see `texgs edit --help`.
-
-    Raises:
-        TexgsError: naming the word that cannot be done.
-    """
+    """Make the changes that words ask for, see `texgs edit --help`; an error names its word."""
     for word in words:
         try:
             _apply(session, word)
@@ -63,14 +57,10 @@ def _change_part(session: Session, part: str, key: str, text: str) -> None:
 
 def _change_scene(session: Session, key: str, text: str) -> None:
     """Change the light or the background; an empty text takes it back."""
-    known({key: text}, ("light", "background"), "the scene")
-    value = _plain(text) if text else None
-    if key == "background":
-        session.set_background(value if text else WHITE)
-        return
-    if isinstance(value, list) and len(value) == 2:
+    value = _plain(text) if text else SCENE_KEYS.get(key)
+    if key == "light" and isinstance(value, list) and len(value) == 2:
         value = dict(zip(("azimuth", "polar"), value, strict=True))
-    session.set_light(light_of(value) if text else HEADLIGHT)
+    session.set_of_scene(key, value)
 
 
 def _file(text: str) -> Path:

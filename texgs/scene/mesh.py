@@ -18,14 +18,12 @@ from texgs.core.memory import require_memory
 from texgs.core.progress import progress
 from texgs.raster import Render
 from texgs.raster.fusion import BLOCK, DepthView, Lattice
-from texgs.scene.export import VERTEX, fill
 from texgs.volume.isosurface import Mesh, isosurface
 
-TRUNCATION = (
-    5.0  # voxels on each side of a surface that know their distance from it, as in 2DGS; at most BLOCK
-)
+TRUNCATION = 5.0  # voxels beside a surface that know their distance from it, as in 2DGS; at most BLOCK
 LEAST_VIEWS = 1  # more views than this must have seen a voxel
 LEAST_VOXEL = 1e-6  # world units; the longest side of a volume is 1
+VERTEX = [*((axis, "<f4") for axis in "xyz"), *((channel, "u1") for channel in ("red", "green", "blue"))]
 CLUSTERS, LEAST_TRIANGLES = 50, 50  # the largest connected parts that stay, and how small they may be
 
 
@@ -104,7 +102,7 @@ def fuse(show: Callable[[Camera], Render], cameras: Sequence[Camera], voxel: flo
 
 @torch.no_grad()
 def depth_view(render: Render, camera: Camera) -> DepthView:
-    """The surface in a view, on the CPU; behind what is fainter the last fragment would be taken for one."""
+    """Return the surface in a view, on the CPU; where a view is faint, its last fragment is none."""
     depth = render.depth if render.median is None else render.median
     if depth is None:
         raise ArgumentError("show: expected renders with median or depth; ask for one in outputs")
@@ -133,11 +131,7 @@ def with_triangles(mesh: Mesh, kept: np.ndarray) -> Mesh:
 
 
 def write_mesh(path: str | Path, mesh: Mesh) -> Path:
-    """Create or replace a binary PLY file in one step; a mesh without colours is grey.
-
-    Raises:
-        ArgumentError: if the file cannot be written.
-    """
+    """Create or replace a binary PLY file in one step; a mesh without colours is grey."""
     from plyfile import PlyData, PlyElement
 
     colors = np.full_like(mesh.vertices, 200, dtype=np.uint8) if mesh.colors is None else mesh.colors
@@ -147,3 +141,10 @@ def write_mesh(path: str | Path, mesh: Mesh) -> Path:
     faces["vertex_indices"] = mesh.triangles
     elements = [PlyElement.describe(vertices, "vertex"), PlyElement.describe(faces, "face")]
     return write_atomic(path, PlyData(elements, byte_order="<").write)
+
+
+def fill(vertices: np.ndarray, places: Tensor, colors: Tensor) -> None:
+    """Set places [V, 3] and colours [V, 3] from 0 to 255 of vertices."""
+    for names, values in ((("x", "y", "z"), places), (("red", "green", "blue"), colors)):
+        for name, column in zip(names, values.detach().cpu().numpy().T, strict=True):
+            vertices[name] = column

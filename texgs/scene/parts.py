@@ -22,9 +22,6 @@ def split(scene: Scene, part: str) -> tuple[str, str | None]:
     """Return the model and segment of a part; the segment may be a new one.
 
     Names of models may have the mark between the two, those of segments have none.
-
-    Raises:
-        ArgumentError: if there is no such model.
     """
     if part in scene.models:
         return part, None
@@ -36,11 +33,7 @@ def split(scene: Scene, part: str) -> tuple[str, str | None]:
 
 
 def entry_of(scene: Scene, part: str) -> Entry:
-    """Return the model or segment of a name.
-
-    Raises:
-        ArgumentError: if there is none.
-    """
+    """Return the model or segment of a name."""
     model, segment = split(scene, part)
     if segment is None:
         return scene.models[model]
@@ -53,11 +46,7 @@ def entry_of(scene: Scene, part: str) -> Entry:
 
 
 def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
-    """Return the scene with another model or segment of a name; None removes a segment.
-
-    Raises:
-        ArgumentError: if there is no such model, or no segment to remove.
-    """
+    """Return the scene with another model or segment of a name; None removes a segment."""
     model, segment = split(scene, part)
     if segment is not None:
         if entry is None:
@@ -71,15 +60,9 @@ def replaced(scene: Scene, part: str, entry: Entry | None) -> Scene:
 
 
 def with_textures(scene: Scene, files: Mapping[str, Path | None], own_colors: bool = False) -> Scene:
-    """Return the scene with other texture files for some of its parts.
+    """Return the scene with other texture files for some of its parts; None: what a part was fitted with.
 
-    Args:
-        scene: to change.
-        files: by part; None stands for the texels that a part was fitted with.
-        own_colors: whether palettes of these parts go back to the fitted ones, which texels were made for.
-
-    Raises:
-        ArgumentError: if there is no such part.
+    With `own_colors`, their palettes go back to the fitted ones, which texels were made for.
     """
     for part, file in files.items():
         entry = entry_of(scene, part)
@@ -95,11 +78,7 @@ def key_path(part: str) -> str:
 
 
 def require_new(scene: Scene, part: str) -> None:
-    """Require that the model of MODEL/SEGMENT has no such segment.
-
-    Raises:
-        ArgumentError: if it has, or there is no such model.
-    """
+    """Require that the model of MODEL/SEGMENT has no such segment."""
     model, segment = split(scene, part)
     if segment in scene.models[model].segments:
         raise ArgumentError(

@@ -46,31 +46,24 @@ class SceneModel:
 
     @property
     def files(self) -> list[Path | None]:
-        """All that `open` reads."""
+        """Return all that `open` reads."""
         paths = [self.file, self.texture]
         for segment in self.segments.values():
             paths += [segment.file, segment.texture]
         return paths
 
     def open(self) -> tuple[Field, list[Tensor]]:
-        """Return the field, of surfels with the texels of all variants, and the masks [N] of its segments.
-
-        Raises:
-            ArgumentError, ShapeError: naming the file.
-        """
+        """Return the field, of surfels with the texels of all variants, and the masks [N] of its segments."""
         fitted = open_field(self.file)
         if isinstance(fitted, Surfels) or self.texture is not None or self.segments:
             return self.surfels(fitted)
         return fitted, []
 
     def surfels(self, fitted: Field | None = None) -> tuple[Surfels, list[Tensor]]:
-        """Return the same, for what only surfels can.
+        """Return the same, for what only surfels can; another kind of field is refused.
 
         Args:
             fitted: what the file holds, where that is known.
-
-        Raises:
-            ArgumentError, ShapeError: naming the file, also where it holds a field of another kind.
         """
         fitted = open_field(self.file) if fitted is None else fitted
         if not isinstance(fitted, Surfels):
@@ -103,7 +96,7 @@ class Scene:
 
     @property
     def edits(self) -> list[PartEdit]:
-        """Of all models; behind the edit of a model those of its segments."""
+        """Return those of all models; behind the edit of a model those of its segments."""
         edits = []
         for model in self.models.values():
             edits += [model.edit, *(segment.edit for segment in model.segments.values())]

@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from texgs.core.errors import ArgumentError
-from texgs.core.io import reading, reading_as, write_bytes
+from texgs.core.io import reading, write_bytes
 from texgs.core.light import Light
 from texgs.core.names import close, is_number, label, named_file, require_name
 from texgs.core.plain_yaml import parse_yaml
@@ -33,34 +33,19 @@ def read_scene(path: str | Path) -> Scene:
         ArgumentError: if the file is missing or a key of it is not as it should be; says which.
     """
     path = Path(path)
-    values = read_values(path)
-    try:
-        with reading_as("a scene", "correct it"):
-            return scene_of(values, path.parent)
-    except ArgumentError as error:
-        raise ArgumentError(f"{path}: {error}") from error
-
-
-def read_values(path: Path) -> Any:
-    """Return the plain values of a YAML file."""
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; texgs compose writes one")
     with reading(path, "a scene in YAML", "correct it"):
-        if path.stat().st_size > LARGEST:
-            raise ArgumentError(f"{path}: expected a scene of at most {LARGEST} bytes; is it another file?")
         try:
-            return parse_yaml(path.read_text(encoding="utf-8"))
+            if path.stat().st_size > LARGEST:
+                raise ArgumentError(f"expected a scene of at most {LARGEST} bytes; is it another file?")
+            return _scene(parse_yaml(path.read_text(encoding="utf-8")), path.parent)
         except ArgumentError as error:
             raise ArgumentError(f"{path}: {error}") from error
 
 
-def scene_of(values: Any, folder: Path) -> Scene:
-    """Return the scene that the plain values of a scene file describe.
-
-    Args:
-        values: as `read_values` returns them.
-        folder: that files are relative to.
-    """
+def _scene(values: Any, folder: Path) -> Scene:
+    """Return the scene that the plain values of a scene file describe, with files in a folder."""
     known(values, KEYS, "the scene")
     if values.get("texgs-scene") != VERSION:
         raise ArgumentError(f"texgs-scene: expected {VERSION}, got {values.get('texgs-scene')!r}")
@@ -73,11 +58,7 @@ def scene_of(values: Any, folder: Path) -> Scene:
 
 
 def write_scene(path: str | Path, scene: Scene) -> Path:
-    """Write a scene file in one step; what is not edited is left out. Files in it are relative to its folder.
-
-    Raises:
-        ArgumentError: if the file cannot be written.
-    """
+    """Write a scene file in one step, with what is edited; files in it are relative to its folder."""
     path = Path(path)
 
     def relative(file: Path) -> str:
@@ -106,6 +87,7 @@ def _plain(entry: SceneModel | SceneSegment, relative: Callable[[Path], str]) ->
 
 
 def _model(where: str, values: Any, folder: Path) -> SceneModel:
+    """Return a model of the plain values of a scene file."""
     known(values, MODEL_KEYS, where)
     entries = values.get("segments", {})
     known(entries, None, f"{where}.segments")
@@ -118,6 +100,7 @@ def _model(where: str, values: Any, folder: Path) -> SceneModel:
 
 
 def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, PartEdit, Path | None]:
+    """Return the file, edit and texture of a model or a segment."""
     file, texture = named_file(f"{where}.file", folder, values.get("file"), kind), values.get("texture")
     if texture is not None:
         texture = named_file(f"{where}.texture", folder, texture, "a texture variant")
@@ -129,11 +112,7 @@ def _entry(where: str, values: Any, folder: Path, kind: str) -> tuple[Path, Part
 
 
 def light_of(value: Any) -> Light:
-    """Return the light that a value of a scene file stands for.
-
-    Raises:
-        ArgumentError: if it stands for none.
-    """
+    """Return the light that a value of a scene file stands for."""
     if value == "headlight":
         return Light("headlight")
     if isinstance(value, dict) and set(value) <= {"azimuth", "polar"} and all(map(is_number, value.values())):
@@ -142,11 +121,7 @@ def light_of(value: Any) -> Light:
 
 
 def known(values: Any, keys: Collection[str] | None, where: str) -> None:
-    """Require a table, with known keys only.
-
-    Raises:
-        ArgumentError: naming what is no table or no key, and the key that is most like it.
-    """
+    """Require a table, with known keys only; a slip names the key that is most like it."""
     if not isinstance(values, dict):
         raise ArgumentError(f"{where}: expected a table of keys and values, got {values!r}")
     for key in values if keys is not None else ():

@@ -25,11 +25,7 @@ def write_segment(
 ) -> Path:
     """Write a segment in one step: a safetensors file with `mask` [N] and `anchors`, places of some surfels.
 
-    Args:
-        path: target.
-        model: of any stage, that the mask belongs to.
-        mask: [N] bool.
-        metadata: JSON, such as the clicks that it came from.
+    The model may be of any stage; metadata are JSON, such as the clicks that it came from.
     """
     check.shape("mask", mask, "N", N=len(model))
     if mask.dtype != torch.bool or not bool(mask.any()):
@@ -43,8 +39,11 @@ def write_segment(
 
 def read_segment(path: str | Path, model: Surfels) -> Tensor:
     """Return the mask [N] bool of a segment, on the model's device."""
-    tensors = _read(Path(path))
-    mask, anchors, expected = tensors["mask"], tensors["anchors"], _anchors(model)
+    _, tensors = read_tensor_file(Path(path), FORMAT, VERSION)
+    mask, anchors, expected = tensors.get("mask"), tensors.get("anchors"), _anchors(model)
+    is_mask = mask is not None and mask.dtype == torch.bool and mask.ndim == 1
+    if mask is None or anchors is None or not is_mask or bool((mask.view(torch.uint8) > 1).any()):
+        raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(tensors)}; make it again")
     # A model without surfels has no places; segments of it are empty, and refused when they are written.
     extent = float((expected.amax(0) - expected.amin(0)).max()) if len(expected) else 0.0
     belongs = len(mask) == len(model) and anchors.shape == expected.shape
@@ -61,12 +60,3 @@ def _anchors(model: Surfels) -> Tensor:
     """Return the means [A, 3] of surfels spread over the list."""
     means = model.parameters["means"].detach().cpu()
     return means[torch.linspace(0, max(len(means) - 1, 0), min(ANCHORS, len(means))).long()].contiguous()
-
-
-def _read(path: Path) -> dict[str, Tensor]:
-    _, tensors = read_tensor_file(path, FORMAT, VERSION)
-    mask, anchors = tensors.get("mask"), tensors.get("anchors")
-    is_whole = mask is not None and anchors is not None and mask.dtype == torch.bool and mask.ndim == 1
-    if not is_whole or bool((mask.view(torch.uint8) > 1).any()):  # type: ignore[union-attr]
-        raise ArgumentError(f"{path}: expected a mask and anchors, got {', '.join(tensors)}; make it again")
-    return tensors

@@ -23,9 +23,10 @@ from texgs.fields.part_edit import PartEdit, color, require_possible
 from texgs.scene.frame import Mode, frame
 from texgs.scene.parts import entry_of, key_path, replaced, require_new, split, with_textures
 from texgs.scene.scene import WHITE, Scene, SceneSegment
-from texgs.scene.scene_file import EDITS, known, read_scene, write_scene
+from texgs.scene.scene_file import EDITS, known, light_of, read_scene, write_scene
 from texgs.scene.segment_file import read_segment, write_segment
 
+SCENE_KEYS = {"light": "headlight", "background": WHITE}  # what is edited of a whole scene, and without edits
 KEPT = 3  # compositions of files as they are: pages may show others in turn, as before an edit and after it
 
 
@@ -33,7 +34,8 @@ class Session:
     """A scene and its history. Parts have the names MODEL and MODEL/SEGMENT.
 
     What is edited by numbers (colours, opacities, light) costs nothing but the next frame: files are read
-    again only where a change brings others. A change that cannot be made leaves the scene as it is.
+    again only where a change brings others. A change that cannot be made is an ArgumentError or a ShapeError
+    that names the part, and leaves the scene as it is.
 
     Args:
         scene: to begin with.
@@ -47,37 +49,28 @@ class Session:
 
     @classmethod
     def open(cls, path: str | Path, device: torch.device | str = "cpu") -> Session:
-        """Return a session that begins with a scene file; its models are read when a frame needs them.
-
-        Raises:
-            ArgumentError: if it is no scene file.
-        """
+        """Return a session that begins with a scene file; its models are read when a frame needs them."""
         return cls(read_scene(path), device)
 
     @property
     def scene(self) -> Scene:
-        """The scene as it is now."""
+        """Return the scene as it is now."""
         return self._past[-1][0]
 
     @property
     def past(self) -> list[str]:
-        """Titles of the steps that were made, the oldest first; see `name_step`."""
+        """Return the titles of the steps that were made, the oldest first; see `name_step`."""
         return [title for _, title in self._past[1:]]
 
     @property
     def future(self) -> list[str]:
-        """Titles of the steps that were taken back, the latest first."""
+        """Return the titles of the steps that were taken back, the latest first."""
         return [title for _, title in reversed(self._future)]
 
     # ---- Changes ------------------------------------------------------------
 
     def set(self, part: str, key: str, value: Any) -> None:
-        """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material.
-
-        Raises:
-            ArgumentError: if there is no such part or key, the value is out of range, or the model's kind of
-                field cannot show it.
-        """
+        """Set a value of a part's edit: `visible`, `palette`, `opacity`, or a factor of the material."""
         entry = entry_of(self.scene, part)
         known({key: value}, EDITS, key_path(part))
         kind = kind_of(self.scene.models[split(self.scene, part)[0]].file)
@@ -89,37 +82,20 @@ class Session:
         self._push(replaced(self.scene, part, replace(entry, edit=edit)))
 
     def reset(self, part: str, key: str) -> None:
-        """Take a value of a part's edit back.
-
-        Raises:
-            ArgumentError: if there is no such part or key.
-        """
+        """Take a value of a part's edit back."""
         self.set(part, key, getattr(PartEdit(), key, None))
 
     def set_texture(self, part: str, file: Path | None) -> None:
-        """Give a part the texels of a texture file; None: those that it was fitted with.
-
-        Raises:
-            ArgumentError, ShapeError: if there is no such part, or the file is not one of its model.
-        """
+        """Give a part the texels of a texture file; None: those that it was fitted with."""
         self.set_textures({part: file})
 
     def set_textures(self, files: Mapping[str, Path | None], own_colors: bool = False) -> None:
-        """Give several parts other texels in one step; see `set_texture`, and `with_textures` for palettes.
-
-        Raises:
-            ArgumentError, ShapeError: as `set_texture`; no part has another texture then.
-        """
-        self._push_read(
-            with_textures(self.scene, files, own_colors), {split(self.scene, part)[0] for part in files}
-        )
+        """Give several parts other texels in one step; see `with_textures` for palettes."""
+        models = {split(self.scene, part)[0] for part in files}
+        self._push_read(with_textures(self.scene, files, own_colors), models)
 
     def set_file(self, part: str, file: Path) -> None:
-        """Put another file in the place of a model or a segment.
-
-        Raises:
-            ArgumentError, ShapeError: if there is no such part, or the file is not one for it.
-        """
+        """Put another file in the place of a model or a segment."""
         scene = replaced(self.scene, part, replace(entry_of(self.scene, part), file=file))
         self._push_read(scene, {split(self.scene, part)[0]})
 
@@ -128,22 +104,18 @@ class Session:
         self._push(replace(self.scene, light=light))
 
     def set_background(self, value: object = WHITE) -> None:
-        """Put another colour behind the scene.
-
-        Raises:
-            ArgumentError: if it is no colour.
-        """
+        """Put another colour behind the scene."""
         self._push(replace(self.scene, background=color("background", value)))
 
+    def set_of_scene(self, key: str, value: Any) -> None:
+        """Set the light or the background, as a scene file has it; see `SCENE_KEYS`."""
+        known({key: value}, SCENE_KEYS, "the scene")
+        self.set_light(light_of(value)) if key == "light" else self.set_background(value)
+
     def add_segment(self, part: str, file: Path) -> None:
-        """Make surfels of a model a part of their own, which looks as the rest of the model does.
+        """Make surfels of a model, those of a file of `write_segment`, a part of their own.
 
-        Args:
-            part: MODEL/SEGMENT, a new name or one whose surfels change.
-            file: of the segment, see `write_segment`.
-
-        Raises:
-            ArgumentError, ShapeError: if there is no such model, or the file is not one of it.
+        It looks as the rest of the model does. A part that is there gets other surfels.
         """
         model, name = split(self.scene, part)
         entry = self.scene.models[model]
@@ -154,15 +126,13 @@ class Session:
     def make_segment(self, part: str, mask: Tensor, file: Path, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it.
 
+        A file that is there is replaced, unless this scene or an earlier one has it: undo brings these back.
+
         Args:
             part: MODEL/SEGMENT, a new name.
-            mask: [N] bool, surfels of the model.
-            file: target, replaced unless this scene or an earlier one has it: undo brings these back.
+            mask: [N] bool, surfels of the model, of which earlier segments have not all.
+            file: target.
             facts: what the segment comes from, JSON.
-
-        Raises:
-            ArgumentError: if it is there already, earlier segments have all of its surfels, or the file is
-                one of the history's.
         """
         require_new(self.scene, part)
         if file.resolve() in {each.resolve() for scene, _ in self._past for each in files_of(scene) if each}:
@@ -184,19 +154,11 @@ class Session:
         self.add_segment(part, file)
 
     def remove_segment(self, part: str) -> None:
-        """Give the surfels of a segment back to their model.
-
-        Raises:
-            ArgumentError: if there is no such segment.
-        """
+        """Give the surfels of a segment back to their model."""
         self._push(replaced(self.scene, part, None))
 
     def rename_segment(self, part: str, name: str) -> None:
-        """Give a segment another name; it keeps its place among those of its model.
-
-        Raises:
-            ArgumentError: if there is no such segment, or it cannot have the name.
-        """
+        """Give a segment another name; it keeps its place among those of its model."""
         model, segment = split(self.scene, part)
         if segment is None:
             raise ArgumentError(f"expected a segment to rename, got the model {part}")
@@ -215,14 +177,14 @@ class Session:
         self._past[-1] = (self.scene, title)
 
     def undo(self) -> bool:
-        """Take the latest change back; whether there was one."""
+        """Take the latest change back; return whether there was one."""
         if len(self._past) == 1:
             return False
         self._future.append(self._past.pop())
         return True
 
     def redo(self) -> bool:
-        """Make again what was undone last; whether there was anything."""
+        """Make again what was undone last; return whether there was anything."""
         if not self._future:
             return False
         self._past.append(self._future.pop())
@@ -232,11 +194,7 @@ class Session:
 
     @property
     def composition(self) -> Composed:
-        """The models of the scene, joined; kept as long as their files are the same.
-
-        Raises:
-            ArgumentError, ShapeError: naming the model and its file.
-        """
+        """Return the models of the scene, joined; kept as long as their files are the same."""
         return self._composition_of(self.scene)
 
     def frame(self, camera: Camera, mode: Mode = "shaded", scene: Scene | None = None) -> np.ndarray:
@@ -254,14 +212,11 @@ class Session:
         return frame(composition, camera, scene.light, scene.edits, mode, scene.background)
 
     def save(self, path: str | Path) -> Path:
-        """Write the scene file in one step; files in it are relative to its folder.
-
-        Raises:
-            ArgumentError: if it cannot be written.
-        """
+        """Write the scene file in one step; files in it are relative to its folder."""
         return write_scene(path, self.scene)
 
     def _composition_of(self, scene: Scene) -> Composed:
+        """Return the models of a scene, joined, as long as their files are the same."""
         states: list[object] = [state_of(file) for file in files_of(scene)]
         for each, composition in tuple(self._opened):  # another thread may put another one there
             if each == states:
@@ -282,6 +237,7 @@ class Session:
         self._push(scene)
 
     def _push(self, scene: Scene) -> None:
+        """Add a scene; what was undone is gone."""
         self._past.append((scene, ""))
         self._future.clear()
 

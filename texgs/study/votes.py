@@ -98,8 +98,8 @@ def counted(votes: Votes) -> dict[str, list[Panel]]:
 
 def published() -> dict[str, list[Panel]]:
     """Return the paper's votes, by what its methods follow."""
-    keys, counted = ({name: name for name in names} for names in (("dataset", "method"), PUBLISHED))
-    votes = paper("user_study", keys, counted)
+    keys, numbers = ({name: name for name in names} for names in (("dataset", "method"), PUBLISHED))
+    votes = paper("user_study", keys, numbers)
     panels: dict[str, list[Panel]] = {follows: [] for follows in METHODS}
     for follows, table in METHODS.items():
         known = set(paper(table, {"method": "method"}, {})["method"])

@@ -31,14 +31,7 @@ MARGIN = 1.1  # of the first view around the bounds
 def describe(
     name: str, scene: Scene, composed: Composed, bounds: tuple[list[float], float] | None = None
 ) -> dict[str, Any]:
-    """Return a scene as a page needs it.
-
-    Args:
-        name: of the scene, to show.
-        scene: with its edits.
-        composed: its models.
-        bounds: of these, as `bounds_of` has them; by default they are computed, which takes a while.
-    """
+    """Return a scene as a page needs it; bounds, as of `bounds_of`, take a while where they are not given."""
     kind = kind_of(next(iter(scene.models.values())).file)
     segments = ["segments"] if "segments" in kind.can else []
     keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
@@ -78,7 +71,7 @@ def describe_model(
 
 
 def abilities(keys: list[str], has_palette: bool) -> list[str]:
-    """What can be edited of a model; only one with a palette has a texture, which can get a new look."""
+    """Return what can be edited of a model; only one with a palette has a texture, which gets new looks."""
     return [*keys, "look"] if has_palette else [key for key in keys if key != "palette"]
 
 
@@ -95,7 +88,7 @@ def modes_of(kind: Kind) -> list[str]:
 
 
 def has_palette(composed: Composed) -> list[bool]:
-    """Of each model, whether it has a palette that can be replaced: surfels without texture have none."""
+    """Return of each model whether its palette can be replaced: surfels without texture have none."""
     if isinstance(composed, Composition):
         return [part.palette is not None for part in composed.parts]
     return [False] * len(composed.palettes)

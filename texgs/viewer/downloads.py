@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,10 +14,9 @@ from texgs.core.movie import write_frames
 from texgs.core.progress import progress
 from texgs.fields.files import kind_of
 from texgs.fields.kinds import Kind
-from texgs.scene import export_file
+from texgs.scene import export
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
-from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.messages import Export, View
 from texgs.viewer.standalone import write_page
 
@@ -27,37 +25,14 @@ FRAMES = 72  # of a turntable, as `texgs render` has it
 
 
 class Downloads:
-    """Writes files into a folder of its own, which is removed in the end.
+    """Writes files into a folder of its own, which is removed in the end."""
 
-    Args:
-        jobs: where that is done.
-        frames: renders.
-    """
-
-    def __init__(self, jobs: Jobs, frames: Frames) -> None:
-        self._jobs, self._frames = jobs, frames
+    def __init__(self, frames: Frames) -> None:
+        self._frames = frames
         self._folder = TemporaryDirectory(prefix="texgs-files-")
 
-    async def write(self, scene: Scene, asked: Export, name: str, watch: Watch) -> Path:
-        """Return the file.
-
-        Args:
-            scene: as it is shown.
-            asked: what to write.
-            name: of the file, without its ending.
-            watch: of the job.
-        """
-        return await self._jobs.run(partial(self._write, scene, asked, name), watch)
-
-    def file(self, name: str) -> Path | None:
-        """Return a file that was written, if there is one of this name."""
-        return next((path for path in Path(self._folder.name).iterdir() if path.name == name), None)
-
-    def close(self) -> None:
-        """Remove all files."""
-        self._folder.cleanup()
-
-    def _write(self, scene: Scene, asked: Export, name: str) -> Path:
+    def write(self, scene: Scene, asked: Export, name: str) -> Path:
+        """Return the file of a scene as it is shown; the name is without its ending."""
         require_kind(scene, asked.kind)
         ending = asked.kind if asked.kind in (*FILMS, "html") else "ply"
         stem = f"{name}-{asked.kind}" if ending == "ply" else name  # there are several kinds of these
@@ -66,7 +41,15 @@ class Downloads:
             return write_frames(path, self._turntable(scene, asked.view))
         if asked.kind == "html":
             return write_page(path, scene, name).path
-        return export_file.export_scene(path, scene, export_file.Export(asked.kind))
+        return export.export_scene(path, scene, export.Export(asked.kind))
+
+    def file(self, name: str) -> Path | None:
+        """Return a file that was written, if there is one of this name."""
+        return next((path for path in Path(self._folder.name).iterdir() if path.name == name), None)
+
+    def close(self) -> None:
+        """Remove all files."""
+        self._folder.cleanup()
 
     def _turntable(self, scene: Scene, view: View) -> Iterator[np.ndarray]:
         """Yield frames of a turn around what the camera looks at, from where it is."""
@@ -77,7 +60,7 @@ class Downloads:
 
 def exports_of(kind: Kind) -> list[str]:
     """Return what scenes of a kind of field can be written as."""
-    return [*FILMS, *(export for export in kind.exports if export not in export_file.OF_MODELS)]
+    return [*FILMS, *(name for name in kind.exports if name not in export.OF_MODELS)]
 
 
 def require_kind(scene: Scene, kind: str) -> None:

@@ -48,12 +48,7 @@ class Pace:
 
 
 class Frames:
-    """Renders scenes of a session in one thread, in the order they are asked for.
-
-    Args:
-        session: that the scenes belong to; its models are read by the thread.
-        origins: whose views are shown.
-    """
+    """Renders scenes of a session, or their views, in one thread, in the order they are asked for."""
 
     def __init__(self, session: Session, origins: Origins) -> None:
         self._session, self._origins = session, origins
@@ -62,13 +57,25 @@ class Frames:
 
     async def frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
         """Return a header and a JPEG picture, see `packed`."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, self._frame, view, scene, pace)
+
+        def work() -> bytes:
+            scale, start = pace.scale(view.moving), time.perf_counter()
+            pixels = self.pixels(view, scene, scale)
+            seconds = time.perf_counter() - start
+            pace.took(seconds, scale)
+            return packed(view, pixels, seconds)
+
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     async def still(self, view: View, scene: Scene) -> bytes:
         """Return a PNG file with the pixels that `texgs render` writes."""
-        loop = asyncio.get_running_loop()
-        return await loop.run_in_executor(self._thread, self._still, view, scene)
+
+        def work() -> bytes:
+            file = io.BytesIO()
+            Image.fromarray(self.pixels(view, scene)).save(file, format="PNG")
+            return file.getvalue()
+
+        return await asyncio.get_running_loop().run_in_executor(self._thread, work)
 
     def pixels(self, view: View, scene: Scene, scale: float = 1.0) -> np.ndarray:
         """Return what a view shows [H, W, 3], uint8, with sides of this part of the pixels."""
@@ -80,27 +87,9 @@ class Frames:
         """End the thread, once the frame that it renders is there."""
         self._thread.shutdown(wait=True, cancel_futures=True)
 
-    def _frame(self, view: View, scene: Scene, pace: Pace) -> bytes:
-        scale, start = pace.scale(view.moving), time.perf_counter()
-        pixels = self.pixels(view, scene, scale)
-        seconds = time.perf_counter() - start
-        pace.took(seconds, scale)
-        return packed(view, pixels, seconds)
-
-    def _still(self, view: View, scene: Scene) -> bytes:
-        file = io.BytesIO()
-        Image.fromarray(self.pixels(view, scene)).save(file, format="PNG")
-        return file.getvalue()
-
 
 def packed(view: View, pixels: np.ndarray, seconds: float) -> bytes:
-    """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture.
-
-    Args:
-        view: that the frame answers.
-        pixels: [H, W, 3] uint8.
-        seconds: that it took to render.
-    """
+    """Return the length of a header (4 bytes, little-endian), the header (JSON), a JPEG picture."""
     quality, sampling = MOVING if view.moving else STILL
     options = [cv2.IMWRITE_JPEG_QUALITY, quality, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, sampling]
     _, picture = cv2.imencode(".jpg", cv2.cvtColor(pixels, cv2.COLOR_RGB2BGR), options)

@@ -32,14 +32,11 @@ HEADERS = {
 
 
 def guard(token: str, host: str) -> Middleware:
-    """A middleware that answers 403 to whatever has not this token, a host of ours, and our own origin.
+    """Return a middleware that answers 403 to all without this token, a host of ours, and our own origin.
 
-    A site that makes its name point to this machine has neither the host nor the origin; a page of another
-    site that opens a socket has not the origin.
-
-    Args:
-        token: first part of every path.
-        host: that the server listens on.
+    The token is the first part of every path, and the host what the server listens on. A site that makes its
+    name point to this machine has neither the host nor the origin; a page of another site that opens a socket
+    has not the origin.
     """
     names = (host.lower(), socket.gethostname().lower(), socket.getfqdn().lower())  # a resolver may be slow
 
@@ -80,7 +77,7 @@ def is_own_host(header: str, host: str, names: Collection[str]) -> bool:
 
 
 def is_own_origin(origin: str | None, header: str, required: bool) -> bool:
-    """Whether a request comes from a page of this server; browsers send no origin with simple requests."""
+    """Return whether a page of this server asks; browsers send no origin with simple requests."""
     if origin is None:
         return not required
     try:
@@ -95,7 +92,7 @@ def is_socket(request: web.Request) -> bool:
 
 
 def hostname(address: str) -> str | None:
-    """Return Lower-case name in an address; None where there is none."""
+    """Return the lower-case name in an address; None where there is none."""
     try:
         return urlsplit(address).hostname
     except ValueError:

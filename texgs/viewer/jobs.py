@@ -22,7 +22,7 @@ class Stopped(TexgsError):
 
 
 def ignore(title: str, done: float) -> None:
-    """Tell nobody."""
+    """Do nothing: nobody watches."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +41,7 @@ class Jobs:
         self._thread = ThreadPoolExecutor(1, "job", torch.set_num_threads, (half,))
 
     async def run(self, work: Callable[[], T], watch: Watch) -> T:
-        """Return what the work returns.
-
-        Args:
-            work: to do in the thread.
-            watch: is told in this thread about the loops in it; see `texgs.core.progress`.
-        """
+        """Return what work returns; who watches it is told in this thread about the loops in the other."""
         loop = asyncio.get_running_loop()
 
         def step(title: str, done: int, total: int | None) -> None:

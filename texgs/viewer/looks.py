@@ -1,35 +1,39 @@
-"""New looks for parts of a scene, from a picture or an instruction: the methods `image` and `text`."""
+"""New looks for parts of a scene, from a picture or an instruction, and the pictures to choose from."""
 
 from __future__ import annotations
 
+import io
 from collections import Counter
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache
 from pathlib import Path
 from shutil import rmtree
 from tempfile import TemporaryDirectory
+from threading import Lock
 from time import monotonic
 from typing import Any
 
+import numpy as np
 import torch
+from PIL import Image
 
 from texgs.config.edit import Edit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed
 from texgs.core.lens import Lens
-from texgs.core.names import part_file
+from texgs.core.names import file_name, part_file
 from texgs.edit.method import method_of
+from texgs.edit.pictures import PICTURES, picture
+from texgs.edit.style_picture import read_style
 from texgs.edit.task import EditedScene, Task
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.variants import write_texture
 from texgs.models.weights import available
 from texgs.scene.scene import Scene
-from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.messages import Look
-from texgs.viewer.styles import Styles
 from texgs.volume.cameras import icosphere_of
 from texgs.volume.view_set import View
 
@@ -37,6 +41,9 @@ LENS = Lens().square(400)  # of the views that parts learn from
 VIEWS = 92
 BETWEEN = 2.0  # seconds between textures on their way that are shown
 KEPT = 20  # of those of each part, and of previews: frames may be on their way
+LARGEST = 32 * 2**20  # bytes of a picture that a page sends
+MOST = 50  # such pictures
+THUMBNAIL = 96  # pixels of a side
 # The first is taken whose weights are on this machine.
 FULL = ("default", "patches")  # recipes for pictures
 GUIDANCE = ("instruct_pix2pix", "filters")  # what edits views by an instruction
@@ -50,17 +57,56 @@ class OrbitTask(Task[Any]):
         return [View(camera, Path(), self.scene.light) for camera in icosphere_of(VIEWS, LENS)]
 
 
+class Styles:
+    """Pictures by name: those that texgs has, and files that pages send, kept as long as this is."""
+
+    def __init__(self) -> None:
+        self._folder = TemporaryDirectory(prefix="texgs-styles-")
+        self._files: dict[str, Path] = {}
+        self._adding = Lock()  # pages may send several at once
+
+    def add(self, name: str, content: bytes) -> str:
+        """Take in a file, with the name that its author gave it; return the name that it has from then on."""
+        with self._adding:
+            if len(self._files) >= MOST:
+                raise ArgumentError(f"style: expected at most {MOST} pictures, got another one; start again")
+            known = f"{len(self._files) + 1} {file_name('style', name)}"
+            path = Path(self._folder.name, known)
+            path.write_bytes(content)
+            try:
+                read_style(path)
+            except ArgumentError as error:
+                path.unlink()
+                raise ArgumentError(str(error).replace(str(path), name)) from error
+            self._files[known] = path
+            return known
+
+    def source(self, name: str) -> str:
+        """Return what `edit.image.style` is for a picture."""
+        if name not in PICTURES and name not in self._files:
+            raise ArgumentError(f"style: expected one of {', '.join(PICTURES)}, or a file; got {name!r:.100}")
+        return str(self._files.get(name, name))
+
+    def close(self) -> None:
+        """Remove the files."""
+        self._folder.cleanup()
+
+
+@lru_cache
+def thumbnail(name: str) -> bytes:
+    """Return a small view of a picture that texgs has, as JPEG."""
+    pixels = picture(name, 4 * THUMBNAIL).permute(1, 2, 0).numpy()
+    file = io.BytesIO()
+    shown = Image.fromarray((255 * pixels).round().astype(np.uint8)).resize((THUMBNAIL, THUMBNAIL))
+    shown.save(file, "JPEG", quality=85)
+    return file.getvalue()
+
+
 class Looks:
-    """Gives parts of a scene new textures.
+    """Gives parts of a scene new textures."""
 
-    Args:
-        jobs: where that is done.
-        styles: pictures to choose from.
-        device: that works.
-    """
-
-    def __init__(self, jobs: Jobs, styles: Styles, device: torch.device | str = "cpu") -> None:
-        self._jobs, self._styles, self._device = jobs, styles, torch.device(device)
+    def __init__(self, styles: Styles, device: torch.device | str = "cpu") -> None:
+        self._styles, self._device = styles, torch.device(device)
         self._folder = TemporaryDirectory(prefix="texgs-looks-")
         self._scratch = ScratchFolders(Path(self._folder.name))
 
@@ -75,46 +121,20 @@ class Looks:
         else:
             said = asked.instruction
             choices = [{"text": {"instruction": said, "guidance": guidance}} for guidance in GUIDANCE]
-        *others, last = (self._typed(asked, choice) for choice in choices)
+        *others, last = (edit_with(asked.parts, choice) for choice in choices)
         edit = next((each for each in others if has_weights(each)), last)
         method_of(edit).check(method_of(edit).of(edit))
         return edit
 
-    async def make(
-        self,
-        scene: Scene,
-        edit: Any,
-        output: Path,
-        watch: Watch,
-        show: Callable[[str, Path], None],
-    ) -> EditedScene:
-        """The scene with new textures, written to a folder, which must not be there; what it showed is gone.
+    def make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
+        """Return the scene with new textures, written to a folder, which must not be there.
 
         Args:
             scene: as it is before.
             edit: see `edit_of`.
             output: folder.
-            watch: of the job.
-            show: is called in the job's thread with a part and the file of its texture on its way.
+            show: is called with a part and the file of its texture on its way, which is gone in the end.
         """
-        return await self._jobs.run(partial(self._make, scene, edit, output, show), watch)
-
-    def preview_folder(self, page: int, parts: Sequence[str]) -> Path:
-        """A new folder for a preview; removed when a page has many of the same parts, and in the end."""
-        return self._scratch.new(f"preview-{page}-{digest(repr(parts))}")
-
-    def close(self) -> None:
-        """Remove what was not kept."""
-        self._folder.cleanup()
-
-    def _typed(self, asked: Look, choice: dict[str, Any]) -> Any:
-        (method,) = choice
-        edit = typed(Edit, {"name": method, "method": method})
-        # What a page has written is taken as it is: a configuration would look for references in it.
-        chosen = replace(getattr(edit, method), **choice[method])
-        return replace(edit, parts=list(asked.parts), **{method: chosen})
-
-    def _make(self, scene: Scene, edit: Any, output: Path, show: Callable[[str, Path], None]) -> EditedScene:
         method = method_of(edit)
         settings, preview = method.of(edit), ThrottledPreview(show, self._scratch)
         task = OrbitTask(settings, edit, scene, {}, output, self._device, 1, LENS, "look", show=preview)
@@ -134,13 +154,17 @@ class Looks:
                     output.parent.rmdir()
             raise
 
+    def preview_folder(self, page: int, parts: Sequence[str]) -> Path:
+        """Return a folder for a preview; removed when a page has many of the same parts, or in the end."""
+        return self._scratch.new(f"preview-{page}-{digest(repr(parts))}")
+
+    def close(self) -> None:
+        """Remove what was not kept."""
+        self._folder.cleanup()
+
 
 class ScratchFolders:
-    """Folders with files that frames may be reading: when there are many of a kind, the oldest is removed.
-
-    Args:
-        parent: folder that they are in.
-    """
+    """Folders with files that frames may be reading: when there are many of a kind, the oldest is removed."""
 
     def __init__(self, parent: Path) -> None:
         self._parent, self._counts = parent, Counter[str]()
@@ -153,12 +177,7 @@ class ScratchFolders:
 
 
 class ThrottledPreview:
-    """Parts on their way, of which some are written and shown.
-
-    Args:
-        show: is called with a part and the file of its texture.
-        folders: for these files.
-    """
+    """Parts on their way, of which some are written and shown."""
 
     def __init__(self, show: Callable[[str, Path], None], folders: ScratchFolders) -> None:
         self._show, self._folders, self._latest = show, folders, monotonic()
@@ -170,6 +189,15 @@ class ThrottledPreview:
         name = part_file("look", part)
         self._show(part, write_texture(self._folders.new(Path(name).stem) / name, model()))
         self._latest = monotonic()
+
+
+def edit_with(parts: Sequence[str], choice: dict[str, Any]) -> Any:
+    """Return the edit of parts by a method and the values of its settings."""
+    ((method, values),) = choice.items()
+    edit = typed(Edit, {"name": method, "method": method})
+    # What a page has written is taken as it is: a configuration would look for references in it.
+    chosen = replace(getattr(edit, method), **values)
+    return replace(edit, parts=list(parts), **{method: chosen})
 
 
 def has_weights(edit: Any) -> bool:

@@ -75,7 +75,7 @@ class Edit:
 
     @property
     def title(self) -> str:
-        """What the list of steps calls it, once it has been made."""
+        """Return what the list of steps calls it, once it has been made."""
         return f"{self.part} {self.key} {title_of_value(self.value)}".strip()
 
 
@@ -142,7 +142,7 @@ class Look:
 class Export:
     """Write a file for the page to save."""
 
-    kind: str  # mp4 or gif, a turntable; html; or as `texgs.scene.export_file.Export` has it
+    kind: str  # mp4 or gif, a turntable; html; or as `texgs.scene.export.Export` has it
     view: View  # that a turntable begins with
     type: Literal["export"] = tag("export")
 
@@ -155,6 +155,11 @@ class Rename:
     name: str  # of the segment
     type: Literal["rename"] = tag("rename")
 
+    @property
+    def title(self) -> str:
+        """Return what the list of steps calls it."""
+        return f"{self.part} renamed to {self.name}"
+
 
 @dataclass(frozen=True, config=STRICT)
 class Remove:
@@ -162,6 +167,11 @@ class Remove:
 
     part: str  # MODEL/SEGMENT
     type: Literal["remove"] = tag("remove")
+
+    @property
+    def title(self) -> str:
+        """Return what the list of steps calls it."""
+        return f"{self.part} removed"
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -32,7 +32,7 @@ SAME = 1e-3  # by which elements of two cameras may differ
 
 
 def find_upwards(file: Path, name: str) -> Path | None:
-    """The nearest file of this name that goes with a model: relative to its folder or one of those above."""
+    """Return the nearest file of this name relative to the folder of a model or one of those above."""
     folders = file.resolve().parents[:NEAR]
     return next((folder / name for folder in folders if (folder / name).is_file()), None)
 
@@ -46,12 +46,12 @@ class Origin:
 
     @cached_property
     def images(self) -> list[Image]:
-        """Its training views."""
+        """Return its training views."""
         return read_views(self.file.parent).train
 
     @cached_property
     def transfer(self) -> dict[str, Any] | None:
-        """Opacities [[value, opacity], ...] and mean colour of its transfer function, if they are known."""
+        """Return opacities [[value, opacity], ...] and mean colour of its transfer function, if known."""
         tf = read_json(self.file).get("tf")
         if not isinstance(tf, dict) or not is_table(tf.get("opacity"), 2) or not is_table(tf.get("color"), 4):
             return None
@@ -80,19 +80,13 @@ class Origins:
 
     @property
     def modes(self) -> list[str]:
-        """What else can be shown, where views are there."""
+        """Return what else can be shown, where views are there."""
         return list(OF_VIEWS) if self._origins else []
 
     def frame(self, view: View, scene: Scene, scale: float) -> np.ndarray:
         """Return the training view that is nearest to a camera, or by how much the scene differs from it.
 
-        Args:
-            view: in one of the modes of views; its camera chooses.
-            scene: of which one model is visible.
-            scale: part of the sides of the frame.
-
-        Returns:
-            [H, W, 3] uint8, the view in the middle.
+        One model of the scene is visible. The view is in the middle [H, W, 3], uint8, of a frame of this scale.
         """
         camera = view.camera.camera(scale)
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]
@@ -110,7 +104,7 @@ class Origins:
 
     @cached_property
     def places(self) -> list[dict[str, Any]]:
-        """Training views as a page goes to them, those that look at the origin with +y up."""
+        """Return the training views as a page goes to them, those that look at the origin with +y up."""
         origin = next(iter(self._origins.values()), None)
         images = [] if origin is None else origin.images
         places = [(index, orbit_of(image.camera)) for index, image in enumerate(images)]
@@ -118,7 +112,7 @@ class Origins:
 
     @cached_property
     def transfer(self) -> dict[str, Any] | None:
-        """The histogram of the volume and the transfer functions of models, where both are known."""
+        """Return the histogram of the volume and the transfer functions of models, where both are known."""
         functions = [tf for each in self._origins.values() if (tf := each.transfer)]
         summary = summary_of(self._volume) if self._volume else {}
         low, high, counts = (summary.get(key) for key in ("minimum", "maximum", "histogram"))
@@ -168,7 +162,7 @@ def over(image: Image, background: tuple[float, float, float]) -> np.ndarray:
 
 
 def fitted(pixels: np.ndarray, width: int, height: int) -> np.ndarray:
-    """A picture [H, W, 3] in the middle of a frame, as large as it can be; its corner's colour around it."""
+    """Return a picture [H, W, 3] as large as it can be in a frame, its corner's colour around it."""
     scale = min(width / pixels.shape[1], height / pixels.shape[0])
     size = [max(1, round(scale * side)) for side in pixels.shape[1::-1]]
     small = cv2.resize(pixels, size, interpolation=cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR)

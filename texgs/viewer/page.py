@@ -8,7 +8,7 @@ import logging
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aiohttp import web
 
@@ -17,34 +17,23 @@ from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
 from texgs.viewer.jobs import Stopped
 from texgs.viewer.messages import Mask, View
-from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
+
+if TYPE_CHECKING:
+    from texgs.viewer.work import Work
 
 log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # that wait for a page which does not listen
 
 
 class Page:
-    """What waits to be sent to a page; of views and scenes only the newest.
-
-    Args:
-        socket: to the page.
-        edits: that all pages share.
-        frames: renders.
-        segmenter: finds what clicks select.
-        number: no other page has had it.
-    """
+    """What waits to be sent to a page; of views and scenes only the newest. No two have the same number."""
 
     def __init__(
-        self,
-        socket: web.WebSocketResponse,
-        edits: SharedEdits,
-        frames: Frames,
-        segmenter: Segmenter,
-        number: int,
+        self, socket: web.WebSocketResponse, edits: SharedEdits, frames: Frames, work: Work, number: int
     ) -> None:
         self.number = number
-        self._socket, self._edits, self._frames, self._segmenter = socket, edits, frames, segmenter
+        self._socket, self._edits, self._frames, self._work = socket, edits, frames, work
         self._notices: deque[dict[str, Any]] = deque(maxlen=MOST_NOTICES)
         self._news: dict[str, dict[str, Any]] = {}  # by type, of each the newest
         self._view: View | None = None
@@ -103,6 +92,7 @@ class Page:
                 self._masking.cancel()
 
     async def _send_what_waits(self) -> None:
+        """Send notices, news and the frame; masks are found meanwhile."""
         while self._notices:
             await self._socket.send_str(json.dumps(self._notices.popleft()))
         news, self._news = self._news, {}
@@ -120,11 +110,13 @@ class Page:
         return self._edits.shown(view, self._trial)
 
     def _tell_newest(self, message: dict[str, Any]) -> None:
+        """Send a message in place of one of its type that waits."""
         self._news.pop(message["type"], None)  # the new one goes behind what others wait
         self._news[message["type"]] = {**message, "answered": self.answered}
         self._wake.set()
 
     async def _send_frame(self, view: View) -> None:
+        """Render a view and send it."""
         try:
             frame = await self._frames.frame(view, self.shown(view), self._pace)
         except Exception as error:  # whatever it is, the server goes on
@@ -135,7 +127,7 @@ class Page:
     async def _find_mask(self, mask: Mask) -> None:
         """Find what clicks select: it may have to wait for a job of another page, while frames go on."""
         try:
-            self._tell_newest(await self._segmenter.mask(self._edits.scene, mask))
+            self._tell_newest(await self._work.mask(mask))
         except Exception as error:  # whatever it is, the server goes on
             self.tell_error(error, mask=mask.id)
         self._wake.set()  # another may wait

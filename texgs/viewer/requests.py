@@ -11,9 +11,9 @@ from aiohttp import web
 from texgs.core.errors import TexgsError
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames
+from texgs.viewer.looks import thumbnail
 from texgs.viewer.messages import VIEWS, View, parse
 from texgs.viewer.shared_edits import SharedEdits
-from texgs.viewer.styles import thumbnail
 from texgs.viewer.work import Work
 
 WEB = Path(__file__).parent / "web"
@@ -21,14 +21,7 @@ SERVED = (".js", ".css", ".svg")
 
 
 class Requests:
-    """Handlers of plain requests.
-
-    Args:
-        edits: that all pages share.
-        frames: renders.
-        work: has the pictures of styles, and files that were written.
-        shown: what a view shows on the page of a number.
-    """
+    """Handlers of plain requests; `shown` is what a view shows on the page of a number."""
 
     def __init__(
         self, edits: SharedEdits, frames: Frames, work: Work, shown: Callable[[View, str], Scene]
@@ -65,14 +58,11 @@ class Requests:
             png = await self._frames.still(view, self._shown(view, request.query.get("page", "")))
         except TexgsError as error:
             raise web.HTTPBadRequest(text=str(error)) from error
-        return web.Response(
-            body=png,
-            content_type="image/png",
-            headers={"Content-Disposition": f'attachment; filename="{Path(self._edits.name).stem}.png"'},
-        )
+        saved = {"Content-Disposition": f'attachment; filename="{Path(self._edits.name).stem}.png"'}
+        return web.Response(body=png, content_type="image/png", headers=saved)
 
     async def style(self, request: web.Request) -> web.StreamResponse:
-        """Return a small view of a picture that texgs paints."""
+        """Return a small view of a picture that texgs has."""
         try:
             picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
         except TexgsError as error:
@@ -80,7 +70,7 @@ class Requests:
         return web.Response(body=picture, content_type="image/jpeg")
 
     async def new_style(self, request: web.Request) -> web.StreamResponse:
-        """Take in a picture of the page's user; the name that it has from then on."""
+        """Take in a picture of the page's user; return the name that it has from then on."""
         content = await request.read()
         try:
             name = await asyncio.to_thread(self._work.styles.add, request.query.get("name", ""), content)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 import io
+from contextlib import suppress
 from dataclasses import asdict, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from texgs.models.masks import MaskModel, mask_model
 from texgs.scene.parts import entry_of, split
 from texgs.scene.scene import Scene
 from texgs.scene.session import state_of
-from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.messages import Clicked, Mask, Segment
 from texgs.volume.cameras import icosphere_of
 
@@ -35,31 +34,26 @@ CHOICES = ("mobile_sam", "grabcut")  # the first whose weights are here
 
 
 class Segmenter:
-    """Finds what clicks select, in one view and in space.
+    """Finds what clicks select, in one view and in space."""
 
-    Args:
-        jobs: where that is done.
-        device: that models are on.
-    """
-
-    def __init__(self, jobs: Jobs, device: torch.device | str = "cpu") -> None:
-        self._jobs, self._device = jobs, torch.device(device)
+    def __init__(self, device: torch.device | str = "cpu") -> None:
+        self._device = torch.device(device)
         self._masks: MaskModel | None = None
         self._opened: tuple[list[object], Surfels] | None = None  # states of its files
 
-    async def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
+    def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
         """Return the mask of a view as a message with a PNG picture, which is transparent elsewhere."""
-        return await self._jobs.run(partial(self._mask, scene, asked), Watch())
+        model, clicks = self._model(scene, asked.model), self._clicks(asked)
+        prompts_at(model, clicks)
+        mask = ViewMasks(model, scene.light, self._mask_model()).mask(clicks)
+        return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
 
-    async def lift(self, scene: Scene, asked: Segment, watch: Watch) -> Lifted:
-        """Return the surfels that masks of many views agree on.
-
-        Args:
-            scene: whose light is in all views.
-            asked: a new name, and the clicks.
-            watch: of the job.
-        """
-        return await self._jobs.run(partial(self._lift, scene, asked), watch)
+    def lift(self, scene: Scene, asked: Segment) -> Lifted:
+        """Return the surfels that masks of many views agree on, which have the scene's light."""
+        model = self._model(scene, split(scene, asked.part)[0])
+        cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, LENS)]
+        clicks, masks, title = self._clicks(asked), self._mask_model(), f"segment {asked.part}"
+        return lift(model, clicks, cameras, masks, light=scene.light, title=title)
 
     def facts(self, asked: Segment) -> dict[str, Any]:
         """Return what a segment comes from, for its file."""
@@ -70,19 +64,8 @@ class Segmenter:
         }
         return {"camera": asdict(asked.camera), **points, "masks": name, "vote": "contribution"}
 
-    def _mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
-        model, clicks = self._model(scene, asked.model), self._clicks(asked)
-        prompts_at(model, clicks)
-        mask = ViewMasks(model, scene.light, self._mask_model()).mask(clicks)
-        return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
-
-    def _lift(self, scene: Scene, asked: Segment) -> Lifted:
-        model = self._model(scene, split(scene, asked.part)[0])
-        cameras = [camera.to(self._device) for camera in icosphere_of(VIEWS, LENS)]
-        clicks, masks, title = self._clicks(asked), self._mask_model(), f"segment {asked.part}"
-        return lift(model, clicks, cameras, masks, light=scene.light, title=title)
-
     def _clicks(self, clicked: Clicked) -> Clicks:
+        """Return the clicks of a page."""
         points = torch.tensor([point[:2] for point in clicked.points], device=self._device)
         positive = torch.tensor([point[2] for point in clicked.points], device=self._device)
         return Clicks(clicked.camera.camera().to(self._device), points, positive)
@@ -98,12 +81,10 @@ class Segmenter:
 
     def _mask_model(self) -> MaskModel:
         """Return MobileSAM where its weights are, else GrabCut, which has none."""
-        for choice in CHOICES if self._masks is None else ():
-            try:
-                self._masks = mask_model(choice, self._device)
-                break
-            except TexgsError:
-                continue
+        for choice in CHOICES:
+            if self._masks is None:
+                with suppress(TexgsError):
+                    self._masks = mask_model(choice, self._device)
         assert self._masks is not None, "GrabCut is always there"
         return self._masks
 

@@ -20,47 +20,21 @@ from texgs.viewer.description import bounds_of, describe
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
-from texgs.viewer.messages import (
-    LARGEST,
-    Cancel,
-    Edit,
-    Export,
-    Look,
-    Mask,
-    Message,
-    Redo,
-    Remove,
-    Rename,
-    Save,
-    Segment,
-    Undo,
-    View,
-    parse,
-)
-from texgs.viewer.opening import Opened
+from texgs.viewer.looks import LARGEST as LARGEST_FILE
+from texgs.viewer.messages import LARGEST, Cancel, Export, Look, Mask, Message, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
 from texgs.viewer.requests import Requests
-from texgs.viewer.shared_edits import SharedEdits
-from texgs.viewer.styles import LARGEST as LARGEST_FILE
+from texgs.viewer.shared_edits import Opened, SharedEdits
 from texgs.viewer.work import Work
 
-Change = Edit | Undo | Redo | Save | Rename | Remove
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
 
 
 class Server:
-    """What the handlers of requests share. The models of the scene are read at once.
-
-    Args:
-        opened: the scene, and where it is saved.
-        device: that frames are rendered on.
-
-    Raises:
-        ArgumentError, ShapeError: naming the model that cannot be read, and its file.
-    """
+    """What the handlers of requests share. The models of the scene are read at once."""
 
     def __init__(self, opened: Opened, device: torch.device | str = "cpu") -> None:
         session = Session(opened.scene, device)
@@ -78,20 +52,13 @@ class Server:
         self._run = secrets.token_hex(8)  # tells pages that they have met another server
 
     def application(self, token: str, host: str = "127.0.0.1") -> web.Application:
-        """Return the application to serve.
-
-        Args:
-            token: first part of every path.
-            host: that it listens on.
-        """
+        """Return the application to serve on a host; the token is the first part of every path."""
         app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_FILE)
         app.router.add_get(f"/{token}/socket", self.socket)
         app.router.add_routes(Requests(self.edits, self.frames, self.work, self._shown).routes(token))
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
         return app
-
-    # ---- Pages ----------------------------------------------------------------
 
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """Return one page: what it asks for is done until it is gone."""
@@ -104,7 +71,7 @@ class Server:
             await socket.close(code=WSCloseCode.TRY_AGAIN_LATER, message=why.encode())
             return socket
         self._count += 1
-        page = Page(socket, self.edits, self.frames, self.work.segmenter, self._count)
+        page = Page(socket, self.edits, self.frames, self.work, self._count)
         page.tell_scene({**self.greeting(), "page": page.number})
         self._pages[page] = socket
         sending = asyncio.create_task(page.send())
@@ -117,9 +84,8 @@ class Server:
             await asyncio.gather(sending, return_exceptions=True)
         return socket
 
-    # ---- Messages -----------------------------------------------------------
-
     async def _listen(self, socket: web.WebSocketResponse, page: Page) -> None:
+        """Answer the messages of a page until it is gone."""
         async for received in socket:
             try:
                 if received.type != WSMsgType.TEXT:
@@ -130,6 +96,7 @@ class Server:
                 page.tell_scene(self.scene_message())  # it shows what it has asked for already
 
     async def _answer(self, message: Message, page: Page) -> None:
+        """Do what a message asks for, or begin to."""
         if isinstance(message, View):
             page.show(message)
         elif isinstance(message, Mask):
@@ -147,26 +114,16 @@ class Server:
         else:
             try:
                 async with self._changing:
-                    await self._change(message, page)
+                    if isinstance(message, Save):
+                        await self._save(message, page)
+                    else:
+                        self.edits.change(message, page.number)
             finally:
                 page.answered += 1
             self._tell_all()
 
-    async def _change(self, message: Change, page: Page) -> None:
-        if isinstance(message, Save):
-            await self._save(message, page)
-        elif isinstance(message, Edit):
-            self.edits.edit(message, page.number)
-        elif isinstance(message, Rename):
-            self.edits.rename_segment(message.part, message.name)
-        elif isinstance(message, Remove):
-            self.edits.remove_segment(message.part)
-        elif isinstance(message, Undo):
-            self.edits.undo()
-        elif isinstance(message, Redo):
-            self.edits.redo()
-
     def _tell_all(self) -> None:
+        """Tell all pages what the scene is now."""
         news = self.scene_message()
         for each in self._pages:
             each.tell_scene(news)
@@ -200,15 +157,16 @@ class Server:
         return {**self.scene_message(), "scene": whole, **facts}
 
     def _describe(self, scene: Scene) -> dict[str, Any]:
+        """Return a scene of the same models as pages need it."""
         return describe(self._title, scene, self._composed, self._bounds)
 
-    # ---- End ----------------------------------------------------------------
-
     async def _say_goodbye(self, app: web.Application) -> None:
-        sockets = list(self._pages.values())
-        await asyncio.gather(*(each.close(code=WSCloseCode.GOING_AWAY) for each in sockets))
+        """Close all connections."""
+        closing = [each.close(code=WSCloseCode.GOING_AWAY) for each in self._pages.values()]
+        await asyncio.gather(*closing)
 
     async def _closing(self, app: web.Application) -> AsyncIterator[None]:
+        """End all threads after the last request."""
         yield
         if self.work.is_at_work:
             print("Waiting for what is being made to stop.", flush=True)

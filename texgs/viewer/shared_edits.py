@@ -1,8 +1,9 @@
-"""The one scene that all pages edit: steps with names, undo and redo, what is saved."""
+"""The one scene that all pages edit: what a viewer is started with, its steps, and where it is saved."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -10,24 +11,72 @@ from typing import Any
 from torch import Tensor
 
 from texgs.core.errors import ArgumentError
-from texgs.core.light import HEADLIGHT
-from texgs.core.names import SCENES, file_name, new_part_file
+from texgs.core.names import SCENES, file_name, label, new_part_file
 from texgs.scene.parts import part_names, with_textures
-from texgs.scene.scene import WHITE, Scene
-from texgs.scene.scene_file import known, light_of, write_scene
-from texgs.scene.session import Session, state_of
-from texgs.viewer.messages import Edit, View
-from texgs.viewer.opening import Opened, title_of
+from texgs.scene.scene import Scene, SceneModel
+from texgs.scene.scene_file import read_scene, write_scene
+from texgs.scene.session import SCENE_KEYS, Session, state_of
+from texgs.viewer.messages import Edit, Redo, Remove, Rename, Undo, View
 from texgs.viewer.segments import alone
+
+SCENE = "scene.yaml"  # as jobs write it
+OF_JOBS = "metrics.json"  # beside what a job wrote, and would write again
+MOST_LISTED = 5
+Change = Edit | Undo | Redo | Rename | Remove
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A scene, and where its edits are saved."""
+
+    scene: Scene
+    title: str
+    folder: Path
+    name: str  # that a scene file gets unless another one is chosen
+    file: Path | None = None  # of the scene, where edits may be written to it
+
+
+def open_scene(path: Path, folder: Path | None = None) -> Opened:
+    """Return the scene of a path.
+
+    A scene that a job wrote is saved under another name in the current folder: jobs do not replace a folder
+    that holds files of others.
+
+    Args:
+        path: scene.yaml, a folder with one of these in it or below, or a model file.
+        folder: for saving; by default that of the scene or the model, or the current one.
+    """
+    if path.is_dir():
+        path = _only_scene(path)
+    of_job = (path.parent / OF_JOBS).exists()
+    folder = folder or (Path.cwd() if of_job else path.parent)
+    if path.suffix in SCENES:
+        name, file = ("edited.yaml", None) if of_job and path.name == SCENE else (path.name, path)
+        return Opened(read_scene(path), title_of(path), folder, name, file)
+    if not path.is_file():
+        raise ArgumentError(f"{path}: no such scene, folder or model; texgs compose writes a scene")
+    scene = Scene({label(str(path), path.stem): SceneModel(path)})
+    return Opened(scene, title_of(path), folder, SCENE)
+
+
+def _only_scene(folder: Path) -> Path:
+    """Return the scene file in a folder or below."""
+    files = sorted(folder.rglob(SCENE))
+    if len(files) != 1:
+        some = ", ".join(str(each.relative_to(folder)) for each in files[:MOST_LISTED])
+        more = ", ..." if len(files) > MOST_LISTED else ""
+        got = f"{len(files)} ({some}{more}); name one of them" if files else "none; texgs compose writes one"
+        raise ArgumentError(f"{folder}: expected one scene.yaml in this folder or below, got {got}")
+    return files[0]
+
+
+def title_of(path: Path) -> str:
+    """Return enough of a path to know the scene by."""
+    return "/".join(path.resolve().parts[-4:])
 
 
 class SharedEdits:
-    """The scene that all pages edit, and where it is saved.
-
-    Args:
-        session: that is edited.
-        opened: what it began with, and where scene files are written to.
-    """
+    """The scene that all pages edit, and where it is saved."""
 
     def __init__(self, session: Session, opened: Opened) -> None:
         self._session, self._folder = session, opened.folder
@@ -39,15 +88,18 @@ class SharedEdits:
 
     @property
     def scene(self) -> Scene:
-        """As it is now."""
+        """Return the scene as it is now."""
         return self._session.scene
 
-    def shown(self, view: View, trial: Mapping[str, Path | None] | None = None) -> Scene:
-        """Return what a view shows.
+    @property
+    def is_saved(self) -> bool:
+        """Return whether a file holds the scene as it is now."""
+        return self.scene == self._saved
 
-        Args:
-            view: of the scene, as it was opened, or of one model alone.
-            trial: textures that parts have in the scene as it is now, as far as there are such parts.
+    def shown(self, view: View, trial: Mapping[str, Path | None] | None = None) -> Scene:
+        """Return what a view shows: the scene now, as it was opened, or one model alone.
+
+        The scene as it is now has the textures of a trial, as far as it has such parts.
         """
         if view.only:
             return alone(self.scene, view.only)
@@ -56,11 +108,6 @@ class SharedEdits:
         names, textures = part_names(self.scene), trial or {}
         tried = {part: textures[part] for part in names if part in textures}
         return with_textures(self.scene, tried, own_colors=True)
-
-    @property
-    def is_saved(self) -> bool:
-        """Whether a file holds the scene as it is now."""
-        return self.scene == self._saved
 
     def state(self) -> dict[str, Any]:
         """Return what pages show of the history, JSON."""
@@ -73,52 +120,42 @@ class SharedEdits:
             "title": self._title,
         }
 
-    def edit(self, edit: Edit, author: int) -> None:
+    def change(self, asked: Change, author: int) -> None:
         """Make a change; edits with the same number by the same author are one step."""
-        step = (author, edit.step, edit.part, edit.key) if edit.step else None
-        goes_on = step is not None and step == self._latest and self._session.undo()
-        try:
-            self._change(edit)
-        except Exception:
-            if goes_on:
-                self._session.redo()
-            raise
-        self._step(edit.title)
+        session, step, before = self._session, None, self.scene
+        if isinstance(asked, Undo):
+            session.undo()
+        elif isinstance(asked, Redo):
+            session.redo()
+        elif isinstance(asked, Rename):
+            session.rename_segment(asked.part, asked.name)
+        elif isinstance(asked, Remove):
+            session.remove_segment(asked.part)
+        else:
+            step = (author, asked.step, asked.part, asked.key) if asked.step else None
+            goes_on = step is not None and step == self._latest and session.undo()
+            try:
+                self._edit(asked)
+            except Exception:
+                if goes_on:
+                    session.redo()
+                raise
+        if not isinstance(asked, Undo | Redo) and self.scene is not before:
+            session.name_step(asked.title)
         self._latest = step
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:
         """Write the file of a new segment, and add it."""
         file = new_part_file("segment", self._folder, Path(self.name).stem, part)
         self._session.make_segment(part, mask, file, facts)
-        self._step(f"{part} new")
+        self._session.name_step(f"{part} new")
+        self._latest = None
 
     def give_textures(self, textures: Mapping[str, Path | None], look: str) -> None:
         """Give parts the textures of a new look, and back the palettes that these were made for."""
         self._session.set_textures(textures, own_colors=True)
-        self._step(f"{', '.join(textures)} {look}")
-
-    def rename_segment(self, part: str, name: str) -> None:
-        """Give a segment another name."""
-        before = self.scene
-        self._session.rename_segment(part, name)
-        if self.scene is before:
-            return
-        self._step(f"{part} renamed to {name}")
-
-    def remove_segment(self, part: str) -> None:
-        """Give the surfels of a segment back to its model; its file stays."""
-        self._session.remove_segment(part)
-        self._step(f"{part} removed")
-
-    def undo(self) -> None:
-        """Take the latest step back, if there is one."""
+        self._session.name_step(f"{', '.join(textures)} {look}")
         self._latest = None
-        self._session.undo()
-
-    def redo(self) -> None:
-        """Make again what was taken back last, if there is anything."""
-        self._latest = None
-        self._session.redo()
 
     def path_of(self, name: str) -> Path:
         """Return the scene file of a name in the folder for saving."""
@@ -139,23 +176,18 @@ class SharedEdits:
         self._own[path.resolve()] = state_of(path.resolve())
         return path
 
-    def _step(self, name: str) -> None:
-        self._session.name_step(name)
-        self._latest = None
-
     def new_folder(self, kind: str) -> Path:
         """Return a folder for the files of a new look that is not there yet."""
         stem = Path(self.name).stem
         folders = (self._folder / f"{stem}-{kind}-{number}" for number in count(1))
         return next(folder for folder in folders if not folder.exists())
 
-    def _change(self, edit: Edit) -> None:
+    def _edit(self, edit: Edit) -> None:
+        """Change one value of a part or of the scene."""
         session, value = self._session, edit.value
-        if edit.part:
-            session.reset(edit.part, edit.key) if value is None else session.set(edit.part, edit.key, value)
-            return
-        known({edit.key: value}, ("light", "background"), "the scene")
-        if edit.key == "background":
-            session.set_background(WHITE if value is None else value)
+        if not edit.part:
+            session.set_of_scene(edit.key, SCENE_KEYS.get(edit.key) if value is None else value)
+        elif value is None:
+            session.reset(edit.part, edit.key)
         else:
-            session.set_light(HEADLIGHT if value is None else light_of(value))
+            session.set(edit.part, edit.key, value)

@@ -45,14 +45,10 @@ class WrittenPage:
 
 
 def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
-    """Create or replace the page of a scene in one step; the same scene gives the same bytes.
+    """Create or replace the page of a scene of surfels in one step; the same scene gives the same bytes.
 
     The surfels are rounded as in compact model files. Hidden models are in the page: they can be shown there.
-
-    Args:
-        path: target, .html.
-        scene: of surfels.
-        name: of the scene, its title.
+    The name of the scene is the title.
     """
     composed = scene.open()
     if not isinstance(composed, Composition):
@@ -72,14 +68,9 @@ def write_page(path: Path, scene: Scene, name: str) -> WrittenPage:
 
 
 def page_of(description: dict[str, Any], surfels: str, picture: bytes) -> str:
-    """Return the page as text.
+    """Return the page of a description, see `describe`, packed surfels, and a JPEG that is shown first.
 
     Nothing but its own script and style may run in it, and it may load nothing: names of a scene are text.
-
-    Args:
-        description: of the scene, see `describe`.
-        surfels: packed, see `pack`.
-        picture: a JPEG that is shown until there is another one.
     """
     from jinja2 import Environment
     from markupsafe import Markup
@@ -120,13 +111,9 @@ def digest(text: str) -> str:
 
 
 def pack(path: Path, composition: Composition) -> str:
-    """The tensors of all models, named NUMBER.PARAMETER, and `labels` [N] of surfels that segments have.
+    """Return the tensors of all models as text, named NUMBER.PARAMETER, and `labels` [N] of segments.
 
     The same scene gives the same text. Browsers unpack zlib by themselves, but not xz.
-
-    Args:
-        path: of the page, for messages.
-        composition: of the scene.
     """
     from safetensors.numpy import save
 
@@ -159,27 +146,22 @@ def web_file(name: str) -> str:
     return files("texgs.viewer").joinpath("web", name).read_text(encoding="utf-8")
 
 
-def joined_modules(*entries: str) -> str:
-    """Return the modules and all that they import, each once and behind what it imports.
+def joined_modules(entry: str) -> str:
+    """Return a module and all that it imports, each once and behind what it imports.
 
     Each becomes a function with its own names, which returns what the module exports into `modules`. That
     does for modules that import by name, from the same folder, and whose exports are declarations.
-
-    Args:
-        entries: names of files.
     """
     texts: dict[str, str] = {}
 
     def add(name: str) -> None:
-        if name in texts:
-            return
         text = web_file(name)
         for _, imported in IMPORT.findall(text):
-            add(imported)
+            if imported not in texts:
+                add(imported)
         exports = ", ".join(exported for _, exported in EXPORT.findall(text))
         body = EXPORT.sub(r"\1", IMPORT.sub(r'const \1 = modules["\2"];', text)).strip()
         texts[name] = f'modules["{name}"] = (() => {{\n{body}\nreturn {{ {exports} }};\n}})();'
 
-    for entry in entries:
-        add(entry)
+    add(entry)
     return "\n\n".join(["const modules = {};", *texts.values()]) + "\n"

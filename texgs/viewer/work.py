@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,28 +18,18 @@ from texgs.core.errors import ArgumentError
 from texgs.core.names import part_file, require_name
 from texgs.edit.parts import parts_with_surfels
 from texgs.scene.parts import entry_of, require_new, split
-from texgs.scene.scene import Scene
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
 from texgs.viewer.jobs import Jobs, Watch
-from texgs.viewer.looks import Looks
-from texgs.viewer.messages import Export, Look, Segment
+from texgs.viewer.looks import Looks, Styles
+from texgs.viewer.messages import Export, Look, Mask, Segment
 from texgs.viewer.page import Page
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
-from texgs.viewer.styles import Styles
 
 
 class Work:
-    """Does one job at a time.
-
-    Args:
-        frames: renders.
-        edits: that jobs add to.
-        changing: is held while the scene changes.
-        changed: is called when it has.
-        device: that works.
-    """
+    """Does one job at a time, which adds to edits; `changing` is held meanwhile, then `changed` called."""
 
     def __init__(
         self,
@@ -51,12 +41,15 @@ class Work:
     ) -> None:
         self._edits, self._changing, self._changed = edits, changing, changed
         self._jobs, self.styles = Jobs(), Styles()
-        self.segmenter = Segmenter(self._jobs, device)
-        self._looks = Looks(self._jobs, self.styles, device)
-        self.downloads = Downloads(self._jobs, frames)
+        self._segmenter, self._looks = Segmenter(device), Looks(self.styles, device)
+        self.downloads = Downloads(frames)
         self._task: asyncio.Task[None] | None = None
         self._page: Page | None = None  # that it is for
         self._stop = threading.Event()
+
+    async def mask(self, asked: Mask) -> dict[str, Any]:
+        """Return what clicks select in a view, as a message; a job of another page may come before."""
+        return await self._jobs.run(partial(self._segmenter.mask, self._edits.scene, asked), Watch())
 
     def begin_segment(self, asked: Segment, page: Page) -> None:
         """Begin to make a segment."""
@@ -80,7 +73,7 @@ class Work:
 
     @property
     def is_at_work(self) -> bool:
-        """Whether something is being made."""
+        """Return whether something is being made."""
         return self._task is not None and not self._task.done()
 
     def stop(self, page: Page | None = None) -> None:
@@ -97,6 +90,7 @@ class Work:
         self.styles.close()
 
     def _begin(self, page: Page, job: Callable[[Watch], Awaitable[None]]) -> None:
+        """Begin a job for a page, unless another one is at work."""
         if self.is_at_work:
             of = " for another page: wait for it" if page is not self._page else ": wait for it, or cancel it"
             raise ArgumentError(f"a job is at work already{of}")
@@ -104,6 +98,7 @@ class Work:
         self._task = asyncio.create_task(self._work(page, job, Watch(page.tell_job, self._stop)))
 
     async def _work(self, page: Page, job: Callable[[Watch], Awaitable[None]], watch: Watch) -> None:
+        """Do a job, and tell its page when it begins, fails and ends."""
         page.tell_job("", 0.0)
         failed = False
         try:
@@ -116,14 +111,15 @@ class Work:
         page.tell_job("", None, failed)
 
     async def _segment(self, asked: Segment, page: Page, watch: Watch) -> None:
-        lifted = await self.segmenter.lift(self._edits.scene, asked, watch)
-        facts = self.segmenter.facts(asked)
+        """Make a segment, and tell its page on how many views it rests."""
+        lifted = await self._jobs.run(partial(self._segmenter.lift, self._edits.scene, asked), watch)
+        facts = self._segmenter.facts(asked)
         async with self._changing:
             await asyncio.to_thread(self._edits.make_segment, asked.part, lifted.mask, facts)
         page.tell(f"{asked.part}: {lifted.basis}", level="info")
 
     async def _look(self, asked: Look, edit: Any, page: Page, watch: Watch) -> None:
-        """Textures on their way show on the page that asked; those of a preview stay until others come."""
+        """Show textures on their way on the page that asked; those of a preview stay until others come."""
         scene, loop = self._edits.scene, asyncio.get_running_loop()
         name, parts = asked.style or asked.instruction, asked.parts
         if not parts:
@@ -139,8 +135,8 @@ class Work:
 
         start = monotonic()
         try:
-            edited = await self._looks.make(scene, edit, output, watch, show)
-            textures = textures_of(edited.scene, parts)
+            edited = await self._jobs.run(partial(self._looks.make, scene, edit, output, show), watch)
+            textures = {part: entry_of(edited.scene, part).texture for part in parts}
             if asked.preview:
                 page.try_on(textures)
                 return
@@ -156,11 +152,7 @@ class Work:
         page.tell(f"{how} Textures are in {output}; the scene is not saved yet.", level="info")
 
     async def _export(self, asked: Export, page: Page, watch: Watch) -> None:
+        """Write a file, and tell its page where it is."""
         scene, name = page.shown(asked.view), Path(self._edits.name).stem
-        path = await self.downloads.write(scene, asked, name, watch)
+        path = await self._jobs.run(partial(self.downloads.write, scene, asked, name), watch)
         page.tell(f"{path.name}: {path.stat().st_size / 2**20:.1f} MiB", level="file", name=path.name)
-
-
-def textures_of(scene: Scene, parts: Sequence[str]) -> dict[str, Path | None]:
-    """Return the texture files of parts of a scene."""
-    return {part: entry_of(scene, part).texture for part in parts}
