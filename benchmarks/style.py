@@ -13,7 +13,7 @@ from texgs.core.process import keep_freed_memory
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe, preset
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.stylize import History, stylize
+from texgs.edit.stylize import Stylized, stylize
 from texgs.fields.surfels.model import Surfels
 from texgs.models.networks import fast_dtype
 from texgs.models.vgg import Vgg
@@ -42,13 +42,13 @@ def run(settings: Settings) -> Section:
 
 def edited(
     scene: Surfels, cameras: list[Camera], style: StylePicture, recipe: Recipe, vgg: Vgg | None
-) -> History:
+) -> Stylized:
     """How an edit went."""
     lights = [Light("headlight")] * len(cameras)
-    return stylize(scene, cameras, lights, style, recipe, vgg=vgg, title="benchmark").history
+    return stylize(scene, cameras, lights, style, recipe, vgg=vgg, title="benchmark")
 
 
-def iterations(runs: list[History], where: dict[str, object], count: int) -> list[Measurement]:
+def iterations(runs: list[Stylized], where: dict[str, object], count: int) -> list[Measurement]:
     """Milliseconds of an iteration, as a whole and by part; and of the start, once."""
     parts = [name for name in runs[0].seconds if name != "start"]
     milliseconds = {f"part {name}": [1e3 * run.seconds[name] / count for run in runs] for name in parts}

@@ -10,11 +10,11 @@ import yaml
 from PIL import Image
 from safetensors.torch import save, save_file
 
+from tests.edit.tasks import task
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from texgs.cli.main import main
 from texgs.core.errors import ArgumentError, OutOfMemoryError
-from texgs.edit.parts import edit_parts
 from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
@@ -43,7 +43,7 @@ def test_a_name_of_a_model_is_no_way_out_of_the_folder(tmp_path):
     hostile = Scene({"../../outside": SceneModel(path)})
     folder = tmp_path / "a" / "b"
     with pytest.raises(ArgumentError, match=r"edit.parts: expected a name that a file can have"):
-        edit_parts(hostile, [], folder, torch.device("cpu"), lambda name, model, surfels: (model, {}))
+        task(hostile, folder).each_part(lambda part, model, surfels, views: model)
     assert sorted(x.name for x in tmp_path.rglob("*.safetensors")) == ["m.safetensors"]
 
 

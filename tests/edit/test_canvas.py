@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from tests.edit.scenes import ball, views
-from texgs.edit.canvas import extent, paint, visible_part
+from texgs.edit.canvas import mean_alpha, paint, visible_part, visible_range
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -82,5 +82,20 @@ def test_the_visible_part_holds_all_that_is_seen_in_multiples_of_eight():
 def test_an_extent_stays_within_the_image(size, places, expected):
     seen = torch.zeros(size, dtype=torch.bool)
     seen[places] = True
-    span = extent(seen)
+    span = visible_range(seen)
     assert (span.start, span.stop) == expected
+
+
+@pytest.mark.parametrize("opacity", [-3.0, 4.0])
+def test_the_mean_alpha_is_the_weighted_mean_of_alpha_of_whole_views(opacity):
+    cameras, lights = views(4)
+    model = ball(opacity=opacity)
+    alphas = torch.stack(
+        [model.render(camera, light).alpha for camera, light in zip(cameras, lights, strict=True)]
+    ).double()
+    expected = float(alphas.square().sum() / alphas.sum())
+    assert mean_alpha(model, cameras) == pytest.approx(expected, rel=1e-5)
+
+
+def test_nothing_to_see_is_not_translucent():
+    assert mean_alpha(ball(opacity=-60.0), views(2)[0]) == 1

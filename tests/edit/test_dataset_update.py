@@ -6,17 +6,16 @@ import pytest
 import torch
 
 from tests.edit.guidances import Returns, Tint, Watching
-from tests.edit.test_gaussian_style import ball as gaussians
-from tests.edit.test_voxel_style import seen
+from tests.edit.test_gaussians import ball as gaussians
+from tests.edit.test_voxels import seen
 from tests.fields.voxels.test_voxels import ball as voxels
 from tests.fit.scenes import HEADLIGHT, cameras
 from texgs.core.errors import ArgumentError, FitError
-from texgs.edit.closeness import Closeness, differentiated
-from texgs.edit.dataset_update import azimuth, field_views, update_field
-from texgs.edit.gaussian_learner import GaussianLearner, radii
+from texgs.edit.dataset_update import PhotometricLoss, azimuth, field_views, update_field
+from texgs.edit.gaussians import GaussianLearner, radii
 from texgs.edit.methods.in2n import In2nKeys
-from texgs.edit.turns import Schedule
-from texgs.edit.voxel_learner import VoxelLearner, corner
+from texgs.edit.methods.updates import UpdateSchedule
+from texgs.edit.voxels import VoxelLearner, corner
 from texgs.fields.optimizer import Rate
 from texgs.fit.settings import CommonRates
 from texgs.raster.losses import ssim
@@ -24,8 +23,8 @@ from texgs.volume.images import Box, Images
 
 COLOR = (0.8, 0.3, 0.1)
 RATES = CommonRates(means=1e-4, sh=0.05, sh_rest=0.0025, means_final=1.0, final=1.0)
-PIXELS = Closeness(0.8, 0.2)
-PATCHES = Closeness(1.0, 0.0)
+PIXELS = PhotometricLoss(0.8, 0.2)
+PATCHES = PhotometricLoss(1.0, 0.0)
 
 
 @torch.no_grad()
@@ -65,9 +64,9 @@ def color_of(field):
 @pytest.mark.parametrize(
     "schedule",
     [
-        Schedule(10, 8, views=1),
-        Schedule(2, 40, learned="newest"),
-        Schedule(2, 40, views=3, group=3, order="random", learned="round"),
+        UpdateSchedule(10, 8, views=1),
+        UpdateSchedule(2, 40, learned="newest"),
+        UpdateSchedule(2, 40, views=3, group=3, order="random", learned="round"),
     ],
     ids=["in2n", "igs2gs", "dge"],
 )
@@ -91,12 +90,12 @@ def test_fields_take_on_the_colour_that_views_are_given(kind, schedule):
 @pytest.mark.parametrize("kind", FROZEN)
 def test_frozen_geometry_is_kept_bit_for_bit(kind):
     learner, images = FROZEN[kind]()
-    field = update_field(learner, images, Tint(COLOR), "anything", Schedule(3, 5, views=2)).field
+    field = update_field(learner, images, Tint(COLOR), "anything", UpdateSchedule(3, 5, views=2)).field
     for name, x in learner.original.tensors("geometry").items():
         assert torch.equal(x, field.tensors("geometry")[name]), name
     assert not torch.equal(learner.original.tensors("appearance")["sh"], field.tensors("appearance")["sh"])
     learner, images = LEARNERS[kind]()
-    field = update_field(learner, images, Tint(COLOR), "anything", Schedule(3, 5, views=2)).field
+    field = update_field(learner, images, Tint(COLOR), "anything", UpdateSchedule(3, 5, views=2)).field
     assert any(
         not torch.equal(x, field.tensors("geometry")[n])
         for n, x in learner.original.tensors("geometry").items()
@@ -108,9 +107,8 @@ def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was():
         learner, images = splats()
         images.planes[:, :3] = round(0.2 * 255)
         guidance = Watching(COLOR)
-        update_field(
-            *(learner, images, guidance, "anything", Schedule(3, 4, views=5, group=5)), keeps_renders=keeps
-        )
+        schedule = UpdateSchedule(3, 4, views=5, group=5)
+        update_field(learner, images, guidance, "anything", schedule, keeps_renders=keeps)
         first, *_, last = guidance.seen
         assert torch.equal(first.conditions, last.conditions), "of all edits, whatever the field is by then"
         assert not torch.equal(first.images, last.images)
@@ -123,7 +121,7 @@ def test_edits_stay_close_to_training_views_or_to_the_field_as_it_was():
 def test_the_guidance_is_told_how_much_noise_to_use():
     learner, images = splats()
     guidance = Watching(COLOR)
-    schedule = Schedule(2, 2, views=1, levels=((0.9, 0.9), (0.3, 0.3)))
+    schedule = UpdateSchedule(2, 2, views=1, levels=((0.9, 0.9), (0.3, 0.3)))
     update_field(learner, images, guidance, "anything", schedule)
     assert [views.level for views in guidance.seen] == [0.9, 0.3]
 
@@ -131,7 +129,7 @@ def test_the_guidance_is_told_how_much_noise_to_use():
 def test_views_that_are_edited_together_go_around_the_object():
     learner, images = splats()
     guidance = Watching(COLOR)
-    update_field(learner, images, guidance, "anything", Schedule(1, 1, group=5))
+    update_field(learner, images, guidance, "anything", UpdateSchedule(1, 1, group=5))
     (views,) = guidance.seen
     angles = [azimuth(camera) for camera in views.cameras]
     assert angles == sorted(angles)
@@ -204,7 +202,7 @@ def test_a_loss_and_its_gradient_are_those_of_its_terms():
         .contiguous()
         .permute(0, 2, 3, 1)
     )
-    loss, gradient = differentiated(Closeness(3.0, 1.0), image, wanted)
+    loss, gradient = PhotometricLoss(3.0, 1.0).with_gradient(image, wanted)
     leaf = image.clone().requires_grad_()
     expected = 3 * (leaf - wanted).abs().mean() + 1 - ssim(leaf, wanted)
     (exact,) = torch.autograd.grad(expected, leaf)
@@ -212,27 +210,15 @@ def test_a_loss_and_its_gradient_are_those_of_its_terms():
     torch.testing.assert_close(gradient, exact, atol=1e-7, rtol=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("values", "message"),
-    [
-        ((0.0, 0.0, 0.0), "l1, dssim, lpips: expected weights of 0 or more and one above"),
-        ((1.0, -1.0, 0.0), "l1, dssim, lpips: expected weights of 0 or more"),
-        ((1.0, 0.0, 1.0), "network: expected one for LPIPS, got none"),
-    ],
-)
-def test_weights_that_make_no_loss(values, message):
-    with pytest.raises(ArgumentError, match=message):
-        Closeness(*values)
-
-
 def test_what_a_guidance_returns_is_checked_and_a_loss_has_to_be_finite():
+    def nothing(views):
+        return views.images * float("nan")
+
     learner, images = splats()
     with pytest.raises(ArgumentError, match="images edited by broken"):
-        update_field(
-            *(learner, images, Returns(lambda views: views.images * float("nan")), "anything", Schedule(1, 5))
-        )
+        update_field(learner, images, Returns(nothing), "anything", UpdateSchedule(1, 5))
     with pytest.raises(ArgumentError, match="instruction: expected what to do in words"):
-        update_field(learner, images, Tint(COLOR), " ", Schedule(1, 5))
+        update_field(learner, images, Tint(COLOR), " ", UpdateSchedule(1, 5))
     learner.step = lambda *_: float("nan")
     with pytest.raises(FitError, match="iteration 0: expected a finite loss, got nan; lower the rates"):
-        update_field(learner, images, Tint(COLOR), "anything", Schedule(1, 5))
+        update_field(learner, images, Tint(COLOR), "anything", UpdateSchedule(1, 5))

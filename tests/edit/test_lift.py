@@ -6,9 +6,10 @@ import torch
 from tests.edit.lift_scenes import BLUE, RED, cameras, joined, nested, overlap, shell, truth, two_balls
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
+from texgs.core.light import HEADLIGHT
 from texgs.edit.clicks import Clicks, is_visible, prompts_at
-from texgs.edit.lift import HEADLIGHT, Lifted, ViewMasks, lift, middle_of
-from texgs.edit.preview import preview
+from texgs.edit.lift import Lifted, ViewMasks, components_at, lift, middle_of
+from texgs.edit.new_segment import preview
 from texgs.models.grabcut import GrabCut
 
 SIZE = 120
@@ -187,3 +188,34 @@ def test_a_segment_of_almost_the_whole_model_is_told():
     assert whole.basis.startswith(
         "masks of 40 of 42 views hold 95% of the model; if that is too much, click "
     )
+
+
+def balls():
+    """Two balls that do not touch, and which surfels are of the first."""
+    model, number = two_balls()
+    return model, number == 0
+
+
+def test_only_the_component_that_holds_the_place_is_kept():
+    model, is_red = balls()
+    both = torch.ones_like(is_red)
+    middle = model.parameters["means"][is_red].mean(0, keepdim=True)
+    assert torch.equal(components_at(model, both, middle), is_red)
+    other = model.parameters["means"][~is_red].mean(0, keepdim=True)
+    assert torch.equal(components_at(model, both, torch.cat([middle, other])), both)
+
+
+def test_what_is_not_in_the_segment_connects_nothing():
+    model, is_red = balls()
+    x = model.parameters["means"][:, 0]
+    red = x[is_red]
+    ends = is_red & ((x < red.quantile(0.2)) | (x > red.quantile(0.8)))
+    at = model.parameters["means"][is_red & (x == red.min())]
+    assert torch.equal(components_at(model, ends, at), ends & (x < red.quantile(0.5)))
+
+
+def test_a_single_surfel_is_a_component():
+    model, is_red = balls()
+    one = torch.zeros_like(is_red)
+    one[7] = True
+    assert torch.equal(components_at(model, one, torch.zeros(1, 3)), one)

@@ -3,11 +3,10 @@ import torch
 
 from texgs.core import memory
 from texgs.core.errors import OutOfMemoryError
-from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.objective import Objective, pooled
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import preset
-from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
+from texgs.edit.sliced_wasserstein import FeatureDistribution, PatchStatistics
 from texgs.edit.style_picture import StylePicture
 from texgs.models.nnfm import StyleFeatures, nnfm
 
@@ -33,7 +32,7 @@ def test_terms_are_the_losses_times_their_weights(vgg):
     mean = sum(map(float, distances)) / 3
     assert float(terms["distribution"]) == pytest.approx(2 * 0.75 * 0.5 * mean, rel=1e-5)
     assert float(terms["clip"]) == pytest.approx(2 * 0.25 * float(image[0, 0, 0]))
-    distance = sliced_wasserstein(image, PatchStatistics.of(STYLE.image), share, bank=5, seed=5)
+    distance = PatchStatistics.of(STYLE.image).distance(image, share, bank=5, seed=5)
     assert float(terms["patches"]) == pytest.approx(3 * float(distance), rel=1e-5)
 
 

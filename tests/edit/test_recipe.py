@@ -41,3 +41,14 @@ def test_mistakes_are_named(changes, message):
 def test_a_recipe_that_is_unknown_is_answered_with_those_known():
     with pytest.raises(ArgumentError, match=r"expected one of default, .*paper, got 'fast'"):
         preset("fast")
+
+
+def test_recipes_but_for_the_papers_follow_the_alpha_of_a_scene():
+    recipe = preset("default")
+    assert recipe.adapted(0.8) is recipe
+    other = recipe.adapted(0.5)
+    assert (other.opacity, other.chroma) == (8, 2)
+    assert (other.distribution, other.patches) == (8 * recipe.distribution, 0)
+    weightless = preset("patches")
+    assert weightless.adapted(0.5).patches == weightless.patches
+    assert preset("paper").adapted(0.5) == preset("paper")

@@ -1,4 +1,4 @@
-"""Colours found from exposures: against dense least squares, and Adam against the same problem."""
+"""Colours found from observations: against dense least squares, and Adam against the same problem."""
 
 import pytest
 import torch
@@ -6,13 +6,11 @@ from torch.testing import assert_close
 
 from tests.edit.textured import around, shell
 from texgs.core.light import Light
-from texgs.edit.back_projection import BackProjection, back_project, fill_unseen, seen_texels
-from texgs.edit.exposures import expose
-from texgs.edit.target_views import render_views
-from texgs.edit.texel_solver import learn, solve
+from texgs.edit.observations import observe, render_views
+from texgs.edit.texel_solver import back_project, fill_unseen, learn, seen_texels, solve
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
-from texgs.fields.surfels.texels import bare_colors, owners
+from texgs.fields.surfels.texels import bare_colors, owners, recolored
 from texgs.raster.losses import l1_dssim
 
 STRIPES = 9.0  # for each world unit
@@ -29,36 +27,32 @@ def problem(model):
 
 
 def striped(model, light):
-    """Rows of exposures of stripes on the surface."""
-    views = render_views(model, bare_colors(model), around(6, 32), light)
+    """Rows of observations of stripes on the surface."""
+    views = render_views(model, around(6, 32), light)
     is_dark = (views.points[..., 1:2] * STRIPES) % 1 < 0.5
     alpha = views.alphas[..., None]
     edited = torch.where(is_dark, 0.2, 0.6) * alpha.expand(-1, -1, -1, 3) + 1 - alpha
-    return expose(model, views, edited, light, (2.0, 1.0, 0.5))
+    return observe(model, views, edited, light, (2.0, 1.0, 0.5))
 
 
 def flat(rows):
-    return [exposure for row in rows for exposure in row]
+    return [observation for row in rows for observation in row]
 
 
-def error(exposures, model, colors):
-    p = model.parameters
-    return sum(
-        float((e.image(colors, p["sizes"], p["offsets"]) - e.wanted).square().sum()) for e in exposures
-    )
+def error(observations, colors):
+    return sum(float((each.image(colors) - each.wanted).square().sum()) for each in observations)
 
 
-def dense(exposures, model):
+def dense(observations, model):
     """Matrix [pixels, T] of one channel and its right-hand side [pixels, 3], float64."""
-    p = model.parameters
-    columns, count = [], len(p["texels"])
+    columns, count = [], len(model.parameters["texels"])
     for texel in range(count):
         unit = torch.zeros(count, 3)
         unit[texel] = 1
-        images = [e.image(unit, p["sizes"], p["offsets"], plain=True)[..., 0] for e in exposures]
+        images = [each.image(unit, plain=True)[..., 0] for each in observations]
         columns.append(torch.cat([image.flatten() for image in images]))
     black = torch.zeros(count, 3)
-    rest = [(e.wanted - e.image(black, p["sizes"], p["offsets"])).reshape(-1, 3) for e in exposures]
+    rest = [(each.wanted - each.image(black)).reshape(-1, 3) for each in observations]
     return torch.stack(columns, dim=1).double(), torch.cat(rest).double()
 
 
@@ -66,19 +60,18 @@ def dense(exposures, model):
 def few():
     """A problem small enough to write down: one opacity, coarse textures, colours that can be had."""
     model = shell(count=24, texels=3, opacity=2.0)
-    views = render_views(model, bare_colors(model), around(4, 24), None)
+    views = render_views(model, around(4, 24), None)
     known = torch.rand(len(model.parameters["texels"]), 3, generator=torch.Generator().manual_seed(5))
-    edited = render_views(model, known, around(4, 24), None).images
-    exposures = flat(expose(model, views, edited, None, (1.0,)))
-    return model, exposures, known
+    edited = render_views(recolored(model, known), around(4, 24), None).images
+    return model, flat(observe(model, views, edited, None, (1.0,))), known
 
 
 def test_sums_are_those_of_the_dense_matrix(few):
-    model, exposures, _ = few
-    A, wanted = dense(exposures, model)
-    sums = back_project(exposures, model)
-    pixels = [e.cover.numel() for e in exposures]
-    shows = torch.cat([e.cover.flatten() for e in exposures]).double() > 1e-4
+    model, observations, _ = few
+    A, wanted = dense(observations, model)
+    sums = back_project(observations, model)
+    pixels = [e.cover.numel() for e in observations]
+    shows = torch.cat([e.cover.flatten() for e in observations]).double() > 1e-4
     assert_close(sums.weights.double(), A[shows].sum(dim=0), atol=1e-3, rtol=1e-4)
     gains = A.sum(dim=1, keepdim=True)
     means = (A.T @ (wanted / gains.clamp_min(1e-4)).clamp(0, 1)) / A.sum(dim=0)[:, None]
@@ -89,13 +82,12 @@ def test_sums_are_those_of_the_dense_matrix(few):
 
 
 def test_solve_agrees_with_dense_least_squares(few):
-    model, exposures, known = few
-    A, wanted = dense(exposures, model)
-    sums = back_project(exposures, model)
-    start = fill_unseen(sums, model)
-    texels = solve(
-        exposures, model, sums, start, sweeps=150, generator=torch.Generator().manual_seed(0), title=""
-    )
+    model, observations, known = few
+    A, wanted = dense(observations, model)
+    sums = back_project(observations, model)
+    start = fill_unseen(sums.colors, sums.weights, model)
+    generator = torch.Generator().manual_seed(0)
+    texels = solve(observations, sums.curvature, start, sweeps=150, generator=generator, title="")
     exact = torch.linalg.lstsq(A, wanted).solution
     left = (A @ exact - wanted).square().sum()
     zero = (A @ start.double() - wanted).square().sum()
@@ -107,13 +99,12 @@ def test_solve_agrees_with_dense_least_squares(few):
 
 def test_three_sweeps_are_as_good_as_the_papers_iterations(problem, model):
     """1,500 of Adam at falling opacity against 54 steps: the squared error of the views, to 0.1 dB."""
-    exposures = flat(problem)
-    sums = back_project(exposures, model)
-    start = fill_unseen(sums, model)
-    solved = solve(exposures, model, sums, start, sweeps=3, generator=torch.Generator(), title="")
+    sums = back_project(flat(problem), model)
+    start = fill_unseen(sums.colors, sums.weights, model)
+    solved = solve(flat(problem), sums.curvature, start, sweeps=3, generator=torch.Generator(), title="")
     learned = by_adam(problem, model, 1500)
-    assert error(problem[1], model, start) > 1.1 * error(problem[1], model, solved)
-    assert error(problem[1], model, solved) < 1.023 * error(problem[1], model, learned)  # 0.1 dB
+    assert error(problem[1], start) > 1.1 * error(problem[1], solved)
+    assert error(problem[1], solved) < 1.023 * error(problem[1], learned)  # 0.1 dB
     assert 0 <= float(solved.min()) <= float(solved.max()) <= 1
 
 
@@ -121,20 +112,19 @@ def test_light_is_made_up_for(model):
     """Stripes as bright under light as they are wanted: bare colours are brighter than the stripes."""
     rows = striped(model, Light("headlight"))
     solved = solved_in(rows, model)
-    assert error(rows[1], model, solved) < 0.4 * error(rows[1], model, bare_colors(model))
-    dark = striped(model, None)
-    assert error(rows[1], model, solved) < 0.9 * error(rows[1], model, solved_in(dark, model))
+    assert error(rows[1], solved) < 0.4 * error(rows[1], bare_colors(model))
+    assert error(rows[1], solved) < 0.9 * error(rows[1], solved_in(striped(model, None), model))
 
 
 def solved_in(rows, model):
     sums = back_project(flat(rows), model)
-    return solve(flat(rows), model, sums, sums.colors, sweeps=3, generator=torch.Generator(), title="")
+    return solve(flat(rows), sums.curvature, sums.colors, sweeps=3, generator=torch.Generator(), title="")
 
 
 def by_adam(rows, model, steps):
     generator = torch.Generator().manual_seed(0)
     start, rate = bare_colors(model), Rate(0.025, 0.1)
-    return learn(rows, model, start, rate=rate, steps=steps, generator=generator, title="")
+    return learn(rows, start, rate=rate, steps=steps, generator=generator, title="")
 
 
 class Rows(list):
@@ -153,18 +143,12 @@ def test_adam_lowers_its_loss_and_follows_the_opacities(problem, model):
     rows = Rows(problem)
     learned = by_adam(rows, model, 90)
     assert rows.asked == [0] * 30 + [1] * 30 + [2] * 30
-    assert loss(problem[-1], model, learned) < 0.8 * loss(problem[-1], model, bare_colors(model))
+    assert loss(problem[-1], learned) < 0.8 * loss(problem[-1], bare_colors(model))
 
 
-def loss(row, model, colors):
-    p = model.parameters
+def loss(row, colors):
     with torch.no_grad():
-        images = [e.image(colors, p["sizes"], p["offsets"]) for e in row]
-        return sum(float(l1_dssim(x, e.wanted, 0.2)) for x, e in zip(images, row, strict=True))
-
-
-def sums_of(colors, weights):
-    return BackProjection(colors, weights, weights)
+        return sum(float(l1_dssim(each.image(colors), each.wanted, 0.2)) for each in row)
 
 
 def test_unseen_texels_take_the_mean_of_their_surfel():
@@ -174,7 +158,7 @@ def test_unseen_texels_take_the_mean_of_their_surfel():
     weights = torch.full((40,), 2.0)
     mine = place[surfel == 3]
     weights[mine[0]], weights[mine[1]], weights[mine[2:]] = 1.0, 3.0, 0.0
-    filled = fill_unseen(sums_of(colors, weights), model)
+    filled = fill_unseen(colors, weights, model)
     expected = (colors[mine[0]] + 3 * colors[mine[1]]) / 4
     assert_close(filled[mine[2:]], expected.expand(2, 3), atol=0.01, rtol=0)
     kept = weights > 0
@@ -195,7 +179,7 @@ def test_hidden_surfels_take_the_colour_of_the_nearest_seen_one(glimpse):
     is_seen = (surfel == 2) | (surfel == 7)
     weights[place[is_seen]] = 1.0
     colors[place[is_seen]] = (surfel[is_seen] / 10)[:, None].expand(-1, 3)
-    filled = fill_unseen(sums_of(colors, weights), model)[place, 0].reshape(10, 4)[:, 0]
+    filled = fill_unseen(colors, weights, model)[place, 0].reshape(10, 4)[:, 0]
     assert_close(filled, torch.tensor([0.2] * 5 + [0.7] * 5), atol=0.08, rtol=0)
 
 
@@ -205,10 +189,10 @@ def test_one_seen_surfel_gives_all_others_its_colour():
     colors, weights = torch.ones(40, 3), torch.zeros(40)
     weights[place[surfel == 4]] = 1.0
     colors[place[surfel == 4]] = 0.3
-    assert_close(fill_unseen(sums_of(colors, weights), model), torch.full((40, 3), 0.3), atol=0.01, rtol=0)
+    assert_close(fill_unseen(colors, weights, model), torch.full((40, 3), 0.3), atol=0.01, rtol=0)
 
 
 def test_nothing_seen_nothing_changes():
     model = shell(count=4, texels=2)
-    sums = sums_of(torch.zeros(16, 3), torch.zeros(16))  # as back_project has it
-    assert torch.equal(fill_unseen(sums, model), bare_colors(model))
+    filled = fill_unseen(torch.zeros(16, 3), torch.zeros(16), model)  # as back_project has it
+    assert torch.equal(filled, bare_colors(model))

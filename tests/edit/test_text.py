@@ -1,22 +1,156 @@
-"""Text-driven editing from end to end, offline."""
+"""Text-driven editing, offline: what it changes and leaves, which views it edits, and what it refuses."""
+
+from dataclasses import replace
 
 import pytest
 import torch
+from torch.testing import assert_close
 
-from tests.edit.guidances import Tint, Watching
+from tests.edit.guidances import Identity, NoisyTint, Returns, Tint, Watching
 from tests.edit.textured import around, shell
-from texgs.core.errors import ArgumentError
+from tests.fields.surfels.samples import sample
+from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.lens import Lens
-from texgs.edit.target_views import render_views
-from texgs.edit.text import RECIPES, edit_by_text
-from texgs.fields.surfels.texels import bare_colors, untextured
+from texgs.core.light import HEADLIGHT, Light
+from texgs.edit.observations import render_views
+from texgs.edit.text import RECIPES, TextRecipe, edit_by_text
+from texgs.fields.part_edit import PartEdit
+from texgs.fields.surfels.composition import Composition
+from texgs.fields.surfels.texels import bare_colors, owners, recolored, untextured
 from texgs.models.filters import ProceduralFilters
 from texgs.volume.cameras import icosphere
+
+BLUE, RED = (0.2, 0.3, 0.8), (0.9, 0.1, 0.1)
+QUICK = TextRecipe("all", opacities=(1.0, 0.5), sweeps=2)
+ADAM = replace(QUICK, iterations=150, rate=0.05)
+CHANGES = {"texels", "colors"}
+TURNED = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0]))  # half a turn about the upright axis
 
 
 @pytest.fixture(scope="module")
 def model():
     return shell()
+
+
+def edited(model, guidance, recipe=QUICK, **options):
+    """The model after an edit of six views from all sides."""
+    return edit_by_text(model, around(6), guidance, "x", recipe, **options).model
+
+
+def seen(model, count=5):
+    """Bare colours from other sides than those that were edited."""
+    return render_views(model, around(count + 4)[2:-2], None)
+
+
+def missed(views, color):
+    """Mean difference to a colour where views are opaque."""
+    return (views.images[views.alphas > 0.95] - torch.tensor(color)).abs().mean()
+
+
+@pytest.mark.parametrize("recipe", [QUICK, ADAM], ids=["solve", "adam"])
+def test_a_tint_is_seen_from_everywhere_and_the_rest_stays(model, recipe):
+    done = edited(model, Tint(BLUE), recipe)
+    for name, x in model.parameters.items():
+        assert torch.equal(x, done.parameters[name]) == (name not in CHANGES), name
+    assert done.metadata == model.metadata
+    assert missed(seen(done), BLUE) < 0.01
+
+
+def test_light_falls_on_what_was_edited_bare(model):
+    """Under any light the edited scene is shaded as a scene of that colour is."""
+    done = edited(model, Tint(BLUE))
+    plain = recolored(model, torch.tensor(BLUE).expand(len(model.parameters["texels"]), 3))
+    for light in (HEADLIGHT, Light("directional", 70, 20)):
+        color, expected = (Composition([m]).render(around(3)[1], light).color for m in (done, plain))
+        assert_close(color, expected, atol=0.03, rtol=0)
+
+
+def test_lit_edits_look_as_wanted_under_the_light_of_the_edit(model):
+    color = (0.4, 0.5, 0.3)
+    lit, bare = (edited(model, Tint(color, lit=is_lit)) for is_lit in (True, False))
+    assert missed(render_views(lit, around(6), HEADLIGHT), color) < 0.02
+    assert missed(render_views(bare, around(6), HEADLIGHT), color) > 0.04
+
+
+def test_identity_changes_nothing_that_is_seen(model):
+    done = edit_by_text(model, around(8), Identity(lit=False), "as it is", TextRecipe("all")).model
+    assert (seen(model).images - seen(done).images).abs().mean() < 0.004
+
+
+def test_only_chosen_surfels_change(model):
+    upper = model.parameters["means"][:, 1] > 0
+    done = edited(model, Tint(BLUE), surfels=upper)
+    place, surfel = owners(model.parameters)
+    p, q = model.parameters, done.parameters
+    assert torch.equal(p["colors"][~upper], q["colors"][~upper])
+    kept = place[~upper[surfel]]
+    assert torch.equal(p["texels"][kept], q["texels"][kept])
+    assert (bare_colors(done)[place[upper[surfel]]] - torch.tensor(BLUE)).abs().mean() < 0.02
+
+
+def test_the_palette_still_recolours(model):
+    done = edited(model, Tint((0.5, 0.5, 0.5)))
+    shift = torch.tensor([0.2, -0.1, 0.1])
+    edit = PartEdit(palette=tuple((model.parameters["palette"] + shift).tolist()))
+    scene, camera = Composition([done]), around(3)[0]
+    plain = scene.render(camera, look="unshaded")
+    moved = scene.render(camera, edits=[edit], look="unshaded")
+    solid = plain.alpha > 0.95
+    assert_close((moved.color - plain.color)[solid].mean(dim=0), shift, atol=0.01, rtol=0)
+
+
+def test_highlights_keep_their_colour():
+    """A dark edit of a bright model: where highlights saturate, they are white, not the old colour's rest."""
+    bright = shell(opacity=6.0)
+    p = {**bright.parameters, "specular": torch.tensor([3.0])}
+    colors = torch.tensor([[1.0, 1.0, 0.1]]).expand(len(p["texels"]), 3)
+    done = edited(recolored(type(bright)(p, bright.shading), colors), Tint((0.1, 0.1, 0.1)))
+    shown = Composition([done]).render(around(6)[3]).color[20:28, 20:28]
+    assert shown.max() > 0.6
+    assert (shown.amax(dim=-1) - shown.amin(dim=-1)).max() < 0.05
+
+
+def test_refinement_sees_the_first_result(model):
+    guidance = Watching(RED)
+    second = edited(edited(model, Tint(BLUE)), guidance)
+    (views,) = guidance.seen
+    assert missed(views, BLUE) < 0.02
+    assert torch.equal(views.images, views.conditions)
+    assert missed(seen(second), RED) < 0.02
+
+
+def test_refinement_keeps_some_of_the_first_style(model):
+    """Dots, then blue: the dots are blue."""
+    cameras, filters = around(4), ProceduralFilters(2.0)
+    dots = edit_by_text(model, cameras, filters, "as a stipple drawing", size=96).model
+    both, plain = (edit_by_text(m, cameras, filters, "make it blue", size=96).model for m in (dots, model))
+    shown = [render_views(m, cameras, None) for m in (dots, both, plain)]
+    solid = shown[0].alphas > 0.95
+    ink, blue, alone = (views.images[solid] for views in shown)
+    assert (blue[:, 2] - blue[:, 0]).mean() > 0.2
+    pattern = torch.corrcoef(torch.stack([ink.mean(dim=1), blue.mean(dim=1)]))[0, 1]
+    assert pattern > 0.6
+    assert blue.std(dim=0).mean() > 2 * alone.std(dim=0).mean()
+
+
+def test_same_seed_same_model(model):
+    one, two, other = (
+        edited(model, NoisyTint(BLUE, 0.2), seed=seed).parameters["texels"] for seed in (1, 1, 2)
+    )
+    assert torch.equal(one, two)
+    assert not torch.equal(one, other)
+
+
+def test_share_of_texels_seen(model):
+    solid = TextRecipe("all", opacities=(2.0,), sweeps=1)
+    front, every = (edit_by_text(model, around(n), Identity(), "x", solid).seen for n in (1, 10))
+    assert 0.2 < front < 0.75
+    assert every > 0.95
+
+
+def test_unseen_sides_have_the_new_colour(model):
+    back = seen(edit_by_text(model, around(1), Tint(BLUE), "x", QUICK).model)
+    assert (back.images[back.alphas > 0.95] - torch.tensor(BLUE)).abs().max() < 0.1
 
 
 def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
@@ -34,7 +168,7 @@ def test_six_views_of_the_size_asked_for_in_the_aspect_of_the_first(model):
 def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model):
     guidance = Watching((0.1, 0.2, 0.3))
     cameras = icosphere(4, *Lens(3.0, 30.0, 64, 64))
-    edit_by_text(model, cameras, guidance, "x", views="nearest", size=32)
+    edit_by_text(model, cameras, guidance, "x", TextRecipe("nearest"), size=32)
     (views,) = guidance.seen
     assert views.images.shape == (6, 32, 32, 3)
     given = {tuple(camera.position.tolist()): camera for camera in cameras}
@@ -46,25 +180,9 @@ def test_training_views_nearest_to_the_axes_as_they_are_but_for_their_size(model
 
 
 def test_the_papers_recipe():
-    paper = RECIPES["paper"].policy
-    assert (paper.iterations, paper.rate, paper.final) == (1500, 0.025, 1.0)
+    paper = RECIPES["paper"]
+    assert (paper.views, paper.iterations, paper.rate, paper.final) == ("nearest", 1500, 0.025, 1.0)
     assert (paper.opacities[0], paper.opacities[-1]) == (2.0, 0.5)
-    assert RECIPES["paper"].views == "nearest"
-
-
-def test_refinement_keeps_some_of_the_first_style(model):
-    """Dots, then blue: the dots are blue."""
-    cameras = around(4)
-    dots = edit_by_text(model, cameras, ProceduralFilters(2.0), "as a stipple drawing", size=96).model
-    both = edit_by_text(dots, cameras, ProceduralFilters(2.0), "make it blue", size=96).model
-    plain = edit_by_text(model, cameras, ProceduralFilters(2.0), "make it blue", size=96).model
-    shown = [render_views(m, bare_colors(m), cameras, None) for m in (dots, both, plain)]
-    solid = shown[0].alphas > 0.95
-    ink, blue, alone = (views.images[solid] for views in shown)
-    assert (blue[:, 2] - blue[:, 0]).mean() > 0.2
-    pattern = torch.corrcoef(torch.stack([ink.mean(dim=1), blue.mean(dim=1)]))[0, 1]
-    assert pattern > 0.6
-    assert blue.std(dim=0).mean() > 2 * alone.std(dim=0).mean()
 
 
 def test_without_texture_some_surfels_have_one_colour_and_others_stay(model):
@@ -77,16 +195,43 @@ def test_without_texture_some_surfels_have_one_colour_and_others_stay(model):
     assert (untextured(model).parameters["texels"] != model.parameters["texels"]).any()
 
 
-def test_bad_arguments(model):
-    with pytest.raises(ArgumentError, match="recipe: expected one of default, paper, got 'fast'"):
-        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", "fast")
-    with pytest.raises(ArgumentError, match="cameras: expected those of the training views, got none"):
-        edit_by_text(model, [], Tint((0, 0, 0)), "x")
-    with pytest.raises(ArgumentError, match="views: expected one of axes, nearest, all, got 'some'"):
-        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", views="some")
-    with pytest.raises(ArgumentError, match=r"cameras: expected 6 at least .*, got 2; .*views=axes"):
-        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", "paper")
-    with pytest.raises(ArgumentError, match="size: expected at least 1 pixel"):
-        edit_by_text(model, around(2), Tint((0, 0, 0)), "x", size=0)
-    with pytest.raises(ArgumentError, match="expected one of stipple drawing"):
-        edit_by_text(model, around(2), ProceduralFilters(), "in the style of van Gogh")
+def broken(views):
+    images = views.images.clone()
+    images[0, 3, 4, 1] = torch.nan
+    return images
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "message"),
+    [
+        (
+            {"guidance": Returns(broken)},
+            ArgumentError,
+            "images edited by broken: expected finite values, got 1 NaN",
+        ),
+        (
+            {"guidance": Returns(torch.zeros(2, 9, 9, 3))},
+            ShapeError,
+            r"images edited by broken: expected \[2, 48, 48, 3\]",
+        ),
+        ({"guidance": ProceduralFilters()}, ArgumentError, "expected one of stipple drawing"),
+        ({"instruction": " "}, ArgumentError, "expected what to do in words"),
+        ({"model": sample("shading")}, ArgumentError, "expected stage texture, got shading"),
+        ({"surfels": torch.zeros(160) > 0}, ArgumentError, "at least one that may change as bool, got 0"),
+        ({"surfels": torch.ones(3) > 0}, ShapeError, "surfels"),
+        (
+            {"recipe": RECIPES["paper"]},
+            ArgumentError,
+            "cameras: expected 6 at least .*, got 2; .*views=axes",
+        ),
+        (
+            {"cameras": [replace(camera, viewmat=TURNED @ camera.viewmat) for camera in around(2)]},
+            ArgumentError,
+            "expected some that show what is to change, got none",
+        ),
+    ],
+)
+def test_mistakes_are_reported_and_nothing_is_made_black(model, changes, error, message):
+    given = {"model": model, "cameras": around(2), "guidance": Tint(BLUE), "instruction": "as van Gogh"}
+    with pytest.raises(error, match=message):
+        edit_by_text(**{**given, "recipe": QUICK, **changes})

@@ -7,7 +7,7 @@ from torch.nn.functional import interpolate, normalize
 
 from tests.models.clips import write_clip
 from texgs.core.errors import ArgumentError, MissingDataError, ShapeError
-from texgs.edit.clip_loss import ClipLoss
+from texgs.edit.objective import ClipLoss
 from texgs.metrics.clip import clip_scores, direction, similarity
 from texgs.models.clip import DEVIATION, MEAN, Clip
 

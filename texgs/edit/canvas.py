@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
 
+from texgs.core import check
 from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
 from texgs.fields.splats import geometry, screen_box
 from texgs.fields.surfels.model import Surfels
@@ -19,8 +21,32 @@ SEEN = 0.02  # of alpha: less is not looked at
 MARGIN, MULTIPLE = 4, 8  # pixels around what is seen, and what sides of the part are a multiple of
 
 
-@dataclass(frozen=True, eq=False)
-class Canvas:
+def require_editable(model: Surfels, surfels: Tensor | None) -> None:
+    """Require a textured model, and surfels [N] bool that may change, one at least; None for all."""
+    if model.stage != "texture":
+        raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
+    if surfels is None:
+        return
+    check.shape("surfels", surfels, "N", N=len(model))
+    if surfels.dtype != torch.bool or not bool(surfels.any()):
+        raise ArgumentError(
+            f"surfels: expected at least one that may change as bool, got {int(surfels.sum())} "
+            f"of {surfels.dtype}; choose a segment that is not empty"
+        )
+
+
+def rasterized(model: Surfels, camera: Camera, opacity: float = 1.0, **options: Any) -> Render:
+    """Rasterize a model with a factor on its opacities, which stay at most 1; see `rasterize`."""
+    means, quats, scales, opacities = geometry(model.parameters)
+    return rasterize(
+        *(means, quats, scales, (opacity * opacities).clamp_max(1)),
+        *(camera.viewmat, camera.K, camera.width, camera.height),
+        options=model.shading.options,
+        **options,
+    )
+
+
+class Canvas(NamedTuple):
     """A view, or the part of it that shows the model."""
 
     color: Tensor  # [3, h, w] premultiplied, over black
@@ -59,45 +85,27 @@ def paint(
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
     features = None if chosen is None else chosen.to(texels)[:, None]  # blended, they are the share
-    render = splatted(model, part, opacity, texture=texture, features=features)
+    render = rasterized(model, part, opacity, texture=texture, features=features)
     color = render.color.permute(2, 0, 1)
     return Canvas(color[:3], render.alpha, None if chosen is None else color[3].detach())
 
 
 def around(model: Surfels, camera: Camera) -> Camera:
-    """The camera of the part of a view that surfels can be seen in; one pixel of it at least."""
+    """Return the camera of the part of a view that surfels can be seen in; one pixel of it at least."""
     box = screen_box(model.parameters, model.shading.options, camera)
     left, top = min(max(box.left, 0), camera.width - 1), min(max(box.top, 0), camera.height - 1)
     right, bottom = min(box.right, camera.width), min(box.bottom, camera.height)
     return camera.crop(left, top, max(right, left + 1), max(bottom, top + 1))
 
 
-def splatted(model: Surfels, camera: Camera, opacity: float, **colored: object) -> Render:
-    """Rasterize a model with a factor on its opacities."""
-    means, quats, scales, opacities = geometry(model.parameters)
-    opacities = (opacity * opacities).clamp_max(1)
-    return rasterize(
-        means,
-        quats,
-        scales,
-        opacities,
-        camera.viewmat,
-        camera.K,
-        camera.width,
-        camera.height,
-        options=model.shading.options,
-        **colored,  # type: ignore[arg-type]
-    )
-
-
 def visible_part(alpha: Tensor) -> tuple[slice, slice]:
-    """Rows and columns of the smallest part of alpha [h, w] that holds all that is seen, and a margin."""
+    """Return rows and columns of the smallest part of alpha [h, w] with all that is seen, and a margin."""
     seen = alpha > SEEN
-    return extent(seen.any(dim=1)), extent(seen.any(dim=0))
+    return visible_range(seen.any(dim=1)), visible_range(seen.any(dim=0))
 
 
-def extent(seen: Tensor) -> slice:
-    """Where a row [n] has anything, widened to a multiple of pixels as far as there are any."""
+def visible_range(seen: Tensor) -> slice:
+    """Return where a row [n] has anything, widened to a multiple of pixels as far as there are any."""
     used = seen.nonzero()[:, 0]
     if not len(used):
         return slice(0, min(MULTIPLE, len(seen)))
@@ -109,17 +117,13 @@ def extent(seen: Tensor) -> slice:
 
 @torch.no_grad()
 def mean_alpha(model: Surfels, cameras: Sequence[Camera]) -> float:
-    """Mean alpha in [0, 1] of the pixels of a few views, each weighted by its alpha; 1 where nothing shows.
+    """Return the mean alpha of pixels of a few views, each weighted by its alpha; 1 where nothing shows.
 
     Weighted so, pixels at the rim of an opaque object hardly count, and the background does not at all.
-
-    Args:
-        model: any stage.
-        cameras: of views that are spread around the model, on any device.
     """
     total = square = 0.0
     for camera in cameras[:: -(-len(cameras) // VIEWS)]:
         part = around(model, camera.to(model.device))
-        alpha = splatted(model, part, 1.0, features=model.parameters["means"][:, :1]).alpha
+        alpha = rasterized(model, part, features=model.parameters["means"][:, :1]).alpha
         total, square = total + float(alpha.sum()), square + float(alpha.square().sum())
     return square / total if total > 0 else 1.0

@@ -11,9 +11,9 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.geometry import quats_to_matrices
+from texgs.edit.canvas import rasterized
 from texgs.fields.splats import REACH, geometry
 from texgs.fields.surfels.model import Surfels
-from texgs.raster import rasterize
 
 FAINT = 0.05  # alpha below which a click is on the background
 TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what hides it: surfaces are thick
@@ -52,10 +52,6 @@ def prompts_at(model: Surfels, clicks: Clicks) -> Prompts:
 
     Behind a layer that lets through more than it shows, a click is on what shows through.
 
-    Args:
-        model: of any stage.
-        clicks: on a view of it.
-
     Raises:
         ArgumentError: if a point is outside of the view or on the background.
     """
@@ -65,7 +61,7 @@ def prompts_at(model: Surfels, clicks: Clicks) -> Prompts:
 
 
 def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float) -> Tensor:
-    """Where the ray through a pixel meets the layer that makes up most of it, [3]."""
+    """Return where the ray through a pixel meets the layer that makes up most of it, [3]."""
     if not (0 <= x < camera.width and 0 <= y < camera.height):
         raise ArgumentError(
             f"point ({x:g}, {y:g}): expected a place in the view of {camera.width} x {camera.height} pixels"
@@ -86,21 +82,16 @@ def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float)
 
 
 def weights_at(model: Surfels, camera: Camera, column: int, row: int) -> Tensor:
-    """How much of a pixel each surfel makes up, [N]."""
+    """Return how much of a pixel each surfel makes up, [N]."""
     pixel = camera.crop(column, row, column + 1, row + 1)
-    opacities = model.parameters["opacities"]
-    seen = rasterize(
-        *geometry(model.parameters),
-        *(pixel.viewmat, pixel.K, 1, 1),
-        features=torch.zeros_like(opacities)[:, None],
-        outputs=("statistics",),
-        options=model.shading.options,
-    ).statistics
-    return seen.weight_sum  # type: ignore[union-attr]
+    nothing = torch.zeros_like(model.parameters["opacities"])[:, None]
+    seen = rasterized(model, pixel, features=nothing, outputs=("statistics",)).statistics
+    assert seen is not None
+    return seen.weight_sum
 
 
 def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> tuple[Tensor, Tensor]:
-    """Where the ray through a place of the image meets surfels, [K, 3], and the camera z there [K].
+    """Return where the ray through a place of the image meets surfels, [K, 3], and the camera z there [K].
 
     Edge on, a surfel is drawn by the filter, beside where the ray meets its plane: then it is its middle.
     """
@@ -115,7 +106,7 @@ def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> 
 
 
 def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float) -> Tensor:
-    """Whether more than half of the light reaches places in a view, [P] bool.
+    """Return which places in a view more than half of the light reaches, [P] bool.
 
     Args:
         pixels: [P, 2] of the places.
@@ -132,6 +123,6 @@ def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float)
 
 
 def extent(model: Surfels) -> float:
-    """Longest side of the box around the surfels' means, world units."""
+    """Return the longest side of the box around the surfels' means, world units."""
     means = model.parameters["means"]
     return float((means.amax(0) - means.amin(0)).max()) if len(means) else 0.0

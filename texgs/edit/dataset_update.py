@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import atan2, isfinite
-from typing import Protocol
+from math import atan2, ceil, isfinite
+from typing import NamedTuple, Protocol
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.errors import FitError
+from texgs.core.errors import ArgumentError, FitError
 from texgs.core.progress import progress
-from texgs.edit.turns import Schedule, turns
+from texgs.edit.methods.updates import UpdateSchedule
+from texgs.edit.objective import LOSS_SCALE
+from texgs.edit.observations import edit_views
 from texgs.fields.field import Field
 from texgs.models.guidance import EditViews, Guidance, require_edited
 from texgs.models.instruction import require_instruction
-from texgs.raster.losses import depth_to_normal
+from texgs.models.lpips import Lpips
+from texgs.raster.losses import l1_dssim
 from texgs.volume.images import Images
 
 
@@ -27,17 +30,83 @@ class Learner(Protocol):
 
     @property
     def original(self) -> Field:
-        """As it was at first."""
+        """Return the field as it was at first."""
         ...
 
     @property
     def field(self) -> Field:
-        """As it is now."""
+        """Return the field as it is now."""
         ...
 
     def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
-        """Learn from some of these views, all that memory and method allow; the loss."""
+        """Learn from some of these views, all that memory and method allow; return the loss."""
         ...
+
+
+@dataclass(frozen=True, eq=False)
+class PhotometricLoss:
+    """How far images are from those that an edit wants: L1, D-SSIM and LPIPS, each with its weight."""
+
+    l1: float
+    dssim: float
+    lpips: float = 0.0
+    network: Lpips | None = None  # for LPIPS
+
+    def __call__(self, image: Tensor, wanted: Tensor) -> Tensor:
+        """Return the weighted sum of mean differences [], differentiable in the image.
+
+        Args:
+            image: [H, W, 3], planar memory; or patches [N, H, W, 3] where D-SSIM has no weight.
+            wanted: the same shape.
+        """
+        pixels = self.l1 + self.dssim
+        loss = image.new_zeros(())
+        if self.dssim:
+            loss = pixels * l1_dssim(image, wanted, self.dssim / pixels)
+        elif self.l1:
+            loss = self.l1 * (image - wanted).abs().mean()
+        if self.lpips and self.network is not None:
+            loss = loss + self.lpips * self.network.distance(image, wanted)
+        return loss
+
+    def with_gradient(self, image: Tensor, wanted: Tensor) -> tuple[float, Tensor]:
+        """Return the loss, and its gradient by the image, of the image's shape."""
+        leaf = image.detach().requires_grad_()
+        loss = self(leaf, wanted)
+        (gradient,) = torch.autograd.grad(LOSS_SCALE * loss, leaf)
+        return float(loss.detach()), gradient / LOSS_SCALE
+
+
+class UpdateStep(NamedTuple):
+    """One iteration."""
+
+    edited: Sequence[int]  # views to edit before it, together
+    level: float  # of noise, as a share
+    learned: Sequence[int]  # views that it may learn from
+
+
+def update_steps(schedule: UpdateSchedule, count: int, generator: torch.Generator) -> Iterator[UpdateStep]:
+    """Yield all iterations on so many views; views and levels of noise are drawn at random."""
+    size, following = min(schedule.views or count, count), 0
+    least = ceil(size / schedule.group)
+    if schedule.period < least:
+        raise ArgumentError(
+            f"schedule: expected rounds of at least {least} iterations, in which {size} views are edited, "
+            f"got {schedule.period}; make rounds longer or edit fewer views in each"
+        )
+    for iteration in range(schedule.iterations):
+        round_, place = divmod(iteration, schedule.period)
+        if place == 0:
+            if schedule.order == "random":
+                chosen = torch.randperm(count, generator=generator)[:size].sort().values.tolist()
+            else:
+                chosen = [(following + k) % count for k in range(size)]
+                following = (following + size) % count
+        low, high = schedule.levels[min(round_, len(schedule.levels) - 1)]
+        level = low + (high - low) * float(torch.rand((), generator=generator))
+        edited = chosen[place * schedule.group : (place + 1) * schedule.group]
+        learned = {"all": range(count), "newest": edited or range(count), "round": chosen}
+        yield UpdateStep(edited, level, learned[schedule.learned])
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +129,7 @@ def update_field(
     images: Images,
     guidance: Guidance,
     instruction: str,
-    schedule: Schedule,
+    schedule: UpdateSchedule,
     *,
     keeps_renders: bool = False,
     shown: int = 1,
@@ -80,14 +149,14 @@ def update_field(
         seed: of all random numbers.
         title: of the progress bar.
     """
-    instruction, generator = require_instruction(instruction), torch.Generator().manual_seed(seed)
-    edits = _Edits(learner, images, guidance, instruction, keeps_renders, generator)
+    generator = torch.Generator().manual_seed(seed)
+    edits = _Edits(learner, images, guidance, require_instruction(instruction), keeps_renders, generator)
     losses: list[float] = []
-    planned = progress(turns(schedule, len(images), generator), schedule.iterations, title=title, unit="step")
-    for iteration, turn in enumerate(planned):
-        if turn.edited:
-            edits.make(turn.edited, turn.level)
-        losses.append(learner.step(edits.images, turn.learned, generator))
+    steps = update_steps(schedule, len(images), generator)
+    for iteration, step in enumerate(progress(steps, schedule.iterations, title=title, unit="step")):
+        if step.edited:
+            edits.make(step.edited, step.level)
+        losses.append(learner.step(edits.images, step.learned, generator))
         if not isfinite(losses[-1]):
             raise FitError(
                 f"iteration {iteration}: expected a finite loss, got {losses[-1]}; lower the rates"
@@ -129,23 +198,22 @@ class _Edits:
         self.count, self.seconds = self.count + len(ids), self.seconds + time.monotonic() - start
 
     def _condition(self, view: int) -> Tensor:
-        """What edits of a view stay close to [H, W, 3]: how it was before the first of them."""
+        """Return what edits of a view stay close to [H, W, 3]: how it was before the first of them."""
         if self.original is None:
             return self.before.target(view).color
-        return (
-            self.original.render(self.before.cameras[view].to(self.original.device)).color.clamp(0, 1).cpu()
-        )
+        camera = self.before.cameras[view].to(self.original.device)
+        return self.original.render(camera).color.clamp(0, 1).cpu()
 
     @torch.no_grad()
     def some(self, count: int) -> list[tuple[Tensor, Tensor]]:
-        """So many views that were edited, as they were and as they are, at most."""
+        """Return so many views that were edited, as they were and as they are, at most."""
         ids = sorted(self.edited)
         chosen = ids[:: max(1, len(ids) // count)][:count]
         return [(self._condition(view), self.images.target(view).color) for view in chosen]
 
 
 def azimuth(camera: Camera) -> float:
-    """Angle of a camera around the world's y axis, radians."""
+    """Return the angle of a camera around the world's y axis, radians."""
     x, _, z = camera.position.tolist()
     return atan2(z, x)
 
@@ -154,32 +222,6 @@ def azimuth(camera: Camera) -> float:
 def field_views(
     field: Field, cameras: Sequence[Camera], conditions: Tensor, level: float | None = None
 ) -> EditViews:
-    """Render views of a field for a guidance.
-
-    Points are those of the mean depth, and normals those of the surface that they make: fields without
-    surfaces have no others.
-
-    Args:
-        field: that can render depth.
-        cameras: of one size, on the field's device.
-        conditions: [V, H, W, 3] what edits stay close to.
-        level: of noise, see `EditViews`.
-    """
-    images, alphas, points, normals = [], [], [], []
-    for camera in cameras:
-        seen = field.render(camera, outputs=("depth",))
-        assert seen.depth is not None
-        images.append(seen.color.clamp(0, 1))
-        alphas.append(seen.alpha)
-        points.append(camera.unproject(seen.depth))
-        is_seen = (seen.alpha > 0)[..., None]
-        normals.append(depth_to_normal(seen.depth, camera.viewmat, camera.K) * is_seen)
-    return EditViews(
-        torch.stack(images),
-        conditions,
-        torch.stack(alphas),
-        torch.stack(points),
-        torch.stack(normals),
-        list(cameras),
-        level,
-    )
+    """Render views of a field for a guidance, see `edit_views`; `level` is of noise, see `EditViews`."""
+    renders = [field.render(camera, outputs=("depth",)) for camera in cameras]
+    return edit_views(renders, cameras, conditions, level)

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
+from texgs.core.light import HEADLIGHT, Light
 from texgs.core.progress import progress
 from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, prompts_at
-from texgs.edit.pieces import pieces_at
 from texgs.edit.votes import ContributionVotes, Vote, votes_of
 from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
@@ -22,7 +22,8 @@ from texgs.models.masks import MaskModel
 WHOLE = 0.9  # share of a model, from which a segment may be more than what was meant
 CERTAIN = 0.8  # share of votes from which surfels stand in for clicks that a view does not see
 AGREEMENT = 0.5  # least overlap of a mask with what other views say, or the mask model lost the object
-HEADLIGHT = Light("headlight")
+TOUCH = 2.0  # standard deviations of two surfels together, within which they touch
+NEIGHBOURS = 16  # surfels that one is compared with to connect them
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ class Lifted:
 
     @property
     def basis(self) -> str:
-        """How many views it rests on, in words; and whether it holds almost the whole model."""
+        """Return how many views it rests on, in words; and whether it holds almost the whole model."""
         views = f"masks of {self.used} of {self.used + self.left_out} views"
         share = float(self.mask.float().mean())
         if share < WHOLE:
@@ -72,7 +73,7 @@ def lift(
         light: in all views.
         vote: how masks become surfels; "centre" is the paper's way, of the masks that have a vote here.
         threshold: of the votes; by default 0.5 of contributions, 0.7 of views.
-        connected: whether only the connected pieces that hold a positive click are kept.
+        connected: whether only the connected components that hold a positive click are kept.
         title: of the progress bar.
 
     Raises:
@@ -100,7 +101,7 @@ def lift(
             "the object, or lower the threshold"
         )
     if connected:
-        selected = pieces_at(model, selected, prompts.places[prompts.positive])
+        selected = components_at(model, selected, prompts.places[prompts.positive])
     return Lifted(selected, reference, used, 1 + len(cameras) - used)
 
 
@@ -112,7 +113,7 @@ class ViewMasks:
 
     @torch.no_grad()
     def mask(self, clicks: Clicks) -> Tensor:
-        """The mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
+        """Return the mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
         camera = clicks.camera
         box = screen_box(self.model.parameters, self.model.shading.options, camera).within(
             camera.width, camera.height
@@ -129,12 +130,12 @@ class ViewMasks:
 
 
 def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:
-    """Cameras by the angle between their directions of view and that of one, the smallest first."""
+    """Sort cameras by the angle between their directions of view and that of one, the smallest first."""
     return sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
 
 
 def _mask(views: ViewMasks, so_far: ContributionVotes, prompts: Prompts, camera: Camera) -> Tensor | None:
-    """The mask of a view, or None where it sees nothing of the object or contradicts the views before."""
+    """Return the mask of a view; None where it sees nothing of the object or contradicts the views before."""
     model = views.model
     values = torch.stack([so_far.seen.float(), so_far.shares], dim=1)
     shown = so_far.shown(camera, values, ("median",))
@@ -156,7 +157,7 @@ def _mask(views: ViewMasks, so_far: ContributionVotes, prompts: Prompts, camera:
 
 
 def middle_of(mask: Tensor) -> tuple[float, float] | None:
-    """The place in a mask [H, W] that is farthest from its outline, in pixels; None in an empty one."""
+    """Return the place in a mask [H, W] farthest from its outline, in pixels; None in an empty one."""
     from scipy.ndimage import distance_transform_edt
 
     if not bool(mask.any()):
@@ -164,3 +165,30 @@ def middle_of(mask: Tensor) -> tuple[float, float] | None:
     distances = distance_transform_edt(mask.cpu().numpy())
     row, column = divmod(int(distances.argmax()), mask.shape[1])
     return column + 0.5, row + 0.5
+
+
+def components_at(model: Surfels, mask: Tensor, places: Tensor) -> Tensor:
+    """Return the connected components of a segment [N] bool, not empty, that hold places [P, 3].
+
+    Of several objects that look alike, only the one clicked on is kept so. Two surfels touch if their means
+    are within 2 standard deviations (the larger ones) of both together. A place is in the component of the
+    nearest surfel of the segment.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    chosen = mask.nonzero()[:, 0]
+    means = model.parameters["means"][chosen].detach().cpu().numpy()
+    reach = TOUCH * model.parameters["scales"][chosen].detach().exp().amax(dim=1).cpu().numpy()
+    tree, count = cKDTree(means), len(means)
+    distances, others = tree.query(means, k=range(1, min(NEIGHBOURS, count - 1) + 2))
+    rows = np.repeat(np.arange(count), others.shape[1])
+    touches = distances.ravel() <= reach[rows] + reach[np.minimum(others.ravel(), count - 1)]
+    edges = (np.ones(int(touches.sum())), (rows[touches], others.ravel()[touches]))
+    _, component = connected_components(coo_array(edges, shape=(count, count)), directed=False)
+    _, nearest = tree.query(places.detach().cpu().numpy())
+    kept = torch.from_numpy(np.isin(component, component[nearest])).to(mask.device)
+    result = torch.zeros_like(mask)
+    result[chosen[kept]] = True
+    return result

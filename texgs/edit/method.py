@@ -59,20 +59,20 @@ class Method(Generic[Settings]):
 
     @property
     def stage(self) -> str:
-        """Its verb, and its stage in the workflow."""
+        """Return its verb, which is its stage in the workflow."""
         return f"edit_{self.name}"
 
     @property
     def module(self) -> str:
-        """Where it is."""
-        return self.run.__module__
+        """Return the module that defines it."""
+        return self.settings.__module__
 
     def takes(self, kind: str) -> bool:
-        """Whether it can edit a kind of field."""
+        """Return whether it can edit a kind of field."""
         return (not self.fields or kind in self.fields) and self.needs <= kinds()[kind].can
 
     def of(self, edit: Any, look: str | None = None) -> Settings:
-        """Its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
+        """Return its settings among those of an edit: the schema's `Edit`, or its node in a configuration.
 
         Args:
             edit: to do.
@@ -84,14 +84,10 @@ class Method(Generic[Settings]):
 
 
 def methods() -> dict[str, Method[Any]]:
-    """All methods by name."""
+    """Return all methods by name."""
     return specifications(PACKAGE, "METHOD")
 
 
 def method_of(edit: Any) -> Method[Any]:
-    """The method of an edit.
-
-    Raises:
-        KeyError: for the edit `none`, which has no method.
-    """
+    """Return the method of an edit; the edit `none` has no method (KeyError)."""
     return methods()[edit.method]

@@ -1,19 +1,20 @@
-"""A new segment of a scene, from clicks on a view of one of its models."""
+"""A new segment of a scene, from clicks on a view of one of its models; and how a mask looks before that."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
+from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.edit.clicks import Clicks
-from texgs.edit.lift import Lifted, lift
+from texgs.core.light import HEADLIGHT, Light
+from texgs.edit.clicks import Clicks, prompts_at
+from texgs.edit.lift import Lifted, ViewMasks, lift
 from texgs.edit.votes import Vote
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
@@ -21,9 +22,12 @@ from texgs.scene.parts import require_new, split
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
 
+MASKED, COVER = (1.0, 0.1, 0.1), 0.6  # colour over what is masked, and its opacity
+POSITIVE, NEGATIVE = (0.0, 0.7, 0.0), (0.0, 0.0, 0.9)  # of clicks
+RADIUS = 0.008  # of clicks, of the longer side
 
-@dataclass(frozen=True, eq=False)
-class Segmented:
+
+class Segmented(NamedTuple):
     """A scene with a new segment, and what that was found in."""
 
     scene: Scene
@@ -57,7 +61,7 @@ def new_segment(
         facts: what the segment comes from, JSON.
         vote: see `lift`, as for what follows.
         threshold: of the votes.
-        connected: whether only connected pieces with a click are kept.
+        connected: whether only connected components with a click are kept.
         title: of the progress bar.
 
     Raises:
@@ -80,24 +84,45 @@ def new_segment(
 
 
 def clicked_model(scene: Scene, name: str, device: torch.device) -> Surfels:
-    """A model of a scene with the textures that it has there, alone, and without other edits of the scene.
+    """Return a model of a scene with the textures that it has there, alone, without other edits of the scene.
 
     Clicks are on this: what an edit makes faint or hides is opaque and in front.
-
-    Raises:
-        ArgumentError, ShapeError: naming the file that is not as it should be.
     """
     return scene.models[name].surfels()[0].to(device)
 
 
 def model_name(scene: Scene, name: str | None, where: str) -> str:
-    """The name of the model to segment: the one given, or that of the only model.
-
-    Raises:
-        ArgumentError: naming `where` it is from, if there is no such model.
-    """
+    """Return the name of the model to segment: the one given by `where`, or that of the only model."""
     if not name and len(scene.models) == 1:
         return next(iter(scene.models))
     if name not in scene.models:
         raise ArgumentError(f"{where}: expected one of {', '.join(scene.models)}, got {name or 'none'}")
     return str(name)
+
+
+@torch.no_grad()
+def preview(
+    model: Surfels, clicks: Clicks, masks: MaskModel, light: Light = HEADLIGHT
+) -> tuple[Tensor, Tensor]:
+    """Return the mask [H, W] bool of a view from clicks on it, and a picture [H, W, 3] of both.
+
+    A mask model that remembers images answers the second click on a view at once.
+
+    Raises:
+        ArgumentError: if a click is outside of the view or on the background.
+    """
+    prompts_at(model, clicks)
+    mask = ViewMasks(model, light, masks).mask(clicks)
+    image = model.render(clicks.camera, light).color.clamp(0, 1)
+    return mask, overlay(image, mask, clicks)
+
+
+def overlay(image: Tensor, mask: Tensor, clicks: Clicks) -> Tensor:
+    """Return an image [H, W, 3] with a mask [H, W] in red, positive clicks in green and negative in blue."""
+    shown = torch.where(mask[..., None], (1 - COVER) * image + COVER * image.new_tensor(MASKED), image)
+    height, width = mask.shape
+    rows, columns = (torch.arange(size, device=image.device) + 0.5 for size in (height, width))
+    for (x, y), is_positive in zip(clicks.points.tolist(), clicks.positive.tolist(), strict=True):
+        near = (rows[:, None] - y).square() + (columns[None] - x).square() <= (RADIUS * max(mask.shape)) ** 2
+        shown = torch.where(near[..., None], image.new_tensor(POSITIVE if is_positive else NEGATIVE), shown)
+    return shown

@@ -9,12 +9,13 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from texgs.core import check
 from texgs.core.errors import ArgumentError
 from texgs.core.memory import require_memory
-from texgs.edit.distribution import FeatureDistribution
 from texgs.edit.recipe import Recipe
-from texgs.edit.sliced import PatchStatistics, sliced_wasserstein
+from texgs.edit.sliced_wasserstein import FeatureDistribution, PatchStatistics
 from texgs.edit.style_picture import StylePicture
+from texgs.models.clip import Clip
 from texgs.models.nnfm import StyleFeatures, nnfm
 from texgs.models.vgg import STYLE_LAYERS, Vgg
 
@@ -24,6 +25,24 @@ STRIDE = 4  # pixels between the positions of the features that NNFM compares
 ON_OBJECT = 0.5  # of alpha, from which a feature or a patch counts
 STYLE_FEATURES = 1100  # bytes of memory for the features of a pixel
 LOSS_SCALE = 4096.0  # while it goes backwards: gradients of a mean over features would underflow in float16
+
+
+class ClipLoss:
+    """|C(R) - C(S)|, the distance of unit features of whole images; those of the style are computed once.
+
+    It is the second term of the paper's loss for image-driven editing. The style is [H, W, 3] in [0, 1].
+    """
+
+    def __init__(self, clip: Clip, style: Tensor) -> None:
+        check.shape("style", style, "H W 3")
+        self.clip = clip
+        with torch.no_grad():
+            self.target = clip.images(style[None])
+
+    def __call__(self, image: Tensor) -> Tensor:
+        """Return the loss [] of an image [H, W, 3] in [0, 1]; differentiable in it."""
+        check.shape("image", image, "H W 3")
+        return (self.clip.images(image[None]) - self.target).norm()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,12 +97,12 @@ class Objective:
     def of_views(
         cls, recipe: Recipe, style: StylePicture, size: tuple[int, int], vgg: Vgg | None
     ) -> Objective:
-        """Compute the same for a picture behind views of a width and height."""
+        """Compute the same for a picture behind views of a width and height, without a CLIP term."""
         scaled = style.scaled(recipe.pattern * max(size))
         return cls.of(recipe, scaled, recipe.reduction(*size), vgg, None)
 
     def terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
-        """Weighted losses [] by name, differentiable in the image.
+        """Return weighted losses [] by name, differentiable in the image.
 
         Args:
             image: [3, h, w] in [0, 1].
@@ -95,13 +114,11 @@ class Objective:
             terms["clip"] = recipe.features * (1 - recipe.lambda_s) * self.clip(image.permute(1, 2, 0))
         if self.patches is not None:
             where = (share > ON_OBJECT) if recipe.foreground else None
-            terms["patches"] = recipe.patches * sliced_wasserstein(
-                image, self.patches, where, iteration, iteration
-            )
+            terms["patches"] = recipe.patches * self.patches.distance(image, where, iteration, iteration)
         return terms
 
     def feature_terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
-        """Those of them that compare features of VGG; see `terms`."""
+        """Return those of them that compare features of VGG; see `terms`."""
         recipe = self.recipe
         if self.style is None or self.vgg is None:
             return {}
@@ -131,12 +148,12 @@ class Objective:
         return F.mse_loss(features.float(), wanted.float())
 
     def small(self, image: Tensor) -> Tensor:
-        """The image [3, h, w] as features see it."""
+        """Return the image [3, h, w] as features see it."""
         return F.avg_pool2d(image[None], self.reduce)[0] if self.reduce > 1 else image
 
 
 def wanted_layers(recipe: Recipe) -> tuple[str, ...]:
-    """Names of the layers that the losses of a recipe look at."""
+    """Return the names of the layers that the losses of a recipe look at."""
     return (*FINE_LAYERS, *STYLE_LAYERS) if recipe.distribution > 0 else STYLE_LAYERS
 
 
@@ -144,7 +161,7 @@ def wanted_layers(recipe: Recipe) -> tuple[str, ...]:
 def style_maps(
     style: StylePicture, recipe: Recipe, vgg: Vgg
 ) -> tuple[dict[int, Tensor], dict[int, Tensor | None]]:
-    """Features [C, h, w] of a style by their stride, and which [h, w] of them count; None: all."""
+    """Return features [C, h, w] of a style by their stride, and which [h, w] of them count; None: all."""
     height, width = style.region.shape
     what = f"features of a style of {width} x {height} pixels"
     require_memory(STYLE_FEATURES * height * width, what, "make edit.image.pattern smaller")
@@ -157,6 +174,6 @@ def style_maps(
 
 
 def pooled(share: Tensor, side: int, size: torch.Size) -> Tensor:
-    """Whether each of [h / side, w / side] features is on the object, bool, cut to the features' size."""
+    """Return which of [h / side, w / side] features are on the object, bool, cut to the features' size."""
     mean = F.avg_pool2d(share[None], side)[0] > ON_OBJECT
     return mean[: size[0], : size[1]]

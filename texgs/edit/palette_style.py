@@ -74,7 +74,7 @@ def stylize_palette(
         )
     dominant = [cluster_colors(style.pixels, CLUSTERS, recipe.seed)[0] for style in styles]
     field = replace(field, parameters={**field.parameters, "palette.colors": torch.stack(dominant)})
-    run = PaletteSteps(field, torch.Generator().manual_seed(recipe.seed))
+    run = PalettePainting(field, torch.Generator().manual_seed(recipe.seed))
     error = run.distil(images, keys.distillation, title)
     objectives = [Objective.of_views(recipe, style, images.size, vgg) for style in styles]
     greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
@@ -97,7 +97,7 @@ class Layer(NamedTuple):
         )
 
 
-class PaletteSteps:
+class PalettePainting:
     """A field whose free colours are on their way to styles.
 
     Args:

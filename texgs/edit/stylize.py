@@ -9,11 +9,10 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.edit.canvas import mean_alpha, paint, visible_part
+from texgs.edit.canvas import mean_alpha, paint, require_editable, visible_part
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.style_loop import Painting, Stopwatch, learn_style
@@ -25,20 +24,13 @@ from texgs.models.vgg import Vgg
 
 
 @dataclass(frozen=True, eq=False)
-class History:
-    """How an edit went."""
-
-    losses: dict[str, list[float]]  # weighted terms by name, a value for each iteration
-    seconds: dict[str, float]  # by part
-
-
-@dataclass(frozen=True, eq=False)
 class Stylized:
     """A model in a style, and how it came to be."""
 
     model: Surfels
-    history: History
     recipe: Recipe  # adapted to the scene
+    losses: dict[str, list[float]]  # weighted terms by name, a value for each iteration
+    seconds: dict[str, float]  # by part of the work
 
 
 def stylize(
@@ -52,7 +44,7 @@ def stylize(
     clip: FeatureTerm | None = None,
     surfels: Tensor | None = None,
     title: str = "style",
-    show: Callable[[Callable[[], Surfels]], None] | None = None,
+    show: Callable[[Callable[[], Surfels]], None] = lambda result: None,
 ) -> Stylized:
     """Give a model the style of a picture (the paper's section Image-Driven NPSE).
 
@@ -76,50 +68,24 @@ def stylize(
         ArgumentError, ShapeError: if the model has no texture, there is no view, or a term is missing.
         FitError: if the loss is no longer finite; nothing is returned then.
     """
-    _check(model, cameras, lights, surfels)
-    watch = Stopwatch(model.device)
-    with watch.part("start"):
-        run = StyleSteps.prepare(model, cameras, lights, style, recipe, vgg, clip, surfels)
-    offer = (lambda: None) if show is None else partial(show, run.result)
-    losses = learn_style(run, len(cameras), recipe, title, watch=watch, show=offer)
-    return Stylized(run.result(), History(losses, dict(watch.seconds)), run.recipe)
-
-
-def _check(
-    model: Surfels, cameras: Sequence[Camera], lights: Sequence[Light], surfels: Tensor | None
-) -> None:
-    if model.stage != "texture":
-        raise ArgumentError(f"model: expected stage texture, got {model.stage}; fit its texture first")
+    require_editable(model, surfels)
     if not cameras or len(lights) != len(cameras):
         raise ArgumentError(
             f"lights: expected one for each of some cameras, got {len(lights)} for {len(cameras)}"
         )
-    if surfels is not None:
-        check.shape("surfels", surfels, "N", N=len(model))
-        if surfels.dtype != torch.bool or not bool(surfels.any()):
-            raise ArgumentError("surfels: expected a bool mask that chooses some, got none chosen")
+    watch = Stopwatch(model.device)
+    with watch.part("start"):
+        run = SurfelPainting(model, cameras, lights, style, recipe, vgg, clip, surfels)
+    offer = partial(show, run.result)
+    losses = learn_style(run, len(cameras), recipe, title, watch=watch, show=offer)
+    return Stylized(run.result(), run.recipe, losses, dict(watch.seconds))
 
 
-@dataclass(eq=False)
-class StyleSteps:
-    """What an edit knows from one step to the next."""
+class SurfelPainting:
+    """Textured surfels on their way to a style; see `stylize`."""
 
-    cameras: Sequence[Camera]
-    lights: Sequence[Light]
-    model: Surfels  # with the colours of its surfels taken out where they change
-    recipe: Recipe
-    style: StylePicture  # at the size at which it is behind the object
-    objective: Objective
-    texels: Tensor  # [T, 3] that learn
-    adam: torch.optim.Optimizer
-    generator: torch.Generator
-    surfels: Tensor | None  # [N] bool, those that change
-    fixed: Tensor | None  # [F] indices of texels that stay
-    owner: Tensor  # [T] surfel of each texel
-
-    @classmethod
-    def prepare(
-        cls,
+    def __init__(
+        self,
         model: Surfels,
         cameras: Sequence[Camera],
         lights: Sequence[Light],
@@ -128,32 +94,33 @@ class StyleSteps:
         vgg: Vgg | None,
         clip: FeatureTerm | None,
         surfels: Tensor | None,
-    ) -> StyleSteps:
-        """Lay the style onto the surface and compute its features."""
+    ) -> None:
         p = model.parameters
         if recipe.adapts:
             recipe = recipe.adapted(mean_alpha(model, cameras))
+        self.cameras, self.lights, self.recipe, self.surfels = cameras, lights, recipe, surfels
         width, height = cameras[0].width, cameras[0].height
-        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height)).vivid(recipe.chroma)
-        objective = Objective.of(recipe, scaled, recipe.reduction(width, height), vgg, clip)
-        colors, fixed = -p["palette"].expand_as(p["colors"]), None
+        scaled = style.to(p["means"].device).scaled(recipe.pattern * max(width, height))
+        self.style = scaled.vivid(recipe.chroma)  # at the size at which it is behind the object
+        self.objective = Objective.of(recipe, self.style, recipe.reduction(width, height), vgg, clip)
+        colors = -p["palette"].expand_as(p["colors"])
         places, surfel = owners(p)
-        owner = torch.empty_like(surfel).index_copy_(0, places, surfel)
-        moving = None if surfels is None else surfels[owner]
-        texels = start_colors(recipe.start, model, scaled, pixel_side(model, cameras), recipe.seed, moving)
+        self.owner = torch.empty_like(surfel).index_copy_(0, places, surfel)  # [T] surfel of each texel
+        moving = None if surfels is None else surfels[self.owner]
+        pixel = pixel_side(model, cameras)
+        texels = start_colors(recipe.start, model, self.style, pixel, recipe.seed, moving)
         if not recipe.is_textured:
-            texels = mean_texels({**p, "texels": texels}).to(texels)[owner]
+            texels = mean_texels({**p, "texels": texels}).to(texels)[self.owner]
+        self.fixed: Tensor | None = None  # [F] indices of texels that stay
         if surfels is not None:
             colors = torch.where(surfels[:, None], colors, p["colors"])
-            fixed = (~surfels[owner]).nonzero()[:, 0]
-            texels[fixed] = p["texels"][fixed]
-        bare = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
-        texels.requires_grad_()
-        adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
-        generator = torch.Generator().manual_seed(recipe.seed)
-        return cls(
-            cameras, lights, bare, recipe, scaled, objective, texels, adam, generator, surfels, fixed, owner
-        )
+            self.fixed = (~surfels[self.owner]).nonzero()[:, 0]
+            texels[self.fixed] = p["texels"][self.fixed]
+        # The colours of surfels are taken out where they change: texels [T, 3] have all of the colour.
+        self.model = Surfels({**p, "colors": colors.contiguous()}, model.shading, model.metadata)
+        self.texels = texels.requires_grad_()
+        self.adam = torch.optim.Adam([self.texels], eps=1e-15, fused=True)
+        self.generator = torch.Generator().manual_seed(recipe.seed)
 
     def render(self, view: int) -> list[Painting]:
         """Show a view over the style or white."""
@@ -175,7 +142,7 @@ class StyleSteps:
         return [Painting(image, share, self.objective, color.backward)]
 
     def behind(self, alpha: Tensor) -> Tensor:
-        """What is behind the object [3, h, w]: white, or somewhere in the mirrored style."""
+        """Return what is behind the object [3, h, w]: white, or somewhere in the mirrored style."""
         if self.recipe.behind == "white":
             return alpha.new_ones(3, *alpha.shape)
         top, left = torch.randint(1 << 20, (2,), generator=self.generator).tolist()
@@ -183,7 +150,7 @@ class StyleSteps:
 
     @torch.no_grad()
     def step(self, iteration: int) -> None:
-        """A step of Adam, after which colours are in [0, 1] again."""
+        """Take a step of Adam, after which colours are in [0, 1] again."""
         recipe = self.recipe
         self.adam.param_groups[0]["lr"] = recipe.rate * recipe.last_rate ** (iteration / recipe.iterations)
         if not recipe.is_textured:  # equal gradients keep equal what starts equal
@@ -196,5 +163,5 @@ class StyleSteps:
             self.texels[self.fixed] = self.model.parameters["texels"][self.fixed]
 
     def result(self) -> Surfels:
-        """The model with the texels as they are now."""
+        """Return the model with the texels as they are now."""
         return recolored(self.model, self.texels.detach(), self.surfels)

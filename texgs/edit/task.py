@@ -1,4 +1,4 @@
-"""What a method of editing gets, and what it gives."""
+"""What a method of editing gets and gives, and how it edits parts of a scene: whole models, or segments."""
 
 from __future__ import annotations
 
@@ -12,19 +12,66 @@ from torch import Tensor
 
 from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
+from texgs.core.names import part_file
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import method_of
-from texgs.edit.parts import edit_fields, edit_parts
 from texgs.fields.field import Field
+from texgs.fields.kinds import kinds
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.variants import labels_of, write_texture
+from texgs.scene.parts import part_names, replaced, split, with_textures
 from texgs.scene.scene import Scene
 from texgs.volume.view_set import View, read_views
 
 Settings = TypeVar("Settings")
 
 
-def ignore(name: str, model: Callable[[], Surfels]) -> None:
-    """Show nobody."""
+def parts_of(scene: Scene, names: Sequence[str]) -> list[str]:
+    """Return the parts of these names, MODEL or MODEL/SEGMENT, that an edit is of; all models by default.
+
+    Raises:
+        ArgumentError: naming the one that is not in the scene, or there twice.
+    """
+    known = part_names(scene)
+    for name in names:
+        if name not in known:
+            raise ArgumentError(f"edit.parts: expected some of {', '.join(known)}, got {name}")
+        if names.count(name) > 1:
+            raise ArgumentError(f"edit.parts: expected different names, got {name} twice")
+    return list(names) or list(scene.models)
+
+
+def parts_with_surfels(scene: Scene) -> list[str]:
+    """Return the names of all parts but models whose surfels are all in segments, and of such segments."""
+    names = []
+    for name, entry in scene.models.items():
+        own = [name, *(f"{name}/{segment}" for segment in entry.segments)]
+        if entry.segments:
+            model, masks = entry.surfels()
+            labels = set(labels_of(masks, len(model)).unique().tolist())
+            own = [part for number, part in enumerate(own) if number in labels]
+        names += own
+    return names
+
+
+def surfels_of(scene: Scene, part: str) -> tuple[Surfels, Tensor | None]:
+    """Return the model of a part with the textures that it has, and which surfels [N] bool are the part's.
+
+    Of a model with segments these are what no segment holds; None stands for all of them.
+    """
+    name, segment = split(scene, part)
+    entry = scene.models[name]
+    model, masks = entry.surfels()
+    if not masks:
+        return model, None
+    number = 0 if segment is None else 1 + list(entry.segments).index(segment)
+    surfels = labels_of(masks, len(model)) == number
+    if not bool(surfels.any()):
+        raise ArgumentError(
+            f"edit.parts: expected surfels of {part}, got none, for (other) segments hold all of them; "
+            "name other parts"
+        )
+    return model, surfels
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +88,20 @@ class Task(Generic[Settings]):
     lens: Lens  # of the views, but for the size of images
     title: str  # of progress bars
     followed: Mapping[str, str] = field(default_factory=dict)  # by model, where not as settings say
-    show: Callable[[str, Callable[[], Surfels]], None] = ignore  # is offered parts on their way
+    show: Callable[[str, Callable[[], Surfels]], None] = lambda part, model: None  # parts on their way
 
-    def settings_for(self, model: str) -> Settings:
-        """Settings with the picture or the instruction that a model follows."""
-        method = method_of(self.edit)
-        look = self.followed.get(model)
-        return self.settings if look is None else replace(self.settings, **{method.follows: look})  # type: ignore[type-var]
+    def settings_for(self, part: str) -> Settings:
+        """Return the settings with the picture or the instruction that the model of a part follows."""
+        look = self.followed.get(split(self.scene, part)[0])
+        changes: dict[str, Any] = {} if look is None else {method_of(self.edit).follows: look}
+        return replace(self.settings, **changes)  # type: ignore[type-var]
+
+    def title_of(self, part: str) -> str:
+        """Return the title of a progress bar."""
+        return f"{self.title} {self.edit.name}, {part}"
 
     def training_views(self, model: str) -> Sequence[View]:
-        """Training views of a model.
+        """Return the training views of a model.
 
         Raises:
             ArgumentError: if the model is none of the data set's.
@@ -63,27 +114,38 @@ class Task(Generic[Settings]):
         return read_views(self.views[model].parent).train
 
     def each_part(self, one: Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]) -> Scene:
-        """Edit the parts one after the other; the scene with their new textures, which are written.
+        """Edit the parts one after the other, each alone, and write their textures.
 
         Args:
             one: from the name of a part, its model with the textures that it has, the surfels that may change
                 (None: all) and training views, to the edited model.
+
+        Returns:
+            The scene with the new textures, without palettes that were edited before: these were of other
+            texels.
         """
-        return edit_parts(
-            *(self.scene, self.edit.parts, self.output, self.device),
-            lambda part, model, surfels: one(part.name, model, surfels, self.training_views(part.model)),
-        )
+        scene = self.scene
+        for part in parts_of(scene, self.edit.parts):
+            file = self.output / part_file("edit.parts", part)
+            model, surfels = surfels_of(scene, part)
+            surfels = None if surfels is None else surfels.to(self.device)
+            edited = one(part, model.to(self.device), surfels, self.training_views(split(scene, part)[0]))
+            path = write_texture(file, edited, {"part": part})
+            scene = with_textures(scene, {part: path}, own_colors=True)
+        return scene
 
     def each_model(self, one: Callable[[str, Field, Sequence[View]], Field]) -> Scene:
-        """Edit whole models of any kind one after the other; the scene with the new ones, which are written.
+        """Edit whole models of any kind one after the other, each alone; return the scene with the new ones.
 
         Args:
             one: from the name of a model, the model and training views, to the edited model.
         """
-        return edit_fields(
-            *(self.scene, self.edit.parts, self.output, self.device),
-            lambda name, model: one(name, model, self.training_views(name)),
-        )
+        scene = self.scene
+        for name in parts_of(scene, self.edit.parts):
+            entry, file = scene.models[split(scene, name)[0]], self.output / part_file("edit.parts", name)
+            edited = one(name, entry.open()[0].to(self.device), self.training_views(name))
+            scene = replaced(scene, name, replace(entry, file=kinds()[edited.kind].write(file, edited)))
+        return scene
 
 
 @dataclass(frozen=True, eq=False)

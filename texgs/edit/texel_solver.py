@@ -1,59 +1,140 @@
-"""How texels follow edited views: by preconditioned stochastic steps, or by Adam as the paper finds them."""
+"""How texels follow edited views: by preconditioned stochastic steps, or by Adam as in the paper."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
 
 from texgs.core.progress import progress
-from texgs.edit.back_projection import BackProjection
-from texgs.edit.exposures import Exposure
+from texgs.edit.observations import LinearObservation, planar
 from texgs.fields.optimizer import Rate
 from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.texels import bare_colors, owners
 from texgs.raster.losses import l1_dssim
 
-STEP = 1.5  # of a Newton step in a typical exposure: 2 is the limit of stability
-LAST_STEP = 0.1  # what single exposures disagree about averages out as steps fall
+FAINT = 1e-4  # gain times alpha below which a pixel says nothing
+HARDLY = 0.01  # of the mean weight: what is seen less than that is hardly seen
+STEP = 1.5  # of a Newton step in a typical observation: 2 is the limit of stability
+LAST_STEP = 0.1  # what single observations disagree about averages out as steps fall
 RIDGE = 0.02  # added to curvatures, relative to their median: texels that are hardly seen stay
 DSSIM = 0.2  # share of D-SSIM in what Adam follows
 
 
+@dataclass(frozen=True, eq=False)
+class BackProjection:
+    """What edited views say about each texel before anything is solved, a projective texture."""
+
+    colors: Tensor  # [T, 3] mean of the bare colours wanted where it is seen, in [0, 1]
+    weights: Tensor  # [T] sum of its weights in pixels, 0 where it is never seen
+    curvature: Tensor  # [T] row sum of the Hessian in a typical observation
+
+
+def back_project(observations: Sequence[LinearObservation], model: Surfels) -> BackProjection:
+    """Average what observations want over the pixels that show a texel.
+
+    The curvature is the row sum A'A 1 of one observation, A being the weights of texels in pixels; divided by
+    it, no eigenvalue of A'A exceeds 1. Over observations it is the mean weighted by itself, sum c^2 / sum c:
+    a texel that few of them show has a small mean and still a large one where it is seen.
+    """
+    texels = model.parameters["texels"]
+    colors, weights = torch.zeros_like(texels), texels.new_zeros(len(texels))
+    total, squares = torch.zeros_like(weights), torch.zeros_like(weights)
+    for observation in observations:
+        ones = torch.ones_like(texels).requires_grad_()
+        image = observation.image(ones, plain=True)
+        gains = image.detach()[..., :1]  # [h, w, 1]
+        shows = gains > FAINT
+        wanted = observation.wanted
+        if observation.is_lit:
+            wanted = wanted - observation.image(torch.zeros_like(ones)).detach()
+        bare = torch.where(shows, wanted / gains.clamp_min(FAINT), 0.0).clamp(0, 1)
+        # The rasterizer treats channels alike and apart: two sums share a pass.
+        both = torch.cat([shows.to(gains), gains, torch.zeros_like(gains)], dim=-1)
+        (sums,) = torch.autograd.grad(image, ones, bare, retain_graph=True)
+        (shares,) = torch.autograd.grad(image, ones, both)
+        colors += sums
+        weights += shares[:, 0]
+        total += shares[:, 1]
+        squares += shares[:, 1].square()
+    tiny = torch.finfo(weights.dtype).tiny
+    mean = colors / weights.clamp_min(tiny)[:, None]
+    return BackProjection(mean.clamp(0, 1), weights, squares / total.clamp_min(tiny))
+
+
+def seen_texels(weights: Tensor) -> Tensor:
+    """Return which texels [T] views really show: not those glimpsed through what is in front of them."""
+    return weights > HARDLY * weights.mean()
+
+
+def fill_unseen(colors: Tensor, weights: Tensor, model: Surfels) -> Tensor:
+    """Return colours [T, 3] of texels, those that views hardly show drawn to what is seen nearest to them.
+
+    That is the mean of the texels of the same surfel, weighted by how much they are seen, [T]; where the
+    whole surfel hardly is, that of the nearest one (by its mean) that is seen. So a side that nobody edited
+    shows what is around: neither the old colours, nor black, nor what shines through from the other side.
+    Where nothing at all is seen, all texels keep their colours.
+    """
+    place, surfel = owners(model.parameters)
+    weight = weights[place]
+    of_surfel = weight.new_zeros(len(model)).index_add_(0, surfel, weight)
+    if not bool((of_surfel > 0).any()):
+        return bare_colors(model)
+    totals = colors.new_zeros(len(model), 3).index_add_(0, surfel, colors[place] * weight[:, None])
+    mean = totals / of_surfel.clamp_min(torch.finfo(weight.dtype).tiny)[:, None]
+    few = HARDLY * of_surfel.mean()
+    around = mean[_nearest(model.parameters["means"], of_surfel > few)]
+    mean = (totals + few * around) / (of_surfel + few)[:, None]
+    few = HARDLY * weight.mean()
+    filled = colors.clone()
+    filled[place] = (colors[place] * weight[:, None] + few * mean[surfel]) / (weight + few)[:, None]
+    return filled
+
+
+def _nearest(means: Tensor, known: Tensor) -> Tensor:
+    """Return indices [N] of the nearest of the known surfels, one at least; of these themselves their own."""
+    from scipy.spatial import cKDTree
+
+    index = torch.arange(len(means), device=means.device)
+    if bool(known.all()):
+        return index
+    ids, points, is_known = known.nonzero()[:, 0], means.detach().cpu().numpy(), known.cpu().numpy()
+    _, nearest = cKDTree(points[is_known]).query(points[~is_known])
+    index[~known] = ids[torch.as_tensor(nearest, device=ids.device)]
+    return index
+
+
 def solve(
-    exposures: Sequence[Exposure],
-    model: Surfels,
-    seen: BackProjection,
+    observations: Sequence[LinearObservation],
+    curvature: Tensor,
     start: Tensor,
     *,
     sweeps: int,
     generator: torch.Generator,
     title: str,
 ) -> Tensor:
-    """Least squares in bare colours over all exposures, one per step, kept in [0, 1].
+    """Return bare colours [T, 3] in [0, 1] by least squares over all observations, one per step.
 
-    Opacities take turns instead of following each other: the problem is one, not a schedule.
+    Opacities take turns instead of following each other: the problem is one, not a schedule. Texels that are
+    not seen keep their colours of the start.
 
     Args:
-        exposures: of all views at all opacities.
-        model: textured.
-        seen: of these exposures.
+        observations: of all views at all opacities.
+        curvature: [T], see `back_project`.
         start: [T, 3] bare colours.
-        sweeps: passes over all exposures.
+        sweeps: passes over all observations.
         generator: of their order.
         title: of the progress bar.
-
-    Returns:
-        [T, 3] bare colours in [0, 1]; those of texels that are not seen are those of the start.
     """
-    sizes, offsets = model.parameters["sizes"], model.parameters["offsets"]
-    scale = _inverse(seen.curvature)[:, None]
+    scale = _inverse(curvature)[:, None]
     colors = start.clone().requires_grad_()
-    order = [i for _ in range(sweeps) for i in torch.randperm(len(exposures), generator=generator).tolist()]
+    count = len(observations)
+    order = [i for _ in range(sweeps) for i in torch.randperm(count, generator=generator).tolist()]
     for step, index in enumerate(progress(order, title=title, unit="view")):
-        exposure = exposures[index]
-        image = exposure.image(colors, sizes, offsets)
-        (gradient,) = torch.autograd.grad(image, colors, image.detach() - exposure.wanted)
+        image = observations[index].image(colors)
+        (gradient,) = torch.autograd.grad(image, colors, image.detach() - observations[index].wanted)
         rate = STEP * (LAST_STEP / STEP) ** (step / len(order))
         with torch.no_grad():
             colors.addcmul_(gradient, scale, value=-rate).clamp_(0, 1)
@@ -61,7 +142,7 @@ def solve(
 
 
 def _inverse(curvature: Tensor) -> Tensor:
-    """1 / (curvature + ridge) [T]; 0 where nothing is seen."""
+    """Return 1 / (curvature + ridge) [T]; 0 where nothing is seen."""
     seen = curvature[curvature > 0]
     if not len(seen):
         return torch.zeros_like(curvature)
@@ -69,8 +150,7 @@ def _inverse(curvature: Tensor) -> Tensor:
 
 
 def learn(
-    exposures: Sequence[Sequence[Exposure]],
-    model: Surfels,
+    observations: Sequence[Sequence[LinearObservation]],
     start: Tensor,
     *,
     rate: Rate,
@@ -78,28 +158,26 @@ def learn(
     generator: torch.Generator,
     title: str,
 ) -> Tensor:
-    """Learn bare colours [T, 3] in [0, 1] by Adam on L1 + D-SSIM, one exposure per step.
+    """Learn bare colours [T, 3] in [0, 1] by Adam on L1 + D-SSIM, one observation per step.
 
-    Over all steps the opacity goes from the first row of exposures to the last.
+    Over all steps the opacity goes from the first row of observations to the last.
 
     Args:
-        exposures: for each opacity those of all views.
-        model: textured.
+        observations: for each opacity those of all views.
         start: [T, 3] bare colours.
         rate: of Adam, over all steps.
         steps: how many.
         generator: of the order of views.
         title: of the progress bar.
     """
-    sizes, offsets = model.parameters["sizes"], model.parameters["offsets"]
     texels = start.clone().requires_grad_()
     adam = torch.optim.Adam([texels], eps=1e-15, fused=True)
     for step in progress(range(steps), title=title, unit="iteration"):
-        row = exposures[step * len(exposures) // steps]
-        exposure = row[int(torch.randint(len(row), (), generator=generator))]
-        beyond = (1 - exposure.cover)[..., None]  # white, in image and target alike
-        wanted = (exposure.wanted + beyond).permute(2, 0, 1).contiguous().permute(1, 2, 0)
-        image = exposure.image(texels, sizes, offsets) + beyond
+        row = observations[step * len(observations) // steps]
+        observation = row[int(torch.randint(len(row), (), generator=generator))]
+        beyond = (1 - observation.cover)[..., None]  # white, in image and target alike
+        wanted = planar(observation.wanted + beyond)
+        image = observation.image(texels) + beyond
         adam.param_groups[0]["lr"] = rate.at(step / steps)
         adam.zero_grad(set_to_none=True)
         l1_dssim(image, wanted, DSSIM).backward()

@@ -3,32 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import Literal, Protocol
+from typing import Literal
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.edit.canvas import rasterized
 from texgs.fields.splats import geometry
 from texgs.fields.surfels.model import Surfels
-from texgs.raster import Render, rasterize, splat
+from texgs.raster import Render, splat
 
 Vote = Literal["contribution", "centre"]
 SEEN = 0.01  # pixels in all views together that a surfel must make up to have a vote
 ROUNDS = 5
 NEIGHBOURS = 5  # seen surfels, whose mean share one that no view shows gets
-
-
-class Votes(Protocol):
-    """Counts what masks of views say about each surfel."""
-
-    def add(self, camera: Camera, mask: Tensor) -> None:
-        """Count the mask [H, W] of a view."""
-        ...
-
-    def selected(self) -> Tensor:
-        """Surfels [N] bool that belong to the object."""
-        ...
 
 
 class ContributionVotes:
@@ -52,7 +41,6 @@ class ContributionVotes:
 
     def __init__(self, model: Surfels, threshold: float = 0.5, rounds: int = ROUNDS) -> None:
         self.model, self.threshold, self.rounds = model, threshold, rounds
-        self.geometry, self.options = geometry(model.parameters), model.shading.options
         self.sums, self.weights = model.parameters["means"].new_zeros(2, len(model))
         self.views: list[tuple[Camera, Tensor]] = []
 
@@ -68,17 +56,17 @@ class ContributionVotes:
 
     @property
     def seen(self) -> Tensor:
-        """Surfels [N] bool that have votes."""
+        """Return the surfels [N] bool that have votes."""
         return self.weights > SEEN
 
     @property
     def shares(self) -> Tensor:
-        """Share [N] of each surfel's plain votes that are for the object; 0 without votes."""
+        """Return the share [N] of each surfel's plain votes that are for the object; 0 without votes."""
         return torch.where(self.seen, self.sums / self.weights.clamp_min(SEEN), 0.0)
 
     @torch.no_grad()
     def refined(self) -> Tensor:
-        """Shares [N] after all rounds."""
+        """Return the shares [N] after all rounds."""
         shares = self.shares
         for _ in range(self.rounds):
             change = torch.zeros_like(shares)
@@ -90,12 +78,12 @@ class ContributionVotes:
         return shares
 
     def selected(self) -> Tensor:
-        """Surfels [N] bool that belong to the object."""
+        """Return the surfels [N] bool that belong to the object."""
         shares, seen = self.refined(), self.seen
         if bool(seen.any()) and not bool(seen.all()):
             from scipy.spatial import cKDTree
 
-            means = self.geometry[0].detach().cpu()
+            means = self.model.parameters["means"].detach().cpu()
             count = min(NEIGHBOURS, int(seen.count_nonzero()))
             known, hidden = seen.cpu(), ~seen.cpu()
             nearest = cKDTree(means[known].numpy()).query(means[hidden].numpy(), k=range(1, count + 1))[1]
@@ -103,15 +91,14 @@ class ContributionVotes:
         return shares > self.threshold
 
     def shown(self, camera: Camera, values: Tensor, outputs: Collection[str] = ()) -> Render:
-        """Values [N, C] of surfels as a view shows them over 0."""
-        lens = (camera.viewmat, camera.K, camera.width, camera.height)
-        return rasterize(*self.geometry, *lens, features=values, outputs=outputs, options=self.options)
+        """Render values [N, C] of surfels over 0."""
+        return rasterized(self.model, camera, features=values, outputs=outputs)
 
     def _splat(self, camera: Camera, image: Tensor) -> tuple[Tensor, Tensor]:
-        """Sums [N] of weight * image [H, W], and sums [N] of weights."""
-        sums, weights = splat(
-            image[..., None].contiguous(), *self.geometry, camera.viewmat, camera.K, options=self.options
-        )
+        """Return sums [N] of weight * image [H, W], and sums [N] of weights."""
+        planes, options = image[..., None].contiguous(), self.model.shading.options
+        lens = camera.viewmat, camera.K
+        sums, weights = splat(planes, *geometry(self.model.parameters), *lens, options=options)
         return sums[:, 0], weights
 
 
@@ -143,13 +130,13 @@ class CentreVotes:
         self.views += 1
 
     def selected(self) -> Tensor:
-        """Surfels [N] bool that belong to the object."""
+        """Return the surfels [N] bool that belong to the object."""
         absent = self.views - self.inside - self.outside
         is_mode = (self.inside > self.outside) & (self.inside > absent)
         return is_mode & (self.inside > self.threshold * self.views)
 
 
 def votes_of(kind: Vote, model: Surfels, threshold: float | None = None) -> ContributionVotes | CentreVotes:
-    """Votes of a kind, with its own threshold unless one is given."""
+    """Return votes of a kind, with its own threshold unless one is given."""
     make = ContributionVotes if kind == "contribution" else CentreVotes
     return make(model) if threshold is None else make(model, threshold)

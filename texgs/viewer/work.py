@@ -16,7 +16,7 @@ import torch
 
 from texgs.core.errors import ArgumentError
 from texgs.core.names import part_file, require_name
-from texgs.edit.parts import parts_with_surfels
+from texgs.edit.task import parts_with_surfels
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods import style
-from texgs.edit.methods.style import FeatureKeys
+from texgs.edit.methods.style import FeatureKeys, Look, Losses, look_method
 
 if TYPE_CHECKING:
-    from texgs.edit.recipe import Recipe
-    from texgs.edit.task import EditedScene, Task
     from texgs.fields.voxels.model import Voxels
     from texgs.volume.view_set import View
 
@@ -29,30 +26,17 @@ class ArfKeys(FeatureKeys):
     exact: bool = key(True, "colours are moved, not their coefficients as if they were colours (ARF's code)")
 
 
-def run(task: Task[ArfKeys]) -> EditedScene:
-    """Give the models the style; write style.png."""
-    from texgs.edit.voxel_style import stylize_voxels
+def stylize(look: Look[ArfKeys], name: str, model: Voxels, views: Sequence[View]) -> tuple[Voxels, Losses]:
+    """Give a grid the style of its picture; features see half of the resolution, and the style too."""
+    from texgs.edit.voxels import stylize_voxels
     from texgs.volume.images import load
 
-    keys, look = task.settings, style.Look.of(task)
-
-    def one(name: str, model: Voxels, views: Sequence[View]) -> Voxels:
-        recipe = recipe_of(keys, len(views), task.edit.seed)
-        edited, look.losses[name] = stylize_voxels(
-            *(model, load(views, task.reduce), look.picture(name), recipe, keys, look.vgg),
-            title=look.title(name),
-        )
-        return edited
-
-    scene = task.each_model(one)  # type: ignore[arg-type]
-    return look.result(scene)
+    keys = look.keys
+    recipe = keys.recipe(round(keys.epochs * len(views)), look.task.edit.seed, reduce=2)
+    images, picture = load(views, look.task.reduce), look.picture(name)
+    return stylize_voxels(model, images, picture, recipe, keys, look.vgg, look.task.title_of(name))
 
 
-def recipe_of(settings: ArfKeys, views: int, seed: int = 0) -> Recipe:
-    """Its losses for a number of views: features see half of the resolution, and the style too."""
-    return settings.recipe(round(settings.epochs * views), seed, reduce=2)
-
-
-METHOD = style.look_method(
-    "arf", "give a scene of voxels the style of a picture, as ARF does", ArfKeys, run, "voxels"
+METHOD = look_method(
+    "arf", "give a scene of voxels the style of a picture, as ARF does", ArfKeys, stylize, "voxels"
 )

@@ -6,20 +6,18 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
+from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
 from texgs.fit.settings import CommonRates
 
 if TYPE_CHECKING:
-    from texgs.edit.closeness import Closeness
-    from texgs.edit.gaussian_learner import GaussianLearner
-    from texgs.edit.task import EditedScene, Task
-    from texgs.edit.turns import Schedule
+    from texgs.edit.dataset_update import PhotometricLoss
+    from texgs.edit.gaussians import GaussianLearner
     from texgs.fields.gaussians.model import Gaussians
     from texgs.volume.images import Images
 
 
 def rates(zeroth: float, means_final: float) -> CommonRates:
-    """Rates of 3DGS, which go on where its fits end, but for two."""
+    """Return the rates of 3DGS, which go on where its fits end, but for two."""
     return CommonRates(1.6e-4, 0.001, 0.005, 0.05, zeroth, zeroth / 20, means_final, 1.0)
 
 
@@ -29,38 +27,31 @@ class Igs2gsKeys(UpdateKeys):
 
     passes: int = key(3, "times that each view is edited", least=1)
     every: int = key(2500, "iterations from pass to pass", least=1)
-    noise: list[float] = key([0.7, 0.98], "level of an edit, from and to, as a share")
+    noise: list[float] = key([0.7, 0.98], "level of noise of an edit, from and to, as a share")
     rates: CommonRates = field(
         default_factory=lambda: rates(0.0025, 0.01), metadata={"help": "learning rates"}
     )
 
 
-def run(task: Task[Igs2gsKeys]) -> EditedScene:
-    """Give the models the look; write views.png and convergence.png."""
-    return edit_by_updates(task, schedule, learner)
-
-
-def schedule(keys: Igs2gsKeys, views: int) -> Schedule:
-    """Passes through all views, each learned from when it is edited."""
-    from texgs.edit.turns import Schedule
-
+def schedule(keys: Igs2gsKeys, views: int) -> UpdateSchedule:
+    """Edit all views in passes, and learn from each when it is edited."""
     levels = noise_range("edit.igs2gs.noise", keys.noise)
-    return Schedule(keys.passes, keys.every, learned="newest", levels=levels)
+    return UpdateSchedule(keys.passes, keys.every, learned="newest", levels=levels)
 
 
-def learner(keys: Igs2gsKeys, model: Gaussians, images: Images, closeness: Closeness) -> GaussianLearner:
-    """The Gaussians, by whole views."""
-    from texgs.edit.gaussian_learner import GaussianLearner
+def learner(keys: Igs2gsKeys, model: Gaussians, images: Images, loss: PhotometricLoss) -> GaussianLearner:
+    """Let the Gaussians learn from whole views."""
+    from texgs.edit.gaussians import GaussianLearner
 
     iterations = schedule(keys, len(images)).iterations
-    return GaussianLearner(model, images, keys.rates, closeness, iterations, is_frozen=keys.frozen)
+    return GaussianLearner(model, images, keys.rates, loss, iterations, is_frozen=keys.frozen)
 
 
 METHOD = update_method(
     "igs2gs",
     "edit all views of a scene of 3D Gaussians in turn by an instruction, as Instruct-GS2GS does",
     Igs2gsKeys,
-    run,
     schedule,
+    learner,
     "gaussians",
 )

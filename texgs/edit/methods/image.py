@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from texgs.edit.recipe import Recipe
-    from texgs.edit.style_picture import StylePicture
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.view_set import View
@@ -35,7 +34,7 @@ class ImageKeys(StyleKeys):
         "default; patches, which needs no weights; preview, the picture laid onto the surface; paper",
         choices=("default", "patches", "preview", "paper"),
     )
-    iterations: int | None = key(None, "views, one each; default the recipe's", least=0)
+    iterations: int | None = key(None, "steps, of one view each; default the recipe's", least=0)
     lambda_s: float | None = key(
         None, "share of NNFM, the rest is CLIP; default the recipe's", least=0, most=1
     )
@@ -44,7 +43,7 @@ class ImageKeys(StyleKeys):
         "backbone of the CLIP term, where lambda_s is below 1; metrics have their own",
         choices=CLIP_BACKBONES,
     )
-    pattern: float = key(1.0, "size of the style's pattern, against the views'", above=0)
+    pattern: float = key(1.0, "size of the style's pattern, as a multiple of the views' size", above=0)
     start: str | None = key(
         None,
         "colours at the start: the picture laid onto the surface, its mean, random pixels of it, or the "
@@ -56,72 +55,44 @@ class ImageKeys(StyleKeys):
 
 def run(task: Task[ImageKeys]) -> EditedScene:
     """Give the parts the style; write style.png."""
-    from texgs.edit.task import EditedScene
-
-    recipe = recipe_of(task.settings, task.edit.seed)
-    pictures: dict[str, StylePicture] = {}
-    losses: dict[str, dict[str, list[float]]] = {}
-    seconds: dict[str, dict[str, float]] = {}
-    adapted: dict[str, Recipe] = {}
-    scene = task.each_part(stylist(task, recipe, pictures, losses, seconds, adapted))
-    return EditedScene(
-        scene,
-        how(list(adapted.values()), task.settings.clip),
-        style.write_styles(task.output, pictures),
-        recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None,
-        {"seconds": seconds},
-        losses,
-    )
-
-
-def stylist(
-    task: Task[ImageKeys],
-    recipe: Recipe,
-    pictures: dict[str, StylePicture],
-    losses: dict[str, dict[str, list[float]]],
-    seconds: dict[str, dict[str, float]],
-    adapted: dict[str, Recipe],
-) -> Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]:
-    """What gives one part the style, for `Task.each_part`; it notes what there is to tell by name."""
-    from texgs.edit.clip_loss import ClipLoss
+    from texgs.edit.objective import ClipLoss
     from texgs.edit.stylize import stylize
+    from texgs.edit.task import EditedScene
     from texgs.models.clip import Clip
     from texgs.models.vgg import Vgg
     from texgs.volume.images import smaller
 
-    vgg = Vgg.load(device=task.device) if recipe.needs_vgg else None
-    network = Clip.load(task.settings.clip, task.device) if recipe.needs_clip else None
+    keys, recipe = task.settings, recipe_of(task.settings, task.edit.seed)
+    look = style.Look(task, Vgg.load(device=task.device) if recipe.needs_vgg else None)
+    network = Clip.load(keys.clip, task.device) if recipe.needs_clip else None
+    seconds: dict[str, dict[str, float]] = {}
+    adapted: list[Recipe] = []
 
     def one(name: str, model: Surfels, surfels: Tensor | None, views: Sequence[View]) -> Surfels:
-        picture = pictures[name] = style_of(task.settings_for(name.split("/")[0]))
-        pixels = picture.image.permute(1, 2, 0).to(task.device)
-        clip = ClipLoss(network, pixels) if network else None
+        picture = look.picture(name)
         result = stylize(
             model,
             [smaller(view.camera, task.reduce) for view in views],
             [view.light for view in views],
             picture,
             recipe,
-            vgg=vgg,
-            clip=clip,
+            vgg=look.vgg,
+            clip=ClipLoss(network, picture.image.permute(1, 2, 0).to(task.device)) if network else None,
             surfels=surfels,
-            title=f"{task.title} {task.edit.name}, {name}",
+            title=task.title_of(name),
             show=partial(task.show, name),
         )
-        losses[name] = result.history.losses
-        seconds[name], adapted[name] = result.history.seconds, result.recipe
+        look.losses[name], seconds[name] = result.losses, result.seconds
+        adapted.append(result.recipe)
         return result.model
 
-    return one
-
-
-def style_of(settings: ImageKeys) -> StylePicture:
-    """The picture, of it the object that was clicked on."""
-    return style.style_of(settings, KEYS)
+    scene, lambda_s = task.each_part(one), recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
+    notes = {"seconds": seconds}
+    return EditedScene(scene, how(adapted, keys.clip), look.write_pictures(), lambda_s, notes, look.losses)
 
 
 def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
-    """The recipe of an edit, with what the configuration changes about it."""
+    """Return the recipe of an edit, with what the configuration changes about it."""
     from texgs.edit.recipe import preset
 
     changes: dict[str, Any] = {
@@ -135,7 +106,7 @@ def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
 
 
 def how(recipes: Sequence[Recipe], clip: str) -> str:
-    """What the edit of some parts works with, for tables; `clip` is the backbone of a CLIP term."""
+    """Return what the edit of some parts works with, for tables; `clip` is the backbone of a CLIP term."""
     names = {
         "VGG-16": any(recipe.needs_vgg for recipe in recipes),
         clip: any(recipe.needs_clip for recipe in recipes),
@@ -153,7 +124,7 @@ def check(settings: ImageKeys) -> None:
 
 
 def weights(settings: ImageKeys) -> Mapping[str, str]:
-    """Those of the recipe, and what finds an object in the picture."""
+    """Return those of the recipe, and what finds an object in the picture."""
     recipe = recipe_of(settings)
     vgg = {"vgg16": "recipe=patches"} if recipe.needs_vgg else {}
     clip = {settings.clip: "lambda_s=1"} if recipe.needs_clip else {}
@@ -169,7 +140,7 @@ METHOD = Method(
     weights,
     needs=frozenset({"texture", "relight"}),
     files=style.files,
-    style=style_of,
+    style=lambda settings: style.style_of(settings, KEYS),
     follows="style",
     followed=lambda settings: Path(settings.style).name,
     numbers=lambda settings: vars(recipe_of(settings)),

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods.updates import UpdateKeys, edit_by_updates, noise_range, update_method
+from texgs.edit.methods.updates import UpdateKeys, UpdateSchedule, noise_range, update_method
 
 if TYPE_CHECKING:
-    from texgs.edit.closeness import Closeness
-    from texgs.edit.task import EditedScene, Task
-    from texgs.edit.turns import Schedule
-    from texgs.edit.voxel_learner import VoxelLearner
+    from texgs.edit.dataset_update import PhotometricLoss
+    from texgs.edit.voxels import VoxelLearner
     from texgs.fields.voxels.model import Voxels
     from texgs.volume.images import Images
 
@@ -26,38 +24,31 @@ class In2nKeys(UpdateKeys):
     lpips: float = key(1.0, "weight of LPIPS on VGG-16; 0 needs no weights", least=0)
     passes: float = key(3.0, "times that each view is edited", above=0)
     every: int = key(10, "iterations between edits", least=1)
-    noise: list[float] = key([0.02, 0.98], "level of an edit, from and to, as a share")
-    patches: int = key(16, "of an iteration", least=1)
-    side: int = key(32, "of a patch", "pixels", least=16)
-    density: float = key(0.05, "rate of densities", least=0)
-    sh: float = key(0.01, "rate of spherical harmonics", least=0)
+    noise: list[float] = key([0.02, 0.98], "level of noise of an edit, from and to, as a share")
+    patches: int = key(16, "patches that an iteration learns from", least=1)
+    side: int = key(32, "side of a patch", "pixels", least=16)
+    density: float = key(0.05, "learning rate of densities", least=0)
+    sh: float = key(0.01, "learning rate of spherical harmonics", least=0)
 
 
-def run(task: Task[In2nKeys]) -> EditedScene:
-    """Give the models the look; write views.png and convergence.png."""
-    return edit_by_updates(task, schedule, learner)
-
-
-def schedule(keys: In2nKeys, views: int) -> Schedule:
-    """One view after the other."""
-    from texgs.edit.turns import Schedule
-
+def schedule(keys: In2nKeys, views: int) -> UpdateSchedule:
+    """Edit one view after the other."""
     rounds = max(1, round(keys.passes * views))
-    return Schedule(rounds, keys.every, views=1, levels=noise_range("edit.in2n.noise", keys.noise))
+    return UpdateSchedule(rounds, keys.every, views=1, levels=noise_range("edit.in2n.noise", keys.noise))
 
 
-def learner(keys: In2nKeys, model: Voxels, images: Images, closeness: Closeness) -> VoxelLearner:
-    """The grid, by patches."""
-    from texgs.edit.voxel_learner import VoxelLearner
+def learner(keys: In2nKeys, model: Voxels, images: Images, loss: PhotometricLoss) -> VoxelLearner:
+    """Let the grid learn from patches."""
+    from texgs.edit.voxels import VoxelLearner
 
-    return VoxelLearner(model, keys, closeness)
+    return VoxelLearner(model, keys, loss)
 
 
 METHOD = update_method(
     "in2n",
     "edit views of a scene of voxels one by one by an instruction, as Instruct-NeRF2NeRF does",
     In2nKeys,
-    run,
     schedule,
+    learner,
     "voxels",
 )

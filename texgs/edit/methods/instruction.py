@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
 
 if TYPE_CHECKING:
+    import numpy as np
     import torch
 
     from texgs.models.guidance import Guidance
 
 SHOWN = 6  # edited views in the picture of them
-PICTURE = {"views.png": "Views before and after they were edited as the instruction says."}
 
 
 @dataclass(frozen=True)
@@ -35,28 +37,25 @@ class InstructionKeys:
     )
 
     def opened(self, device: torch.device) -> Guidance:
-        """What edits the views."""
-        from texgs.models.guidance import Disagreeing
-
-        editor = self._editor(device)
-        return Disagreeing(editor, self.disagreement) if self.disagreement else editor
-
-    def _editor(self, device: torch.device) -> Guidance:
-        """The same, whose views agree as well as they can."""
+        """Return what edits the views."""
         from texgs.models.filters import ProceduralFilters
+        from texgs.models.guidance import Disagreeing
         from texgs.models.instruct_pix2pix import NO_LIGHT, InstructPix2Pix
         from texgs.models.weights import locate
 
+        editor: Guidance
         if self.guidance == "filters":
-            return ProceduralFilters()
-        return InstructPix2Pix.open(
-            locate("instruct-pix2pix"),
-            device,
-            text_scale=self.text_scale,
-            image_scale=self.image_scale,
-            negative=NO_LIGHT if self.negative is None else self.negative,
-            epipolar=self.epipolar,
-        )
+            editor = ProceduralFilters()
+        else:
+            editor = InstructPix2Pix.open(
+                locate("instruct-pix2pix"),
+                device,
+                text_scale=self.text_scale,
+                image_scale=self.image_scale,
+                negative=NO_LIGHT if self.negative is None else self.negative,
+                epipolar=self.epipolar,
+            )
+        return Disagreeing(editor, self.disagreement) if self.disagreement else editor
 
     def check(self) -> None:
         """Require an instruction that the guidance understands."""
@@ -67,5 +66,14 @@ class InstructionKeys:
             understand(instruction)
 
     def weights(self) -> dict[str, str]:
-        """The diffusion model, where it edits the views."""
+        """Return the diffusion model, where it edits the views."""
         return {"instruct-pix2pix": "guidance=filters"} if self.guidance == "instruct_pix2pix" else {}
+
+
+def write_views(folder: Path, rows: Mapping[str, Sequence[np.ndarray]]) -> dict[str, str]:
+    """Write views.png, a row of pictures [H, W, 3] each before and after edits; return what it shows."""
+    from texgs.core.figures import write_grid
+
+    titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]
+    write_grid(folder / "views.png", rows, titles)
+    return {"views.png": "Views before and after they were edited as the instruction says."}

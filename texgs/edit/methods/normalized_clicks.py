@@ -11,12 +11,12 @@ MASKS = ("mobile_sam", "sam_vit_h", "grabcut")  # the second is the paper's
 
 
 def mask_weights(masks: str) -> dict[str, str]:
-    """Weights of what finds the object, for `Method.weights`."""
+    """Return the weights of what finds the object, for `Method.weights`."""
     return {} if masks == "grabcut" else {masks: "masks=grabcut"}
 
 
-def shares(name: str, points: Sequence[Any]) -> list[list[float]]:
-    """Clicks as shares of the sides of a picture."""
+def normalized_clicks(name: str, points: Sequence[Any]) -> list[list[float]]:
+    """Return clicks as shares of the sides of a picture, checked."""
     for point in points:
         is_pair = isinstance(point, list) and len(point) == 2
         if not is_pair or not all(isinstance(x, int | float) and 0 <= x < 1 for x in point):

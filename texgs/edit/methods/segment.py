@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ from texgs.core.keys import key
 from texgs.core.lens import Lens
 from texgs.core.names import require_name
 from texgs.edit.method import Method
-from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, shares
+from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
 
 if TYPE_CHECKING:
     import torch
@@ -31,8 +31,8 @@ DIMMED = 0.15  # opacity of what is not in the segment, in its picture
 class SegmentKeys:
     """Where is clicked, and how masks become surfels."""
 
-    model: str = key("", "whose part it is; may be left out where there is one")
-    name: str = key("part", "of the segment")
+    model: str = key("", "model whose part it is; may be left out where there is one")
+    name: str = key("part", "name of the segment")
     view: list[float] = key([30.0, 20.0], "azimuth and polar angle of the view clicked on", "degrees")
     # OmegaConf takes no integers for list[list[float]].
     points: list[Any] = key([], "clicks on the part: right and down, as shares of the view's sides")
@@ -49,8 +49,8 @@ class SegmentKeys:
         "views that vote: some around the object, or those of training, as in the paper",
         choices=("icosphere", "training"),
     )
-    views: int = key(42, "of the icosphere, 10 f^2 + 2", least=12)
-    size: int = key(512, "of these views", "pixels", least=32)
+    views: int = key(42, "number of views of the icosphere, 10 f^2 + 2", least=12)
+    size: int = key(512, "side of these views", "pixels", least=32)
 
 
 def run(task: Task[SegmentKeys]) -> EditedScene:
@@ -86,7 +86,7 @@ def run(task: Task[SegmentKeys]) -> EditedScene:
 
 
 def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
-    """Cameras of the views that vote on a model."""
+    """Return the cameras of the views that vote on a model."""
     from texgs.volume.cameras import icosphere_of
     from texgs.volume.images import smaller
 
@@ -98,8 +98,8 @@ def voters(task: Task[SegmentKeys], model: str) -> list[Camera]:
 
 
 def places_of(settings: SegmentKeys) -> list[list[float]]:
-    """The clicks, those beside the part last, as shares of the sides of the view."""
-    places = shares("edit.segment.points", [*settings.points, *settings.others])
+    """Return the clicks, those beside the part last, as shares of the sides of the view."""
+    places = normalized_clicks("edit.segment.points", [*settings.points, *settings.others])
     if not settings.points:
         raise ArgumentError("edit.segment.points: expected one at least, such as [[0.5, 0.4]], got none")
     if len(settings.view) != 2:
@@ -108,7 +108,7 @@ def places_of(settings: SegmentKeys) -> list[list[float]]:
 
 
 def clicks_of(settings: SegmentKeys, lens: Lens, device: torch.device) -> Clicks:
-    """Clicks in pixels of a view through a lens."""
+    """Return clicks in pixels of a view through a lens."""
     import torch
 
     from texgs.core.camera import orbit
@@ -126,7 +126,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     import torch
 
     from texgs.core.figures import write_grid
-    from texgs.edit.preview import overlay
+    from texgs.edit.new_segment import overlay
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.cameras import orbit_path
 
@@ -139,7 +139,7 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
     def shown(of: Surfels, camera: Camera) -> torch.Tensor:
         return of.render(camera.to(task.device), task.scene.light).color.clamp(0, 1)
 
-    marked = overlay(shown(model, clicks.camera), lifted.reference, clicks.points, clicks.positive)
+    marked = overlay(shown(model, clicks.camera), lifted.reference, clicks)
     around = orbit_path(SHOWN, POLAR, *task.lens)
     pictures = [marked, shown(dimmed, clicks.camera), *(shown(dimmed, camera) for camera in around)]
     titles = ["clicks and mask", "segment", *(f"view {index + 1}" for index in range(SHOWN))]
@@ -155,13 +155,8 @@ def check(settings: SegmentKeys) -> None:
     frequency_of(settings.views, "edit.segment.views")
 
 
-def weights(settings: SegmentKeys) -> Mapping[str, str]:
-    """The mask model's, where it has some."""
-    return mask_weights(settings.masks)
-
-
 def adds(settings: SegmentKeys, models: Sequence[str]) -> Sequence[str]:
-    """The segment."""
+    """Return the name of the segment."""
     model = settings.model or (models[0] if len(models) == 1 else "")
     if model not in models:
         raise ConfigError(f"edit.segment.model: expected one of {', '.join(models)}, got {model or 'none'}")
@@ -174,7 +169,7 @@ METHOD = Method(
     SegmentKeys,
     run,
     check,
-    weights,
+    lambda settings: mask_weights(settings.masks),
     needs=frozenset({"segments"}),
     adds=adds,
     is_look=False,

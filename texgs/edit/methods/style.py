@@ -1,16 +1,16 @@
-"""What methods share that follow a picture: which picture, and which object of it."""
+"""What methods share that follow a picture: which picture, which object of it, and how views are compared."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, shares
+from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -18,8 +18,11 @@ if TYPE_CHECKING:
     from texgs.edit.recipe import Recipe
     from texgs.edit.style_picture import Find, StylePicture
     from texgs.edit.task import EditedScene, Task
+    from texgs.fields.field import Field
     from texgs.models.vgg import Vgg
-    from texgs.scene.scene import Scene
+    from texgs.volume.view_set import View
+
+Losses = dict[str, list[float]]  # weighted terms by name, a value for each iteration
 
 
 @dataclass(frozen=True)
@@ -40,12 +43,11 @@ class FeatureKeys(StyleKeys):
     foreground: bool = key(True, "only what is on the object counts, not what is behind")
     sampled: bool = key(False, "features are drawn at random and searched roughly, for CPUs")
 
-    def recipe(self, iterations: int, seed: int, reduce: int) -> Recipe:
-        """Its losses, for features that see averages of `reduce` pixels each way."""
-        from texgs.edit.recipe import DEFAULT, Recipe
+    def recipe(self, iterations: int, seed: int, **changes: Any) -> Recipe:
+        """Return the losses, with changes to other fields of `Recipe`."""
+        from texgs.edit.recipe import Recipe
 
-        drawn = (DEFAULT.queries, DEFAULT.positions, DEFAULT.dimensions) if self.sampled else (None,) * 3
-        queries, positions, dimensions = drawn
+        exact: dict[str, Any] = {} if self.sampled else dict.fromkeys(("queries", "positions", "dimensions"))
         return Recipe(
             iterations=iterations,
             features=self.nnfm,
@@ -54,92 +56,99 @@ class FeatureKeys(StyleKeys):
             behind="white",
             cropped=False,
             foreground=self.foreground,
-            queries=queries,
-            positions=positions,
-            dimensions=dimensions,
-            reduce=reduce,
             seed=seed,
+            **exact,
+            **changes,
         )
 
-    def weights(self) -> dict[str, str]:
-        """VGG where features are compared, and what finds the object."""
-        without = "nnfm=0" if self.patches else ""
-        return {**({"vgg16": without} if self.nnfm > 0 else {}), **weights(self)}
 
-    @property
-    def how(self) -> str:
-        """What the edit works with, for tables."""
-        used = {"VGG-16": self.nnfm > 0, "patches": self.patches > 0}
-        return " + ".join(name for name, is_used in used.items() if is_used)
-
-
-Keys = TypeVar("Keys", bound=FeatureKeys)
+Keys = TypeVar("Keys", bound=StyleKeys)
+FeatureKeysType = TypeVar("FeatureKeysType", bound=FeatureKeys)
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
-    """Pictures on their way onto the models of a scene, and how the losses fell."""
+class Look(Generic[Keys]):
+    """Pictures on their way onto the parts of a scene, and what there is to tell about it."""
 
-    task: Task[Any]
+    task: Task[Keys]
     vgg: Vgg | None
-    pictures: dict[str, StylePicture] = field(default_factory=dict)  # by model
-    losses: dict[str, dict[str, list[float]]] = field(default_factory=dict)  # by model and term
+    pictures: dict[str, StylePicture] = field(default_factory=dict)  # by part
+    losses: dict[str, Losses] = field(default_factory=dict)  # by part
+    notes: dict[str, Any] = field(default_factory=dict)
 
-    @classmethod
-    def of(cls, task: Task[Any]) -> Look:
-        """What an edit with `FeatureKeys` follows."""
-        from texgs.models.vgg import Vgg
+    @property
+    def keys(self) -> Keys:
+        """Return what the configuration says."""
+        return self.task.settings
 
-        vgg = Vgg.load(device=task.device) if task.settings.nnfm > 0 else None
-        return cls(task, vgg)
+    def picture(self, part: str) -> StylePicture:
+        """Return what a part follows."""
+        self.pictures[part] = style_of(self.task.settings_for(part), f"edit.{self.task.edit.method}")
+        return self.pictures[part]
 
-    def picture(self, model: str) -> StylePicture:
-        """What a model follows."""
-        method = self.task.edit.method
-        self.pictures[model] = style_of(self.task.settings_for(model), f"edit.{method}")
-        return self.pictures[model]
+    def write_pictures(self) -> dict[str, str]:
+        """Write style.png, or one for each part where pictures differ; return what they show."""
+        import torch
 
-    def title(self, model: str) -> str:
-        """Of a progress bar."""
-        return f"{self.task.title} {self.task.edit.name}, {model}"
+        from texgs.core.image import write_png
 
-    def result(self, scene: Scene) -> EditedScene:
-        """The edited scene; writes its style pictures."""
-        from texgs.edit.task import EditedScene
-
-        pictures = write_styles(self.task.output, self.pictures)
-        return EditedScene(scene, self.task.settings.how, pictures, losses=self.losses)
-
-
-def write_styles(folder: Path, pictures: Mapping[str, StylePicture]) -> dict[str, str]:
-    """Write style.png, or one for each model where they follow different pictures; what they show."""
-    import torch
-
-    from texgs.core.image import write_png
-
-    first, *others = (picture.image for picture in pictures.values())
-    if all(torch.equal(first, other) for other in others):
-        pictures = {"": next(iter(pictures.values()))}
-    shown = {}
-    for name, picture in pictures.items():
-        file = f"style-{name.replace('/', '-')}.png" if name else "style.png"
-        write_png(folder / file, picture.image.permute(1, 2, 0))
-        shown[file] = f"The style picture{f' of {name}' if name else ''}."
-    return shown
+        pictures = self.pictures
+        first, *others = (picture.image for picture in pictures.values())
+        if all(torch.equal(first, other) for other in others):
+            pictures = {"": next(iter(pictures.values()))}
+        shown = {}
+        for name, picture in pictures.items():
+            file = f"style-{name.replace('/', '-')}.png" if name else "style.png"
+            write_png(self.task.output / file, picture.image.permute(1, 2, 0))
+            shown[file] = f"The style picture{f' of {name}' if name else ''}."
+        return shown
 
 
 def look_method(
-    name: str, summary: str, settings: type[Keys], run: Callable[[Task[Keys]], EditedScene], field: str
-) -> Method[Keys]:
-    """The specification of a method that gives a kind of field the style of a picture."""
+    name: str,
+    summary: str,
+    settings: type[FeatureKeysType],
+    stylize: Callable[[Look[FeatureKeysType], str, Any, Sequence[View]], tuple[Any, Losses]],
+    kind: str,
+) -> Method[FeatureKeysType]:
+    """Return the specification of a method that gives models of one kind of field the style of a picture.
+
+    Args:
+        name: of the method.
+        summary: what it does.
+        settings: its keys.
+        stylize: from a look, the name of a model, the model and its training views to the edited model and
+            the losses.
+        kind: of field.
+    """
     where = f"edit.{name}"
 
-    def checked(values: Keys) -> None:
+    def run(task: Task[FeatureKeysType]) -> EditedScene:
+        from texgs.edit.task import EditedScene
+        from texgs.models.vgg import Vgg
+
+        keys = task.settings
+        look = Look(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
+
+        def one(name: str, model: Field, views: Sequence[View]) -> Field:
+            edited: Field
+            edited, look.losses[name] = stylize(look, name, model, views)
+            return edited
+
+        scene = task.each_model(one)
+        how = " + ".join(["VGG-16"] * (keys.nnfm > 0) + ["patches"] * (keys.patches > 0))
+        return EditedScene(scene, how, look.write_pictures(), notes=look.notes, losses=look.losses)
+
+    def checked(values: FeatureKeysType) -> None:
         if not values.nnfm and not values.patches:
             raise ArgumentError(
                 f"{where}.nnfm, {where}.patches: expected a weight above 0 for one of them, got 0 for both"
             )
         check(values, where)
+
+    def needed(values: FeatureKeysType) -> Mapping[str, str]:
+        without = "nnfm=0" if values.patches else ""
+        return {**({"vgg16": without} if values.nnfm > 0 else {}), **weights(values)}
 
     return Method(
         name,
@@ -147,8 +156,8 @@ def look_method(
         settings,
         run,
         checked,
-        lambda values: values.weights(),
-        fields=frozenset({field}),
+        needed,
+        fields=frozenset({kind}),
         files=files,
         style=lambda values: style_of(values, where),
         follows="style",
@@ -157,22 +166,22 @@ def look_method(
 
 
 def files(settings: StyleKeys) -> dict[str, Path]:
-    """The picture's file, where it is one."""
+    """Return the picture's file, where it is one."""
     path = Path(settings.style)
     return {"style": path} if path.is_file() else {}
 
 
 def weights(settings: StyleKeys) -> dict[str, str]:
-    """What finds the object, where that needs weights."""
+    """Return what finds the object, where that needs weights."""
     return mask_weights(settings.masks) if settings.region else {}
 
 
 def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
-    """The picture of texgs that has this name, or of a file; `key` is where it stands: edit.image.style.
+    """Return the picture of texgs that has this name, or of a file.
 
     Args:
         name: or path.
-        key: that it is the value of.
+        key: that it is the value of, such as edit.image.style.
         find: returns the part that counts, see `read_style`; by default all.
     """
     from texgs.edit.pictures import PICTURES, picture
@@ -188,24 +197,30 @@ def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
     return read_style(name, find)
 
 
-def check(settings: StyleKeys, where: str) -> None:
-    """Require a picture that is there, and clicks on it."""
+def require_picture(name: str, key: str) -> None:
+    """Require one of the pictures of texgs, or a file that can be read as one."""
     from texgs.edit.pictures import PICTURES
 
-    if settings.style not in PICTURES:
-        picture_of(settings.style, f"{where}.style")
-    shares(f"{where}.region", settings.region)
+    if name not in PICTURES:
+        picture_of(name, key)
+
+
+def check(settings: StyleKeys, where: str) -> None:
+    """Require a picture that is there, and clicks on it."""
+    require_picture(settings.style, f"{where}.style")
+    normalized_clicks(f"{where}.region", settings.region)
 
 
 def style_of(settings: StyleKeys, where: str) -> StylePicture:
-    """The picture, of it the object that was clicked on."""
+    """Return the picture, of it the object that was clicked on."""
     import torch
 
     from texgs.models.masks import mask_model
 
     def find(image: Tensor) -> Tensor:
         height, width = image.shape[:2]
-        points = torch.tensor(shares(f"{where}.region", settings.region)) * torch.tensor([width, height])
+        clicks = normalized_clicks(f"{where}.region", settings.region)
+        points = torch.tensor(clicks) * torch.tensor([width, height])
         masks = mask_model(settings.masks, torch.device("cpu"))
         return masks(image, points, torch.ones(len(points), dtype=torch.bool))
 

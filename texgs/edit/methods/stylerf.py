@@ -10,11 +10,9 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.methods import style
-from texgs.edit.methods.style import FeatureKeys
+from texgs.edit.methods.style import FeatureKeys, Look, Losses, look_method
 
 if TYPE_CHECKING:
-    from texgs.edit.recipe import Recipe
-    from texgs.edit.task import EditedScene, Task
     from texgs.fields.palette.model import PaletteField
     from texgs.volume.view_set import View
 
@@ -30,47 +28,33 @@ class StyleRfKeys(FeatureKeys):
     )
     epochs: float = key(5.0, "rounds through the training views, for the style", least=0)
     distillation: int = key(500, "steps before, in which free colours learn the recoloured palette", least=0)
-    rate: float = key(1e-2, "of Adam", above=0)
+    rate: float = key(1e-2, "learning rate of free colours", above=0)
     variation: float = key(1.0, "weight of total variation of the image", least=0)
 
 
-def run(task: Task[StyleRfKeys]) -> EditedScene:
-    """Give the models the styles; write style.png."""
+def stylize(
+    look: Look[StyleRfKeys], name: str, model: PaletteField, views: Sequence[View]
+) -> tuple[PaletteField, Losses]:
+    """Give palette colours the styles of their pictures; features see half of the resolution."""
     from texgs.edit.palette_style import stylize_palette
     from texgs.volume.images import load
 
-    keys, look = task.settings, style.Look.of(task)
-    errors = {}
-    pictures = [style.picture_of(name, STYLES) for name in keys.styles]
-
-    def one(name: str, model: PaletteField, views: Sequence[View]) -> PaletteField:
-        recipe = recipe_of(keys, len(views), task.edit.seed)
-        chosen = pictures or [look.picture(name)] * len(model.colors)
-        look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
-        edited, look.losses[name], errors[name] = stylize_palette(
-            *(model, load(views, task.reduce), chosen, recipe, keys, look.vgg), title=look.title(name)
-        )
-        return edited
-
-    scene = task.each_model(one)  # type: ignore[arg-type]
-    result = look.result(scene)
-    return replace(result, notes={"distillation_rmse": errors})
-
-
-def recipe_of(settings: StyleRfKeys, views: int, seed: int = 0) -> Recipe:
-    """Its losses for a number of views: features see half of the resolution, and the style too."""
-    recipe = settings.recipe(round(settings.epochs * views), seed, reduce=2)
-    return replace(recipe, rate=settings.rate)
+    keys, task = look.keys, look.task
+    recipe = keys.recipe(round(keys.epochs * len(views)), task.edit.seed, reduce=2, rate=keys.rate)
+    pictures = [style.picture_of(each, STYLES) for each in keys.styles]
+    look.pictures.update({f"{name}-{index + 1}": each for index, each in enumerate(pictures)})
+    pictures = pictures or [look.picture(name)] * len(model.colors)
+    images, title = load(views, task.reduce), task.title_of(name)
+    edited, losses, error = stylize_palette(model, images, pictures, recipe, keys, look.vgg, title)
+    look.notes.setdefault("distillation_rmse", {})[name] = error
+    return edited, losses
 
 
 def check(settings: StyleRfKeys) -> None:
     """Require pictures that are there."""
-    from texgs.edit.pictures import PICTURES
-
     LOOK.check(settings)
     for name in settings.styles:
-        if name not in PICTURES:
-            style.picture_of(name, STYLES)
+        style.require_picture(name, STYLES)
 
 
 def check_fit(settings: StyleRfKeys, fit: Any) -> None:
@@ -83,16 +67,16 @@ def check_fit(settings: StyleRfKeys, fit: Any) -> None:
 
 
 def files(settings: StyleRfKeys) -> dict[str, Path]:
-    """Pictures that are files."""
+    """Return the pictures that are files."""
     several = {f"style{i}": Path(name) for i, name in enumerate(settings.styles) if Path(name).is_file()}
     return {**style.files(settings), **several}
 
 
-LOOK = style.look_method(
+LOOK = look_method(
     "stylerf",
     "give a scene of palette fields the styles of pictures, as StyleRF-VolVis does",
     StyleRfKeys,
-    run,
+    stylize,
     "palette",
 )
 METHOD = replace(

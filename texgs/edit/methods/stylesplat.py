@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods import style
-from texgs.edit.methods.style import FeatureKeys
+from texgs.edit.methods.style import FeatureKeys, Look, Losses, look_method
 
 if TYPE_CHECKING:
-    from texgs.edit.recipe import Recipe
-    from texgs.edit.task import EditedScene, Task
     from texgs.fields.gaussians.model import Gaussians
     from texgs.volume.view_set import View
 
@@ -21,36 +18,27 @@ if TYPE_CHECKING:
 class StyleSplatKeys(FeatureKeys):
     """How colours of 3D Gaussians take on a style."""
 
-    iterations: int = key(2000, "views, one each", least=0)
-    rate: float = key(0.005, "of zeroth harmonics; the others have a twentieth", above=0)
+    iterations: int = key(2000, "steps of the style, of one view each", least=0)
+    rate: float = key(0.005, "learning rate of zeroth harmonics; the others have a twentieth", above=0)
 
 
-def run(task: Task[StyleSplatKeys]) -> EditedScene:
-    """Give the models the style; write style.png."""
-    from texgs.edit.gaussian_style import stylize_gaussians
+def stylize(
+    look: Look[StyleSplatKeys], name: str, model: Gaussians, views: Sequence[View]
+) -> tuple[Gaussians, Losses]:
+    """Give Gaussians the style of their picture; features see every pixel."""
+    from texgs.edit.gaussians import stylize_gaussians
     from texgs.volume.images import smaller
 
-    recipe, look = recipe_of(task.settings, task.edit.seed), style.Look.of(task)
-
-    def one(name: str, model: Gaussians, views: Sequence[View]) -> Gaussians:
-        cameras = [smaller(view.camera, task.reduce) for view in views]
-        edited, look.losses[name] = stylize_gaussians(
-            *(model, cameras, look.picture(name), recipe, look.vgg), title=look.title(name)
-        )
-        return edited
-
-    return look.result(task.each_model(one))  # type: ignore[arg-type]
+    keys, task = look.keys, look.task
+    recipe = keys.recipe(keys.iterations, task.edit.seed, reduce=1, rate=keys.rate)
+    cameras = [smaller(view.camera, task.reduce) for view in views]
+    return stylize_gaussians(model, cameras, look.picture(name), recipe, look.vgg, task.title_of(name))
 
 
-def recipe_of(settings: StyleSplatKeys, seed: int = 0) -> Recipe:
-    """Its losses: features see every pixel."""
-    return replace(settings.recipe(settings.iterations, seed, reduce=1), rate=settings.rate)
-
-
-METHOD = style.look_method(
+METHOD = look_method(
     "stylesplat",
     "give a scene of 3D Gaussians the style of a picture, as StyleSplat does",
     StyleSplatKeys,
-    run,
+    stylize,
     "gaussians",
 )

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
 from texgs.edit.method import Method
-from texgs.edit.methods.instruction import PICTURE, SHOWN, InstructionKeys
+from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
 
 if TYPE_CHECKING:
     import numpy as np
     from torch import Tensor
 
     from texgs.edit.task import EditedScene, Task
+    from texgs.edit.text import TextRecipe
     from texgs.fields.surfels.model import Surfels
     from texgs.volume.view_set import View
 
@@ -30,8 +31,8 @@ class TextKeys(InstructionKeys):
     )
     views: str | None = key(
         None,
-        "that are edited: new ones along the axes, which the scene fills; the six training views nearest "
-        "to the axes, as in the paper; or all training views; default the recipe's",
+        "views that are edited: new ones along the axes, which the scene fills; the six training views "
+        "nearest to the axes, as in the paper; or all training views; default the recipe's",
         choices=("axes", "nearest", "all"),
     )
     textured: bool = key(True, "each texel follows, or each surfel has one colour: the paper's comparison")
@@ -40,7 +41,6 @@ class TextKeys(InstructionKeys):
 
 def run(task: Task[TextKeys]) -> EditedScene:
     """Give the parts the look; write views.png with the views that were edited."""
-    from texgs.core.figures import write_grid
     from texgs.edit.task import EditedScene
     from texgs.edit.text import edit_by_text
     from texgs.fields.surfels.texels import untextured
@@ -54,12 +54,12 @@ def run(task: Task[TextKeys]) -> EditedScene:
         result = edit_by_text(
             model,
             [smaller(view.camera, task.reduce).to(task.device) for view in views],
-            *(guidance, task.settings_for(name.split("/")[0]).instruction, settings.recipe),
-            views=settings.views,  # type: ignore[arg-type]
+            *(guidance, task.settings_for(name).instruction, recipe_of(settings)),
             light=views[0].light,
             surfels=surfels,
             size=settings.size,
             seed=task.edit.seed,
+            title=task.title_of(name),
         )
         seen[name] = result.seen
         rows[f"{name} before"] = [image.cpu().numpy() for image in result.views.images[:SHOWN]]
@@ -67,22 +67,20 @@ def run(task: Task[TextKeys]) -> EditedScene:
         return result.model if settings.textured else untextured(result.model, surfels)
 
     scene = task.each_part(one)
-    titles = [f"view {index + 1}" for index in range(len(next(iter(rows.values()))))]
-    write_grid(task.output / "views.png", rows, titles)
     return EditedScene(
         scene,
         f"{guidance.name}, {settings.recipe}" + ("" if settings.textured else ", without texture"),
-        PICTURE,
+        write_views(task.output, rows),
         notes={"instruction": task.followed or settings.instruction, "seen": seen},
     )
 
 
-def numbers(settings: TextKeys) -> Mapping[str, Any]:
-    """Which views are edited, and how texels follow."""
+def recipe_of(settings: TextKeys) -> TextRecipe:
+    """Return the recipe of an edit, with the views that the configuration chooses."""
     from texgs.edit.text import RECIPES
 
     recipe = RECIPES[settings.recipe]
-    return {"views": settings.views or recipe.views, **vars(recipe.policy)}
+    return replace(recipe, views=settings.views) if settings.views else recipe  # type: ignore[arg-type]
 
 
 METHOD = Method(
@@ -95,5 +93,5 @@ METHOD = Method(
     needs=frozenset({"texture", "relight"}),
     follows="instruction",
     followed=lambda settings: settings.instruction,
-    numbers=numbers,
+    numbers=lambda settings: vars(recipe_of(settings)),
 )

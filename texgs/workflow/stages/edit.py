@@ -149,13 +149,13 @@ def fallen(losses: Mapping[str, Mapping[str, Sequence[float]]]) -> tuple[int, di
 
 def followed(task: Task[Any]) -> dict[str, str]:
     """Return the picture or the words that each part follows; none where the method follows neither."""
-    from texgs.edit.parts import parts_of
+    from texgs.edit.task import parts_of
 
     method = method_of(task.edit)
     if not method.follows:
         return {}
-    parts = [part.name for part in parts_of(task.scene, task.edit.parts)]
-    return {name: method.followed(task.settings_for(name.split("/")[0])) for name in parts}
+    parts = parts_of(task.scene, task.edit.parts)
+    return {part: method.followed(task.settings_for(part)) for part in parts}
 
 
 def edited_scene(config: Config) -> dict[str, Path]:

@@ -60,20 +60,20 @@ def work(settings: Settings, inputs: dict[str, Path], output: Path) -> Outcome:
 
 def styles_of(settings: Settings, scene: Scene, longest: int) -> list[StyledModel]:
     """Return the styles of models, `longest` pixels large; none of segments, words or several pictures."""
-    from texgs.edit.parts import parts_of
+    from texgs.edit.task import parts_of
     from texgs.metrics.metric import StyledModel
 
     edit = settings.edit
     parts, method = parts_of(scene, edit.parts), method_of(edit)
-    if method.style is None or any(part.segment for part in parts):
+    if method.style is None or any(part not in scene.models for part in parts):
         return []
     styles = []
     for part in parts:
-        picture = method.style(method.of(edit, settings.followed.get(part.model)))
+        picture = method.style(method.of(edit, settings.followed.get(part)))
         if picture is None:
             return []
         style = picture.scaled(longest)
-        styles.append(StyledModel(part.model, part.name, style.image, style.region))
+        styles.append(StyledModel(part, part, style.image, style.region))
     return styles
 
 

@@ -1,4 +1,4 @@
-"""3D Gaussians that learn from whole views: what Instruct-GS2GS and DGE do between edits."""
+"""How 3D Gaussians follow a style (StyleSplat, Jain et al. 2024) or edited views (Instruct-GS2GS, DGE)."""
 
 from __future__ import annotations
 
@@ -9,27 +9,100 @@ import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.edit.closeness import Closeness, differentiated
+from texgs.edit.dataset_update import PhotometricLoss
+from texgs.edit.objective import Objective
+from texgs.edit.recipe import Recipe
+from texgs.edit.style_loop import Painting, learn_style
+from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
 from texgs.fit.rates import extent, rates
 from texgs.fit.settings import CommonRates, Rates
+from texgs.models.vgg import Vgg
 from texgs.volume.images import Images
 
+HIGHER = 1 / 20  # rate of the higher harmonics in styles, against that of the zeroth
 PRUNE_EVERY = 100  # iterations
 LEAST_OPACITY, LARGEST_SCALE, LARGEST_RADIUS = 0.005, 0.1, 5.0  # scale in extents; radius in pixels
 SIGMAS = 3.0  # of a Gaussian that its radius on screen has
 
 
+def stylize_gaussians(
+    model: Gaussians,
+    cameras: Sequence[Camera],
+    style: StylePicture,
+    recipe: Recipe,
+    vgg: Vgg | None = None,
+    title: str = "style",
+) -> tuple[Gaussians, dict[str, list[float]]]:
+    """Give Gaussians the style of a picture; only their spherical harmonics change.
+
+    Args:
+        model: fitted.
+        cameras: of its training views, of one size, on any device.
+        style: the picture.
+        recipe: of the distance to the style; a view in each iteration.
+        vgg: for NNFM, if the recipe wants it.
+        title: of the progress bar.
+
+    Returns:
+        The Gaussians, and the weighted terms of the loss by name, a value for each iteration.
+    """
+    run = GaussianPainting(model, cameras, style, recipe, vgg)
+    losses = learn_style(run, len(cameras), recipe, title)
+    harmonics = {name: x.detach() for name, x in run.harmonics.items()}
+    return replace(model, parameters=join({**run.geometry, **harmonics})), losses
+
+
+class GaussianPainting:
+    """Gaussians whose harmonics are on their way to a style."""
+
+    def __init__(
+        self,
+        model: Gaussians,
+        cameras: Sequence[Camera],
+        style: StylePicture,
+        recipe: Recipe,
+        vgg: Vgg | None,
+    ) -> None:
+        self.model, self.cameras = model, cameras
+        size = cameras[0].width, cameras[0].height
+        self.objective = Objective.of_views(recipe, style.to(model.device), size, vgg)
+        self.geometry = model.tensors("geometry")
+        self.harmonics = {
+            name: x.clone(memory_format=torch.contiguous_format).requires_grad_()
+            for name, x in split(model.parameters["sh"]).items()
+        }
+        rates = {"sh": recipe.rate, "sh_rest": HIGHER * recipe.rate}
+        groups = [{"params": [x], "lr": rates[name]} for name, x in self.harmonics.items()]
+        self.adam = torch.optim.Adam(groups, eps=1e-15, fused=True)
+
+    def render(self, view: int) -> list[Painting]:
+        """Show a view over white."""
+        learned = replace(self.model, parameters=join({**self.geometry, **self.harmonics}))
+        shown = learned.render(self.cameras[view].to(self.model.device))
+        image = shown.color.detach().permute(2, 0, 1).clamp(0, 1).requires_grad_()
+
+        def backward(gradient: Tensor) -> None:
+            shown.color.backward(gradient.permute(1, 2, 0))
+
+        return [Painting(image, shown.alpha.detach(), self.objective, backward)]
+
+    def step(self, iteration: int) -> None:
+        """Take a step of Adam."""
+        self.adam.step()
+        self.adam.zero_grad()
+
+
 class GaussianLearner:
-    """Gaussians with Adam.
+    """Gaussians that learn from whole views by Adam.
 
     Args:
         model: to start from; it stays as it is.
         images: its training views.
         learning: rates of Adam.
-        closeness: loss on views.
+        loss: on views.
         iterations: in all.
         is_frozen: only harmonics learn.
         prunes: whether Gaussians that are faint, or large in the scene or on screen, are removed now and
@@ -41,13 +114,13 @@ class GaussianLearner:
         model: Gaussians,
         images: Images,
         learning: CommonRates,
-        closeness: Closeness,
+        loss: PhotometricLoss,
         iterations: int,
         *,
         is_frozen: bool = False,
         prunes: bool = False,
     ) -> None:
-        self.original, self.closeness, self.iterations = model, closeness, iterations
+        self.original, self.loss, self.iterations = model, loss, iterations
         self.prunes = prunes and not is_frozen
         self.extent = extent(images.cameras, model.parameters["means"].cpu())
         raw = {**model.parameters, **split(model.parameters["sh"])}
@@ -59,16 +132,16 @@ class GaussianLearner:
 
     @property
     def field(self) -> Gaussians:
-        """As they are now."""
+        """Return the Gaussians as they are now."""
         parameters = {name: x.detach() for name, x in self.optimizer.parameters.items()}
         return replace(self.original, parameters=join(parameters))
 
     def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
-        """Learn from one of these views, drawn at random; the loss."""
+        """Learn from one of these views, drawn at random; return the loss."""
         view = views[int(torch.randint(len(views), (), generator=generator))]
         target = images.target(view, self.original.device)
         shown = replace(self.original, parameters=join(self.optimizer.parameters)).render(target.camera)
-        loss, gradient = differentiated(self.closeness, shown.color, target.color)
+        loss, gradient = self.loss.with_gradient(shown.color, target.color)
         shown.color.backward(gradient)
         self.iteration += 1
         self.optimizer.step(self.iteration / self.iterations)
@@ -92,7 +165,7 @@ class GaussianLearner:
 
 
 def radii(means: Tensor, scales: Tensor, camera: Camera) -> Tensor:
-    """Radii [N] in pixels of `SIGMAS` of the largest scale of Gaussians; 0 for those behind the camera.
+    """Return radii [N] in pixels: `SIGMAS` of the largest scale of Gaussians; 0 behind the camera.
 
     Args:
         means: [N, 3].

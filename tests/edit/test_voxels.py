@@ -14,8 +14,8 @@ from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.voxel_style import (
-    ArfSteps,
+from texgs.edit.voxels import (
+    VoxelPainting,
     moved,
     object_colors,
     recolored_images,
@@ -86,7 +86,7 @@ def test_the_step_has_the_gradient_of_autograd(vgg, monkeypatch):
     field = ball(degree=0)
     images, recipe = seen(field.grid, count=1), replace(RECIPE, iterations=1, features=1.0)
     weights = ArfKeys(content=0.3, variation=0.7)
-    run = ArfSteps(field.grid, field, weights, torch.Generator())
+    run = VoxelPainting(field.grid, field, weights, torch.Generator())
     gradients = []
     monkeypatch.setattr(run, "step", lambda step: gradients.append(run.optimizer.gradient.rows.clone()))
     run.follow(images, Objective.of_views(recipe, STYLE, images.size, vgg))
@@ -103,7 +103,7 @@ def test_the_step_has_the_gradient_of_autograd(vgg, monkeypatch):
     right = (image[:, :, 1:] - image[:, :, :-1]).square().mean()
     expected = {**terms, "content": 0.3 * content, "variation": 0.7 * (down + right) / 2}
     assert {name: values[0] for name, values in losses.items()} == pytest.approx(
-        {name: float(term) for name, term in expected.items()}, rel=1e-4, abs=1e-9
+        {name: float(term.detach()) for name, term in expected.items()}, rel=1e-4, abs=1e-9
     )
     sum(expected.values()).backward()
     color = [0, 1, 2]
@@ -145,7 +145,7 @@ def test_in_the_end_colours_have_the_mean_and_covariance_of_the_style():
     for is_exact in (True, False):
         weights = replace(WEIGHTS, exact=is_exact)
         edited, _ = stylize_voxels(field, images, style, RECIPE, weights)
-        run = ArfSteps(edited.grid, edited, weights, torch.Generator().manual_seed(3))
+        run = VoxelPainting(edited.grid, edited, weights, torch.Generator().manual_seed(3))
         colors = run.rendered_colors(images.cameras, True, 1)
         misses[is_exact] = float((torch.cat([colors.mean(0), colors.T.cov().flatten()]) - wanted).abs().max())
     assert misses[True] < 0.02

@@ -1,4 +1,4 @@
-"""ARF: the colours of a voxel grid follow a style; where it is stays (Zhang et al. 2022)."""
+"""How voxel grids follow a style (ARF, Zhang et al. 2022) or edited views (Instruct-NeRF2NeRF)."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from torch import Tensor
 
 from texgs.core.camera import Camera
 from texgs.core.progress import progress
+from texgs.edit.dataset_update import PhotometricLoss
 from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import Painting, Terms, image_variation, learn_style
@@ -23,14 +24,17 @@ from texgs.raster.shading import Y00
 from texgs.raster.voxel_grid import GREY, VoxelGrid, drop_sh, recolored
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_variation_of_some
 from texgs.raster.voxels import Rays, Samples, camera_rays
-from texgs.volume.images import Images
+from texgs.volume.images import Box, Images
 
 if TYPE_CHECKING:
     from texgs.edit.methods.arf import ArfKeys
+    from texgs.edit.methods.in2n import In2nKeys
 
-RAYS, RUN = 5000, 2  # a step of the first phase, and neighbours among them
-RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # of coefficients, log-linear
+RAYS, RUN = 5000, 2  # a step of ARF's first phase, and neighbours among them
+RATE, LAST_RATE, RATE_STEPS = 0.1, 0.01, 250_000  # of ARF's coefficients, log-linear
 COUNTED = 1_000_000  # pixels that statistics of colours look at
+TV_DENSITY, TV_SH = 1e-5, 1e-3  # weights of total variation of densities and of spherical harmonics (IN2N)
+OCCUPY_EVERY = 50  # iterations between looks at which cells show anything, where densities learn
 
 
 def stylize_voxels(
@@ -65,7 +69,7 @@ def stylize_voxels(
     colors = object_colors(planes[:3].T, planes[3], generator, recipe.foreground)
     matrix, offset = (x.float() for x in color_map(colors, style.pixels))
     images = recolored_images(images, matrix, offset, recipe.foreground)
-    run = ArfSteps(moved(drop_sh(field.grid), matrix, offset, keys.exact), field, keys, generator)
+    run = VoxelPainting(moved(drop_sh(field.grid), matrix, offset, keys.exact), field, keys, generator)
     run.learn_rays(images, title)
     run.follow(images, Objective.of_views(recipe, style, images.size, vgg))
     losses = learn_style(run, len(images), recipe, title)
@@ -75,7 +79,7 @@ def stylize_voxels(
 
 
 def object_colors(color: Tensor, alpha: Tensor, generator: torch.Generator, foreground: bool) -> Tensor:
-    """Colours [M, 3] of the object, drawn from pixels [N, 3] over white by their alpha [N]; or all pixels."""
+    """Return colours [M, 3] of the object, drawn from pixels [N, 3] over white by their alpha [N]; or all."""
     if not foreground:
         return color
     drawn = torch.rand(alpha.shape, generator=generator) < alpha
@@ -84,7 +88,7 @@ def object_colors(color: Tensor, alpha: Tensor, generator: torch.Generator, fore
 
 
 def recolored_images(images: Images, matrix: Tensor, offset: Tensor, foreground: bool) -> Images:
-    """Views whose colours, or those of the object alone, are moved by an affine map, and cut to [0, 1]."""
+    """Move colours of views, or those of the object alone, by an affine map, and cut them to [0, 1]."""
     planes = images.planes.clone()
     for view in planes:
         alpha = view[3].float() / 255 if foreground else torch.ones(view.shape[1:])
@@ -96,13 +100,19 @@ def recolored_images(images: Images, matrix: Tensor, offset: Tensor, foreground:
 
 
 def moved(grid: VoxelGrid, matrix: Tensor, offset: Tensor, is_exact: bool) -> VoxelGrid:
-    """The grid with mapped colours; not exact: coefficients s become A s + b, as in ARF's code."""
+    """Return the grid with mapped colours; not exact: coefficients s become A s + b, as in ARF's code."""
     if not is_exact:
         offset = Y00 * offset + GREY - GREY * matrix.sum(1)
     return recolored(grid, matrix, offset)
 
 
-class ArfSteps:
+def sampled(grid: VoxelGrid, field: Voxels, rays: Tensor) -> tuple[Samples, Rays]:
+    """Return the samples of rays [N, 6] over white, and what they bring back."""
+    out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
+    return Samples(grid, field.march, rays, out), out
+
+
+class VoxelPainting:
     """A grid on its way to a style.
 
     Args:
@@ -113,7 +123,7 @@ class ArfSteps:
     """
 
     def __init__(self, grid: VoxelGrid, field: Voxels, keys: ArfKeys, generator: torch.Generator) -> None:
-        self.grid, self.march, self.keys, self.generator = grid, field.march, keys, generator
+        self.grid, self.original, self.keys, self.generator = grid, field, keys, generator
         self.optimizer = VoxelOptimizer(grid)
 
     def learn_rays(self, images: Images, title: str) -> None:
@@ -122,7 +132,7 @@ class ArfSteps:
         steps = range(round(self.keys.ray_epochs * len(rays) / RAYS))
         for step in progress(steps, title=f"{title}, recoloured views", unit="step"):
             drawn, target = rays.draw(RAYS, RUN, self.generator)
-            samples, out = self.sample(drawn)
+            samples, out = sampled(self.grid, self.original, drawn)
             error = out.color - target
             samples.add_gradient(error * (2 / error.numel()), None, self.optimizer.gradient)
             self.step(step)
@@ -135,7 +145,7 @@ class ArfSteps:
         """Show a view over white."""
         width, height = self.images.size
         target = self.images.target(view)
-        samples, out = self.sample(camera_rays(target.camera).flatten(0, 1))
+        samples, out = sampled(self.grid, self.original, camera_rays(target.camera).flatten(0, 1))
         image = out.color.unflatten(0, (height, width)).permute(2, 0, 1).contiguous().requires_grad_()
 
         def backward(gradient: Tensor) -> None:
@@ -153,22 +163,73 @@ class ArfSteps:
         return [Painting(image, out.alpha.reshape(height, width), self.objective, backward, added)]
 
     def rendered_colors(self, cameras: Sequence[Camera], foreground: bool, stride: int) -> Tensor:
-        """Colours [M, 3] that views of the grid have."""
+        """Return colours [M, 3] that views of the grid have."""
         colors = []
         for camera in cameras:
             rays = camera_rays(camera)[::stride, ::stride].flatten(0, 1).contiguous()
-            _, out = self.sample(rays)
+            _, out = sampled(self.grid, self.original, rays)
             colors.append(object_colors(out.color, out.alpha, self.generator, foreground))
         return torch.cat(colors)
 
-    def sample(self, rays: Tensor) -> tuple[Samples, Rays]:
-        """Samples of rays over white, and what they bring back."""
-        out = Rays(rays.new_empty(len(rays), 3), *rays.new_empty(2, len(rays)))
-        return Samples(self.grid, self.march, rays, out), out
-
     def step(self, step: int) -> None:
-        """A step of RMSProp on the colours, with total variation of some random blocks."""
+        """Take a step of RMSProp on the colours, with total variation of some random blocks."""
         variation = (0.0, self.keys.sh_variation, self.generator, self.optimizer.gradient)
         add_variation_of_some(self.grid, *variation)
         rate = RATE * (LAST_RATE / RATE) ** (step / RATE_STEPS)
         self.optimizer.step(VoxelRates(0.0, rate, rate))
+
+
+class VoxelLearner:
+    """A grid that learns from patches of views by RMSProp.
+
+    Args:
+        field: to start from; it stays as it is.
+        keys: rates and patches.
+        loss: on patches, without D-SSIM.
+    """
+
+    def __init__(self, field: Voxels, keys: In2nKeys, loss: PhotometricLoss) -> None:
+        self.original, self.keys, self.loss = field, keys, loss
+        self.density = 0.0 if keys.frozen else keys.density
+        self.grid = field.grid.with_rows(field.grid.rows.clone())
+        self.optimizer = VoxelOptimizer(self.grid)
+        self.iteration = 0
+
+    @property
+    def field(self) -> Voxels:
+        """Return the grid as it is now."""
+        self.grid.refresh_occupancy()
+        return replace(self.original, grid=self.grid)
+
+    @torch.no_grad()
+    def step(self, images: Images, views: Sequence[int], generator: torch.Generator) -> float:
+        """Learn from patches of these views, drawn at random around what is visible; return the loss."""
+        keys, size = self.keys, images.size
+        side = min(keys.side, *size)
+        rays, wanted = [], []
+        for place in torch.randint(len(views), (keys.patches,), generator=generator).tolist():
+            left, top = corner(images.boxes[views[place]], side, size, generator)
+            camera = images.cameras[views[place]].crop(left, top, left + side, top + side)
+            rays.append(camera_rays(camera).flatten(0, 1))
+            wanted.append(images.planes[views[place], :3, top : top + side, left : left + side])
+        samples, out = sampled(self.grid, self.original, torch.cat(rays))
+        shape = (keys.patches, side, side, 3)
+        target = torch.stack(wanted).permute(0, 2, 3, 1).float() / 255
+        with torch.enable_grad():
+            loss, gradient = self.loss.with_gradient(out.color.reshape(shape), target)
+        samples.add_gradient(gradient.reshape(-1, 3), None, self.optimizer.gradient)
+        weight = TV_DENSITY if self.density else 0.0
+        add_variation_of_some(self.grid, weight, TV_SH, generator, self.optimizer.gradient)
+        self.optimizer.step(VoxelRates(self.density, keys.sh, keys.sh))
+        self.iteration += 1
+        if self.density and self.iteration % OCCUPY_EVERY == 0:
+            self.grid.refresh_occupancy()
+        return loss
+
+
+def corner(box: Box, side: int, size: tuple[int, int], generator: torch.Generator) -> tuple[int, int]:
+    """Draw left and top of a patch inside of an image of this width and height, its middle from a box."""
+    low, high = torch.tensor(box[:2]), torch.tensor(box[2:])
+    middle = low + (torch.rand(2, generator=generator) * (high - low)).long()
+    left, top = (middle - side // 2).clamp_min(0).minimum(torch.tensor(size) - side).tolist()
+    return left, top

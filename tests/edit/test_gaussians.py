@@ -8,7 +8,7 @@ import torch
 from tests.edit.scenes import RADIUS, sphere_points
 from tests.fit.scenes import cameras
 from texgs.core.errors import ArgumentError
-from texgs.edit.gaussian_style import HIGHER, stylize_gaussians
+from texgs.edit.gaussians import HIGHER, stylize_gaussians
 from texgs.edit.objective import Objective
 from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe

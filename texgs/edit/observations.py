@@ -1,0 +1,207 @@
+"""Edited views as linear equations: which bare colours of texels make them, at several opacities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import torch
+from torch import Tensor
+from torch.nn.functional import avg_pool2d
+
+from texgs.core.camera import Camera
+from texgs.core.errors import ArgumentError
+from texgs.core.light import Light
+from texgs.edit.canvas import rasterized
+from texgs.fields.surfels.model import Surfels
+from texgs.fields.surfels.shading import light_direction, material, viewer
+from texgs.fields.surfels.texels import bare_colors
+from texgs.models.guidance import EditViews
+from texgs.raster import Render, Texture
+from texgs.raster.losses import depth_to_normal
+from texgs.raster.shading import blinn_phong_texture
+
+MARGIN = 11  # pixels around content: a window of SSIM
+SOFT = 0.05  # alpha below which colours are rather those of the neighbourhood
+NEAR, FAR = 9, 65  # pixels, windows of that neighbourhood
+FEW = 0.02  # mean alpha of a window below which it rather has the colour of the larger one
+
+
+def edit_views(
+    renders: Iterable[Render], cameras: Sequence[Camera], conditions: Tensor | None, level: float | None
+) -> EditViews:
+    """Return what a guidance sees of renders over white, with depth.
+
+    Points are those of the mean depth. Fields without normals get those of the surface that these make.
+
+    Args:
+        renders: one for each camera.
+        cameras: of one size.
+        conditions: [V, H, W, 3] what edits stay close to; None: the renders.
+        level: of noise, see `EditViews`.
+    """
+    images, alphas, points, normals = [], [], [], []
+    for camera, seen in zip(cameras, renders, strict=True):
+        assert seen.depth is not None
+        images.append(seen.color.clamp(0, 1))
+        alphas.append(seen.alpha)
+        points.append(camera.unproject(seen.depth))
+        normal = seen.normal
+        if normal is None:
+            is_seen = (seen.alpha > 0)[..., None]
+            normal = depth_to_normal(seen.depth, camera.viewmat, camera.K) * is_seen
+        normals.append(normal)
+    shown, *rest = (torch.stack(each) for each in (images, alphas, points, normals))
+    return EditViews(shown, shown if conditions is None else conditions, *rest, list(cameras), level)
+
+
+@torch.no_grad()
+def render_views(model: Surfels, cameras: Sequence[Camera], light: Light | None) -> EditViews:
+    """Render a textured model for a guidance by cameras of one size; without a light, its bare colours."""
+    sizes = {(camera.width, camera.height) for camera in cameras}
+    if len(sizes) != 1:
+        raise ArgumentError(f"cameras: expected at least one, all of one size, got sizes {sorted(sizes)}")
+    p, colors = model.parameters, bare_colors(model)
+    white = torch.ones_like(colors[0])
+    renders = (
+        rasterized(
+            *(model, camera),
+            texture=Texture(*light_on(model, camera, light), colors, p["sizes"], p["offsets"]),
+            background=white,
+            outputs=("depth", "normal"),
+        )
+        for camera in cameras
+    )
+    return edit_views(renders, cameras, None, None)
+
+
+def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tensor, Tensor]:
+    """Return highlight [N, 3] and gain [N]: a fragment of bare colour c looks like highlight + gain * c.
+
+    The model is relightable; without a light, colours look as they are.
+    """
+    p, shading = model.parameters, model.shading
+    black = torch.zeros_like(p["means"])
+    if light is None:
+        return black, torch.ones_like(p["opacities"])
+    return blinn_phong_texture(
+        black,
+        *material(p, shading.material).values(),
+        *(p["means"], p["quats"], viewer(camera, shading), light_direction(light, camera)),
+        facing=shading.facing,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class LinearObservation:
+    """One view at one opacity: how bare colours become an image, and the image wanted. Over black."""
+
+    model: Surfels
+    opacity: float  # factor on the opacities of surfels
+    texture: Texture  # highlights and gains, both 0 for surfels that do not change
+    camera: Camera  # of the part of the view that shows anything
+    cover: Tensor  # [h, w] share of the surfels that change
+    wanted: Tensor  # [h, w, 3] what they should add to the image
+
+    @property
+    def is_lit(self) -> bool:
+        """Return whether there are highlights."""
+        return bool(self.texture.base.any())
+
+    def image(self, colors: Tensor, *, plain: bool = False) -> Tensor:
+        """Return what bare colours [T, 3] add to the image [h, w, 3]; differentiable in them.
+
+        Plain is without highlights: then it is linear in the colours.
+        """
+        texture = replace(self.texture, texels=colors)
+        if plain:
+            texture = replace(texture, base=torch.zeros_like(texture.base))
+        return rasterized(self.model, self.camera, self.opacity, texture=texture).color
+
+
+def observe(
+    model: Surfels,
+    views: EditViews,
+    edited: Tensor,
+    light: Light | None,
+    opacities: Sequence[float],
+    surfels: Tensor | None = None,
+) -> list[list[LinearObservation]]:
+    """Return for each opacity the equations of all views.
+
+    An edited view says which colours surfels should have where they are seen. At another opacity the same
+    colours are wanted, at the alpha of that opacity, so that nothing gets darker or paler to make up for it.
+
+    Args:
+        model: textured.
+        views: as the guidance saw them.
+        edited: [V, H, W, 3] over white.
+        light: that views were rendered with; None for bare colours.
+        opacities: factors on the opacities of the model.
+        surfels: [N] which may change; all by default.
+    """
+    own = model.parameters["opacities"]
+    changing = torch.ones_like(own) if surfels is None else surfels.to(own)
+    straight = [straight_colors(image, alpha) for image, alpha in zip(edited, views.alphas, strict=True)]
+    return [
+        [
+            _observation(model, opacity, changing, camera, light, color)
+            for camera, color in zip(views.cameras, straight, strict=True)
+        ]
+        for opacity in opacities
+    ]
+
+
+@torch.no_grad()
+def _observation(
+    model: Surfels, opacity: float, changing: Tensor, camera: Camera, light: Light | None, color: Tensor
+) -> LinearObservation:
+    p = model.parameters
+    highlight, gain = light_on(model, camera, light)
+    lit = highlight * changing[:, None], gain * changing
+    texture = Texture(*lit, p["texels"], p["sizes"], p["offsets"])
+    cover = rasterized(model, camera, opacity, features=changing[:, None]).color[..., 0]
+    left, top, right, bottom = content(cover)
+    part = cover[top:bottom, left:right].clone()
+    wanted = planar(color[top:bottom, left:right] * part[..., None])
+    return LinearObservation(model, opacity, texture, camera.crop(left, top, right, bottom), part, wanted)
+
+
+def planar(image: Tensor) -> Tensor:
+    """Return an image [H, W, C] in planar memory, as the rasterizer returns and takes images."""
+    return image.permute(2, 0, 1).contiguous().permute(1, 2, 0)
+
+
+def content(cover: Tensor) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom of what is not 0 in [H, W], with a margin; never empty."""
+    height, width = cover.shape
+    columns, rows = (cover > 0).any(dim=0).nonzero(), (cover > 0).any(dim=1).nonzero()
+    if not len(columns):
+        return 0, 0, 1, 1
+    left, right = max(int(columns[0]) - MARGIN, 0), min(int(columns[-1]) + 1 + MARGIN, width)
+    return left, max(int(rows[0]) - MARGIN, 0), right, min(int(rows[-1]) + 1 + MARGIN, height)
+
+
+def straight_colors(image: Tensor, alpha: Tensor) -> Tensor:
+    """Return colours [H, W, 3] in [0, 1] that an image over white shows where it is not transparent.
+
+    Where alpha is small, and nothing could be divided by it, they go over to the mean of what is around, and
+    so they continue beyond the silhouette.
+
+    Args:
+        image: [H, W, 3] over white.
+        alpha: [H, W].
+    """
+    own = (image - (1 - alpha[..., None])).clamp_min(0).minimum(alpha[..., None])  # premultiplied
+    overall = own.sum(dim=(0, 1)) / alpha.sum().clamp_min(1e-6)
+    around = _mean(own, alpha, NEAR, _mean(own, alpha, FAR, overall))
+    return ((own + SOFT * around) / (alpha[..., None] + SOFT)).clamp(0, 1)
+
+
+def _mean(own: Tensor, alpha: Tensor, window: int, beyond: Tensor) -> Tensor:
+    """Return the mean colour [H, W, 3] of a window; where it is nearly empty, `beyond`."""
+    planes = torch.cat([own, alpha[..., None]], dim=-1).permute(2, 0, 1)[None]
+    for size in ((window, 1), (1, window)):  # separable, and zeros beyond the border count as transparent
+        planes = avg_pool2d(planes, size, stride=1, padding=(size[0] // 2, size[1] // 2))
+    *color, cover = planes[0]
+    return (torch.stack(color, dim=-1) + FEW * beyond) / (cover[..., None] + FEW)
