@@ -51,8 +51,9 @@ def edit_views(
             is_seen = (seen.alpha > 0)[..., None]
             normal = depth_to_normal(seen.depth, camera.viewmat, camera.K) * is_seen
         normals.append(normal)
-    shown, *rest = (torch.stack(each) for each in (images, alphas, points, normals))
-    return EditViews(shown, shown if conditions is None else conditions, *rest, list(cameras), level)
+    shown, alpha, places, facing = map(torch.stack, (images, alphas, points, normals))
+    conditions = shown if conditions is None else conditions
+    return EditViews(shown, conditions, alpha, places, facing, list(cameras), level)
 
 
 @torch.no_grad()
@@ -84,11 +85,10 @@ def light_on(model: Surfels, camera: Camera, light: Light | None) -> tuple[Tenso
     black = torch.zeros_like(p["means"])
     if light is None:
         return black, torch.ones_like(p["opacities"])
+    a, d, s, b = material(p, shading.material).values()
+    place, toward = viewer(camera, shading), light_direction(light, camera)
     return blinn_phong_texture(
-        black,
-        *material(p, shading.material).values(),
-        *(p["means"], p["quats"], viewer(camera, shading), light_direction(light, camera)),
-        facing=shading.facing,
+        black, a, d, s, b, p["means"], p["quats"], place, toward, facing=shading.facing
     )
 
 
