@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -104,11 +105,14 @@ class Look(Generic[Keys]):
         return shown
 
 
+Stylize = Callable[[Look[FeatureKeysType], str, Any, "Sequence[View]"], tuple[Any, Losses]]
+
+
 def look_method(
     name: str,
     summary: str,
     settings: type[FeatureKeysType],
-    stylize: Callable[[Look[FeatureKeysType], str, Any, Sequence[View]], tuple[Any, Losses]],
+    stylize: Stylize[FeatureKeysType],
     kind: str,
 ) -> Method[FeatureKeysType]:
     """Return the specification of a method that gives models of one kind of field the style of a picture.
@@ -122,47 +126,52 @@ def look_method(
         kind: of field.
     """
     where = f"edit.{name}"
-
-    def run(task: Task[FeatureKeysType]) -> EditedScene:
-        from texgs.edit.task import EditedScene
-        from texgs.models.vgg import Vgg
-
-        keys = task.settings
-        look = Look(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
-
-        def one(name: str, model: Field, views: Sequence[View]) -> Field:
-            edited: Field
-            edited, look.losses[name] = stylize(look, name, model, views)
-            return edited
-
-        scene = task.each_model(one)
-        how = " + ".join(["VGG-16"] * (keys.nnfm > 0) + ["patches"] * (keys.patches > 0))
-        return EditedScene(scene, how, look.write_pictures(), notes=look.notes, losses=look.losses)
-
-    def checked(values: FeatureKeysType) -> None:
-        if not values.nnfm and not values.patches:
-            raise ArgumentError(
-                f"{where}.nnfm, {where}.patches: expected a weight above 0 for one of them, got 0 for both"
-            )
-        check(values, where)
-
-    def needed(values: FeatureKeysType) -> Mapping[str, str]:
-        without = "nnfm=0" if values.patches else ""
-        return {**({"vgg16": without} if values.nnfm > 0 else {}), **weights(values)}
-
     return Method(
         name,
         summary,
         settings,
-        run,
-        checked,
-        needed,
+        partial(_run, stylize),
+        partial(_check_features, where),
+        _feature_weights,
         fields=frozenset({kind}),
         files=files,
         style=lambda values: style_of(values, where),
         follows="style",
         followed=lambda values: Path(values.style).name,
     )
+
+
+def _run(stylize: Stylize[FeatureKeysType], task: Task[FeatureKeysType]) -> EditedScene:
+    """Give the models the style; write style.png."""
+    from texgs.edit.task import EditedScene
+    from texgs.models.vgg import Vgg
+
+    keys = task.settings
+    look = Look(task, Vgg.load(device=task.device) if keys.nnfm > 0 else None)
+
+    def one(name: str, model: Field, views: Sequence[View]) -> Field:
+        edited: Field
+        edited, look.losses[name] = stylize(look, name, model, views)
+        return edited
+
+    scene = task.each_model(one)
+    how = " + ".join(["VGG-16"] * (keys.nnfm > 0) + ["patches"] * (keys.patches > 0))
+    return EditedScene(scene, how, look.write_pictures(), notes=look.notes, losses=look.losses)
+
+
+def _check_features(where: str, settings: FeatureKeys) -> None:
+    """Require that something is compared with the style."""
+    if not settings.nnfm and not settings.patches:
+        raise ArgumentError(
+            f"{where}.nnfm, {where}.patches: expected a weight above 0 for one of them, got 0 for both"
+        )
+    check(settings, where)
+
+
+def _feature_weights(settings: FeatureKeys) -> dict[str, str]:
+    """Return VGG where features are compared, and what finds the object."""
+    without = "nnfm=0" if settings.patches else ""
+    return {**({"vgg16": without} if settings.nnfm > 0 else {}), **weights(settings)}
 
 
 def files(settings: StyleKeys) -> dict[str, Path]:

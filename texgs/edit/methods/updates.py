@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from texgs.core.errors import ArgumentError
@@ -12,7 +13,9 @@ from texgs.edit.method import Method
 from texgs.edit.methods.instruction import SHOWN, InstructionKeys, write_views
 
 if TYPE_CHECKING:
-    from texgs.edit.dataset_update import Learner, PhotometricLoss, Updated
+    import numpy as np
+
+    from texgs.edit.dataset_update import Learner, PhotometricLoss
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.field import Field
     from texgs.volume.images import Images
@@ -95,54 +98,64 @@ def update_method(
         kind: of field.
         keeps_renders: edits stay close to views of the fitted model, not to the training views.
     """
-
-    def run(task: Task[Keys]) -> EditedScene:
-        from texgs.edit.dataset_update import update_field
-        from texgs.edit.task import EditedScene
-        from texgs.volume.images import load
-
-        keys, guidance = task.settings, task.settings.opened(task.device)
-        loss = keys.loss(task.device)
-        updates: dict[str, Updated] = {}
-
-        def one(name: str, model: Field, views: Sequence[View]) -> Field:
-            images = load(views, task.reduce)
-            updates[name] = update_field(
-                *(learner(keys, model, images, loss), images, guidance),
-                task.settings_for(name).instruction,
-                schedule(keys, len(views)),
-                keeps_renders=keeps_renders,
-                shown=SHOWN,
-                seed=task.edit.seed,
-                title=task.title_of(name),
-            )
-            return updates[name].field
-
-        scene = task.each_model(one)
-        rows = {}
-        for name, each in updates.items():
-            rows[f"{name} before"] = [old.numpy() for old, _ in each.views]
-            rows[f"{name} edited"] = [new.numpy() for _, new in each.views]
-        notes: dict[str, Any] = {
-            name: {"edits": each.edits, "seconds of them": each.guided} for name, each in updates.items()
-        }
-        notes["instruction"] = task.followed or keys.instruction
-        how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
-        losses = {name: {"loss": each.losses} for name, each in updates.items()}
-        return EditedScene(scene, how, write_views(task.output, rows), notes=notes, losses=losses)
-
-    def checked(values: Keys) -> None:
-        values.check()
-        if not (values.l1 or values.dssim or values.lpips):
-            raise ArgumentError(
-                f"edit.{name}.l1, dssim, lpips: expected a weight above 0 for one of them, got 0 for all"
-            )
-        schedule(values, 1)
-
     return Method(
-        *(name, summary, settings, run, checked),
+        name,
+        summary,
+        settings,
+        partial(_run, schedule, learner, keeps_renders),
+        partial(_check, name, schedule),
         lambda values: values.weights(),
         fields=frozenset({kind}),
         follows="instruction",
-        followed=lambda settings: settings.instruction,
+        followed=lambda values: values.instruction,
     )
+
+
+def _run(
+    schedule: Callable[[Keys, int], UpdateSchedule],
+    learner: Callable[[Keys, Any, Images, PhotometricLoss], Learner],
+    keeps_renders: bool,
+    task: Task[Keys],
+) -> EditedScene:
+    """Give the models the look; write views.png."""
+    from texgs.edit.dataset_update import update_field
+    from texgs.edit.task import EditedScene
+    from texgs.volume.images import load
+
+    keys, guidance = task.settings, task.settings.opened(task.device)
+    loss = keys.loss(task.device)
+    rows: dict[str, list[np.ndarray]] = {}
+    losses: dict[str, dict[str, list[float]]] = {}
+    notes: dict[str, Any] = {}
+
+    def one(name: str, model: Field, views: Sequence[View]) -> Field:
+        images = load(views, task.reduce)
+        updated = update_field(
+            *(learner(keys, model, images, loss), images, guidance),
+            task.settings_for(name).instruction,
+            schedule(keys, len(views)),
+            keeps_renders=keeps_renders,
+            shown=SHOWN,
+            seed=task.edit.seed,
+            title=task.title_of(name),
+        )
+        rows[f"{name} before"] = [old.numpy() for old, _ in updated.views]
+        rows[f"{name} edited"] = [new.numpy() for _, new in updated.views]
+        notes[name] = {"edits": updated.edits, "seconds of them": updated.guided}
+        losses[name] = {"loss": updated.losses}
+        return updated.field
+
+    scene = task.each_model(one)
+    notes["instruction"] = task.followed or keys.instruction
+    how = f"{guidance.name}, geometry {'frozen' if keys.frozen else 'learns'}"
+    return EditedScene(scene, how, write_views(task.output, rows), notes=notes, losses=losses)
+
+
+def _check(name: str, schedule: Callable[[Keys, int], UpdateSchedule], settings: Keys) -> None:
+    """Require an instruction, a loss and a schedule that there can be."""
+    settings.check()
+    if not (settings.l1 or settings.dssim or settings.lpips):
+        raise ArgumentError(
+            f"edit.{name}.l1, dssim, lpips: expected a weight above 0 for one of them, got 0 for all"
+        )
+    schedule(settings, 1)
