@@ -21,12 +21,10 @@ from typing import NamedTuple
 from benchmarks.command import call
 from texgs.core.checksum import Checksums
 from texgs.core.io import read_json
-from texgs.workflow.absent import lacking
-from texgs.workflow.experiments import selected
 from texgs.workflow.forecast import PROBE, Speed, probe, speeds, work_of
-from texgs.workflow.graph import graph
-from texgs.workflow.product import as_sweep
+from texgs.workflow.graph import drawn
 from texgs.workflow.result import METRICS
+from texgs.workflow.sweep import as_sweep
 
 FILE = Path(str(files("texgs.workflow").joinpath("speeds.csv")))
 PROBES = 5  # times that the probe is asked; the median counts
@@ -64,7 +62,7 @@ def samples(runs: Sequence[str]) -> dict[str, list[Sample]]:
     """Jobs of runs that are done, by stage."""
     by_stage: dict[str, list[Sample]] = defaultdict(list)
     for words in runs:
-        planned = graph(selected(as_sweep(tuple(shlex.split(words))), lacking).by_sweep, Checksums.load())
+        _, planned = drawn(as_sweep(tuple(shlex.split(words))), Checksums.load())
         for folder, job in planned.run.items():
             metrics = job.output / METRICS
             if metrics.exists():

@@ -8,8 +8,7 @@ import pytest
 from texgs.core.checksum import Checksums
 from texgs.core.io import write_json
 from texgs.workflow import result
-from texgs.workflow.earlier import earlier
-from texgs.workflow.graph import Graph
+from texgs.workflow.graph import Graph, earlier
 
 VIEWS, FIT, EDIT = (
     Path("results/engine", name) for name in ("TF01/views", "TF01/quick/texture", "edits/gold")

@@ -4,7 +4,8 @@ import pytest
 
 from texgs.config.compose import compose
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
-from texgs.workflow.checks import check_edit, require_base
+from texgs.workflow.checks import check_edit, require_edit
+from texgs.workflow.stage_table import STAGES
 
 FITS = {
     **dict.fromkeys(("arf", "in2n"), "plenoxels_quick"),
@@ -52,14 +53,18 @@ def test_one_sentence_for_each(edit, word, message):
         check_edit(compose(("dataset=sphere", f"fit={fit}", f"edit={edit}", *word.split("|"))))
 
 
+def require(words):
+    require_edit(STAGES[f"edit_{compose(words).edit.method}"], words)
+
+
 def test_what_an_edit_by_hand_starts_from_is_told_at_once(tmp_path):
     words = ("dataset=engine", "edit=crimson", f"results={tmp_path}")
     with pytest.raises(
         MissingDataError, match=r"edit\.base: lobe is not done yet; run texgs edit_segment edit=lobe"
     ):
-        require_base(words)
+        require(words)
     with pytest.raises(ConfigError, match=r"edit\.base: expected the file of a scene or one of"):
-        require_base((*words, "edit.base=none-such"))
+        require((*words, "edit.base=none-such"))
     with pytest.raises(ConfigError, match=r"edit\.parts: expected some of"):
-        require_base(("dataset=engine", "edit=glass", "edit.parts=[nothing]"))
-    require_base(("dataset=engine", "edit=glass"))
+        require(("dataset=engine", "edit=glass", "edit.parts=[nothing]"))
+    require(("dataset=engine", "edit=glass"))

@@ -167,7 +167,7 @@ def test_a_killed_job_goes_on_where_it_was(folder, tmp_path, monkeypatch):
 
 def test_a_job_of_the_workflow(folder, capsys):
     from texgs.config.compose import compose
-    from texgs.workflow.stage import settings_file
+    from texgs.workflow.settings_files import settings_file
     from texgs.workflow.stage_table import STAGES
 
     settings = settings_file(STAGES["volume"].settings(compose(tuple(TINY))), "results")

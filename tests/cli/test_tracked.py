@@ -2,6 +2,7 @@
 
 import json
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -10,13 +11,11 @@ from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
 from texgs.report.results import Comparison, EditResult, FitResult, GalleryResult, PseResult, Shown, plain
 from texgs.workflow.job import Job
-from texgs.workflow.product import as_sweep
 from texgs.workflow.provenance import device, seed
-from texgs.workflow.stage import for_tf
+from texgs.workflow.runs import PARENT
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.sweep import variants
+from texgs.workflow.sweep import as_sweep, variants
 from texgs.workflow.tracked import RUNS, Tracking, curves, name, of_workflow, scalars, tags
-from texgs.workflow.tracking import PARENT
 
 GOLD = ("edit=gold", "edit.text.size=64,128")
 IDENTITY = {"settings": "0123", "code": "4567"}
@@ -25,7 +24,7 @@ IDENTITY = {"settings": "0123", "code": "4567"}
 def job(stage, words, tf=None):
     """The job of the last variant of some words."""
     config = compose(variants(as_sweep(("dataset=sphere", "fit=demo", *words)))[-1])
-    return Job.of(STAGES[stage], for_tf(config, tf) if tf else config, Checksums())
+    return Job.of(STAGES[stage], replace(config, tf=tf) if tf else config, Checksums())
 
 
 @pytest.mark.parametrize(

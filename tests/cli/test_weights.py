@@ -7,9 +7,9 @@ from texgs.config.compose import compose
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.models import weights
-from texgs.workflow.stage import settings_digest
+from texgs.workflow.missing import missing_weights, require_same, weights_of
+from texgs.workflow.settings_files import settings_digest
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.weights import missing, require_same, weights_of
 
 CLIP = "clip-vit-base-patch32"
 
@@ -70,7 +70,7 @@ def test_a_job_works_with_the_weights_it_was_planned_with(there):
 
 def test_missing_weights_name_the_command_and_are_not_downloaded(there, monkeypatch):
     monkeypatch.setattr(weights, "_download_file", lambda *_: pytest.fail("downloaded"))
-    (line,) = missing(compose(("dataset=orbital", "edit=style")))
+    (line,) = missing_weights(compose(("dataset=orbital", "edit=style")))
     assert line == (
         "edit style: the weights of vgg16 are not on this machine; "
         "`texgs weights vgg16` downloads them or says how to get them, and edit.image.recipe=patches does "
@@ -85,9 +85,9 @@ def test_the_papers_share_of_clip_is_refused_without_its_weights(there):
         "how to get them, and edit.image.lambda_s=1 does without them"
     )
     for name, *words in (("style_paper",), *(("style", f"edit.image.lambda_s={x}") for x in (0, 0.9))):
-        lines = missing(compose(("dataset=orbital", f"edit={name}", *words)))
+        lines = missing_weights(compose(("dataset=orbital", f"edit={name}", *words)))
         assert f"edit {name}: {of_clip}" in lines
-    (line,) = missing(compose(("dataset=orbital", "edit=style_paper", "edit.image.lambda_s=1")))
+    (line,) = missing_weights(compose(("dataset=orbital", "edit=style_paper", "edit.image.lambda_s=1")))
     assert "vgg16" in line
 
 

@@ -8,9 +8,8 @@ from hydra import initialize_config_dir
 from omegaconf import OmegaConf
 
 from texgs.config.compose import compose
-from texgs.config.composition import composition, merge
+from texgs.config.composition import composition, merge, resolve
 from texgs.config.project import ROOT
-from texgs.config.references import resolve
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 

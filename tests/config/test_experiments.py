@@ -2,6 +2,7 @@
 
 import contextlib
 import itertools
+from dataclasses import replace
 
 import pytest
 
@@ -9,7 +10,7 @@ from texgs.config.project import ROOT
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.workflow.experiments import LeftOut, selected
 from texgs.workflow.locate import tf_names
-from texgs.workflow.stage import fit_folder, for_tf
+from texgs.workflow.stage import fit_folder
 from texgs.workflow.stage_table import STAGES
 
 
@@ -203,7 +204,7 @@ def jobs_with_all_data(config):
     """The jobs of a configuration, but for those of files that are not there."""
     for stage in STAGES.values():
         with contextlib.suppress(MissingDataError):
-            for each in [for_tf(config, name) for name in tf_names(config)] if stage.per_tf else [config]:
+            for each in [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]:
                 if stage.applies(each):
                     stage.inputs(each)
                     yield stage, each

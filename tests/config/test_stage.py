@@ -6,7 +6,7 @@ import yaml
 from texgs.config.compose import compose
 from texgs.core.errors import ConfigError
 from texgs.workflow.locate import source_file, tf_names, views_folder
-from texgs.workflow.stage import settings_digest, settings_file
+from texgs.workflow.settings_files import settings_digest, settings_file
 from texgs.workflow.stage_table import STAGES
 
 

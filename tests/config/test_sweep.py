@@ -1,14 +1,14 @@
+from dataclasses import replace
+
 import pytest
 
 from texgs.config.compose import compose
 from texgs.config.project import members
 from texgs.core.errors import ConfigError
 from texgs.workflow.inputs import scene_before
-from texgs.workflow.product import as_sweep
-from texgs.workflow.stage import edit_folder, fit_folder, for_tf
+from texgs.workflow.stage import edit_folder, fit_folder
 from texgs.workflow.stage_table import STAGES
-from texgs.workflow.sweep import variants
-from texgs.workflow.variants import swept
+from texgs.workflow.sweep import as_sweep, swept, variants
 
 
 def test_without_a_sweep_there_are_the_given_words():
@@ -64,7 +64,7 @@ def test_variants_that_change_edits_alone_share_the_fits():
     words = ("edit=style", *words_of(a=["edit.image.lambda_s=0.5"], b=[]), "sweep.edit_seeds=[0,1]")
     assert folders(words) == [f"default/style-{each}" for each in ("a", "a-s1", "b", "b-s1")]
     first, *_ = map(compose, variants(words))
-    assert STAGES["texture"].settings(for_tf(first, "TF01"))["fit"]["sweep"] == "none"
+    assert STAGES["texture"].settings(replace(first, tf="TF01"))["fit"]["sweep"] == "none"
     assert (
         STAGES["edit_image"].settings(first)["fit"] | {"sweep": "mine", "variant": "a"}
         == (STAGES["edit_image"].settings(first)["fit"])

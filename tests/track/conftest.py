@@ -5,7 +5,7 @@ import shutil
 import pytest
 from mlflow import MlflowClient
 
-from texgs.workflow.tracking.store import SETTINGS, connect
+from texgs.workflow.store import SETTINGS, connect
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -10,7 +10,7 @@ import mlflow.artifacts
 import mlflow.store.tracking.sqlalchemy_store
 from mlflow import MlflowClient
 
-from texgs.workflow.tracking import run
+from texgs.workflow.runs import run
 
 N_JOBS, N_METRICS = 8, 20
 

@@ -12,8 +12,7 @@ import psutil
 import pytest
 
 from texgs.core.io import write_json
-from texgs.workflow.tracking import begin, process_tags
-from texgs.workflow.tracking.record import HOST, PROCESS, is_alive
+from texgs.workflow.runs import HOST, PROCESS, begin, is_alive, process_tags
 
 pytestmark = pytest.mark.subprocess
 
@@ -22,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 JOB = """
 import sys, time
 from pathlib import Path
-from texgs.workflow.tracking import process_tags, run
+from texgs.workflow.runs import process_tags, run
 tags = process_tags(Path(sys.argv[2]))
 with run(sys.argv[1], experiment="texgs", name="job", tags=tags, params={}) as recorded:
     print(recorded.id, flush=True)

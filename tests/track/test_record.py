@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 from mlflow.utils.validation import _validate_metric_name
 
 from texgs.core.errors import ArgumentError
-from texgs.workflow.tracking import PARENT, TrackingError, begin, record, run
+from texgs.workflow import runs
+from texgs.workflow.runs import PARENT, begin, run
+from texgs.workflow.store import TrackingError
 
 ROOT = Path(__file__).parents[2]
 JOB = {"experiment": "texgs", "name": "fit", "tags": {"git.sha": "0f3c"}, "params": {"fit": {"steps": 7}}}
@@ -33,7 +35,7 @@ def python(code, *arguments):
     command = [
         sys.executable,
         "-c",
-        f"import sys\nfrom texgs.workflow.tracking import run\n{code}",
+        f"import sys\nfrom texgs.workflow.runs import run\n{code}",
         *arguments,
     ]
     return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
@@ -186,7 +188,7 @@ def test_nested_parameters_become_dotted_names_and_text():
         "fit": {"steps": 30000, "rate": {"means": 1.6e-4}, "windows": [1, 2.5, None]},
         **{"shaded": True, "mask": None, "edits": {}, "volume": Path("a.vti"), "prompt": 'a "blue" one'},
     }
-    assert record.flatten(params) == {
+    assert runs.flatten(params) == {
         "fit.steps": "30000",
         "fit.rate.means": "0.00016",
         "fit.windows": "[1, 2.5, null]",
@@ -196,11 +198,11 @@ def test_nested_parameters_become_dotted_names_and_text():
 
 def test_names():
     names = ("wildcards.dataset", "psnr/TF01", "clip@512", "../a//b/", "")
-    assert [*map(record.allowed_name, names)] == ["wildcards.dataset", "psnr/TF01", "clip_512", "a/b", "_"]
+    assert [*map(runs.allowed_name, names)] == ["wildcards.dataset", "psnr/TF01", "clip_512", "a/b", "_"]
 
 
 @given(st.text(max_size=300))
 def test_every_name_is_one_that_mlflow_takes(text):
-    name = record.allowed_name(text)
+    name = runs.allowed_name(text)
     _validate_metric_name(name)
-    assert len(name) <= record.LONGEST_NAME
+    assert len(name) <= runs.LONGEST_NAME

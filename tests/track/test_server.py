@@ -9,7 +9,8 @@ import urllib.request
 import pytest
 
 from tests.track.eight import assert_eight_jobs_lose_nothing
-from texgs.workflow.tracking import TrackingError, begin, run
+from texgs.workflow.runs import begin, run
+from texgs.workflow.store import TrackingError
 
 pytestmark = pytest.mark.subprocess
 

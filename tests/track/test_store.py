@@ -11,7 +11,8 @@ from mlflow import MlflowClient
 from mlflow.artifacts import download_artifacts
 
 from tests.track.eight import assert_eight_jobs_lose_nothing
-from texgs.workflow.tracking import TrackingError, begin, run
+from texgs.workflow.runs import begin, run
+from texgs.workflow.store import TrackingError
 
 pytestmark = pytest.mark.subprocess
 

@@ -165,7 +165,7 @@ def test_a_changed_line_runs_the_stages_that_import_it(project, sources):
     sources("texgs/report/fit_figure.py", "import annotations\n", "import annotations\n\nCHANGED = True\n")
     pictures = {"figure", "comparison", "gallery", "mesh", "pse", "tables", "report"}
     assert changed(project) == pictures
-    sources("texgs/config/fit.py", '"random numbers', '"seed of the random numbers')
+    sources("texgs/config/recipes.py", '"seed of random numbers', '"seed of all random numbers')
     assert changed(project) == pictures, "help texts do not count"
 
 

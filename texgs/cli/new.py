@@ -81,10 +81,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Read the volume, choose TFs, write the file and the plot, and say what comes next."""
     from texgs.cli.stage import ensure
-    from texgs.config.check import check_name
     from texgs.config.dataset import BasicTF
-    from texgs.config.files import shown
-    from texgs.config.project import members, own_folder
+    from texgs.config.project import check_name, members, own_folder, shown
     from texgs.volume.tf_files import read_tf
     from texgs.workflow.stage_table import STAGES
 

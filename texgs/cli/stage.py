@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.core.errors import ArgumentError
-from texgs.workflow.stage import Stage, for_tf
+from texgs.workflow.stage import Stage
 from texgs.workflow.stage_table import STAGES, jobs
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
             "results=FOLDER says where results go"
         )
     from texgs.config.compose import compose
-    from texgs.workflow.checks import check_basic_tfs, require_base, require_edit, require_fit, require_fits
+    from texgs.workflow.checks import check_basic_tfs, require_edit, require_fit, require_fits
     from texgs.workflow.locate import tf_names
 
     words = tuple(arguments.overrides)
@@ -65,12 +66,11 @@ def run(arguments: argparse.Namespace) -> int:
     check_basic_tfs(config.dataset)
     require_fit(stage, config)
     if stage.place == "edit" or stage.name == "edit_metrics":
-        require_edit(stage, config)
-        require_base(words)
+        require_edit(stage, words)
     if stage.name == "comparison":
         require_fits(words)
     known = makers(words)
-    for each in [for_tf(config, name) for name in tf_names(config)] if stage.per_tf else [config]:
+    for each in [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]:
         ensure(stage, each, known, force=arguments.force)
     return 0
 
@@ -112,8 +112,8 @@ def ensure(
     from texgs.core.checksum import Checksums
     from texgs.models.weights import locate
     from texgs.workflow.job import Job, execute
+    from texgs.workflow.missing import needed
     from texgs.workflow.tracked import Tracking
-    from texgs.workflow.weights import needed
 
     if stage.name == "volume":
         fetch_volume(config)

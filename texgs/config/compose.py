@@ -2,37 +2,18 @@
 
 import os
 import re
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
 
-from hydra.errors import HydraException
-from omegaconf.errors import OmegaConfBaseException
-from yaml import YAMLError
-
-from texgs.config.check import check
 from texgs.config.composition import Places, Words, composition
-from texgs.config.files import origin
-from texgs.config.project import folders
+from texgs.config.mistakes import told
+from texgs.config.project import LONGEST, check_name, folders, is_scene_file
 from texgs.config.schema import Config
-from texgs.config.slips import no_such_key, sentence
 from texgs.core.errors import ConfigError
-from texgs.core.keys import UnknownKey, ValueMismatch, typed
+from texgs.core.keys import mismatch, typed
+from texgs.core.names import close
 
 NAMED = ("dataset", "fit", "edit")  # groups whose files have names, which folders of results get
-
-# What Hydra and OmegaConf raise for values and files that they do not understand.
-MISTAKES = (
-    HydraException,
-    OmegaConfBaseException,
-    YAMLError,
-    ArithmeticError,
-    OSError,
-    RecursionError,
-    TypeError,
-    ValueError,
-)
 
 
 def compose(overrides: tuple[str, ...] = (), first: Path | None = None) -> Config:
@@ -56,12 +37,49 @@ def _composed(overrides: Words, places: Places, _data_folder: str | None) -> Con
         raise ConfigError(f"{places[-1]}: no configuration there; install texgs again")
     with told():
         config = typed(Config, composition(overrides, places))
-    check(config)
-    check_named(overrides, config)
+    check_names(config)
+    check_meshes(config)
+    check_chosen(overrides, config)
     return config
 
 
-def check_named(overrides: Words, config: Config) -> None:
+def check_names(config: Config) -> None:
+    """Require names that folders can have, other than those that texgs gives its own folders there."""
+    for key in ("fit.name", "edit.name", "gallery.name", "dataset.name", "views.name"):
+        group, _, _ = key.partition(".")
+        check_name(key, name := getattr(config, group).name)
+        if group in ("fit", "edit", "gallery") and re.fullmatch("sheet|comparison|views.*", name):
+            raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
+    if config.edit.base is not None and not is_scene_file(config.edit.base):
+        check_name("edit.base", config.edit.base)
+    for tf in config.dataset.basic_tfs:
+        check_name("dataset.basic_tfs", tf)
+    for key, value, pattern, expected in (
+        ("views.name", config.views.name, "views(-.*)?", "views or views-..."),
+        ("sweep.name", config.sweep.name, r"[A-Za-z0-9_-]*", "letters, digits, _ or -"),
+        (
+            *("variant", config.variant, rf"([A-Za-z0-9_-][A-Za-z0-9_.-]{{,{LONGEST - 1}}})?"),
+            f"at most {LONGEST} letters, digits, _, - or .",
+        ),
+    ):
+        if not re.fullmatch(pattern, value):
+            raise ConfigError(str(mismatch(key, expected, value)))
+
+
+def check_meshes(config: Config) -> None:
+    """Require of the basic TFs with meshes that the data set has them, and a volume to compare with."""
+    known = list(config.dataset.basic_tfs)
+    if config.mesh.tfs and config.dataset.views_folder is not None:
+        raise ConfigError(
+            f"mesh.tfs: data set {config.dataset.name} starts from views and has no volume to compare with; "
+            "leave mesh.tfs empty"
+        )
+    for tf in config.mesh.tfs:
+        if tf not in known:
+            raise ConfigError(f"mesh.tfs: expected some of {', '.join(known)}, got {tf}{close(tf, known)}")
+
+
+def check_chosen(overrides: Words, config: Config) -> None:
     """Require of chosen files that they have their own names: results would go to the folder of another."""
     for group in NAMED:
         chosen = [word.partition("=")[2].strip("'\"") for word in overrides if word.startswith(f"{group}=")]
@@ -72,18 +90,3 @@ def check_named(overrides: Words, config: Config) -> None:
                 f"{group}={chosen[-1]}: expected `name: {chosen[-1]}` in its file, got {name}; "
                 f"change it there, or add {group}.name={name}"
             )
-
-
-@contextmanager
-def told() -> Iterator[None]:
-    """Make one sentence of what Hydra and OmegaConf raise."""
-    try:
-        yield
-    except UnknownKey as error:
-        raise ConfigError(f"{origin(error.key, error.value)}{no_such_key(error.key)}") from error
-    except ValueMismatch as error:
-        raise ConfigError(f"{origin(error.key, error.value)}{error}") from error
-    except ConfigError:
-        raise
-    except MISTAKES as error:
-        raise ConfigError(sentence(error)) from error

@@ -1,18 +1,20 @@
 """Compose files of conf/ and overrides by Hydra's rules, into plain values.
 
 Hydra reads the overrides, finds the files and puts them into their order. What it makes of their values, a
-configuration with a node for each, takes 0.1 s, and a run has hundreds: here they are merged as they are.
+configuration with a node for each, takes 0.1 s, and a run has hundreds: here they are merged as they are, and
+references to other keys, `${dataset.image}` or `${.name}` for a neighbour, are replaced.
 """
 
 import os
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from dataclasses import asdict
+from fnmatch import fnmatchcase
 from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from hydra._internal.config_repository import CachingConfigRepository, ConfigRepository
 from hydra._internal.config_search_path_impl import ConfigSearchPathImpl
@@ -20,10 +22,11 @@ from hydra._internal.defaults_list import create_defaults_list
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override, OverrideType
 from hydra.core.plugins import Plugins
+from hydra.plugins.config_source import ConfigResult
 from omegaconf import OmegaConf
 
 from texgs.config.describe import keys
-from texgs.config.references import resolve
+from texgs.config.mistakes import MISTAKES, misread
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
 from texgs.core.keys import UnknownKey, mismatch
@@ -31,17 +34,38 @@ from texgs.core.keys import UnknownKey, mismatch
 Words = tuple[str, ...]
 Places = tuple[Path, ...]
 ALONE = ("fit", "edit")  # groups of which a run combines many files with those of others
+REFERENCE = re.compile(r"(?<!\\)\$\{(\.*)([\w.-]+)\}")
+DEEPEST = 20  # references that refer to another one
 
 
-class Files:
-    """The files of some folders, each of which is read once."""
+class Repository(ConfigRepository):
+    """The files of some folders; one that cannot be read is told with its line."""
 
     def __init__(self, places: Places) -> None:
         Plugins.instance()  # registers what reads files
         path = ConfigSearchPathImpl()
         for place in places:
             path.append("texgs", f"file://{place}")
-        self.repository = CachingConfigRepository(ConfigRepository(path))
+        super().__init__(path)
+        self.places = places
+
+    def load_config(self, config_path: str) -> ConfigResult | None:
+        """Return what a file holds, such as `fit/quick`."""
+        try:
+            return super().load_config(config_path)
+        except MISTAKES as error:
+            paths = (place / f"{config_path}.yaml" for place in self.places)
+            problem = next((misread(path) for path in paths if path.is_file()), None)
+            if problem is None:
+                raise
+            raise ConfigError(problem) from error
+
+
+class Files:
+    """The files of some folders, each of which is read once, and the orders in which Hydra merges them."""
+
+    def __init__(self, places: Places) -> None:
+        self.repository = CachingConfigRepository(Repository(places))
         self._values: dict[str, dict[str, Any]] = {}
         self._listed: dict[tuple[str, Words], list[tuple[str, str]]] = {}
 
@@ -56,8 +80,7 @@ class Files:
         a run, which needs all combinations, finds each once.
         """
         alone: dict[str, list[tuple[str, str]]] = {}
-        for word in choices:
-            override = parsed(word)
+        for override in map(parsed, choices):
             if override.key_or_group in ALONE and override.type is OverrideType.CHANGE:
                 files = self.listed(f"{override.key_or_group}/{override.value()}")
                 alone[override.key_or_group] = files
@@ -101,12 +124,6 @@ def files_of(places: Places, _changed: tuple[int, ...]) -> Files:
     return Files(places)
 
 
-def changes(places: Places) -> tuple[int, ...]:
-    """Return when the files of some folders were changed."""
-    paths = (path for place in places for path in sorted(place.rglob("*.yaml")))
-    return tuple(path.stat().st_mtime_ns for path in paths if path.is_file())
-
-
 def composition(words: Words, places: Places) -> dict[str, Any]:
     """Return the values of all keys, references to others resolved.
 
@@ -116,18 +133,21 @@ def composition(words: Words, places: Places) -> dict[str, Any]:
 
     Raises:
         HydraException: for a file that is not there, or a word that is no override.
-        OmegaConfBaseException, YAMLError, OSError: for a file that cannot be read.
-        ConfigError: for a word that cannot be done.
+        ConfigError: for a file that cannot be read, or a word that cannot be done.
     """
-    files, overrides = files_of(places, changes(places)), [parsed(word) for word in words]
-    choices = tuple(word for word, each in zip(words, overrides, strict=True) if files.is_choice(each))
+    paths = (path for place in places for path in sorted(place.rglob("*.yaml")))
+    files = files_of(places, tuple(path.stat().st_mtime_ns for path in paths if path.is_file()))
+    for word in words:
+        if parsed(word).is_sweep_override():
+            raise ConfigError(several_values(word))
+    choices = tuple(word for word in words if files.is_choice(parsed(word)))
     values = asdict(Config())
     values["data_folder"] = os.environ.get("TEXGS_DATA", values["data_folder"])
     for name, package in files.chosen(choices):
         merge(values, files.values(name, package))
-    for override in overrides:
-        if not files.is_choice(override):
-            apply(values, override)
+    for word in words:
+        if word not in choices:
+            apply(values, parsed(word))
     return resolve(values)
 
 
@@ -142,16 +162,8 @@ def merge(table: dict[str, Any], later: Mapping[str, Any]) -> None:
 
 @cache
 def parsed(word: str) -> Override:
-    """Return a word as Hydra reads it, with a single value.
-
-    Raises:
-        OverrideParseException: for a word that is none.
-        ConfigError: for several values.
-    """
-    override = _parser().parse_overrides([word])[0]
-    if override.is_sweep_override():
-        raise ConfigError(several_values(word))
-    return override
+    """Return a word as Hydra reads it; OverrideParseException for a word that is none."""
+    return _parser().parse_overrides([word])[0]
 
 
 @cache
@@ -166,39 +178,28 @@ def apply(values: dict[str, Any], override: Override) -> None:
     is_added = override.is_add() or override.is_force_add()
     table: Any = values
     for part in parents:
-        table = entry(table, part, key, is_added=is_added)
-    if not isinstance(table, dict):
-        table[position(table, last, key)] = value
-    elif override.is_delete():
-        if last not in table or value not in (None, table[last]):
+        if is_added and isinstance(table, dict):
+            table.setdefault(part, {})
+        table = table[index_of(part, table, key)]
+    if override.is_delete():
+        if not isinstance(table, dict) or last not in table or value not in (None, table[last]):
             raise UnknownKey(key, "no such key")
         del table[last]
-    elif last in table or is_added or is_key(key):
+    elif not isinstance(table, dict):
+        table[index_of(last, table, key)] = value
+    elif last in table or is_added or any(fnmatchcase(key, each.name) for each in keys()):
         merge(table, {last: value})
     else:
         raise UnknownKey(key, "no such key")
 
 
-def entry(table: Any, part: str, key: str, *, is_added: bool) -> Any:
-    """Return the part of a table or list that a key goes through."""
-    if isinstance(table, list):
-        return table[position(table, part, key)]
-    if not isinstance(table, dict) or (part not in table and not is_added):
-        raise UnknownKey(key, "no such key")
-    return table.setdefault(part, {})
-
-
-def position(table: Any, part: str, key: str) -> int:
-    """Return the position in a list that a part of a key names."""
-    if not isinstance(table, list) or not part.isdecimal() or int(part) >= len(table):
-        raise UnknownKey(key, "no such key")
-    return int(part)
-
-
-def is_key(name: str) -> bool:
-    """Return whether the schema has a key; not for names that a table may have any of."""
-    patterns = (re.escape(each.name).replace(r"\*", r"[^.]+") for each in keys())
-    return any(re.fullmatch(pattern, name) for pattern in patterns)
+def index_of(part: str, table: Any, key: str) -> str | int:
+    """Return where a part of a key is: the name in a table, or the position in a list."""
+    if isinstance(table, dict) and part in table:
+        return part
+    if isinstance(table, list) and part.isdecimal() and int(part) < len(table):
+        return int(part)
+    raise UnknownKey(key, "no such key")
 
 
 def several_values(word: str) -> str:
@@ -210,3 +211,45 @@ def several_values(word: str) -> str:
         f"{word}: expected one value, got several; a list stands in brackets{brackets}, "
         f"a text with a comma in quotes, and for a sweep there is texgs run {word}"
     )
+
+
+def resolve(values: dict[str, Any]) -> dict[str, Any]:
+    """Replace the references in values, in place where these are simple; return the values.
+
+    Those with resolvers, such as ${oc.env:HOME}, are left to OmegaConf.
+    """
+    found = list(_texts(values, ()))
+    if any("${" in REFERENCE.sub("", text) for _, _, _, text in found):
+        return cast(dict[str, Any], OmegaConf.to_container(OmegaConf.create(values), resolve=True))
+    for table, name, path, text in found:
+        table[name] = _value(values, text, path, DEEPEST)
+    return values
+
+
+def _texts(table: Any, path: Words) -> Iterator[tuple[Any, Any, Words, str]]:
+    """Yield the texts with references: the table or list that holds each, its name there, path and text."""
+    for name, value in table.items() if isinstance(table, dict) else enumerate(table):
+        if isinstance(value, str):
+            if "${" in value:
+                yield table, name, (*path, str(name)), value
+        elif isinstance(value, dict | list):
+            yield from _texts(value, (*path, str(name)))
+
+
+def _value(values: dict[str, Any], text: str, path: Words, left: int) -> Any:
+    """Return what a text with references stands for; a text that is one reference alone, of any type."""
+
+    def target(match: re.Match[str]) -> Any:
+        dots, name = match.groups()
+        at = (*(path[: len(path) - len(dots)] if dots else ()), *name.split("."))
+        found: Any = values
+        for part in at:
+            if not isinstance(found, dict) or part not in found:
+                raise ConfigError(f"{'.'.join(path)}: {match[0]} refers to {'.'.join(at)}, which is no key")
+            found = found[part]
+        return _value(values, found, at, left - 1) if isinstance(found, str) and "${" in found else found
+
+    if not left:
+        raise ConfigError(f"{'.'.join(path)}: {text} refers to itself; write a value")
+    whole = REFERENCE.fullmatch(text)
+    return target(whole) if whole else REFERENCE.sub(lambda match: str(target(match)), text)

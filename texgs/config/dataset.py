@@ -1,4 +1,4 @@
-"""The schema of conf/dataset: a volume with its basic transfer functions."""
+"""The schema of conf/dataset: a volume with its basic transfer functions, and of the meshes of these."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -80,3 +80,15 @@ class Dataset:
     looks: dict[str, LookKeys] = field(
         default_factory=dict, metadata={"help": "by basic TF, what edits with edit.looks make of it"}
     )
+
+
+@dataclass(frozen=True)
+class MeshKeys:
+    """Surfaces of fits beside those of their volumes."""
+
+    tfs: list[str] = key([], "basic TFs that get a mesh: those with an opaque surface")
+    voxel: float = key(1 / 128, "edge of the cells that depth is fused in", "world units", above=0)
+    opacity: float = key(
+        0.5, "opacity of a TF, per opacity unit, from which on there is a surface", above=0, below=1
+    )
+    tolerance: float = key(0.01, "distance that counts as right in the F-score", "world units", above=0)

@@ -9,7 +9,6 @@ from types import UnionType
 from typing import Any
 
 from texgs.config.schema import Config
-from texgs.core.keys import Bounds
 
 
 @dataclass(frozen=True)
@@ -22,22 +21,24 @@ class Key:
     help: str
     unit: str
     choices: tuple[str, ...]
-    bounds: Bounds
 
 
 @cache
 def keys() -> tuple[Key, ...]:
-    """Every key, in the order of the schema."""
+    """Return every key, in the order of the schema."""
     return tuple(_walk(Config, ""))
 
 
 def describe(config: Config) -> str:
-    """A table of all keys: name, value, type, unit, meaning.
-
-    Args:
-        config: whose values are shown as defaults.
-    """
-    return "\n".join(f"  {entry.name}={_value(entry, config)}\n      {_meaning(entry)}" for entry in keys())
+    """Return a table of all keys: name, value in a configuration, type, unit, meaning."""
+    lines = []
+    for entry in keys():
+        value = entry.default if "*" in entry.name else value_at(config, entry.name)
+        text = "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+        unit = f" [{entry.unit}]" if entry.unit else ""
+        choices = f"; one of {', '.join(entry.choices)}" if entry.choices else ""
+        lines.append(f"  {entry.name}={text}\n      {entry.type}{unit}: {entry.help}{choices}")
+    return "\n".join(lines)
 
 
 def value_at(config: Config, name: str) -> Any:
@@ -52,49 +53,24 @@ def value_at(config: Config, name: str) -> Any:
 
 
 def _walk(table: type, prefix: str) -> Iterator[Key]:
+    """Yield the keys of a dataclass, and of those in its lists and tables."""
     hints = typing.get_type_hints(table)
     for field in dataclasses.fields(table):
         name, hint = f"{prefix}{field.name}", hints[field.name]
-        below, star = _table(hint)
-        if below:
-            yield from _walk(below, f"{name}.{star}")
+        inner = [hint, *typing.get_args(hint)[-1:]]
+        if below := next((each for each in inner if dataclasses.is_dataclass(each)), None):
+            yield from _walk(typing.cast(type, below), f"{name}." if below is hint else f"{name}.*.")
         else:
             default = None if field.default is dataclasses.MISSING else field.default
-            told: dict[str, Any] = {
-                key: field.metadata.get(key) for key in ("help", "unit", "choices", "bounds")
-            }
-            yield Key(name, _type(hint), default, **told)
-
-
-def _table(hint: Any) -> tuple[type | None, str]:
-    """The dataclass a hint holds, and `*.` where it is in a list or dict."""
-    arguments = typing.get_args(hint)
-    if dataclasses.is_dataclass(hint):
-        return typing.cast(type, hint), ""
-    if arguments and dataclasses.is_dataclass(arguments[-1]):
-        return typing.cast(type, arguments[-1]), "*."
-    return None, ""
+            said: dict[str, Any] = {part: field.metadata.get(part) for part in ("help", "unit", "choices")}
+            yield Key(name, _type(hint), default, **said)
 
 
 def _type(hint: Any) -> str:
+    """Return a type in words."""
     if isinstance(hint, UnionType):
         return " or ".join(_type(argument) for argument in typing.get_args(hint))
-    return (
-        "null"
-        if hint is type(None)
-        else str(getattr(hint, "__name__", hint) if not typing.get_args(hint) else hint).replace(
-            "typing.", ""
-        )
-    )
-
-
-def _value(entry: Key, config: Config) -> str:
-    """The value in a configuration; of keys that come any number of times the schema's default."""
-    value = entry.default if "*" in entry.name else value_at(config, entry.name)
-    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
-
-
-def _meaning(entry: Key) -> str:
-    choices = f"; one of {', '.join(entry.choices)}" if entry.choices else ""
-    unit = f" [{entry.unit}]" if entry.unit else ""
-    return f"{entry.type}{unit}: {entry.help}{choices}"
+    if hint is type(None):
+        return "null"
+    name = hint if typing.get_args(hint) else getattr(hint, "__name__", hint)
+    return str(name).replace("typing.", "")

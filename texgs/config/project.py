@@ -1,9 +1,13 @@
-"""Where the workflow and the configurations are: those of texgs, and those of the user's project.
+"""A project: the folders of its workflow and configurations, and the names that its files can have.
 
 The working directory is the project: its `conf/` comes first, that of texgs after it.
 """
 
+import re
 from pathlib import Path
+
+from texgs.core.errors import ConfigError
+from texgs.core.keys import mismatch
 
 PACKAGE = Path(__file__).parents[1]
 INSTALLED = PACKAGE / "_project"  # where a wheel puts them, see CMakeLists.txt
@@ -11,25 +15,60 @@ ROOT = INSTALLED if INSTALLED.is_dir() else PACKAGE.parent  # holds Snakefile, c
 SNAKEFILE = ROOT / "Snakefile"
 PROFILES = ROOT / "workflow" / "profiles"
 
+# Folders below `results`.
+RESERVED = ("volume", "transfer", "gallery", "logs", "mlartifacts", "tables", "scene", "study")
+LONGEST = 100  # characters of a name: it becomes that of files and folders
+NO_TEXT = re.compile("null|true|false|yes|no|on|off|nan|inf(inity)?", re.IGNORECASE)  # to YAML or Hydra
+
 
 def own_folder() -> Path:
-    """The user's configurations: `conf/` of the working directory, which may not be there."""
+    """Return the user's configurations: `conf/` of the working directory, which may not be there."""
     return Path.cwd() / "conf"
 
 
 def folders() -> tuple[Path, ...]:
-    """Folders with configurations; of files with the same name, that of the first folder counts."""
+    """Return folders with configurations; of files with the same name, that of the first folder counts."""
     own, shipped = own_folder(), ROOT / "conf"
     return (own, shipped) if own.is_dir() and own.resolve() != shipped.resolve() else (shipped,)
 
 
 def members(group: str) -> list[str]:
-    """Names of the files of a group, such as all data sets."""
+    """Return the names of the files of a group, such as all data sets."""
     files = (path for folder in folders() for path in (folder / group).glob("*.yaml"))
     return sorted({path.stem for path in files if path.is_file()})
 
 
 def groups() -> str:
-    """The groups of conf/ with their members, a line each."""
+    """Return the groups of conf/ with their members, a line each."""
     names = {path.name for folder in folders() for path in folder.iterdir() if path.is_dir()}
     return "\n".join(f"  {name}={'|'.join(members(name))}" for name in sorted(names) if members(name))
+
+
+def shown(path: Path) -> str:
+    """Return a path as the user would write it."""
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
+
+
+def check_name(key: str, name: str) -> None:
+    """Require a name that can be a folder beside the others below `results`.
+
+    Raises:
+        ConfigError: naming the key.
+    """
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name):
+        raise ConfigError(str(mismatch(key, "a letter and then letters, digits, _ or -", name)))
+    if len(name) > LONGEST:
+        raise ConfigError(
+            f"{key}: expected at most {LONGEST} characters, got {len(name)}; choose a shorter one"
+        )
+    if NO_TEXT.fullmatch(name):
+        raise ConfigError(
+            f"{key}: {name} is a word that YAML or Hydra does not read as text; choose another name"
+        )
+    if name.lower() in RESERVED:  # also where upper and lower case are one
+        raise ConfigError(f"{key}: {name} is a folder of texgs; choose another name")
+
+
+def is_scene_file(base: str) -> bool:
+    """Return whether what an edit starts from is the file of a scene, not the name of another edit."""
+    return base.endswith((".yaml", ".yml"))

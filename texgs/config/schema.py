@@ -6,11 +6,9 @@ that names the key; `texgs views --help` prints this file.
 
 from dataclasses import dataclass, field
 
-from texgs.config.dataset import Dataset
-from texgs.config.edit import Edit
-from texgs.config.fit import Fit
+from texgs.config.dataset import Dataset, MeshKeys
 from texgs.config.gallery import GalleryKeys
-from texgs.config.mesh import MeshKeys
+from texgs.config.recipes import Edit, Fit
 from texgs.config.views import ViewKeys
 from texgs.core.keys import key
 from texgs.models.catalogue import CLIP_BACKBONES

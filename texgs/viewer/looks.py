@@ -19,7 +19,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from texgs.config.edit import Edit
+from texgs.config.recipes import Edit
 from texgs.core.checksum import digest
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import typed

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from texgs.config.compose import compose
+from texgs.config.composition import Words
 from texgs.config.project import members
 from texgs.core.errors import ArgumentError, ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD, method_of, methods
@@ -21,12 +22,7 @@ if TYPE_CHECKING:
 
 
 def check_fit(config: Config) -> None:
-    """Require settings of the fit that fit each other, and a device that its field is fitted on.
-
-    Raises:
-        ConfigError: if it is fitted on others.
-        ArgumentError: naming the key that is not as it should be.
-    """
+    """Require settings of the fit that fit each other, and a device that its field is fitted on."""
     fit, kind = config.fit, fit_specs()[config.fit.field]
     if config.device.name not in kind.devices:
         raise ConfigError(
@@ -39,15 +35,36 @@ def check_fit(config: Config) -> None:
         kind.check(getattr(fit, kind.name))
 
 
-def require_fit(stage: Stage, config: Config) -> None:
-    """Require a fit that a stage can work on; stages before the fits work with any.
+def check_edit(config: Config) -> None:
+    """Require of an edit all that can be told without its scene and without weights."""
+    if config.edit.method != NO_METHOD:
+        method = method_of(config.edit)
+        require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
+        for look in looks_of(config).values() or [None]:
+            method.check(method.of(config.edit, look))
+        method.check_fit(method.of(config.edit), config.fit)
 
-    Raises:
-        ConfigError: if its field goes through other phases, has no surface, or is not fitted on the device.
-        ArgumentError: if settings of the fit do not fit each other.
-    """
+
+def check_basic_tfs(dataset: Any) -> None:
+    """Check the points of all basic TFs of a data set, and that their ranges do not overlap."""
+    from texgs.volume.transfer import TransferFunction, check_disjoint
+
+    where = dataset.name
+    try:
+        basic = {}
+        for name, points in dataset.basic_tfs.items():
+            where = f"{dataset.name}: basic TF {name}:"
+            basic[name] = TransferFunction(points.opacity, points.color)
+        where = f"{dataset.name}: basic TFs"
+        check_disjoint(basic)
+    except ArgumentError as error:
+        raise ArgumentError(f"{where} {error}") from error
+
+
+def require_fit(stage: Stage, config: Config) -> None:
+    """Require a fit that a verb can work on: of its field, and with a surface for meshes."""
     if "{fit}" not in stage.rule.folder:
-        return
+        return  # stages before the fits work with any
     fit, kind = config.fit, fit_specs()[config.fit.field]
     if stage.place == "phase" and stage.name not in kind.phases:
         owner = next(other.name for other in fit_specs().values() if stage.name in other.phases)
@@ -64,7 +81,7 @@ def require_fit(stage: Stage, config: Config) -> None:
     check_fit(config)
 
 
-def require_fits(words: tuple[str, ...]) -> None:
+def require_fits(words: Words) -> None:
     """Require several recipes, each without mistakes."""
     recipes = compose(words).fits
     if len(recipes) < 2:
@@ -73,8 +90,9 @@ def require_fits(words: tuple[str, ...]) -> None:
         check_fit(compose((*words, f"fit={recipe}")))
 
 
-def require_edit(stage: Stage, config: Config) -> None:
-    """Require that the edit of a configuration is one for this stage, without mistakes."""
+def require_edit(stage: Stage, words: Words) -> None:
+    """Require that the edit is one for this verb, and that what it starts from is there with its parts."""
+    config = compose(words)
     own = [name for name, method in methods().items() if method.stage == stage.name]
     expected = own or [name for name, method in methods().items() if method.is_look]
     if config.edit.method not in expected:
@@ -83,15 +101,6 @@ def require_edit(stage: Stage, config: Config) -> None:
             f"(edit={config.edit.name}); choose another edit of conf/edit"
         )
     check_edit(config)
-
-
-def require_base(words: tuple[str, ...]) -> None:
-    """Require of an edit by hand that what it starts from is there, and has the parts that it changes.
-
-    Raises:
-        ConfigError, MissingDataError: naming what is not.
-    """
-    config = compose(words)
     if config.edit.base in members("edit") and scene_before(config).is_file():
         return  # it may have been made with other words than those of conf/edit: the parts it has count
     chain = lineage(words)
@@ -99,40 +108,3 @@ def require_base(words: tuple[str, ...]) -> None:
         name, before = chain[-2]
         verb = method_of(compose(before).edit).stage
         raise MissingDataError(f"edit.base: {name} is not done yet; run texgs {verb} edit={name} first")
-
-
-def check_edit(config: Config) -> None:
-    """Require of an edit all that can be told without its scene and without weights.
-
-    Raises:
-        ArgumentError: naming what is not as it should be.
-    """
-    if config.edit.method != NO_METHOD:
-        method = method_of(config.edit)
-        require(config.fit.field, method.needs, f"edit {config.edit.name}", method.fields)
-        for look in looks_of(config).values() or [None]:
-            method.check(method.of(config.edit, look))
-        method.check_fit(method.of(config.edit), config.fit)
-
-
-def check_basic_tfs(dataset: Any) -> None:
-    """Check the points of all basic TFs of a configuration, and that their ranges do not overlap.
-
-    Args:
-        dataset: the part `dataset` of the configuration.
-
-    Raises:
-        ArgumentError: naming the basic TF, or the two that overlap.
-    """
-    from texgs.volume.transfer import TransferFunction, check_disjoint
-
-    basic = {}
-    for name, points in dataset.basic_tfs.items():
-        try:
-            basic[name] = TransferFunction(points.opacity, points.color)
-        except ArgumentError as error:
-            raise ArgumentError(f"{dataset.name}: basic TF {name}: {error}") from error
-    try:
-        check_disjoint(basic)
-    except ArgumentError as error:
-        raise ArgumentError(f"{dataset.name}: basic TFs {error}") from error

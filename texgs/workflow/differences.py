@@ -19,13 +19,7 @@ from texgs.report.metrics_files import Record, of
 from texgs.report.results import EditResult, FitResult, SheetResult
 from texgs.report.table import Column, Table
 
-COLUMNS = (
-    Column("what"),
-    Column("the paper"),
-    Column("here"),
-    Column("in"),
-    Column("where the paper says it"),
-)
+COLUMNS = tuple(map(Column, ("what", "the paper", "here", "in", "where the paper says it")))
 ALL = "all"  # of what no key expresses
 CAPTION = (
     "Keys whose values in conf/ are not those of the paper, for the recipes and edits of this report, and "
@@ -83,11 +77,10 @@ def differences(
     edits: Sequence[str] = (),
     views: Mapping[str, Mapping[int, Sequence[str]]] | None = None,
 ) -> Table:
-    """Return the table of what differs from the paper.
+    """Return the table of what differs from the paper; a difference that several files share is one row.
 
-    A difference that several files share is one row. Names without a file in conf/, such as variants of a
-    sweep, are left out, and so is what has nothing to compare: fits of other fields than surfels, and edits
-    by methods that are not the paper's.
+    Names without a file in conf/, such as variants of a sweep, are left out, and so is what has nothing to
+    compare: fits of other fields than surfels, and edits by methods that are not the paper's.
 
     Args:
         recipes: of fits, files of conf/fit.
@@ -100,8 +93,6 @@ def differences(
             for claim, here in compared(group, name):
                 if plain(here) != plain(claim.paper):
                     names[claim.key, text(here)].append(name)
-    claims = {claim.key: claim for claim in published().keys}
-    order = list(claims)
     rows = [
         (count.what, text(count.paper), text(here), ", ".join(some), count.where)
         for count in published().views
@@ -109,8 +100,10 @@ def differences(
         if here != count.paper
     ]
     rows += [
-        (key, text(claims[key].paper), here, ", ".join(some), claims[key].where)
-        for (key, here), some in sorted(names.items(), key=lambda item: order.index(item[0][0]))
+        (claim.key, text(claim.paper), here, ", ".join(some), claim.where)
+        for claim in published().keys
+        for (key, here), some in names.items()
+        if key == claim.key
     ]
     rows += [(each.what, each.paper, each.here, ALL, each.where) for each in published().others]
     titles = [column.title for column in COLUMNS]
@@ -136,14 +129,12 @@ def views_of(records: Sequence[Record[Any]]) -> dict[str, dict[int, list[str]]]:
 
 def compared(group: str, name: str) -> Iterator[tuple[Claim, Any]]:
     """Yield claims of the paper that a file of conf/ can be compared with, each with the value there."""
-    config, prefix, numbers = compose((f"{group}={name}",)), f"{group}.", dict[str, Any]()
-    if group == "fit" and config.fit.field != "surfels":
-        return
-    if group == "edit":
-        if config.edit.method == NO_METHOD:
-            return
+    config, prefix, numbers = compose((f"{group}={name}",)), "fit.", dict[str, Any]()
+    if group == "edit" and config.edit.method != NO_METHOD:
         method = method_of(config.edit)
         prefix, numbers = f"edit.{method.name}.", dict(method.numbers(method.of(config.edit)))
+    elif group == "edit" or config.fit.field != "surfels":
+        return
 
     def value(key: str) -> Any:
         _, is_number, number = key.partition(".recipe.")

@@ -1,53 +1,59 @@
-"""The edits of an experiment, as more words for `compose`."""
+"""The edits of an experiment, as more words for `compose`, and the parts that they give a scene."""
 
-from texgs.config.check import is_scene_file
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 from texgs.config.compose import compose
-from texgs.config.project import members
+from texgs.config.composition import Words
+from texgs.config.project import is_scene_file, members
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.names import close
 from texgs.edit.method import NO_METHOD, method_of
 from texgs.workflow.inputs import scene_before
 from texgs.workflow.locate import tf_names
 
+if TYPE_CHECKING:
+    from texgs.edit.keys import EditKeys
+
 OF_ONE = ("edit.name=", "edit.method=", "edit.base=", "edit.parts=")  # not of what an edit starts from
 
 
-def edits(words: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """The words of each edit of the experiment, those that it starts from before it; none without edits."""
+def edits(words: Words) -> list[Words]:
+    """Return the words of each edit of the experiment, those that it starts from before it."""
     config = compose(words)
-    repeated = [name for name in config.edits if config.edits.count(name) > 1]
-    if repeated:
+    if repeated := [name for name in config.edits if config.edits.count(name) > 1]:
         raise ConfigError(f"edits: expected different names, got {repeated[0]} twice")
     if not config.edits and config.edit.method == NO_METHOD:
         return []
-    given = [(*words, f"edit={name}") for name in config.edits] or [words]
-    by_name: dict[str, tuple[str, ...]] = {}
-    for each in given:
+    by_name: dict[str, Words] = {}
+    for each in [(*words, f"edit={name}") for name in config.edits] or [words]:
         for name, ancestor in lineage(each):
             by_name.setdefault(name, ancestor)
     return list(by_name.values())
 
 
-def lineage(words: tuple[str, ...]) -> list[tuple[str, tuple[str, ...]]]:
-    """Name and words of an edit and of all that it starts from, the first one first.
+def lineage(words: Words) -> list[tuple[str, Words]]:
+    """Return name and words of an edit and of all that it starts from, the first one first.
 
     Changed values hold for all of them, but for the name, the kind, the base and the parts.
     """
-    chain: list[tuple[str, tuple[str, ...]]] = []
-    following: tuple[str, ...] | None = words
+    chain: list[tuple[str, Words]] = []
+    following: Words | None = words
     while following is not None:
         edit = compose(following).edit
         if edit.name in [name for name, _ in chain]:
             raise ConfigError(f"edit.base: {edit.name} starts from itself; choose another base")
-        chain.append((edit.name, following))
+        chain.insert(0, (edit.name, following))
         rest = [word for word in words if not word.startswith(OF_ONE)]
         following = None if edit.base is None or is_made(following) else (*rest, f"edit={edit.base}")
-    require_parts(chain[::-1])
-    return chain[::-1]
+    require_parts([each for _, each in chain])
+    return chain
 
 
-def is_made(words: tuple[str, ...]) -> bool:
-    """Whether an edit starts from a scene that is there already, and not from another edit of conf/edit."""
+def is_made(words: Words) -> bool:
+    """Return whether an edit starts from a scene that is there, and not from another edit of conf/edit."""
     config = compose(words)
     base, known = config.edit.base, members("edit")
     if is_scene_file(base):
@@ -62,21 +68,32 @@ def is_made(words: tuple[str, ...]) -> bool:
     )
 
 
-def require_parts(chain: list[tuple[str, tuple[str, ...]]]) -> None:
+def require_parts(chain: Sequence[Words]) -> None:
     """Require of edits, each of which starts from the one before it, that the parts they change are there."""
-    first = compose(chain[0][1])
-    if first.edit.base is not None:  # a scene that is there already, and says so at once
+    chained = [compose(words).edit for words in chain]
+    if chained[0].base is not None:  # a scene that is there already, and says so at once
         return
     try:
-        known = tf_names(first)
+        models = tf_names(compose(chain[0]))
     except MissingDataError:  # which is told elsewhere
         return
-    models = list(known)
-    for _, words in chain:
-        edit = compose(words).edit
+    known = list(models)
+    for edit in chained:
         for part in edit.parts:
             if part not in known:
                 hint = close(part, known)
                 raise ConfigError(f"edit.parts: expected some of {', '.join(known)}, got {part}{hint}")
-        method = method_of(edit)
-        known += method.adds(method.of(edit), models)
+        known += added_parts(edit, models)
+
+
+def added_parts(edit: EditKeys, models: Sequence[str]) -> Sequence[str]:
+    """Return the parts that an edit adds to a scene of some models."""
+    method = method_of(edit)
+    return method.adds(method.of(edit), models)
+
+
+def ancestry(name: str) -> list[EditKeys]:
+    """Return an edit of conf/edit and those that it starts from, the first one first."""
+    edit = compose((f"edit={name}",)).edit
+    is_first = edit.base is None or is_scene_file(edit.base) or edit.base not in members("edit")
+    return [edit] if is_first else [*ancestry(edit.base), edit]

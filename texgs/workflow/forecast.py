@@ -42,27 +42,19 @@ class Speed:
     per_iteration: float  # and megapixel
 
     def seconds(self, megapixels: float, iterations: int) -> float:
-        """Of one job."""
+        """Return those of one job."""
         return self.constant + megapixels * (self.per_megapixel + iterations * self.per_iteration)
 
 
 def forecast(words: tuple[str, ...]) -> Forecast:
-    """What a run with these words would do. Nothing is written.
-
-    Raises:
-        ConfigError, ArgumentError: for a mistake in the words.
-    """
+    """Return what a run with these words would do; nothing is written."""
     from texgs.core.checksum import Checksums
-    from texgs.workflow.absent import lacking
-    from texgs.workflow.experiments import selected
-    from texgs.workflow.graph import graph
-    from texgs.workflow.product import as_sweep
+    from texgs.workflow.graph import drawn
+    from texgs.workflow.sweep import as_sweep
 
-    selection = selected(as_sweep(words), lacking)
-    planned = graph(selection.by_sweep, Checksums.load())
+    selection, planned = drawn(as_sweep(words), Checksums.load())
     lack_files = {folder for folders in planned.missing.values() for folder in folders}
-    table, seconds, done = speeds(), 0.0, 0
-    to_do: Counter[str] = Counter()
+    table, to_do, seconds, done = speeds(), Counter[str](), 0.0, 0
     for folder, job in planned.run.items():
         if folder in lack_files:
             continue  # told where the selection is shown
@@ -71,19 +63,17 @@ def forecast(words: tuple[str, ...]) -> Forecast:
             continue
         to_do[job.stage.name] += 1
         seconds += STEP_SECONDS + table[job.stage.name].seconds(*work_of(job, planned.configs[folder]))
-    if to_do:
-        seconds += START_SECONDS
-    return Forecast(selection, to_do, done, seconds)
+    return Forecast(selection, to_do, done, seconds + (START_SECONDS if to_do else 0))
 
 
 def work_of(job: Job, config: Config) -> tuple[float, int]:
-    """Megapixels of a view of a job, and its iterations."""
+    """Return megapixels of a view of a job, and its iterations."""
     pixels = config.views.width * config.views.height / config.fit.reduce**2
     return pixels / 1e6, iterations(job.settings)
 
 
 def iterations(settings: Any) -> int:
-    """All iterations and steps that the settings of a job name."""
+    """Return all iterations and steps that the settings of a job name."""
     if isinstance(settings, Mapping):
         own = [value for key, value in settings.items() if key == "iterations" or key.endswith("steps")]
         return sum(each for each in own if isinstance(each, int)) + sum(map(iterations, settings.values()))
@@ -91,14 +81,14 @@ def iterations(settings: Any) -> int:
 
 
 def speeds() -> dict[str, Speed]:
-    """The measured speeds by stage, and that of the probe."""
+    """Return the measured speeds by stage, and that of the probe."""
     text = files("texgs.workflow").joinpath("speeds.csv").read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if not line.startswith("#")]
     return {row.pop("stage"): Speed(**{k: float(v) for k, v in row.items()}) for row in csv.DictReader(lines)}
 
 
 def probe() -> float:
-    """Seconds of one view of 20,000 surfels with its gradients at 400x400 pixels, on all threads."""
+    """Return the seconds of a view of 20,000 surfels with its gradients at 400x400 pixels, on all threads."""
     import torch
 
     from texgs.raster import rasterize
@@ -120,10 +110,10 @@ def probe() -> float:
 
 
 def show(words: tuple[str, ...]) -> int:
-    """Print a forecast, a line for each thing; 1 if the run would not start."""
+    """Print a forecast, a line for each thing; return 1 if the run would not start."""
     expected = forecast(words)
     selection = expected.selection
-    configs = [each for some in selection.by_sweep.values() for each in some]
+    configs = selection.configs
     for config in {config.dataset.name: config for config in configs[::-1]}.values():  # of its fits
         if selection.skips or not selection.lacking(config):
             print(f"ok       data set {config.dataset.name:16} {source(config)}")
@@ -144,14 +134,14 @@ def show(words: tuple[str, ...]) -> int:
 
 
 def duration(seconds: float) -> str:
-    """In minutes or hours, as one says it."""
+    """Return a time in words."""
     if seconds < 2 * 3600:
         return f"{max(1, round(seconds / 60))} min"
     return f"{seconds / 3600:.0f} hours" if seconds < 48 * 3600 else f"{seconds / 86400:.0f} days"
 
 
 def source(config: Config) -> str:
-    """Where the data of a data set come from."""
+    """Return where the data of a data set come from."""
     volume = config.dataset.volume
     if config.dataset.views_folder is not None:
         return str(Path(config.data_folder, config.dataset.views_folder))

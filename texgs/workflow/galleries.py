@@ -1,8 +1,7 @@
 """What a gallery shows in each place: its row and its column, put together and checked."""
 
 import re
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +10,16 @@ from texgs.config.gallery import AS_FITTED, GridKeys, ShotKeys
 from texgs.config.project import members
 from texgs.config.schema import Config
 from texgs.core.errors import ConfigError
+from texgs.core.names import close
 from texgs.edit.method import method_of
-from texgs.workflow.gallery_scenes import check_changes, fit_of, takers
-from texgs.workflow.inputs import prepared_volume, sibling
+from texgs.workflow.edits import added_parts, ancestry
+from texgs.workflow.inputs import prepared_volume, sibling, with_recipe
+from texgs.workflow.locate import tf_names
 from texgs.workflow.stage import edit_folder, fit_folder, made
+from texgs.workflow.sweep import changes
 
 FRONT, SIDE = [-90.0, 20.0], [0.0, 20.0]  # azimuth and polar angle of cameras, degrees
-NUMBERS = {"view": 2, "light": 2, "box": 3}
+ANYWHERE = ("background", "light")  # changes of the whole scene
 
 
 @dataclass(frozen=True)
@@ -27,6 +29,12 @@ class Place:
     shot: ShotKeys  # of its row and its column together
     scene: str  # key of its file among the inputs
     file: Path
+
+    def picture(self) -> dict[str, Any]:
+        """Return what the stage reads of the place."""
+        values = asdict(self.shot)
+        read = ("show", "view", "fov_y", "box", "pixels", "light", "changes")
+        return {"scene": self.scene, **{name: values[name] for name in read}}
 
 
 def gallery_command(config: Config) -> str:
@@ -40,7 +48,7 @@ def gallery_grids(config: Config) -> list[dict[str, Any]]:
     shown = []
     for grid, places in places_of(config):
         rows = [
-            {"title": row.title, "pictures": [picture(place) for place in line]}
+            {"title": row.title, "pictures": [place.picture() for place in line]}
             for row, line in zip(grid.rows, places, strict=True)
         ]
         titles = [column.title for column in grid.columns]
@@ -49,22 +57,15 @@ def gallery_grids(config: Config) -> list[dict[str, Any]]:
 
 
 def gallery_inputs(config: Config) -> dict[str, Path]:
-    """The scenes of all places, and the volume where one is shown."""
+    """Return the scenes of all places, and the volume where one is shown."""
     places = [place for _, rows in places_of(config) for row in rows for place in row if place.shot.show]
     scenes = {place.scene: place.file for place in places}
     needs_volume = any(place.shot.show != "scene" for place in places)
     return {**scenes, **(prepared_volume(config) if needs_volume else {})}
 
 
-def picture(place: Place) -> dict[str, Any]:
-    """What the stage reads of one place."""
-    values = asdict(place.shot)
-    read = ("show", "view", "fov_y", "box", "pixels", "light", "changes")
-    return {"scene": place.scene, **{name: values[name] for name in read}}
-
-
 def places_of(config: Config) -> list[tuple[GridKeys, list[list[Place]]]]:
-    """The grids of a gallery, each with the places of its rows; rows and columns without any are left out."""
+    """Return the grids with the places of their rows; rows and columns without any are left out."""
     grids = config.gallery.grids or [all_looks(config)]
     names = [grid.name for grid in grids]
     for name in names:
@@ -73,61 +74,8 @@ def places_of(config: Config) -> list[tuple[GridKeys, list[list[Place]]]]:
     return [filled(config, grid) for grid in grids]
 
 
-def filled(config: Config, grid: GridKeys) -> tuple[GridKeys, list[list[Place]]]:
-    """A grid with its places."""
-    where = f"gallery.grids.{grid.name}"
-    titles = [row.title for row in grid.rows]
-    if repeated := [title for title in titles if titles.count(title) > 1]:
-        raise ConfigError(f"{where}: expected rows with different titles, got {repeated[0]!r} twice")
-    has_volume = config.dataset.views_folder is None
-    places = [
-        [place_of(config, together(row, column, has_volume), where) for column in grid.columns]
-        for row in grid.rows
-    ]
-    rows = [index for index, row in enumerate(places) if any(place.shot.show for place in row)]
-    columns = [
-        index for index in range(len(grid.columns)) if any(places[row][index].shot.show for row in rows)
-    ]
-    if not rows:
-        raise ConfigError(f"{where}: expected a picture in a row and a column, got none")
-    kept = GridKeys(grid.name, grid.caption, [grid.rows[i] for i in rows], [grid.columns[i] for i in columns])
-    return kept, [[places[row][column] for column in columns] for row in rows]
-
-
-def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
-    """What a row and a column say of the place that they share, with defaults for what neither says."""
-    said = {each.name: getattr(column, each.name) or getattr(row, each.name) for each in fields(ShotKeys)}
-    show = said["show"] or "scene"
-    if (row.show and column.show and row.show != column.show) or not (has_volume or show == "scene"):
-        show = ""
-    changes = [*row.changes, *column.changes]
-    edit, view = said["edit"] or AS_FITTED, said["view"] or FRONT
-    return ShotKeys(**{**said, "show": show, "edit": edit, "view": view, "changes": changes})
-
-
-def place_of(config: Config, shot: ShotKeys, where: str) -> Place:
-    """A place with the file of its scene."""
-    for name, count in NUMBERS.items():
-        given = getattr(shot, name)
-        if given and (len(given) != count or (name == "box" and not is_inside(given))):
-            expected = "left, top and side, from 0 to 1" if name == "box" else "azimuth and polar angle"
-            raise ConfigError(f"{where}.{name}: expected {expected}, got {given}")
-    of_fit = fit_of(config, shot, where)
-    check_changes(config, shot, where)
-    if shot.edit == AS_FITTED:
-        return Place(shot, f"{fit_folder(of_fit)}/{AS_FITTED}", made("compose", of_fit))
-    edit = str(shot.edit)
-    return Place(shot, f"{fit_folder(of_fit)}/{edit_folder(of_fit, edit)}", sibling(of_fit, edit))
-
-
-def is_inside(box: Sequence[float]) -> bool:
-    """Whether a box is a part of the view."""
-    left, top, side = box
-    return min(left, top) >= 0 < side and max(left, top) + side <= 1 + 1e-9
-
-
 def all_looks(config: Config) -> GridKeys:
-    """The scene as fitted and all scenes of the experiment with a new look, in two views."""
+    """Return a grid of the scene as fitted and all scenes with a new look, in two views."""
     if not config.edits:
         raise ConfigError("edits: expected some to show, such as edits=[glass,gold], got none")
     columns = [ShotKeys("volume", show="volume"), ShotKeys("as fitted")]
@@ -139,3 +87,108 @@ def all_looks(config: Config) -> GridKeys:
     words = "The volume, the scene of the first recipe as fitted, and all its new looks."
     rows = [ShotKeys("front", view=FRONT), ShotKeys("side", view=SIDE)]
     return GridKeys("gallery", words, rows, columns)
+
+
+def filled(config: Config, grid: GridKeys) -> tuple[GridKeys, list[list[Place]]]:
+    """Return a grid with its places."""
+    where = f"gallery.grids.{grid.name}"
+    titles = [row.title for row in grid.rows]
+    if repeated := [title for title in titles if titles.count(title) > 1]:
+        raise ConfigError(f"{where}: expected rows with different titles, got {repeated[0]!r} twice")
+    has_volume = config.dataset.views_folder is None
+    places = [
+        [place_of(config, together(row, column, has_volume), where) for column in grid.columns]
+        for row in grid.rows
+    ]
+    rows = [index for index, row in enumerate(places) if any(place.shot.show for place in row)]
+    columns = [index for index in range(len(grid.columns)) if any(row[index].shot.show for row in places)]
+    if not rows:
+        raise ConfigError(f"{where}: expected a picture in a row and a column, got none")
+    kept = GridKeys(grid.name, grid.caption, [grid.rows[i] for i in rows], [grid.columns[i] for i in columns])
+    return kept, [[places[row][column] for column in columns] for row in rows]
+
+
+def together(row: ShotKeys, column: ShotKeys, has_volume: bool) -> ShotKeys:
+    """Return what a row and a column say of the place that they share, with defaults for the rest."""
+    said = {each.name: getattr(column, each.name) or getattr(row, each.name) for each in fields(ShotKeys)}
+    show = said["show"] or "scene"
+    if (row.show and column.show and row.show != column.show) or not (has_volume or show == "scene"):
+        show = ""
+    changes = [*row.changes, *column.changes]
+    edit, view = said["edit"] or AS_FITTED, said["view"] or FRONT
+    return ShotKeys(**{**said, "show": show, "edit": edit, "view": view, "changes": changes})
+
+
+def place_of(config: Config, shot: ShotKeys, where: str) -> Place:
+    """Return a place with the file of its scene, which it is required to have."""
+    for name, given in (("view", shot.view), ("light", shot.light)):
+        if len(given) not in (0, 2):
+            raise ConfigError(f"{where}.{name}: expected azimuth and polar angle, got {given}")
+    if shot.box and not is_inside(shot.box):
+        raise ConfigError(f"{where}.box: expected left, top and side, from 0 to 1, got {shot.box}")
+    of_fit, edit = fit_of(config, shot, where), str(shot.edit)
+    check_changes(config, shot, where)
+    if edit == AS_FITTED:
+        return Place(shot, f"{fit_folder(of_fit)}/{AS_FITTED}", made("compose", of_fit))
+    return Place(shot, f"{fit_folder(of_fit)}/{edit_folder(of_fit, edit)}", sibling(of_fit, edit))
+
+
+def is_inside(box: list[float]) -> bool:
+    """Return whether a box is left, top and side of a part of the view."""
+    return len(box) == 3 and min(box[:2]) >= 0 < box[2] and max(box[:2]) + box[2] <= 1 + 1e-9
+
+
+def fit_of(config: Config, shot: ShotKeys, where: str) -> Config:
+    """Return the configuration of the fit whose scene is shown: of a recipe and a variant."""
+    recipes = recipes_of(config)
+    if shot.fit is not None and shot.fit not in recipes:
+        raise ConfigError(
+            f"{where}.fit: expected one of {', '.join(recipes)}, got {shot.fit}{close(shot.fit, recipes)}"
+        )
+    able = takers(config, str(shot.edit), where)
+    if shot.fit is not None and shot.fit not in able:
+        raise ConfigError(f"{where}.fit: {shot.edit} does not work on {shot.fit}; choose another recipe")
+    if not able:
+        raise ConfigError(f"{where}.edit: {shot.edit} works on none of {', '.join(recipes)}; add a recipe")
+    variants = list(changes(config))
+    if (shot.variant or "") not in (variants or [""]):
+        expected = f"one of {', '.join(variants)}" if variants else "none without a sweep"
+        hint = close(shot.variant or "", variants)
+        raise ConfigError(f"{where}.variant: expected {expected}, got {shot.variant or 'none'}{hint}")
+    of_fit = with_recipe(config, shot.fit or able[0]) if config.fits else config
+    return replace(of_fit, variant=shot.variant or of_fit.variant)
+
+
+def recipes_of(config: Config) -> list[str]:
+    """Return the recipes of an experiment."""
+    return config.fits or [config.fit.name]
+
+
+def takers(config: Config, edit: str, where: str) -> list[str]:
+    """Return the recipes of the experiment that an edit works on."""
+    recipes = recipes_of(config)
+    if edit == AS_FITTED:
+        return recipes
+    known = list(dict.fromkeys(each.name for name in config.edits for each in ancestry(name)))
+    if edit not in known:
+        expected = ", ".join([AS_FITTED, *known])
+        raise ConfigError(f"{where}.edit: expected one of {expected}, got {edit}{close(edit, known)}")
+    method = method_of(compose((f"edit={edit}",)).edit)
+    if not config.fits:
+        return [name for name in recipes if method.takes(config.fit.field)]
+    return [name for name in recipes if method.takes(compose((f"fit={name}",)).fit.field)]
+
+
+def check_changes(config: Config, shot: ShotKeys, where: str) -> None:
+    """Require of changes that the parts are there which they change."""
+    parts = models = tf_names(config)
+    for edit in ancestry(str(shot.edit)) if shot.edit != AS_FITTED else ():
+        parts = [*parts, *added_parts(edit, models)]
+    for change in shot.changes:
+        name, is_change, _ = change.partition("=")
+        part = name.rpartition(".")[0] or name
+        if not is_change or part not in (*parts, *ANYWHERE):
+            raise ConfigError(
+                f"{where}.changes: expected PART.KEY=VALUE with one of {', '.join(parts)}, got "
+                f"{change}{close(part, parts)}"
+            )

@@ -5,14 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from texgs.config.composition import Words
 from texgs.core.errors import ConfigError, MissingDataError
-from texgs.workflow.checks import check_basic_tfs, check_fit
+from texgs.core.io import read_json
+from texgs.report.metrics_files import below
+from texgs.workflow.checks import check_basic_tfs, check_edit, check_fit
+from texgs.workflow.experiments import LeftOut, Selection, selected
 from texgs.workflow.job import Job
-from texgs.workflow.result import METRICS, stamped
-from texgs.workflow.stage import settings_digest
-from texgs.workflow.stage_table import SWEPT
+from texgs.workflow.missing import lacking, missing_weights
+from texgs.workflow.result import METRICS, fingerprint, is_complete, stamped
+from texgs.workflow.settings_files import settings_digest
+from texgs.workflow.stage_table import STAGES, SWEPT
 from texgs.workflow.stage_table import jobs as jobs_of
 
 if TYPE_CHECKING:
@@ -73,10 +79,13 @@ class Graph:
         """Add the jobs of a configuration, and return their folders.
 
         Raises:
-            ConfigError, ArgumentError: for basic TFs or a fit with mistakes, and two variants of one folder.
+            ConfigError, ArgumentError: for basic TFs, a fit or an edit with mistakes, and two variants of one
+                folder.
         """
         check_basic_tfs(config.dataset)
         check_fit(config)
+        check_edit(config)
+        self.missing |= {line: [] for line in missing_weights(config)}
         try:
             listed = jobs_of(config)
         except MissingDataError as error:
@@ -105,3 +114,36 @@ def graph(by_sweep: Mapping[str, Iterable[Config]], checksums: Checksums) -> Gra
         folders = (folder for config in configs for folder in made.add(config, checksums))
         made.sweeps[sweep] = list(dict.fromkeys(folders))
     return made
+
+
+def drawn(words: Words, checksums: Checksums) -> tuple[Selection, Graph]:
+    """Return the configurations that some words describe, and their jobs."""
+    selection = selected(words, lacking)
+    return selection, graph(selection.by_sweep, checksums)
+
+
+def earlier(
+    results: str, of_run: Graph, checksums: Checksums
+) -> tuple[dict[str, str], dict[LeftOut, list[str]]]:
+    """Return the whole results of earlier runs, which tables and the report show beside those of a run.
+
+    Returns:
+        Their metrics files with digests of the contents, but for results made from others that have been
+        replaced since, or will be by this run; and these results, with their places.
+    """
+    digests: dict[str, str] = {}
+    outdated: dict[LeftOut, list[str]] = {}
+    for folder in sorted({path.parent.as_posix() for path in below(results)} - set(of_run.run)):
+        if not is_complete(Path(folder), checksums):
+            continue
+        facts = read_json(file := Path(folder, METRICS))
+        for name, path in facts.get("made_from", {}).items():  # not told by versions of texgs before this
+            source, was = Path(path), facts["inputs"][name]
+            is_other = source.is_file() and fingerprint(source, checksums) != was
+            if is_other or (source.is_file() and of_run.is_replaced(source.parent.as_posix())):
+                why = f"comes from {source.parent}, which has been made anew since; run its job again"
+                outdated[LeftOut(folder, why)] = [STAGES[facts["stage"]].place]
+                break
+        else:
+            digests[file.as_posix()] = checksums.of(file)
+    return digests, outdated

@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
-from texgs.config.project import members
+from texgs.config.project import is_scene_file, members
 from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.edit.method import NO_METHOD
@@ -15,10 +15,12 @@ from texgs.fit.kinds import fit_specs
 from texgs.workflow.locate import tf_names, views_folder
 from texgs.workflow.stage import edit_folder, folder_of, made, plain
 
+# `compose` and `sweep` are imported where they are called: Hydra, which these load, takes 0.3 s.
+
 
 def is_fit(config: Config) -> bool:
     """Return whether a configuration is of views and fits, not of an edit."""
-    return bool(config.edit.method == NO_METHOD)
+    return config.edit.method == NO_METHOD
 
 
 def is_fit_of(kind: str) -> Callable[[Config], bool]:
@@ -38,14 +40,14 @@ def has_scene(config: Config) -> bool:
 
 def is_swept(config: Config) -> bool:
     """Return whether the configuration is of a sweep."""
-    from texgs.workflow.variants import changes  # not at the top: it loads Hydra
+    from texgs.workflow.sweep import changes
 
     return bool(changes(config))
 
 
 def is_first_recipe(config: Config) -> bool:
     """Return whether the fit is the first one of the experiment's, whose configuration stands for all."""
-    return not config.fits or bool(config.fit.name == with_recipe(config, config.fits[0]).fit.name)
+    return not config.fits or config.fit.name == with_recipe(config, config.fits[0]).fit.name
 
 
 def prepared_volume(config: Config) -> dict[str, Path]:
@@ -64,6 +66,11 @@ def model_of(stage: str) -> Callable[[Config], dict[str, Path]]:
     return lambda config: {"model": made("phase", config, stage), **view_set(config)}
 
 
+def last_phase(config: Config) -> str:
+    """Return the phase of a fit that makes what scenes are composed of."""
+    return fit_specs()[config.fit.field].phases[-1]
+
+
 def all_models(config: Config) -> dict[str, Path]:
     """Return the models of all basic TFs after the last phase, by name."""
     if config.tf is not None:
@@ -71,9 +78,9 @@ def all_models(config: Config) -> dict[str, Path]:
     return {name: made("phase", config, last_phase(config), name) for name in tf_names(config)}
 
 
-def last_phase(config: Config) -> str:
-    """Return the phase of a fit that makes what scenes are composed of."""
-    return str(fit_specs()[config.fit.field].phases[-1])
+def models_of_scene(config: Config) -> dict[str, Path]:
+    """Return the models that a scene names, as inputs beside it."""
+    return {f"model.{name}": path for name, path in all_models(config).items()}
 
 
 def scene_and_volume(config: Config) -> dict[str, Path]:
@@ -82,9 +89,21 @@ def scene_and_volume(config: Config) -> dict[str, Path]:
     return scene if config.dataset.views_folder is not None else {**scene, **prepared_volume(config)}
 
 
-def models_of_scene(config: Config) -> dict[str, Path]:
-    """Return the models that a scene names, as inputs beside it."""
-    return {f"model.{name}": path for name, path in all_models(config).items()}
+def scene_before(config: Config) -> Path:
+    """Return the scene.yaml that an edit starts from."""
+    base = config.edit.base
+    if base is None:
+        return made("compose", config)
+    if not is_scene_file(base):
+        return sibling(config, base)
+    if not Path(base).is_file():
+        raise MissingDataError(f"edit.base: {base} is not there; name the file of a scene, or another edit")
+    return Path(base)
+
+
+def sibling(config: Config, name: str) -> Path:
+    """Return the scene.yaml that another edit of the same fit writes."""
+    return folder_of("edit", config).with_name(edit_folder(config, name)) / made("edit", config).name
 
 
 def shown_tfs(config: Config) -> dict[str, Any]:
@@ -95,7 +114,7 @@ def shown_tfs(config: Config) -> dict[str, Any]:
 
 def variant_of_fit(config: Config) -> str:
     """Return the variant of the fit; empty for a fit that all variants of a sweep share."""
-    from texgs.workflow.variants import fit_variant
+    from texgs.workflow.sweep import fit_variant
 
     return fit_variant(config)
 
@@ -116,12 +135,9 @@ def is_changed(fit: Any, later: Sequence[str] = ()) -> bool:
 
     if fit.name not in members("fit"):
         return True
-    file = compose((f"fit={fit.name}",)).fit
-    return any(
-        getattr(fit, key.name) != getattr(file, key.name)
-        for key in fields(file)
-        if key.name not in ("seed", *later)
-    )
+    file, ignored = compose((f"fit={fit.name}",)).fit, ("seed", *later)
+    names = (key.name for key in fields(file) if key.name not in ignored)
+    return any(getattr(fit, name) != getattr(file, name) for name in names)
 
 
 def view_settings(config: Config) -> dict[str, Any]:
@@ -140,22 +156,3 @@ def with_recipe(config: Config, name: str) -> Config:
 
     recipe = compose((f"fit={name}",)).fit
     return replace(config, fit=replace(config.fit, name=recipe.name, field=recipe.field))
-
-
-def scene_before(config: Config) -> Path:
-    """Return the scene.yaml that an edit starts from."""
-    from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
-
-    base = config.edit.base
-    if base is None:
-        return made("compose", config)
-    if not is_scene_file(base):
-        return sibling(config, base)
-    if not Path(base).is_file():
-        raise MissingDataError(f"edit.base: {base} is not there; name the file of a scene, or another edit")
-    return Path(base)
-
-
-def sibling(config: Config, name: str) -> Path:
-    """Return the scene.yaml that another edit of the same fit writes."""
-    return folder_of("edit", config).with_name(edit_folder(config, name)) / made("edit", config).name

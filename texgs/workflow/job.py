@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from texgs.config.schema import Config
 from texgs.core.checksum import Checksums
@@ -16,14 +16,11 @@ from texgs.core.keys import ValueMismatch, typed
 from texgs.core.progress import curve_logger
 from texgs.report.results import plain
 from texgs.workflow import result, tracked
-from texgs.workflow import tracking as track
+from texgs.workflow.missing import require_same, weights_of
 from texgs.workflow.provenance import record
-from texgs.workflow.stage import Outcome, Stage, settings_digest
-from texgs.workflow.tracked import Tracking
-from texgs.workflow.variants import swept
-from texgs.workflow.weights import require_same, weights_of
-
-T = TypeVar("T")
+from texgs.workflow.runs import run
+from texgs.workflow.settings_files import settings_digest
+from texgs.workflow.stage import Outcome, Stage
 
 
 @dataclass(frozen=True)
@@ -35,38 +32,34 @@ class Job:
     inputs: Mapping[str, Path]
     output: Path
     checksums: Checksums = field(default_factory=Checksums, compare=False)  # what is known of files
-    swept: Mapping[str, str] = field(default_factory=dict, compare=False)  # see workflow/variants.py
+    swept: Mapping[str, str] = field(default_factory=dict, compare=False)  # see workflow/sweep.py
 
     @classmethod
     def of(cls, stage: Stage, config: Config, checksums: Checksums) -> Job:
-        """The job that a configuration describes; its settings name the weights that it works with.
+        """Return the job that a configuration describes; its settings name the weights that it works with.
 
         Raises:
             ConfigError: if the configuration does not fit the stage.
             MissingDataError: if a file from elsewhere is not there.
         """
+        from texgs.workflow.sweep import swept  # not at the top: jobs go without Hydra
+
         settings, weights = stage.settings(config), weights_of(stage, config, checksums)
         named = {} if weights is None else {"weights": weights}
         files = stage.inputs(config), stage.output(config)
         return cls(stage, {**settings, **named}, *files, checksums, swept(config))
 
     def identity(self) -> dict[str, Any]:
-        """What the job's result depends on: settings, code and the contents of input files."""
-        files = {name: result.fingerprint(path, self.checksums) for name, path in self.inputs.items()}
+        """Return what the job's result depends on: settings, code and the contents of input files."""
         return {
             "stage": self.stage.name,
             "settings": settings_digest(self.settings),
             "code": self.stage.code(self.settings),
-            "inputs": files,
+            "inputs": {name: result.fingerprint(path, self.checksums) for name, path in self.inputs.items()},
         }
 
-    def made_from(self) -> dict[str, Path]:
-        """The inputs that are files of other results."""
-        files = self.inputs.items()
-        return {name: path for name, path in files if path.name in result.recorded(path.parent)}
-
     def is_done(self) -> bool:
-        """Whether the folder holds the whole result of exactly this job."""
+        """Return whether the folder holds the whole result of exactly this job."""
         if not result.is_complete(self.output, self.checksums):
             return False
         return all(path.exists() for path in self.inputs.values()) and (
@@ -74,7 +67,7 @@ class Job:
         )
 
 
-def execute(job: Job, tracking: Tracking, *, force: bool = False) -> bool:
+def execute(job: Job, tracking: tracked.Tracking, *, force: bool = False) -> bool:
     """Run a job, unless its result is there; an interrupted run of the same job goes on.
 
     The result before it stays until this one is complete.
@@ -86,9 +79,6 @@ def execute(job: Job, tracking: Tracking, *, force: bool = False) -> bool:
 
     Returns:
         Whether there was something to do.
-
-    Raises:
-        TexgsError: for a mistake of the user.
     """
     with result.alone(job.output):
         result.recover(job.output)
@@ -98,7 +88,8 @@ def execute(job: Job, tracking: Tracking, *, force: bool = False) -> bool:
     return True
 
 
-def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
+def _execute(job: Job, tracking: tracked.Tracking, *, is_fresh: bool) -> None:
+    """Run a job in its work folder, and put its result in place."""
     for name, path in job.inputs.items():
         if not path.exists():
             raise ArgumentError(
@@ -106,35 +97,32 @@ def _execute(job: Job, tracking: Tracking, *, is_fresh: bool) -> None:
             )
         result.require_intact(path)
     require_same(job.settings.get("weights", {}))
-    settings = _typed(job.stage.schema, job)
+    try:
+        settings = typed(job.stage.schema, job.settings)
+    except ValueMismatch as error:
+        raise ArgumentError(f"settings of a {job.stage.name} job: {error}") from error
     identity = job.identity()
+    inputs = job.inputs.items()
+    made_from = {name: path.as_posix() for name, path in inputs if path.name in result.recorded(path.parent)}
     work = result.claim(job.output, identity, is_fresh=is_fresh)
-    with track.run(
+    with run(
         tracking.uri,
         experiment=tracking.experiment,
         name=tracked.name(job),
         tags=tracked.tags(job, identity, tracking.parent),
         params={**job.swept, **job.settings},
-    ) as run:
+    ) as recorded:
         start = time.perf_counter()
-        with curve_logger(run.log if run.id else None):
+        with curve_logger(recorded.log if recorded.id else None):
             outcome: Outcome = job.stage.work(settings, dict(job.inputs), work)
         seconds = time.perf_counter() - start
         metrics = {
-            **record(job.settings, identity, job.made_from(), seconds),
-            "run": run.id,
+            **record(job.settings, identity, made_from, seconds),
+            "run": recorded.id,
             "result": type(outcome.result).__name__,
             "numbers": plain(outcome.result),
             "pictures": dict(job.stage.rule.shown if outcome.pictures is None else outcome.pictures),
         }
         write_json(work / result.METRICS, metrics)
         result.publish(job.output)
-        tracked.log_result(run, job, metrics)
-
-
-def _typed(kind: type[T], job: Job) -> T:
-    """A job's settings as the dataclass of its stage."""
-    try:
-        return typed(kind, job.settings)
-    except ValueMismatch as error:
-        raise ArgumentError(f"settings of a {job.stage.name} job: {error}") from error
+        tracked.log_result(recorded, job, metrics)

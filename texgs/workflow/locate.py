@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from texgs.config.dataset import BasicTF, Volume
+from texgs.config.project import check_name
 from texgs.core.cache import cache_folder
 from texgs.core.errors import ConfigError, MissingDataError
 from texgs.core.io import is_there
@@ -16,12 +17,9 @@ if TYPE_CHECKING:
 
 
 def source_file(config: Config) -> Path | None:
-    """The volume's file, or folder of slices; None if it is generated.
+    """Return the volume's file, or folder of slices; None if it is generated.
 
-    A file that can be downloaded may be still to come.
-
-    Raises:
-        MissingDataError: if it is not there and cannot be downloaded; says how to get it.
+    A file that can be downloaded may be still to come; for others MissingDataError says how to get them.
     """
     dataset, volume = config.dataset, config.dataset.volume
     if dataset.views_folder is not None:
@@ -47,11 +45,7 @@ def source_file(config: Config) -> Path | None:
 
 
 def cached_volume(volume: Volume) -> Path:
-    """Where a volume's file is downloaded to; another checksum is another file.
-
-    Raises:
-        ConfigError: if there is no checksum to compare it with.
-    """
+    """Return where a volume's file is downloaded to; another checksum, which it needs, is another file."""
     checksum, name = volume.sha256, file_name("dataset.volume.file", Path(volume.file or "").name)
     if not checksum or not checksum.isalnum():
         raise ConfigError(
@@ -61,24 +55,29 @@ def cached_volume(volume: Volume) -> Path:
 
 
 def views_folder(config: Config, tf: str | None = None) -> Path | None:
-    """Folder of the views that a data set without volume starts from; None for one with a volume.
+    """Return the folder of the views, by default of `config.tf`, that a data set without volume starts from.
 
-    By default that of `config.tf`.
+    One with a volume has none.
     """
     if config.dataset.views_folder is None:
         return None
     folder = Path(config.data_folder, config.dataset.views_folder, tf or config.tf or "")
     if not (folder / "transforms_train.json").is_file():
-        raise MissingDataError(
-            f"data set {config.dataset.name}: no views in {folder}; "
-            f"{config.dataset.volume.obtain or 'put them there, with a file transforms_train.json'}, "
-            "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
-        )
+        how = config.dataset.volume.obtain or "put them there, with a file transforms_train.json"
+        raise no_views(config, f"no views in {folder}; {how}")
     return folder
 
 
+def no_views(config: Config, why: str) -> MissingDataError:
+    """Return the error for views that are not there."""
+    return MissingDataError(
+        f"data set {config.dataset.name}: {why}, "
+        "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
+    )
+
+
 def basic_tf(config: Config) -> BasicTF:
-    """The basic TF that `config.tf` names."""
+    """Return the basic TF that `config.tf` names."""
     known = config.dataset.basic_tfs
     if config.tf not in known:
         names = ", ".join(known) or "none"
@@ -89,14 +88,10 @@ def basic_tf(config: Config) -> BasicTF:
 
 
 def tf_names(config: Config) -> list[str]:
-    """The basic TFs to work on: the one chosen, else all of the data set; those of views are its subfolders.
+    """Return the basic TFs to work on: the one chosen, else all of the data set.
 
-    Raises:
-        ConfigError: if there are none, or not the one chosen.
-        MissingDataError: if there is no folder of views.
+    Those of views are its subfolders; MissingDataError says how to get these.
     """
-    from texgs.config.check import check_name  # not at the top: it loads Hydra
-
     if config.tf is not None:
         if config.dataset.views_folder is None:
             basic_tf(config)
@@ -108,11 +103,8 @@ def tf_names(config: Config) -> list[str]:
         for name in names:
             check_name(f"folder of views in {folder}", name)
         if not names:
-            raise MissingDataError(
-                f"data set {config.dataset.name}: no folder of views in {folder}; "
-                f"{config.dataset.volume.obtain or 'put one there per basic TF'}, "
-                "or name the folder above with data_folder=FOLDER or TEXGS_DATA"
-            )
+            how = config.dataset.volume.obtain or "put one there per basic TF"
+            raise no_views(config, f"no folder of views in {folder}; {how}")
     if not names:
         raise ConfigError(f"data set {config.dataset.name}: expected at least one basic TF, got none")
     return names

@@ -6,26 +6,26 @@ wrote before it submitted the job, so that nothing is composed, digested or look
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from texgs.config.project import folders
+from texgs.config.project import ROOT, folders
 from texgs.core.cache import keep, recall
-from texgs.core.checksum import digest, of_folders, sha256
+from texgs.core.checksum import digest, of_folders
 from texgs.core.errors import ConfigError
-from texgs.core.io import write_atomic
-from texgs.workflow.code import ROOT
-from texgs.workflow.stage import LONG_AGO
+from texgs.core.io import write_bytes
+from texgs.workflow.stage import edit_folder, fit_folder
 from texgs.workflow.stage_table import RULES, STAGES, SWEPT
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
-    from texgs.core.checksum import Checksums
+    from texgs.workflow.experiments import LeftOut
     from texgs.workflow.job import Job
     from texgs.workflow.stage import Rule
 
@@ -50,7 +50,7 @@ class Plan:
     notes: dict[str, str]  # files that tables and the report read: whether somebody else has changed them
 
     def warning(self) -> str:
-        """What a user should know before the run begins; empty where there is nothing."""
+        """Return what a user should know before the run begins; empty where there is nothing."""
         if not self.replaced:
             return ""
         others = len(self.replaced) - 1
@@ -80,14 +80,14 @@ class Plan:
         return int(any(use in self.gpu for use in rule.gpu))
 
     def done(self, *places: str, sweep: str = "") -> list[str]:
-        """The metrics files of all jobs that have one of some places, of a sweep or of none."""
+        """Return the metrics files of all jobs that have one of some places, of a sweep or of none."""
         folders = self.sweeps.get(sweep, ())
         return sorted(f"{folder}/metrics.json" for folder in folders if self.jobs[folder]["place"] in places)
 
 
 def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
-    """What Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep."""
-    from texgs.workflow.product import as_sweep
+    """Return what Snakemake's `--config` says, in Hydra's syntax; keys with several values are a sweep."""
+    from texgs.workflow.sweep import as_sweep  # where it is called: jobs on a cluster go without Hydra
 
     if unknown := sorted(set(config) - {*GROUPS, "overrides", "pathvars"}):
         expected = ", ".join(GROUPS)
@@ -108,7 +108,7 @@ def words_of(config: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def planned(words: tuple[str, ...], *, is_job: bool) -> tuple[Plan, list[str]]:
-    """The plan of a run, and a sentence for each thing that is missing for some of its jobs.
+    """Return the plan of a run, and a sentence for each thing that is missing for some of its jobs.
 
     Args:
         words: overrides of the configuration.
@@ -129,129 +129,81 @@ def make(words: tuple[str, ...]) -> tuple[Plan, list[str]]:
     """Plan a run, and note in their settings which results are not those of the plan; see `planned`."""
     from texgs.config.compose import compose
     from texgs.core.checksum import Checksums
-    from texgs.workflow.absent import lacking, left_out, missing_weights
-    from texgs.workflow.earlier import earlier
-    from texgs.workflow.experiments import apart, selected
-    from texgs.workflow.graph import graph
+    from texgs.workflow.experiments import apart
+    from texgs.workflow.graph import drawn, earlier
+    from texgs.workflow.settings_files import note_results, note_tables
 
-    checksums, selection = Checksums.load(), selected(words, lacking)
-    configs = [each for some in selection.by_sweep.values() for each in some]
-    config = compose(apart(words)[0])
+    checksums = Checksums.load()
+    selection, planned = drawn(words, checksums)
+    config, configs = compose(apart(words)[0]), selection.configs
     results = Path(config.results).as_posix()  # as the folders of the jobs have it
-    planned = graph(selection.by_sweep, checksums)
     others, outdated = earlier(results, planned, checksums)
-    plain_jobs = {folder: plain(job, results) for folder, job in planned.jobs.items()}
-    note_results(planned.jobs.values(), [each["settings"] for each in plain_jobs.values()])
+    jobs = {folder: plain(job, results) for folder, job in planned.jobs.items()}
+    note_results(planned.jobs.values(), [job["settings"] for job in jobs.values()])
+    uses = {"views" for each in configs if each.views.mapper == "gpu"}
+    uses |= {"fit" for each in configs if each.device.name == "cuda"}
     plan = Plan(
         results,
         config.tracking.uri,
         config.tracking.experiment,
-        gpu_uses(configs),
-        plain_jobs,
+        sorted(uses),
+        jobs,
         planned.sweeps,
         downloads(configs),
         wildcards(configs),
         left_out({**selection.left_out, **outdated}, results),
         others,
         planned.of_other_settings,
-        notes(results, checksums),
+        note_tables(results, checksums),
     )
     checksums.save()
-    return plan, list(dict.fromkeys([*planned.missing, *missing_weights(configs)]))
-
-
-def gpu_uses(configs: Iterable[Config]) -> list[str]:
-    """Return what GPUs are for in some configurations: views, fits or both."""
-    uses = {"views" if each.views.mapper == "gpu" else "" for each in configs}
-    uses |= {"fit" if each.device.name == "cuda" else "" for each in configs}
-    return sorted(filter(None, uses))
-
-
-def wildcards(configs: Sequence[Config]) -> dict[str, list[str]]:
-    """What the wildcards of rules stand for in these configurations."""
-    from texgs.workflow.stage import edit_folder, fit_folder
-
-    values = {
-        "dataset": {each.dataset.name for each in configs},
-        "views": {each.views.name for each in configs},
-        "fit": {fit_folder(each) for each in configs},
-        "edit": {edit_folder(each) for each in configs},
-        "gallery": {each.gallery.name for each in configs},
-        "phase": {stage.name for stage in STAGES.values() if stage.place == "phase"},
-    }
-    return {name: sorted(own) for name, own in values.items()}
+    return plan, list(planned.missing)
 
 
 def plain(job: Job, results: str) -> dict[str, Any]:
-    """A job in plain values; its settings file is written."""
-    from texgs.workflow.stage import settings_file
+    """Return a job in plain values; its settings file is written."""
+    from texgs.workflow.settings_files import settings_file
 
-    settings = settings_file(job.settings, results)
-    inputs = {name: path.as_posix() for name, path in job.inputs.items()}
     return {
         "stage": job.stage.name,
         "place": job.stage.place,
-        "settings": settings,
+        "settings": settings_file(job.settings, results),
         "code": job.stage.code(job.settings),
-        "inputs": inputs,
+        "inputs": {name: path.as_posix() for name, path in job.inputs.items()},
         "swept": dict(job.swept),
     }
 
 
-def notes(results: str, checksums: Checksums) -> dict[str, str]:
-    """Note in files for tables and the report what of them has been changed since they were made.
+def wildcards(configs: Iterable[Config]) -> dict[str, list[str]]:
+    """Return what the wildcards of rules stand for in these configurations."""
+    values: dict[str, set[str]] = {
+        "phase": {stage.name for stage in STAGES.values() if stage.place == "phase"},
+        **{name: set() for name in ("dataset", "views", "fit", "edit", "gallery")},
+    }
+    for each in configs:
+        values["dataset"].add(each.dataset.name)
+        values["views"].add(each.views.name)
+        values["fit"].add(fit_folder(each))
+        values["edit"].add(edit_folder(each))
+        values["gallery"].add(each.gallery.name)
+    return {name: sorted(own) for name, own in values.items()}
+
+
+def left_out(entries: Mapping[LeftOut, Iterable[str]], results: str) -> str:
+    """Write what a run goes on without, with the places of its jobs, to a file named after its contents.
 
     Returns:
-        These files by the names of the rules.
+        The path of the file: JSON, a list of objects with `what`, `why` and `places`.
     """
-    from texgs.workflow.stage import note_result
-
-    made = recall(written_file(results), "") or {}
-    changed = sorted(
-        path for path, sha in made.items() if Path(path).exists() and checksums.of(Path(path)) != sha
-    )
-    files = {}
-    for name, place in {"tables": f"{results}/tables", "report": f"{results}/report.html"}.items():
-        files[name] = f"{results}/.conf/{name}.txt"
-        if not Path(files[name]).exists():
-            write_atomic(Path(files[name]), lambda file: file.write(b"whole\n"))
-            os.utime(files[name], (LONG_AGO, LONG_AGO))
-        own = [path for path in changed if path.startswith(place)]
-        note_result(files[name], f"{', '.join(own)}: changed since they were made" if own else None)
-    return files
-
-
-def note_written(results: str, made: Iterable[str]) -> None:
-    """Note the checksums of tables and the report, which a run has made, for the next one to compare."""
-    known = recall(written_file(results), "") or {}
-    of_tables = {path for path in made if path.startswith((f"{results}/tables/", f"{results}/report.html"))}
-    keep(written_file(results), "", {**known, **{path: sha256(Path(path)) for path in sorted(of_tables)}})
-
-
-def written_file(results: str) -> Path:
-    """Return the file that holds the checksums of tables and the report."""
-    return Path(results, ".conf", "written.json")
-
-
-def note_results(jobs: Iterable[Job], settings: Iterable[str]) -> None:
-    """Note in the settings files of jobs whether a result that is there is not theirs; several may share one.
-
-    Snakemake knows of inputs and parameters. That a result is damaged, or that a job failed and left the
-    result before it in place, it learns by this: it takes a file for changed where its contents are.
-    """
-    from texgs.workflow.result import METRICS
-    from texgs.workflow.stage import note_result
-
-    wrong: dict[str, list[str]] = {}
-    for job, file in zip(jobs, settings, strict=True):
-        if (job.output / METRICS).exists():
-            wrong.setdefault(file, []).extend([] if job.is_done() else [str(job.output)])
-    for file, outputs in wrong.items():
-        note_result(file, f"{', '.join(outputs)}: not whole, or of another job" if outputs else None)
+    text = json.dumps([{**asdict(each), "places": [*places]} for each, places in entries.items()], indent=1)
+    path = Path(results) / ".conf" / f"left-out-{digest(text)}.json"
+    if not path.exists():
+        write_bytes(path, text.encode())
+    return path.as_posix()
 
 
 def downloads(configs: Iterable[Config]) -> dict[str, tuple[str, str]]:
-    """Address and checksum of the volumes that are not in the data folder, by the files they go to."""
+    """Return address and checksum of the volumes that are not in the data folder, by the files they go to."""
     from texgs.workflow.locate import cached_volume
 
     volumes = [(config.data_folder, config.dataset.volume) for config in configs]

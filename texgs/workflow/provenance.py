@@ -5,6 +5,7 @@ from __future__ import annotations
 import getpass
 import os
 import platform
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -24,9 +25,9 @@ PACKAGES = (  # whose code decides results
 
 
 def record(
-    settings: Mapping[str, Any], identity: Mapping[str, Any], made_from: Mapping[str, Path], seconds: float
+    settings: Mapping[str, Any], identity: Mapping[str, Any], made_from: Mapping[str, str], seconds: float
 ) -> dict[str, Any]:
-    """Where and how the result of a job came about.
+    """Return where and how the result of a job came about.
 
     Args:
         settings: of the job.
@@ -46,7 +47,7 @@ def record(
         "code_sha": identity["code"],
         "git_sha": git_revision(),
         "inputs": identity["inputs"],
-        "made_from": {name: path.as_posix() for name, path in made_from.items()},
+        "made_from": made_from,
         "weights": settings.get("weights", {}),
         "versions": versions(),
         "machine": machine(),
@@ -54,7 +55,7 @@ def record(
 
 
 def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """The recipe of the fit and what tells it from others, where the stage is of a fit or later."""
+    """Return the recipe of the fit and what tells it from others, where the stage is of a fit or later."""
     fit = settings.get("fit", {})
     if "variant" not in fit:
         return {}
@@ -63,12 +64,12 @@ def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def edit(settings: Mapping[str, Any]) -> dict[str, str]:
-    """The edit, where the stage is of one."""
+    """Return the edit, where the stage is of one."""
     return {"edit": settings["edit"]["name"]} if "edit" in settings else {}
 
 
 def device(settings: Mapping[str, Any]) -> str:
-    """What did the work: of jobs with a fit what showed its scene, of others what rendered the volume.
+    """Return what did the work: of jobs with a fit what showed its scene, of others what rendered the volume.
 
     Some jobs of fits on a GPU do not use it, and then have none.
     """
@@ -81,7 +82,7 @@ def device(settings: Mapping[str, Any]) -> str:
 
 
 def seed(settings: Mapping[str, Any]) -> int | None:
-    """The seed of the stage's random numbers, where it has one."""
+    """Return the seed of the stage's random numbers, where it has one."""
     if settings.get("look", NO_METHOD) != NO_METHOD:
         return int(settings["look_seed"])
     parts = [settings.get(name, {}) for name in ("edit", "fit", "volume")]
@@ -89,7 +90,7 @@ def seed(settings: Mapping[str, Any]) -> int | None:
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, texgs and what results depend on most."""
+    """Return versions of Python, texgs and what results depend on most."""
     versions = {"python": platform.python_version(), "texgs": __version__}
     for package in PACKAGES:
         try:
@@ -100,14 +101,15 @@ def versions() -> dict[str, str]:
 
 
 def machine() -> dict[str, Any]:
-    """What else decides the last bits of results: processor, instruction sets, BLAS and threads.
+    """Return what else decides the last bits of results: processor, instruction sets, BLAS and threads.
 
     Of torch and numpy only what the job has loaded.
     """
     facts: dict[str, Any] = {"system": platform.platform(), "cores": os.cpu_count()}
     if torch := sys.modules.get("torch"):
         facts |= {"threads": torch.get_num_threads(), "torch_cpu": torch.backends.cpu.get_cpu_capability()}
-        facts["torch_blas"] = setting(torch.__config__.show(), "BLAS_INFO")
+        blas = re.search(r"\bBLAS_INFO=([^\s,]*)", torch.__config__.show())
+        facts["torch_blas"] = blas and blas[1]
     if numpy := sys.modules.get("numpy"):
         facts["numpy_blas"] = numpy.show_config(mode="dicts")["Build Dependencies"]["blas"].get("name")
     native = sys.modules.get("texgs.raster.native")
@@ -116,14 +118,8 @@ def machine() -> dict[str, Any]:
     return facts
 
 
-def setting(text: str, name: str) -> str | None:
-    """The value of NAME=VALUE in what torch says about its build."""
-    words = text.replace(",", " ").split()
-    return next((word.partition("=")[2] for word in words if word.startswith(f"{name}=")), None)
-
-
 def user() -> str:
-    """Who runs this; a number where the system has no name for it."""
+    """Return who runs this; a number where the system has no name for it."""
     try:
         return getpass.getuser()
     except (KeyError, OSError):

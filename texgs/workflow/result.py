@@ -55,11 +55,7 @@ def alone(output: Path) -> Iterator[None]:
 
 
 def run_alone(results: str) -> FileLock:
-    """Hold the results of a workflow as long as the process lives.
-
-    Returns:
-        The lock, to be kept.
-    """
+    """Hold the results of a workflow as long as the process lives, which keeps the lock."""
     lock = FileLock(Path(results, ".run.lock"))
     try:
         lock.acquire(blocking=False)
@@ -71,19 +67,15 @@ def run_alone(results: str) -> FileLock:
 
 
 def work_folder(output: Path) -> Path:
-    """Where a job works before its result is complete: beside the result, so that relative paths hold."""
+    """Return where a job works before its result is complete: beside it, so that relative paths hold."""
     return output.with_name(f".{output.name}.work")
 
 
 def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> Path:
-    """The folder for a job to work in: empty, or with what an interrupted run of the same job left there.
+    """Return the folder for a job to work in: with what an interrupted run of the same job left there.
 
-    A damaged result of the same job is a start, too: its good files are kept.
-
-    Args:
-        output: folder of the result.
-        identity: of the job.
-        is_fresh: whether to begin from nothing; then the result stays in any case until it is replaced.
+    A damaged result of the same job is a start, too: its good files are kept. A fresh start is from nothing;
+    then the result stays in any case until it is replaced.
     """
     require_own(output)
     work = work_folder(output)
@@ -106,7 +98,7 @@ def _take_back(output: Path, work: Path) -> None:
 
 def publish(output: Path) -> None:
     """Put what a job has made, with the checksums of all its files, in place of the result before it."""
-    work, old = work_folder(output), _old(output)
+    work, old = work_folder(output), output.with_name(f".{output.name}.old")
     names = sorted(path.relative_to(work).as_posix() for path in work.rglob("*") if path.is_file())
     write_json(work / FILES, {name: sha256(work / name) for name in names if name != STAMP})
     if output.exists():
@@ -117,7 +109,7 @@ def publish(output: Path) -> None:
 
 def recover(output: Path) -> None:
     """Finish what a process that was killed while it swapped two results had begun."""
-    work, old = work_folder(output), _old(output)
+    work, old = work_folder(output), output.with_name(f".{output.name}.old")
     if output.exists() and not output.is_dir():
         return  # it is none of ours
     if not output.exists() or not any(output.iterdir()):
@@ -128,7 +120,7 @@ def recover(output: Path) -> None:
 
 
 def stamped(folder: Path) -> Any:
-    """Identity of the job that a folder is of; None where there is none that can be read."""
+    """Return the identity of the job that a folder is of; None where there is none that can be read."""
     return _content(folder / STAMP)
 
 
@@ -139,7 +131,7 @@ def recorded(folder: Path) -> dict[str, str]:
 
 
 def _content(path: Path) -> Any:
-    """What a JSON file holds; None where it is missing or damaged: then its folder is of no job."""
+    """Return what a JSON file holds; None where it is missing or damaged: then its folder is of no job."""
     try:
         return read_json(path)
     except ArgumentError:
@@ -147,11 +139,9 @@ def _content(path: Path) -> Any:
 
 
 def damaged(output: Path, checksums: Checksums | None) -> list[str]:
-    """Files of a complete result that are missing or not what they were.
+    """Return the files of a complete result that are missing or not what they were.
 
-    Args:
-        output: folder of the result; one that is not complete has no files.
-        checksums: what is known of files, or None to read them all.
+    What is not known of files, without checksums anything, is read.
     """
     if not (output / FILES).exists():
         return []
@@ -166,7 +156,7 @@ def damaged(output: Path, checksums: Checksums | None) -> list[str]:
 
 
 def is_complete(output: Path, checksums: Checksums) -> bool:
-    """Whether a result is there with all its files, as they were made."""
+    """Return whether a result is there with all its files, as they were made."""
     return (output / FILES).exists() and (output / METRICS).exists() and not damaged(output, checksums)
 
 
@@ -195,7 +185,7 @@ def require_own(output: Path) -> None:
 
 
 def fingerprint(path: Path, checksums: Checksums) -> str:
-    """Checksum of an input: of the result that it belongs to, with the identity of the job that made it.
+    """Return the checksum of an input: of the result that it belongs to, with the identity of its job.
 
     A file from elsewhere counts with its contents. A header counts with its samples as well, a folder with
     its slices, and the transforms_train.json of views from elsewhere with all images and points beside it.
@@ -233,7 +223,3 @@ def require_intact(path: Path) -> None:
         f"{folder / lost[0]}: missing or damaged since {maker} made it; "
         "run the same command again, and it is made anew"
     )
-
-
-def _old(output: Path) -> Path:
-    return output.with_name(f".{output.name}.old")

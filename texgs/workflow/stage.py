@@ -1,33 +1,25 @@
 """What a stage of the workflow is: the configuration it reads, the code it runs, the place of its files.
 
 A stage is one module of texgs/workflow/stages, see `stage_table`. Its settings are a dataclass whose fields
-say by `read` which values of the configuration they have. Those of a job are written once to a file named
-after their contents. That file is an input of the job and the digest of the code a parameter, so a changed
-value or line of code reruns what depends on it.
+say by `read` which values of the configuration they have.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass, replace
-from datetime import datetime
+from dataclasses import dataclass, field, fields, is_dataclass
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, Literal, cast, get_type_hints
 
-import yaml
-
 from texgs.config.schema import Config
 from texgs.core.checksum import digest
-from texgs.core.io import write_atomic
 from texgs.edit.method import methods
 from texgs.fields.kinds import kinds
 from texgs.metrics.metric import metrics
 from texgs.report.results import Result
 from texgs.workflow.code import code_digest
 
-LONG_AGO = 946684800  # the year 2000, in seconds
 EVERY = 1024  # threads, of which a job gets as many as there are
 
 
@@ -42,11 +34,6 @@ class Rule:
     threads: int = 4
     gpu: tuple[Literal["views", "fit"], ...] = ()  # what a GPU is for, where the configuration asks for one
     shown: Mapping[str, str] = field(default_factory=dict)  # captions of files in the report of Snakemake
-
-    @property
-    def is_per_tf(self) -> bool:
-        """Whether there is a job for each basic TF, not for the whole data set."""
-        return "{tf}" in self.folder
 
 
 @dataclass(frozen=True)
@@ -87,7 +74,7 @@ class Stage:
     @property
     def per_tf(self) -> bool:
         """Whether there is a job for each basic TF, not for the whole data set."""
-        return self.rule.is_per_tf
+        return "{tf}" in self.rule.folder
 
     def settings(self, config: Config) -> dict[str, Any]:
         """Return what a job reads, as plain lists and dicts."""
@@ -132,36 +119,6 @@ def selected(schema: type[Any], config: Config) -> dict[str, Any]:
     return values
 
 
-def settings_file(settings: dict[str, Any], results: str) -> str:
-    """Write a job's settings to `RESULTS/.conf/STAGE-DIGEST.yaml`, unless that is there; return its path."""
-    text = _yaml(settings)
-    path = Path(results) / ".conf" / f"{settings['stage']}-{digest(text)}.yaml"
-    if not path.exists():
-        write_atomic(path, lambda file: file.write(text.encode()))
-    return path.as_posix()
-
-
-def note_result(settings: str, note: str | None) -> None:
-    """Write a note on the result of a job, with the time, under its settings, in place of the one before.
-
-    Without a note the file is made older than any result: the job that read it with one needs no second run.
-    """
-    path = Path(settings)
-    text = path.read_text(encoding="utf-8")
-    kept = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("#"))
-    if note is not None:
-        kept += f"# {datetime.now().isoformat(timespec='microseconds')} {note}\n"
-    if kept != text:
-        write_atomic(path, lambda file: file.write(kept.encode()))
-        if note is None:
-            os.utime(path, (LONG_AGO, LONG_AGO))
-
-
-def settings_digest(settings: dict[str, Any]) -> str:
-    """Return the digest of a job's settings: the one in the name of its file."""
-    return digest(_yaml(settings))
-
-
 def plain(value: Any) -> Any:
     """Return a value of a configuration, or tables and lists of them, as plain dicts and lists."""
     if is_dataclass(value):
@@ -169,15 +126,6 @@ def plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(name): plain(each) for name, each in value.items()}
     return [plain(each) for each in value] if isinstance(value, list | tuple) else value
-
-
-def _yaml(settings: dict[str, Any]) -> str:
-    return yaml.dump(settings, Dumper=yaml.CSafeDumper, allow_unicode=True)
-
-
-def for_tf(config: Config, name: str) -> Config:
-    """Return the same configuration for one basic TF."""
-    return replace(config, tf=name)
 
 
 def folder_of(rule: str, config: Config, phase: str = "", tf: str | None = None) -> Path:
@@ -204,14 +152,14 @@ def made(rule: str, config: Config, phase: str = "", tf: str | None = None) -> P
 
 def fit_folder(config: Config) -> str:
     """Return the name of a fit's folder: the recipe, the variant of a sweep, and a seed other than 0."""
-    from texgs.workflow.variants import fit_variant  # not at the top: it loads Hydra
+    from texgs.workflow.sweep import fit_variant  # not at the top: it loads Hydra
 
     return _folder(config.fit.name, fit_variant(config), config.fit.seed)
 
 
 def edit_folder(config: Config, name: str = "") -> str:
     """Return that of an edit in the same way; `name`: of another edit than that of `config`."""
-    from texgs.workflow.variants import edit_variant
+    from texgs.workflow.sweep import edit_variant
 
     return _folder(name or config.edit.name, edit_variant(config), config.edit.seed)
 

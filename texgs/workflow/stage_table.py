@@ -7,23 +7,19 @@ from __future__ import annotations
 
 import pkgutil
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from texgs.workflow.stage import Rule, Stage, for_tf
+from texgs.workflow.inputs import is_fit
+from texgs.workflow.locate import tf_names
+from texgs.workflow.stage import Rule, Stage
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
 
 PACKAGE = "texgs.workflow.stages"
-SWEPT = (
-    "volume",
-    "views",
-    "phase",
-    "edit",
-    "edit_metrics",
-    "gallery",
-)  # shown of a sweep
+SWEPT = ("volume", "views", "phase", "edit", "edit_metrics", "gallery")  # places shown of a sweep
 
 
 def discovered() -> Iterator[Stage]:
@@ -45,11 +41,8 @@ def jobs(config: Config) -> list[tuple[Stage, Config]]:
     Raises:
         MissingDataError: if basic TFs are folders of views that are not there.
     """
-    from texgs.workflow.inputs import is_fit
-    from texgs.workflow.locate import tf_names
-
     names = tf_names(config)
-    by_tf = [for_tf(config, name) for name in names] if is_fit(config) else []
+    by_tf = [replace(config, tf=name) for name in names] if is_fit(config) else []
     return [
         (stage, each)
         for stage in STAGES.values()

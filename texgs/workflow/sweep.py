@@ -1,28 +1,169 @@
-"""Sweeps: the variants of an experiment, as more words for `compose`."""
+"""Sweeps: the variants of an experiment, as more words for `compose`, and what each of them changes.
 
-from collections.abc import Sequence
+A sweep is a file of conf/sweep, or made of keys with several values in Hydra's syntax: `fit.low_pass=2,6`,
+`views.train.frequency=range(2,6)`.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from functools import lru_cache
 from itertools import product
 
+from hydra.core.override_parser.types import Quote, QuotedString
+from hydra.errors import HydraException
+
 from texgs.config.compose import compose
-from texgs.config.describe import value_at
-from texgs.config.schema import Config
+from texgs.config.composition import Words, parsed
+from texgs.config.describe import keys, value_at
+from texgs.config.schema import NO_SWEEP, Config
 from texgs.core.errors import ConfigError
 from texgs.edit.keys import EditKeys
 from texgs.edit.method import NO_METHOD
-from texgs.workflow.product import SEEDS, key_of
-from texgs.workflow.variants import OF_EDITS, OF_FITS, changes, changes_edits, group_of, is_of_edits, own_name
 
-SWEPT = (*OF_FITS, OF_EDITS)
+OF_FITS = ("views", "fit", "device")  # groups of keys that change fits
+OF_EDITS = "edit"
+SEEDS = {"fit.seed": "seeds", "edit.seed": "edit_seeds"}  # keys of `sweep` with the values of others
+ONLY_SEEDS = "seeds"  # name of a sweep over nothing else, and of its only variant
 ELSEWHERE = {  # keys whose values have a list of their own
     **{key: f"sweep.{listed}" for key, listed in SEEDS.items()},
-    "edit": "edits=[...]",
-    "edit.name": "edits=[...]",
+    **dict.fromkeys(("edit", "edit.name"), "edits=[...]"),
 }
 
 
-def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
-    """The words of each variant of the sweep with each seed; the given ones, where there is none.
+def key_of(word: str) -> str:
+    """Return the key or group that an override changes."""
+    return word.partition("=")[0].lstrip("+")
+
+
+def group_of(word: str) -> str:
+    """Return the group that an override is of."""
+    return key_of(word).partition(".")[0]
+
+
+def label(value: str) -> str:
+    """Return a value as part of the name of a variant."""
+    text = re.sub(r"[^A-Za-z0-9_.-]+", "-", value)
+    return text if re.fullmatch(r"-?\d[\d.]*", text) else text.strip("-.") or "empty"
+
+
+def has_several(word: str) -> bool:
+    """Return whether a word gives its key several values."""
+    try:
+        return bool(parsed(word).is_sweep_override())
+    except HydraException:  # which `compose` tells
+        return False
+
+
+def values(word: str) -> list[str]:
+    """Return the values that a word gives its key, as people write them.
+
+    That is true instead of Hydra's True, and 100000 instead of 1e5 where an integer is expected.
+    """
+    if not has_several(word) or not (parsed(word).is_choice_sweep() or parsed(word).is_range_sweep()):
+        raise ConfigError(
+            f"{word}: expected several values, such as fit.low_pass=2,6 or fit.seed=range(3); "
+            "a list stands in brackets, a text with a comma in quotes"
+        )
+    texts = [
+        text.lower() if text in ("True", "False") else text for text in parsed(word).sweep_string_iterator()
+    ]
+    is_whole = any(entry.name == key_of(word) and "float" not in entry.type for entry in keys())
+    return [re.sub(r"^(-?\d+)\.0$", r"\1", text) for text in texts] if is_whole else texts
+
+
+def as_sweep(words: Words) -> Words:
+    """Return the words, with those that give a key several values as a sweep, named after the keys.
+
+    Each combination of values is a variant. Seeds make none: they are what means are over.
+
+    Raises:
+        ConfigError: if values cannot be listed, or the words choose another sweep.
+    """
+    several = [word for word in words if has_several(word)]
+    rest = tuple(word for word in words if word not in several)
+    seeds = tuple(f"sweep.{SEEDS[key_of(x)]}=[{','.join(values(x))}]" for x in several if key_of(x) in SEEDS)
+    over = [word for word in several if key_of(word) not in SEEDS]
+    chosen = [word for word in rest if key_of(word) == "sweep" and word != "sweep=none"]
+    if over and chosen:
+        raise ConfigError(f"{over[0]}: {chosen[0]} has variants of its own; leave out one of the two")
+    if chosen or not several:
+        return (*rest, *seeds)
+    name = "-".join(key_of(word).rpartition(".")[2] for word in over) or ONLY_SEEDS
+    listed = ",".join(QuotedString(word, Quote.single).with_quotes() for word in over)
+    return (*rest, *seeds, f"sweep.name={name}", f"sweep.over=[{listed}]")
+
+
+@lru_cache(maxsize=64)
+def combinations(over: Words) -> Mapping[str, Words]:
+    """Return the overrides of each combination of the values of some keys, by the values."""
+    overrides: dict[str, Words] = {}
+    for choice in product(*map(values, over)):
+        name = "-".join(map(label, choice))
+        if name in overrides:
+            raise ConfigError(f"sweep.over: expected different variants, got {name} twice")
+        pairs = zip(over, choice, strict=True)
+        overrides[name] = tuple(f"{word.partition('=')[0]}={value}" for word, value in pairs)
+    return overrides
+
+
+def changes(config: Config) -> Mapping[str, Words]:
+    """Return the overrides of each variant of the sweep, by name; none without a sweep."""
+    sweep = config.sweep
+    if sweep.over and sweep.variants:
+        raise ConfigError("sweep.over: expected none beside sweep.variants; leave out one of the two")
+    given: Mapping[str, Words] = {name: tuple(each) for name, each in sweep.variants.items()}
+    if sweep.over:
+        given = combinations(tuple(sweep.over))
+    if sweep.name == NO_SWEEP:
+        if given:
+            raise ConfigError("sweep.name: expected a name for the table of the variants, got none")
+        return {}
+    if not given and all(len(getattr(sweep, listed)) < 2 for listed in SEEDS.values()):
+        raise ConfigError(
+            f"sweep {sweep.name}: expected variants, keys to sweep over or several seeds, got none of them"
+        )
+    return given or {ONLY_SEEDS: ()}
+
+
+def is_of_edits(config: Config) -> bool:
+    """Return whether the variants of the sweep have edits that differ."""
+    variants = changes(config)
+    named = any(group_of(change) == OF_EDITS for listed in variants.values() for change in listed)
+    return bool(variants) and (named or len(config.sweep.edit_seeds) > 1)
+
+
+def fit_variant(config: Config) -> str:
+    """Return what the variant is called by its fits; empty for fits that all variants of edits share."""
+    return own_name(config, config.variant, OF_FITS) if is_of_edits(config) else config.variant
+
+
+def edit_variant(config: Config) -> str:
+    """Return the variant that an edit is of; empty where all have the same edits, of different fits."""
+    return config.variant if is_of_edits(config) else ""
+
+
+def own_name(config: Config, variant: str, groups: Sequence[str]) -> str:
+    """Return the name of what overrides of some groups make of a variant; empty where it has none of these.
+
+    In a sweep over keys it is that of their values, so that all variants with the same ones share it.
+    """
+    own = [change for change in changes(config).get(variant, ()) if group_of(change) in groups]
+    if not own or not config.sweep.over:
+        return variant if own else ""
+    return "-".join(label(change.partition("=")[2]) for change in own)
+
+
+def swept(config: Config) -> dict[str, str]:
+    """Return what makes a configuration another one than the rest of its sweep: values as text, by keys."""
+    listed = changes(config).get(config.variant, ())
+    texts = {key_of(change): change.partition("=")[2] for change in listed}
+    texts |= {key: "" for key, seeds in SEEDS.items() if len(getattr(config.sweep, seeds)) > 1}
+    return {key: str(value_at(config, key)) if "." in key else text for key, text in texts.items()}
+
+
+def variants(words: Words) -> list[Words]:
+    """Return the words of each variant of the sweep with each seed; the given ones, where there is none.
 
     Variants that change the views have a folder of their own for them, unless they name one.
     """
@@ -30,8 +171,7 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     by_variant, sweep = changes(config), config.sweep
     if not by_variant:
         return [words]
-    for name, listed in by_variant.items():
-        check_variant(name, listed)
+    check_variants(by_variant)
     check_seeds(config)
     words = (*words, *edits_of_sweep(config))
     if is_of_edits(config):
@@ -46,26 +186,38 @@ def variants(words: tuple[str, ...]) -> list[tuple[str, ...]]:
     ]
 
 
-def own_views(config: Config, name: str) -> tuple[str, ...]:
-    """The word that gives a variant a folder for its views, where it changes them and names none."""
+def own_views(config: Config, name: str) -> Words:
+    """Return the word that gives a variant a folder for its views, where it changes them and names none."""
     own = own_name(config, name, ("views",))
     is_named = "views.name" in map(key_of, changes(config)[name])
     return (f"views.name=views-{own.replace('.', '_')}",) if own and not is_named else ()
 
 
-def check_variant(name: str, listed: Sequence[str]) -> None:
-    """Require of a variant that it changes what may differ between variants."""
-    if not name:
-        raise ConfigError("sweep.variants: expected a name for each variant, got an empty one")
-    for change in listed:
-        key = key_of(change)
-        if group_of(change) not in SWEPT:
-            raise ConfigError(
-                f"sweep.variants.{name}: expected overrides of views, fit, device or edit, got {change}; "
-                "the rest is the same for all variants, and several data sets go to datasets=[...]"
-            )
-        if key in ELSEWHERE:
-            raise ConfigError(f"sweep.variants.{name}: got {change}, whose values go to {ELSEWHERE[key]}")
+def edits_of_sweep(config: Config) -> Words:
+    """Return the word with the edits of the sweep, where the experiment has none of its own."""
+    if config.edits or config.edit.method != NO_METHOD:
+        return ()
+    if is_of_edits(config) and not config.sweep.edits:
+        raise ConfigError(
+            f"sweep {config.sweep.name}: expected an edit that its variants change, got none; "
+            "choose one, such as edit=style"
+        )
+    return (f"edits=[{','.join(config.sweep.edits)}]",) if config.sweep.edits else ()
+
+
+def check_variants(by_variant: Mapping[str, Sequence[str]]) -> None:
+    """Require of variants that they change what may differ between variants."""
+    for name, listed in by_variant.items():
+        if not name:
+            raise ConfigError("sweep.variants: expected a name for each variant, got an empty one")
+        for change in listed:
+            if group_of(change) not in (*OF_FITS, OF_EDITS):
+                raise ConfigError(
+                    f"sweep.variants.{name}: expected overrides of views, fit, device or edit, got {change}; "
+                    "the rest is the same for all variants, and several data sets go to datasets=[...]"
+                )
+            if elsewhere := ELSEWHERE.get(key_of(change)):
+                raise ConfigError(f"sweep.variants.{name}: got {change}, whose values go to {elsewhere}")
 
 
 def check_seeds(config: Config) -> None:
@@ -80,29 +232,16 @@ def check_seeds(config: Config) -> None:
             raise ConfigError(f"{key}: expected seeds of a sweep in sweep.{listed}, got {key}={own}")
 
 
-def edits_of_sweep(config: Config) -> tuple[str, ...]:
-    """The word with the edits of the sweep, where the experiment has none of its own."""
-    if config.edits or config.edit.method != NO_METHOD:
-        return ()
-    if is_of_edits(config) and not config.sweep.edits:
-        raise ConfigError(
-            f"sweep {config.sweep.name}: expected an edit that its variants change, got none; "
-            "choose one, such as edit=style"
-        )
-    return (f"edits=[{','.join(config.sweep.edits)}]",) if config.sweep.edits else ()
-
-
-def check_edits(words: tuple[str, ...]) -> None:
+def check_edits(words: Words) -> None:
     """Require of each edit of a sweep of edits alone that its variants differ."""
     config = compose(words)
-    listed = [change for each in changes(config).values() for change in each]
-    if len(config.sweep.edit_seeds) > 1 or not all(map(changes_edits, listed)):
+    listed = {key_of(change) for each in changes(config).values() for change in each}
+    if len(config.sweep.edit_seeds) > 1 or any(group_of(key) != OF_EDITS for key in listed):
         return
-    tables = {key_of(change).split(".")[1] for change in listed}
+    tables = {key.split(".")[1] for key in listed}
     for edit in [compose((*words, f"edit={name}")).edit for name in config.edits] or [config.edit]:
         if not tables & {edit.method, *(field.name for field in fields(EditKeys))}:
             raise ConfigError(
                 f"sweep {config.sweep.name}: expected to change edit {edit.name}, whose keys are "
-                f"edit.{edit.method}, got {', '.join(sorted({key_of(change) for change in listed}))}; "
-                "leave out that edit"
+                f"edit.{edit.method}, got {', '.join(sorted(listed))}; leave out that edit"
             )

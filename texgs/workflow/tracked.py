@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean
@@ -15,9 +16,8 @@ from texgs.core.checksum import digest
 from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result
-from texgs.workflow import tracking as track
-from texgs.workflow.product import key_of
 from texgs.workflow.provenance import edit, git_revision, recipe, seed, user
+from texgs.workflow.runs import PARENT, Run, begin, process_tags
 
 if TYPE_CHECKING:
     from texgs.workflow.job import Job
@@ -39,12 +39,9 @@ class Tracking:
 def of_workflow(output: Path) -> tuple[Tracking, dict[str, str]]:
     """Return where the workflow wants the job of a folder recorded, and the values of its variant."""
     uri, experiment = os.environ.get("TEXGS_TRACKING"), os.environ.get("TEXGS_EXPERIMENT", "texgs")
-    runs: dict[str, Any]
-    try:
-        runs = json.loads(Path(os.environ[RUNS]).read_text()) if uri else {}
-    except (KeyError, OSError, ValueError):  # a job that no run of the workflow has started
-        runs = {}
-    own = runs.get(output.as_posix(), {})
+    own: dict[str, Any] = {}
+    with suppress(KeyError, OSError, ValueError):  # of a job that no run of the workflow has started
+        own = json.loads(Path(os.environ[RUNS]).read_text())[output.as_posix()] if uri else {}
     return Tracking(uri, experiment, own.get("parent")), own.get("swept", {})
 
 
@@ -70,17 +67,17 @@ def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str,
     }
     return {
         "mlflow.user": user(),
-        **({track.PARENT: parent} if parent else {}),
+        **({PARENT: parent} if parent else {}),
         **{key: str(value) for key, value in facts.items() if value not in (None, "", NO_SWEEP)},
         "config.sha": identity["settings"],
         "code.sha": identity["code"],
         "git.sha": git_revision(),
         "output": job.output.as_posix(),
-        **track.process_tags(job.output / result.METRICS),
+        **process_tags(job.output / result.METRICS),
     }
 
 
-def log_result(run: track.Run, job: Job, metrics: Mapping[str, Any]) -> None:
+def log_result(run: Run, job: Job, metrics: Mapping[str, Any]) -> None:
     """Record the numbers, curves and pictures of a job, and the path and checksum of what others read."""
     run.log({name: metrics[name] for name in ("seconds", "peak_memory_mib")} | scalars(metrics["numbers"]))
     for step, values in curves(metrics["numbers"]):
@@ -143,7 +140,7 @@ def runs_file(results: str) -> str:
     return f"{results}/.conf/runs.json"
 
 
-def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, track.Run]:
+def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, Run]:
     """Begin the runs of a workflow and of its sweeps, by name, and write the file that jobs read.
 
     The same command in the same place goes on with the runs that it had.
@@ -152,16 +149,16 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, track.Run]:
     key = digest("\n".join([place, *words]))
     common = {"mlflow.user": user(), "git.sha": git_revision(), "output": place}
 
-    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> track.Run:
+    def run(name: str, title: str, tags: Mapping[str, str], params: Mapping[str, object]) -> Run:
         given: dict[str, Any] = {"name": title, "tags": {**common, **tags}, "params": params}
-        return track.begin(plan.tracking, experiment=plan.experiment, key=f"{key} {name}", **given)
+        return begin(plan.tracking, experiment=plan.experiment, key=f"{key} {name}", **given)
 
-    groups = " ".join(word for word in words if "." not in key_of(word))
-    values = {key_of(word): word.partition("=")[2] for word in words}
+    values = {word.partition("=")[0].lstrip("+"): word.partition("=")[2] for word in words}
+    groups = " ".join(word for word in words if "." not in word.partition("=")[0])
     runs = {WHOLE: run(WHOLE, groups or "texgs", {"stage": "workflow"}, values)}
     for name in filter(None, plan.sweeps):
         keys = {key for folder in plan.sweeps[name] for key in plan.jobs[folder]["swept"]}
-        tags = {"stage": "sweep", "sweep": name, track.PARENT: str(runs[WHOLE].id)}
+        tags = {"stage": "sweep", "sweep": name, PARENT: str(runs[WHOLE].id)}
         runs[name] = run(name, f"sweep {name}", tags, {"keys": ", ".join(sorted(keys))})
     if plan.tracking is not None:
         jobs = plan.jobs.items()
@@ -170,7 +167,7 @@ def begin_runs(plan: Plan, words: tuple[str, ...]) -> dict[str, track.Run]:
     return runs
 
 
-def end_runs(runs: Mapping[str, track.Run], status: str, plan: Plan, made: Iterable[str]) -> None:
+def end_runs(runs: Mapping[str, Run], status: str, plan: Plan, made: Iterable[str]) -> None:
     """End the runs of a workflow, with the tables and the report among the files that it has made."""
     files = [Path(file) for file in sorted(made) if Path(file).is_file()]
     tables, report = Path(plan.results, "tables"), Path(plan.results, "report.html")

@@ -15,7 +15,8 @@ from texgs.report.table import DOCUMENT, FORMATS
 from texgs.report.tables import specs
 from texgs.workflow import tracked
 from texgs.workflow.code import code_digest
-from texgs.workflow.plan import note_written, planned, words_of
+from texgs.workflow.plan import planned, words_of
+from texgs.workflow.settings_files import note_written
 from texgs.workflow.stage_table import RULES
 
 collect_rarely()

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from yaml import YAMLError
 
-from texgs.config.edit import Edit
+from texgs.config.project import is_scene_file
+from texgs.config.recipes import Edit
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.plain_yaml import parse_yaml
 from texgs.edit.keys import EditKeys
@@ -160,8 +161,6 @@ def followed(task: Task[Any]) -> dict[str, str]:
 
 def edited_scene(config: Config) -> dict[str, Path]:
     """Return the scene that an edit starts from, its models, their training views, and files of styles."""
-    from texgs.config.check import is_scene_file  # not at the top: it loads Hydra
-
     if config.edit.base == config.edit.name:
         raise ConfigError(f"edit.base: {config.edit.name} starts from itself; choose another base")
     if config.tf is not None:

@@ -214,7 +214,7 @@ def inputs(config: Config) -> dict[str, Path]:
 
 def applies(config: Config) -> bool:
     """Return whether this is the first of the recipes and variants of an experiment with scenes to show."""
-    from texgs.workflow.variants import changes
+    from texgs.workflow.sweep import changes
 
     variants = list(changes(config))
     shows_all = len(config.edits) > 1 and not variants

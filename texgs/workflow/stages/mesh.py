@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from texgs.config.dataset import BasicTF
-from texgs.config.mesh import MeshKeys
+from texgs.config.dataset import BasicTF, MeshKeys
 from texgs.core.errors import ArgumentError
 from texgs.fields.kinds import kinds
 from texgs.report.results import MeshResult

@@ -15,34 +15,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError
-from texgs.workflow.tracking.store import cause, connect, public, reason, translated
+from texgs.workflow.store import cause, connect, public, reason, translated
 
 if TYPE_CHECKING:
     from mlflow import MlflowClient
 
 PARENT = "mlflow.parentRunId"  # tag of a run inside of another one
 KEY = "texgs.parent"  # tag by which a run is found again
-HOST, PROCESS, METRICS = (
-    "texgs.host",
-    "texgs.process",
-    "texgs.metrics",
-)  # tags of its process
+HOST, PROCESS, METRICS = "texgs.host", "texgs.process", "texgs.metrics"  # tags of its process
 LONGEST_NAME = 250
 
 logger = logging.getLogger("texgs")
 
 
 class Run:
-    """A run, whose errors it never raises: results are files, and outlive their tracking.
-
-    Attributes:
-        id: the run's identifier in the store; None where tracking is off.
-        trouble: why the run is incomplete, where it is; final when it has ended.
-    """
+    """A run, whose errors it never raises: results are files, and outlive their tracking."""
 
     def __init__(self, client: MlflowClient | None = None, id: str | None = None, store: str = "") -> None:
-        self.id = id
-        self.trouble: str | None = None
+        self.id = id  # in the store; None where tracking is off
+        self.trouble: str | None = None  # why the run is incomplete, where it is; final when it has ended
         self._client: Any = client
         self._store = store
         self._sent: list[Callable[[], object]] = []  # each waits for what was sent, raises what went wrong
@@ -70,7 +61,7 @@ class Run:
             raise ArgumentError(f"{path}: no such file to record in the tracking store")
         self._attempt(lambda: self._client.log_artifact(self.id, str(path), folder))
 
-    def end(self, status: str, error: Exception | None = None) -> None:
+    def end(self, status: str, error: BaseException | None = None) -> None:
         """Wait for what MLflow still sends, and end the run: FINISHED, FAILED with the error, or KILLED."""
         if self._client is None:
             return
@@ -144,22 +135,18 @@ def begin(
 
 
 @contextmanager
-def run(
-    uri: str | None, *, experiment: str, name: str, tags: Mapping[str, str], params: Mapping[str, object]
-) -> Iterator[Run]:
+def run(uri: str | None, **job: Any) -> Iterator[Run]:
     """Record a job as one run; arguments as for `begin`.
 
     The run ends as FINISHED, as FAILED where the job raises, or as KILLED where it is interrupted.
     A store that is lost on the way never fails the job, and is named in one warning of the logger `texgs`.
     """
-    recorded = begin(uri, experiment=experiment, name=name, tags=tags, params=params)
+    recorded = begin(uri, **job)
     try:
         yield recorded
-    except Exception as error:
-        recorded.end("FAILED", error)
-        raise
-    except BaseException:
-        recorded.end("KILLED")
+    except BaseException as error:
+        is_error = isinstance(error, Exception)
+        recorded.end("FAILED" if is_error else "KILLED", error if is_error else None)
         raise
     recorded.end("FINISHED")
 

@@ -1,4 +1,4 @@
-"""Weights that edits need: whether they are on this machine, and their part in the identity of a job."""
+"""What a run needs and this machine may not have: data, and weights, which are part of a job's identity."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 from texgs.core.checksum import Checksums
 from texgs.core.errors import MissingDataError
 from texgs.edit.method import NO_METHOD, method_of
+from texgs.models import weights
+from texgs.workflow.stage_table import jobs
 
 if TYPE_CHECKING:
     from texgs.config.schema import Config
@@ -16,8 +18,33 @@ if TYPE_CHECKING:
 SHOWN = 12  # digits of checksums in settings
 
 
+def lacking(config: Config) -> list[str]:
+    """Return a sentence for each thing that a configuration needs, data and weights, and that is not here."""
+    sentences = []
+    try:
+        for stage, each in jobs(config):
+            try:
+                stage.inputs(each)
+            except MissingDataError as error:
+                sentences.append(str(error))
+    except MissingDataError as error:  # the basic TFs themselves
+        sentences.append(str(error))
+    return list(dict.fromkeys([*sentences, *missing_weights(config)]))
+
+
+def missing_weights(config: Config) -> list[str]:
+    """Return what is said of weights that an edit needs and this machine has not; nothing is downloaded."""
+    return [
+        f"edit {config.edit.name}: the weights of {name} are not on this machine; "
+        f"`texgs weights {name}` downloads them or says how to get them"
+        + (f", and {word} does without them" if word else "")
+        for name, word in needed(config).items()
+        if not weights.available(name)
+    ]
+
+
 def needed(config: Config) -> Mapping[str, str]:
-    """Names of the weights that the edit of a configuration needs, each with the word that does without."""
+    """Return names of the weights that an edit needs, each with the word that does without."""
     if config.edit.method == NO_METHOD:
         return {}
     method = method_of(config.edit)
@@ -26,17 +53,10 @@ def needed(config: Config) -> Mapping[str, str]:
 
 
 def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, str | None] | None:
-    """Checksums of all weights that a stage may work with, None for those that are not on this machine.
+    """Return checksums of all weights that a stage may work with, None for those that are not here.
 
-    They are part of a job's settings: when weights arrive or change, what used them is made again.
-
-    Args:
-        stage: of the job.
-        config: of one edit, or of none.
-        checksums: what is known of files.
-
-    Returns:
-        None for a stage that never works with weights.
+    They are part of a job's settings: when weights arrive or change, what used them is made again. A stage
+    that never works with weights has None.
     """
     if stage.name == "edit_metrics":
         names = ["vgg16", "lpips_vgg", config.metric.clip]
@@ -48,9 +68,7 @@ def weights_of(stage: Stage, config: Config, checksums: Checksums) -> dict[str, 
 
 
 def _short(name: str, checksums: Checksums) -> str | None:
-    from texgs.models.weights import checksum
-
-    digest = checksum(name, checksums)
+    digest = weights.checksum(name, checksums)
     return digest and digest[:SHOWN]
 
 
@@ -63,16 +81,3 @@ def require_same(recorded: Mapping[str, str | None]) -> None:
                 f"weights of {name}: expected {expected or 'none'}, as when the job was planned, "
                 f"got {present or 'none'}; run the same command again"
             )
-
-
-def missing(config: Config) -> list[str]:
-    """What is said of weights that an edit needs and this machine has not; nothing is downloaded."""
-    from texgs.models.weights import available
-
-    return [
-        f"edit {config.edit.name}: the weights of {name} are not on this machine; "
-        f"`texgs weights {name}` downloads them or says how to get them"
-        + (f", and {word} does without them" if word else "")
-        for name, word in needed(config).items()
-        if not available(name)
-    ]

@@ -36,15 +36,7 @@ class TrackingError(TexgsError, RuntimeError):
 
 
 def connect(uri: str, experiment: str) -> tuple[MlflowClient, str]:
-    """Open a store, and make the experiment where there is none of this name.
-
-    Args:
-        uri: `sqlite:///PATH` for a local file, made where there is none, or the address of a server.
-        experiment: name of the experiment.
-
-    Returns:
-        A client and the experiment's identifier.
-    """
+    """Open a store, made where there is none; return a client and the experiment's identifier."""
     os.environ.update({key: value for key, value in SETTINGS.items() if key not in os.environ})
     import mlflow  # sets the levels of its loggers, so that it comes before they are changed
 
@@ -79,8 +71,7 @@ def path_of(uri: str) -> Path:
 
 def _address(database: Path) -> str:
     """Return the address of a file for MLflow, which takes what follows a "?" for options."""
-    path = str(database)
-    return f"sqlite:///{os.path.relpath(path) if '?' in path else path}"
+    return f"sqlite:///{os.path.relpath(database) if '?' in str(database) else database}"
 
 
 def _prepare(database: Path) -> None:
@@ -115,9 +106,9 @@ def _experiment_id(client: MlflowClient, name: str, location: str | None) -> str
             f"experiment {name!r} was deleted from the tracking store; bring it back with "
             f"`mlflow experiments restore --experiment-id {experiment.experiment_id}`, or choose another name"
         )
-    if experiment is not None and location in (None, experiment.artifact_location):
-        return str(experiment.experiment_id)
     if experiment is not None:
+        if location in (None, experiment.artifact_location):
+            return str(experiment.experiment_id)
         # The store was moved: MLflow keeps absolute addresses, and would go on to write to the old place.
         before = f"{name} {experiment.experiment_id}, before it was moved"
         client.rename_experiment(experiment.experiment_id, before)

@@ -1,9 +1,15 @@
-"""Settings of the fit: phases as data. The names of presets in conf/fit stand in every table."""
+"""The schema of conf/fit and conf/edit: what all fits and edits have, and tables of kinds and methods.
 
+The names of presets in conf/fit stand in every table.
+"""
+
+from collections.abc import Iterable
 from dataclasses import dataclass, make_dataclass
 from typing import Any
 
 from texgs.core.keys import key
+from texgs.edit.keys import EditKeys
+from texgs.edit.method import methods
 from texgs.fit.kinds import fit_specs
 from texgs.fit.settings import Material, Phase, Seeds, TextureKeys
 
@@ -33,13 +39,11 @@ class FitKeys:
     texture: TextureKeys = key(TextureKeys, "phase 3")
 
 
-def _with_kinds() -> Any:
-    """Make the keys of fits of surfels, and a table of keys for each other kind of field."""
-    others = [kind for kind in fit_specs().values() if kind.settings is not None]
-    tables = [(kind.name, kind.settings, key(kind.settings, kind.summary)) for kind in others]
-    return make_dataclass(
-        "Fit", tables, bases=(FitKeys,), frozen=True, namespace={"__doc__": FitKeys.__doc__}
-    )
+def _with_tables(name: str, base: type, owners: Iterable[Any]) -> Any:
+    """Return a dataclass with the keys of another one, and a table of keys for each kind or method."""
+    tables = [(each.name, each.settings, key(each.settings, each.summary)) for each in owners]
+    return make_dataclass(name, tables, bases=(base,), frozen=True, namespace={"__doc__": base.__doc__})
 
 
-Fit = _with_kinds()
+Fit = _with_tables("Fit", FitKeys, (kind for kind in fit_specs().values() if kind.settings is not None))
+Edit = _with_tables("Edit", EditKeys, methods().values())
