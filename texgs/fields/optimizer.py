@@ -26,10 +26,7 @@ class Rate:
 class Optimizer:
     """Parameters by name, each with its own learning rate.
 
-    Args:
-        parameters: become leaves that require a gradient.
-        rates: name to rate; parameters without one are constant.
-        betas: how much moments keep in a step.
+    Parameters become leaves that require a gradient; those without a rate are constant.
     """
 
     def __init__(
@@ -53,12 +50,9 @@ class Optimizer:
         self._adam.zero_grad(set_to_none=True)
 
     def edit_rows(self, n: int, keep: Tensor, added: Mapping[str, Tensor]) -> None:
-        """Keep some of the n surfels and append others, whose moments start at zero.
+        """Keep some [n] bool of the n rows and append others by name, whose moments start at zero.
 
-        Args:
-            n: number of surfels before; parameters of another length are shared and stay.
-            keep: [n] bool.
-            added: rows to append, by name; the same number each.
+        Parameters of another length are shared and stay.
         """
 
         def edited(moment: Tensor) -> Tensor:

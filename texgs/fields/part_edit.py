@@ -43,11 +43,7 @@ class PartEdit:
 
 
 def require_possible(edit: PartEdit, kind: str) -> None:
-    """Require of a kind of field that it can show an edit.
-
-    Raises:
-        ArgumentError: naming the first value that it cannot show, unless the value changes nothing.
-    """
+    """Require of a kind of field that it can show an edit, but for values that change nothing."""
     for each in fields(edit):
         needs = NEEDS.get(each.name, "relight")
         if needs not in kinds()[kind].can and getattr(edit, each.name) != each.default:
@@ -72,11 +68,7 @@ def opacity_factors(edits: Sequence[PartEdit] | None, count: int, kind: str) -> 
 
 
 def color(name: str, value: object) -> tuple[float, float, float]:
-    """Return red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f".
-
-    Raises:
-        ArgumentError: naming the value.
-    """
+    """Return red, green and blue in [0, 1] from a list, or from hexadecimal text such as "#ffd27f"."""
     channels: object = value
     if isinstance(value, str) and len(value) == 7 and value[0] == "#":
         try:

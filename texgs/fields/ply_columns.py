@@ -17,10 +17,7 @@ from texgs.raster.shading import DEGREES
 def splat_columns(p: Mapping[str, Tensor], normals: Tensor, sh: Tensor) -> dict[str, Tensor]:
     """Return [N] values by property, in the order of 2DGS and 3DGS.
 
-    Args:
-        p: raw `means`, `opacities`, `scales` [N, 2 or 3] and `quats`.
-        normals: [N, 3].
-        sh: [N, K, 3]; all but the first become `f_rest`, one channel after the other.
+    Of harmonics [N, K, 3], all but the first become `f_rest`, one channel after the other.
     """
     place = dict(zip("xyz", p["means"].T, strict=True))
     normal = dict(zip(("nx", "ny", "nz"), normals.T, strict=True))

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
 from math import ceil, floor, isfinite
-from typing import Self
+from typing import Any, Protocol, Self
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
+from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import Role
-from texgs.raster import Options
+from texgs.raster import Options, Render, Texture, rasterize
 from texgs.raster.shading import Y00
 from texgs.volume.images import Box, Images, Target
 
@@ -20,11 +21,24 @@ GEOMETRY = ("means", "quats", "scales", "opacities")
 REACH = 3.34  # standard deviations at which opacity 1 has fallen to 1/255, below which nothing is drawn
 
 
+class Shading(Protocol):
+    """What turns raw parameters of surfels or 3D Gaussians into what the rasterizer takes."""
+
+    @property
+    def options(self) -> Options:
+        """For the rasterizer."""
+
+    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
+        """Return colours [N, 3] in a view, or a texture; differentiable."""
+
+
 @dataclass(frozen=True, eq=False)
 class Splats:
-    """Raw parameters by name, all float32 on one device."""
+    """Raw parameters by name, all float32 on one device, and how they are drawn."""
 
     parameters: Mapping[str, Tensor]
+    shading: Shading
+    metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.parameters["means"])
@@ -42,6 +56,30 @@ class Splats:
         """Return the parameters of geometry, or all others, which are of colour, material and texture."""
         is_geometry = role == "geometry"
         return {name: x for name, x in self.parameters.items() if (name in GEOMETRY) == is_geometry}
+
+    def render(
+        self,
+        camera: Camera,
+        light: Light = HEADLIGHT,
+        *,
+        background: Tensor | None = None,
+        outputs: Collection[str] = (),
+        opacity: Tensor | None = None,
+    ) -> Render:
+        """Render one view, see `Field`; `opacity` [N] are factors on opacities, which stay at most 1."""
+        place = geometry(self.parameters)
+        if opacity is not None:
+            place = (*place[:3], (place[3] * opacity).clamp_max(1))
+        colored = self.shading.colors(self.parameters, camera, light)
+        kind = "texture" if isinstance(colored, Texture) else "features"
+        return rasterize(
+            *place,
+            *(camera.viewmat, camera.K, camera.width, camera.height),
+            background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
+            outputs=outputs,
+            options=self.shading.options,
+            **{kind: colored},  # type: ignore[arg-type]
+        )
 
 
 def geometry(parameters: Mapping[str, Tensor]) -> tuple[Tensor, Tensor, Tensor, Tensor]:

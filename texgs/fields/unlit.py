@@ -32,17 +32,7 @@ class UnlitField(ABC):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """Render the field.
-
-        Args:
-            camera: on the field's device.
-            light: changes nothing.
-            background: [3]; white by default.
-            outputs: such as "depth".
-
-        Raises:
-            ArgumentError: for an output that fields of this kind do not have.
-        """
+        """Render one view, see `Field`; light changes nothing."""
         return self.draw(camera, background, outputs)
 
     @abstractmethod
@@ -88,16 +78,7 @@ class UnlitScene(ABC, Generic[F]):
         background: Tensor | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """Render all visible fields.
-
-        Args:
-            camera: on the fields' device.
-            light: changes nothing.
-            edits: one for each field, of opacity and visibility; by default nothing is changed.
-            look: only "shaded".
-            background: [3]; white by default.
-            outputs: that fields of this kind have.
-        """
+        """Render one view, see `Composed`; light changes nothing, and the look is "shaded"."""
         if look != "shaded":
             raise ArgumentError(
                 f"look: expected shaded, got {look}; {self.kind} have light in their colours, fit surfels"

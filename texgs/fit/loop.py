@@ -9,10 +9,10 @@ import torch
 from torch import Tensor
 
 from texgs.fields.optimizer import Optimizer
-from texgs.fields.splats import join, visible_part
+from texgs.fields.splats import Shading, join, visible_part
 from texgs.fit.checkpoint import ResumableFit
 from texgs.fit.densify import DensityControl
-from texgs.fit.losses import Shading, render_view, view_loss
+from texgs.fit.losses import render_view, view_loss
 from texgs.fit.rates import extent, rates
 from texgs.fit.settings import Phase
 from texgs.volume.images import Images

@@ -3,35 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import torch
 from torch import Tensor
 
 from texgs.core.camera import Camera
-from texgs.core.light import Light
-from texgs.fields.splats import geometry
+from texgs.fields.splats import Shading, geometry
 from texgs.fields.surfels.shading import ShadingModel, material
 from texgs.fit.settings import Losses
-from texgs.raster import Options, Render, Texture, rasterize
+from texgs.raster import Render, rasterize
 from texgs.raster.losses import bilateral_smoothness, l1_dssim, normal_consistency, ssim
 from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Target
 
 SMOOTHED = len(MATERIAL)
-
-
-class Shading(Protocol):
-    """What turns raw parameters of surfels or 3D Gaussians into what the rasterizer takes."""
-
-    @property
-    def options(self) -> Options:
-        """For the rasterizer."""
-        ...
-
-    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor | Texture:
-        """Return colours [N, 3] in a view, or a texture; differentiable."""
-        ...
 
 
 def view_loss(

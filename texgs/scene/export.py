@@ -140,7 +140,7 @@ def write_points(path: str | Path, model: Surfels, least_opacity: float = 0.5) -
     from plyfile import PlyData, PlyElement
 
     if model.stage != "surfels":
-        model = joined([Part.of(model)], [PartEdit()])
+        model = joined([Part(model)], [PartEdit()])
     means, _, _, opacities = geometry(model.parameters)
     opaque = opacities >= least_opacity
     if not bool(opaque.any()):

@@ -26,13 +26,7 @@ def write_gaussians(path: str | Path, model: Gaussians) -> Path:
 
     A safetensors file with the raw tensors under their names. Its header has one entry, "texgs-gaussians":
     JSON with `version`, `filter` and `metadata`.
-
-    Args:
-        path: target, by custom `model.safetensors`.
-        model: on any device. Its metadata must be JSON: tuples come back as lists, keys as text.
-
-    Returns:
-        The path.
+    Metadata must be JSON: tuples come back as lists, keys as text.
     """
     with located(path):
         _require_finite_float32(model)

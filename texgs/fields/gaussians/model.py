@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import torch
 from torch import Tensor
@@ -13,12 +13,12 @@ from torch.nn.functional import pad
 from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError, ShapeError
-from texgs.core.light import HEADLIGHT, Light
+from texgs.core.light import Light
 from texgs.fields.field import sizes_in_mib
 from texgs.fields.part_edit import MOST_OPAQUE, PartEdit, opacity_factors
-from texgs.fields.splats import Splats, geometry
-from texgs.fields.unlit import UnlitField, UnlitScene
-from texgs.raster import Options, Render, rasterize
+from texgs.fields.splats import Splats
+from texgs.fields.unlit import UnlitScene
+from texgs.raster import Options, Render
 from texgs.raster.shading import DEGREES, spherical_harmonics
 
 SHAPES = {"means": "N 3", "quats": "N 4", "scales": "N 3", "opacities": "N", "sh": "N K 3"}
@@ -37,13 +37,13 @@ class Baked:
         """For the rasterizer."""
         return Options(antialiased=self.antialiased)
 
-    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light = HEADLIGHT) -> Tensor:
+    def colors(self, parameters: Mapping[str, Tensor], camera: Camera, light: Light) -> Tensor:
         """Return colours [N, 3] in a view, whatever the light; differentiable."""
         return spherical_harmonics(parameters["sh"], parameters["means"], camera.position)
 
 
 @dataclass(frozen=True, eq=False)
-class Gaussians(Splats, UnlitField):
+class Gaussians(Splats):
     """Raw parameters by name, as 3DGS has them, all float32 on one device.
 
     `means` [N, 3] world units, `quats` [N, 4] wxyz of any length, `scales` [N, 3] natural logarithm,
@@ -56,7 +56,6 @@ class Gaussians(Splats, UnlitField):
     kind: ClassVar[str] = "gaussians"
 
     shading: Baked = field(default_factory=Baked)
-    metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if set(self.parameters) != set(SHAPES):
@@ -75,30 +74,6 @@ class Gaussians(Splats, UnlitField):
         return sizes_in_mib(
             {"geometry": PLY_GEOMETRY * len(self), "shading": PLY_SHADING * len(self), "texture": 0},
             {"geometry": n_geometry, "shading": n_shading, "texture": 0},
-        )
-
-    def draw(
-        self,
-        camera: Camera,
-        background: Tensor | None,
-        outputs: Collection[str],
-        opacity: Tensor | float = 1.0,
-    ) -> Render:
-        """Render the Gaussians; `opacity`, one or [N], is a factor on opacities, which stay at most 1."""
-        means, quats, scales, opacities = geometry(self.parameters)
-        return rasterize(
-            means,
-            quats,
-            scales,
-            (opacities * opacity).clamp_max(1),
-            camera.viewmat,
-            camera.K,
-            camera.width,
-            camera.height,
-            features=self.shading.colors(self.parameters, camera),
-            background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
-            outputs=outputs,
-            options=self.shading.options,
         )
 
 
@@ -120,7 +95,8 @@ class JoinedGaussians(UnlitScene[Gaussians]):
     def _blend(
         self, factors: Sequence[float], camera: Camera, background: Tensor | None, outputs: Collection[str]
     ) -> Render:
-        return self.whole.draw(camera, background, outputs, self._per_gaussian(factors))
+        opacity = self._per_gaussian(factors)
+        return self.whole.render(camera, background=background, outputs=outputs, opacity=opacity)
 
     def edited(self, edits: Sequence[PartEdit]) -> Gaussians:
         """Return what is visible as one model, opacities as edited.

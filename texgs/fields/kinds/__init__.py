@@ -39,18 +39,12 @@ class Kind:
     """One kind of field. Its module imports nothing heavy before `functions` is called."""
 
     name: str
-    formats: tuple[str, ...]
-    """Entries of headers by which its files are known."""
-    can: frozenset[Capability]
-    """What edits may do with it."""
-    functions: Callable[[], Functions]
-    """Imports what reads, writes and composes it."""
-    exports: tuple[str, ...] = ()
-    """What `texgs export` writes of it."""
-    depth: Literal["", "median", "depth"] = ""
-    """Which of its outputs meshes are made of; empty where it has neither."""
-    film_size: int = 320
-    """Pixels of a side of its films of edits; fewer where a frame takes seconds."""
+    formats: tuple[str, ...]  # entries of headers by which its files are known
+    can: frozenset[Capability]  # what edits may do with it
+    functions: Callable[[], Functions]  # imports what reads, writes and composes it
+    exports: tuple[str, ...] = ()  # what `texgs export` writes of it
+    depth: Literal["", "median", "depth"] = ""  # which of its outputs meshes are made of, if it has one
+    film_size: int = 320  # pixels of a side of its films of edits; fewer where a frame takes seconds
 
     @property
     def module(self) -> str:

@@ -3,8 +3,6 @@
 Lighting is baked into their colours, so that edits can change their opacity but not their light or palette.
 """
 
-from __future__ import annotations
-
 from texgs.fields.kinds import Functions, Kind
 
 

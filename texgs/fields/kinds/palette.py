@@ -1,7 +1,5 @@
 """Small networks whose colours are mixtures of a palette: what StyleRF-VolVis builds on."""
 
-from __future__ import annotations
-
 from texgs.fields.kinds import Functions, Kind
 
 

@@ -1,7 +1,5 @@
 """Textured 2D Gaussians: what the paper is about. All edits work on them."""
 
-from __future__ import annotations
-
 from texgs.fields.kinds import ALL, Functions, Kind
 
 

@@ -1,7 +1,5 @@
 """Sparse grids of voxels (Plenoxels): what ARF and Instruct-NeRF2NeRF build on."""
 
-from __future__ import annotations
-
 from texgs.fields.kinds import Functions, Kind
 
 

@@ -26,12 +26,7 @@ GRID = ("masks", "density")  # its tensors, before networks
 
 
 def write_palette(path: str | Path, field: PaletteField) -> Path:
-    """Create or replace a file of a palette field in one step; the same field gives the same bytes.
-
-    Args:
-        path: target.
-        field: to write. Its metadata must be JSON.
-    """
+    """Create or replace a file of a palette field in one step; its metadata must be JSON."""
     geometry = field.geometry
     networks = {name: x.detach().contiguous() for name, x in field.parameters.items()}
     check.finite(**networks)

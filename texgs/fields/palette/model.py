@@ -51,11 +51,7 @@ class PaletteField(UnlitField):
         return self.parameters["palette.colors"]
 
     def to(self, device: torch.device | str) -> PaletteField:
-        """Return the same field, which is rendered on the CPU alone.
-
-        Raises:
-            DeviceError: for another device.
-        """
+        """Return the same field, which is rendered on the CPU alone."""
         if torch.device(device).type != "cpu":
             raise DeviceError(f"device: expected cpu, got {device}; palette fields are rendered on the CPU")
         return self
@@ -70,9 +66,7 @@ class PaletteField(UnlitField):
     def color(self, points: Points, harmonics: Tensor) -> Tensor:
         """Return colours [n, 3] of points: free ones or else those of the palette, and light.
 
-        Args:
-            points: in the unit cube, with their features.
-            harmonics: [n, 16] of the directions of their rays.
+        `harmonics` [n, 16] are those of the directions of their rays.
         """
         parameters, levels = self.parameters, self.geometry.levels
         lit = light(points.features, harmonics, parameters)

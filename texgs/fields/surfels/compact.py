@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import lzma
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,7 +24,7 @@ from texgs.core.ply_file import is_ply
 from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.model_file import describe, model_of, read_model
 from texgs.fields.surfels.ply import read_ply
-from texgs.fields.surfels.texels import mean_texels, offsets_of, owners
+from texgs.fields.surfels.texels import mean_texels, offsets_of, owners, with_first_texels
 
 FORMAT = "texgs-compact"
 VERSION = 1
@@ -86,12 +87,10 @@ def open_model(path: str | Path) -> Surfels:
     path = Path(path)
     if is_ply(path):
         return read_ply(path)
-    try:
-        with path.open("rb") as file:
-            is_compact = file.read(len(MAGIC)) == MAGIC
-    except OSError:
-        is_compact = False  # the reader says what is wrong
-    return read_compact(path) if is_compact else read_model(path)
+    with suppress(OSError), path.open("rb") as file:  # the reader says what is wrong
+        is_compact = file.read(len(MAGIC)) == MAGIC
+        return read_compact(path) if is_compact else read_model(path)
+    return read_model(path)
 
 
 @torch.no_grad()
@@ -125,15 +124,9 @@ def _without_unseen(model: Surfels, seen: Tensor) -> Surfels:
         raise ArgumentError(f"seen: expected bool, got {seen.dtype}; compare it with a threshold")
     if model.stage != "texture":
         return model
-    p = model.parameters
-    place, surfel = owners(p)
-    first = offsets_of(p["sizes"])  # [N]
-    texels, kept = p["texels"][place], seen[surfel]
-    texels[first[~seen]] = mean_texels(p)[~seen].to(texels)
-    kept[first] = True
-    sizes = torch.where(seen[:, None], p["sizes"], 1)
-    texture = {"texels": texels[kept], "sizes": sizes, "offsets": offsets_of(sizes)}
-    return replace(model, parameters={**p, **texture})
+    p, texels = model.parameters, model.parameters["texels"].clone()
+    texels[p["offsets"][~seen]] = mean_texels(p)[~seen].to(texels)
+    return with_first_texels(replace(model, parameters={**p, "texels": texels}), seen)
 
 
 def _rounded(name: str, values: Tensor) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from itertools import accumulate
 from math import log, sqrt
@@ -36,42 +36,24 @@ class Edited:
     opacities: Tensor  # [N]
 
 
-@dataclass(frozen=True, eq=False)
 class Part:
-    """What edits and lights change of one model, ready for use.
+    """What edits and lights change of one relightable model, ready for use.
 
-    Its methods take the edit of what no segment holds, and one for each segment behind it.
+    Masks [N] bool are those of its segments. Methods take the edit of what no segment holds, and one for each
+    segment behind it.
     """
 
-    model: Surfels
-    colors: Tensor  # [N, 3] offsets from the palette
-    palette: Tensor | None  # [3]; None without texture
-    material: Mapping[str, Tensor]  # factors, [N] or [1]
-    opacities: Tensor  # [N]
-    segments: int = 0
-    labels: Tensor | None = None  # [N] number of the segment, 0 for none; None without segments
-
-    @classmethod
-    def of(cls, model: Surfels, masks: Sequence[Tensor] = ()) -> Part:
-        """Return the part of a relightable model.
-
-        Args:
-            model: of stage shading or texture.
-            masks: [N] bool of its segments; of two that overlap, the first has the surfel.
-
-        Raises:
-            ArgumentError, ShapeError: if the model has no shading yet, or a mask is not one of it.
-        """
+    def __init__(self, model: Surfels, masks: Sequence[Tensor] = ()) -> None:
         if model.stage == "surfels":
             raise ArgumentError(
                 "model: expected stage shading or texture, got surfels; fit its shading first"
             )
         p = model.parameters
-        factors = material(p, model.shading.material)
-        labels = labels_of(masks, len(model)) if masks else None
-        return cls(
-            model, p["colors"], p.get("palette"), factors, p["opacities"].sigmoid(), len(masks), labels
-        )
+        self.model, self.segments = model, len(masks)
+        self.colors, self.palette = p["colors"], p.get("palette")  # offsets from a palette, if there is one
+        self.material = material(p, model.shading.material)  # factors, [N] or [1]
+        self.opacities = p["opacities"].sigmoid()
+        self.labels = labels_of(masks, len(model)) if masks else None  # [N] number of the segment, or 0
 
     def per_surfel(self, values: Sequence[float]) -> float | Tensor:
         """Return the value of each surfel's edit [N]; a plain number where all are the same."""
@@ -143,7 +125,7 @@ class Composition:
                 f"models: expected one low_pass, got {' and '.join(map(str, passes))}; fit them by one recipe"
             )
         masks = [()] * len(models) if segments is None else segments
-        self.parts = [Part.of(model, own) for model, own in zip(models, masks, strict=True)]
+        self.parts = [Part(model, own) for model, own in zip(models, masks, strict=True)]
         self.options = models[0].shading.options
         geometries = [geometry(model.parameters)[:3] for model in models]
         self.means, self.quats, self.scales = (torch.cat(x) for x in zip(*geometries, strict=True))
@@ -175,21 +157,7 @@ class Composition:
         background: Tensor | None = None,
         outputs: Collection[str] = (),
     ) -> Render:
-        """Render all visible models.
-
-        Args:
-            camera: on the models' device.
-            light: shines on all models.
-            edits: one for each model, and behind it one for each of its segments; by default nothing is
-                changed.
-            look: what colour shows: with light; without; texels alone, around grey; surfels as opaque discs
-                of one standard deviation, with light and without texels; or one factor of the material.
-            background: [3]; white by default, for a factor black.
-            outputs: of the rasterizer.
-
-        Raises:
-            ArgumentError: if there are not as many edits as models and segments, or one cannot be applied.
-        """
+        """Render one view, see `Composed`."""
         if look not in get_args(Look):
             raise ArgumentError(f"look: expected one of {', '.join(get_args(Look))}, got {look}")
         edited, opacities = self._edited(edits)
@@ -201,14 +169,8 @@ class Composition:
         if look == "discs":
             scales, opacities = NARROW * scales, torch.where(opacities > 0, DISC, 0.0)
         return rasterize(
-            self.means,
-            self.quats,
-            scales,
-            opacities,
-            camera.viewmat,
-            camera.K,
-            camera.width,
-            camera.height,
+            *(self.means, self.quats, scales, opacities),
+            *(camera.viewmat, camera.K, camera.width, camera.height),
             texture=Texture(base, gain, self.texels, self.sizes, self.offsets),
             background=background,
             outputs=outputs,

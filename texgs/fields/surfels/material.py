@@ -5,22 +5,13 @@ from collections.abc import Mapping
 from texgs.core.errors import ArgumentError
 
 RANGES = {  # that factors can be in, by the range of materials, see `fit.material_range`; others have none
-    "bounded": {
-        "ambient": (0.0, 1.0),
-        "diffuse": (0.0, 1.0),
-        "specular": (0.0, 1.0),
-        "shininess": (1.0, 100.0),
-    },
+    "bounded": dict.fromkeys(("ambient", "diffuse", "specular"), (0.0, 1.0)) | {"shininess": (1.0, 100.0)},
     "paper": {"specular": (0.0, 5.0), "shininess": (0.0, 50.0)},  # those of the release
 }
 
 
 def require_material(factors: Mapping[str, float], kind: str) -> None:
-    """Require factors that a range of materials can express.
-
-    Raises:
-        ArgumentError: naming the first that it cannot.
-    """
+    """Require factors that a range of materials can express."""
     for name, (low, high) in RANGES[kind].items():
         if not low < factors[name] < high:
             raise ArgumentError(

@@ -2,35 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
-
-import torch
-from torch import Tensor
+from typing import ClassVar, Literal
 
 from texgs.core import check
-from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
-from texgs.core.light import HEADLIGHT, Light
 from texgs.fields.field import sizes_in_mib
-from texgs.fields.splats import GEOMETRY, Splats, geometry
+from texgs.fields.splats import GEOMETRY, Splats
 from texgs.fields.surfels.shading import ShadingModel
-from texgs.raster import Render, Texture, rasterize
 from texgs.raster.shading import MATERIAL
 
-SHAPES = {
-    "means": "N 3",
-    "quats": "N 4",
-    "scales": "N 2",
-    "opacities": "N",
-    "sh": "N K 3",
-    "colors": "N 3",
-    "palette": "3",
-    "texels": "T 3",
-    "sizes": "N 2",
-    "offsets": "N",
-}
+SHAPES = {"means": "N 3", "quats": "N 4", "scales": "N 2", "opacities": "N", "sh": "N K 3", "colors": "N 3"}
+SHAPES |= {"palette": "3", "texels": "T 3", "sizes": "N 2", "offsets": "N"}
 TEXTURE = ("palette", "texels", "sizes", "offsets")
 # What the paper counts, and what we store; every tensor of a model is in one group.
 COUNTED = {"geometry": GEOMETRY, "shading": MATERIAL, "texture": ("texels",)}
@@ -56,7 +39,6 @@ class Surfels(Splats):
     kind: ClassVar[str] = "surfels"
 
     shading: ShadingModel = field(default_factory=ShadingModel)
-    metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         given = self.parameters
@@ -96,33 +78,3 @@ class Surfels(Splats):
         if "texels" in self.parameters:
             return "texture"
         return "shading" if "ambient" in self.parameters else "surfels"
-
-    def render(
-        self,
-        camera: Camera,
-        light: Light = HEADLIGHT,
-        *,
-        background: Tensor | None = None,
-        outputs: Collection[str] = (),
-    ) -> Render:
-        """Render the surfels.
-
-        Args:
-            camera: on the model's device.
-            light: shines on the surfels; before the shading phase, their colours are spherical harmonics.
-            background: [3]; white by default.
-            outputs: of the rasterizer.
-        """
-        colored = self.shading.colors(self.parameters, camera, light)
-        kind = "texture" if isinstance(colored, Texture) else "features"
-        return rasterize(
-            *geometry(self.parameters),
-            camera.viewmat,
-            camera.K,
-            camera.width,
-            camera.height,
-            background=torch.ones_like(camera.viewmat[0, :3]) if background is None else background,
-            outputs=outputs,
-            options=self.shading.options,
-            **{kind: colored},  # type: ignore[arg-type]
-        )

@@ -39,9 +39,6 @@ def write_model(path: str | Path, model: Surfels) -> Path:
         path: target, by custom `model.safetensors`.
         model: any stage, on any device. Its metadata must be JSON: tuples come back as lists, keys as text.
 
-    Returns:
-        The path.
-
     Raises:
         ArgumentError, ShapeError: if the model could not be read back (a tensor is missing, unknown, not
             finite or of another type, textures overlap, metadata is no JSON), or the file cannot be written.

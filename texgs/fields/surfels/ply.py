@@ -60,14 +60,6 @@ def write_ply(path: str | Path, model: Surfels, flavour: str = "2dgs") -> Path:
       `diffuse_factor`, `shininess`, `ambient_factor`, `specular_factor` under its activations. It clamps the
       coloured and the white part of its shading one by one, so that it may render less light.
 
-    Args:
-        path: target.
-        model: any stage, on any device.
-        flavour: one of the above.
-
-    Returns:
-        The path.
-
     Raises:
         ArgumentError: if the flavour is unknown or cannot express the model, a value is not finite, or the
             file cannot be written.

@@ -67,11 +67,7 @@ def between(low: float, high: float, raw: Tensor) -> Tensor:
 def raw_material(
     ambient: float, diffuse: float, specular: float, shininess: float, kind: str
 ) -> dict[str, Tensor]:
-    """Invert `material` for one material, [1] each.
-
-    Raises:
-        ArgumentError: if a factor is outside what the kind can express.
-    """
+    """Invert `material` for one material, [1] each, whose factors the kind must be able to express."""
     factors = dict(zip(MATERIAL, (ambient, diffuse, specular, shininess), strict=True))
     require_material(factors, kind)
     raw = {name: torch.tensor([factor]) for name, factor in factors.items()}

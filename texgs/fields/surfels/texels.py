@@ -37,11 +37,7 @@ def mean_texels(parameters: Mapping[str, Tensor]) -> Tensor:
 
 
 def footprint(sizes: Tensor) -> Tensor:
-    """Return the share [T] of each texel in its surfel, which falls off like the Gaussian.
-
-    Args:
-        sizes: texels along u and v [N, 2], one surfel after the other.
-    """
+    """Return the share [T] of each texel in its surfel, in their order, which falls off like the Gaussian."""
     owner = torch.repeat_interleave(sizes.long().prod(dim=1))  # [T]
     place = torch.arange(len(owner), device=owner.device) - offsets_of(sizes)[owner]
     columns, rows = sizes.long().unbind(dim=1)
@@ -67,17 +63,22 @@ def lean(field: Field) -> Field:
     """Give surfels whose texels are all the same one: they look as before. Other fields stay as they are."""
     if not isinstance(field, Surfels) or field.stage != "texture":
         return field
-    p = field.parameters
+    place, surfel = owners(field.parameters)
+    texels = field.parameters["texels"][place]
+    differs = (texels != texels[offsets_of(field.parameters["sizes"])[surfel]]).any(1)
+    is_whole = torch.zeros(len(field), dtype=torch.bool, device=place.device)
+    return with_first_texels(field, is_whole.index_fill_(0, surfel[differs], True))
+
+
+def with_first_texels(model: Surfels, whole: Tensor) -> Surfels:
+    """Leave the first texel alone to surfels that are not whole [N] bool; textures come in their order."""
+    p = model.parameters
     place, surfel = owners(p)
-    first = offsets_of(p["sizes"])  # [N] in the order of surfels
-    texels = p["texels"][place]
-    differs = (texels != texels[first[surfel]]).any(1)
-    is_plain = torch.ones_like(first, dtype=torch.bool).index_fill_(0, surfel[differs], False)
-    kept = ~is_plain[surfel]
-    kept[first] = True
-    sizes = torch.where(is_plain[:, None], 1, p["sizes"])
-    texture = {"texels": texels[kept], "sizes": sizes, "offsets": offsets_of(sizes).to(p["offsets"])}
-    return replace(field, parameters={**p, **texture})
+    kept = whole[surfel]
+    kept[offsets_of(p["sizes"])] = True
+    sizes = torch.where(whole[:, None], p["sizes"], 1)
+    texture = {"texels": p["texels"][place[kept]], "sizes": sizes, "offsets": offsets_of(sizes)}
+    return replace(model, parameters={**p, **texture})
 
 
 def bare_colors(model: Surfels) -> Tensor:
@@ -95,10 +96,8 @@ def recolored(model: Surfels, colors: Tensor, surfels: Tensor | None = None) -> 
     Highlights are added to the colour of a surfel and clamped before its texels are: the mean has to be in
     that colour, or highlights would take on the hue that the surfel had before.
 
-    Args:
-        model: textured.
-        colors: [T, 3] bare colours of all texels, in their places in the list.
-        surfels: [N] bool, which change; all by default.
+    Colors [T, 3] are bare ones of all texels, in their places in the list; surfels [N] bool are those that
+    change, by default all.
     """
     p = model.parameters
     place, surfel = owners(p)

@@ -23,13 +23,7 @@ VERSION = 1
 def write_texture(path: str | Path, model: Surfels, metadata: Mapping[str, Any] | None = None) -> Path:
     """Write texels and colours of a model, with the sizes of its textures to know it by, in one step.
 
-    Args:
-        path: target.
-        model: textured.
-        metadata: JSON, such as what the style is.
-
-    Raises:
-        ArgumentError: if the model has no texture, metadata is no JSON, or the file cannot be written.
+    Metadata are JSON, such as what the style is.
     """
     if model.stage != "texture":
         raise ArgumentError(f"{path}: expected a model of stage texture, got {model.stage}")
@@ -70,13 +64,6 @@ def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
     """Return the number of each surfel's segment [N], int64, counted from 1; 0 where no segment holds it.
 
     A surfel that several masks hold belongs to the first: later segments get what earlier ones left.
-
-    Args:
-        masks: [N] bool of each segment, at least one.
-        n: surfels of the model.
-
-    Raises:
-        ArgumentError, ShapeError: if a mask is not [N] bool.
     """
     labels = torch.zeros(n, dtype=torch.int64, device=masks[0].device)
     for number, mask in reversed(list(enumerate(masks, start=1))):
@@ -90,14 +77,12 @@ def labels_of(masks: Sequence[Tensor], n: int) -> Tensor:
 def with_variants(model: Surfels, labels: Tensor, variants: Sequence[Surfels]) -> Surfels:
     """Return the model with the texture of each segment taken from its own variant of the model.
 
-    Args:
-        model: textured; what no segment holds stays as it is here.
-        labels: [N], see `labels_of`.
-        variants: of each segment the model with other texels and colours (offsets from the palette), laid out
-            alike; with the same tensors as the model's nothing changes.
+    What no segment holds stays as it is. The model itself is returned where nothing changes.
 
-    Returns:
-        The model itself where nothing changes, else one with new texels and colours.
+    Args:
+        model: textured.
+        labels: [N], see `labels_of`.
+        variants: of each segment the model with other texels and colours, laid out alike.
     """
     p = model.parameters
     places, surfel = owners(p)

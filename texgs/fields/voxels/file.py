@@ -24,12 +24,7 @@ COEFFICIENTS = {1: 0, 4: 1, 9: 2}  # degrees by number of coefficients
 
 
 def write_voxels(path: str | Path, field: Voxels) -> Path:
-    """Create or replace a file of voxels in one step; the same grid gives the same bytes.
-
-    Args:
-        path: target.
-        field: to write. Its metadata must be JSON.
-    """
+    """Create or replace a file of voxels in one step; its metadata must be JSON."""
     density, sh = unpack_rows(field.grid.rows.detach())
     check.finite(density=density, sh=sh)
     tensors = {"masks": field.grid.masks, "density": density.contiguous(), "sh": sh.contiguous()}

@@ -39,11 +39,7 @@ class TrainingRays:
 
 
 def training_rays(images: Images) -> TrainingRays:
-    """Return rays through the pixels of all views that show something, or are next to it.
-
-    Raises:
-        ArgumentError: if no view shows anything.
-    """
+    """Return rays through the pixels of all views that show something, or are next to it."""
     width, height = images.size
     order = curve(width, height)
     directions, views, colors = [], [], []
