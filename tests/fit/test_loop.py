@@ -9,7 +9,7 @@ from texgs.fields.surfels.model import Surfels
 from texgs.fields.surfels.shading import raw_material
 from texgs.fit import checkpoint
 from texgs.fit.checkpoint import CHECKED_EVERY
-from texgs.fit.rates import extent
+from texgs.fit.loop import extent
 from texgs.fit.seeds import seed_surfels
 from texgs.fit.settings import Densify, Losses, Rates, Seeds
 from texgs.metrics.quality import evaluate, mean

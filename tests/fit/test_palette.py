@@ -14,9 +14,8 @@ from texgs.fit import checkpoint
 from texgs.fit.checkpoint import run_to_end
 from texgs.fit.kinds.palette import HashKeys, PaletteKeys
 from texgs.fit.kinds.voxels import Decay, GridStage, VoxelKeys
-from texgs.fit.palette import PaletteFit
+from texgs.fit.palette import PaletteFit, base_loss
 from texgs.fit.palette_colors import object_palette
-from texgs.fit.palette_losses import base_loss
 from texgs.metrics.quality import psnr
 
 VOXELS = VoxelKeys(

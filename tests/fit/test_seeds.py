@@ -210,7 +210,7 @@ def test_mistakes_in_points_are_named(tmp_path):
     with pytest.raises(ArgumentError, match=r"points3d\.ply: expected a whole PLY file"):
         seeds(tmp_path)
     write_ply(path, {name: column for name, column in xyz().items() if name != "z"})
-    with pytest.raises(ArgumentError, match="expected vertices with x, y and z, found no z"):
+    with pytest.raises(ArgumentError, match="points3d.ply: expected vertices with a number z each, got x, y"):
         seeds(tmp_path)
     write_ply(path, {**xyz(), "x": ("float", ["nan"] * 5)})
     with pytest.raises(ArgumentError, match="expected finite x, y and z"):

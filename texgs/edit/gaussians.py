@@ -17,7 +17,7 @@ from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.optimizer import Optimizer
 from texgs.fields.splats import GEOMETRY, join, split
-from texgs.fit.rates import extent, rates
+from texgs.fit.loop import extent, rates
 from texgs.fit.settings import CommonRates, Rates
 from texgs.models.vgg import Vgg
 from texgs.volume.images import Images

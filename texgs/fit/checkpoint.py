@@ -87,11 +87,6 @@ def run_to_end(fit: ResumableFit, folder: Path, title: str) -> float:
     An interruption loses half a minute at most. Whoever has written the result removes the checkpoint, see
     `discard`.
 
-    Args:
-        fit: at its start.
-        folder: of checkpoints.
-        title: of the progress bar.
-
     Raises:
         FitError: if the loss or a parameter is no longer finite.
         ArgumentError: if the checkpoint cannot be read, or none be written.
@@ -130,10 +125,6 @@ def _tell(fit: ResumableFit, n_told: int) -> int:
 
 def save(folder: str | Path, fit: ResumableFit) -> Path:
     """Write the state of a fit, and return the file; the one before stays until this one is complete.
-
-    Args:
-        folder: of the run, created where missing; it holds one checkpoint.
-        fit: between two iterations.
 
     Raises:
         FitError: if a value is NaN or infinite; the last good checkpoint stays.

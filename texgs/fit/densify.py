@@ -21,13 +21,9 @@ def is_shared(name: str, values: Tensor) -> bool:
 
 
 class DensityControl:
-    """Statistics since the last step, and the steps (Kerbl et al. 2023, section 5, as in 2DGS).
+    """Statistics of n surfels or Gaussians since the last step, and the steps.
 
-    Args:
-        settings: when and how.
-        n: number of surfels or Gaussians.
-        extent: radius of the cameras, world units.
-        device: of the surfels.
+    As Kerbl et al. 2023, section 5, and 2DGS have them; `extent` is the radius of the cameras, world units.
     """
 
     def __init__(self, settings: Densify, n: int, extent: float, device: torch.device) -> None:

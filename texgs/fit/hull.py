@@ -20,10 +20,9 @@ Box = tuple[Tensor, Tensor]  # lowest and highest corner [3]
 
 
 def hull_points(images: Images, box: Box, count: int, generator: torch.Generator) -> Tensor:
-    """Draw random points of the box that project onto something visible in every view.
+    """Draw random points [count, 3] of the box that project onto something visible in every view.
 
-    Returns:
-        [count, 3] in world units, or fewer where the hull is but a tiny part of the box.
+    There are fewer where the hull is but a tiny part of the box.
     """
     inside: list[Tensor] = []
     for _ in range(ROUNDS):

@@ -3,30 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import torch
 from torch import Tensor
 
-from texgs.fields.optimizer import Optimizer
+from texgs.core.camera import Camera
+from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.splats import Shading, join, visible_part
 from texgs.fit.checkpoint import ResumableFit
 from texgs.fit.densify import DensityControl
 from texgs.fit.losses import render_view, view_loss
-from texgs.fit.rates import extent, rates
-from texgs.fit.settings import Phase
+from texgs.fit.settings import Phase, Rates
+from texgs.raster.shading import MATERIAL
 from texgs.volume.images import Images
+
+USUAL_DISTANCE = 4.0  # of cameras, in radii of the object
+SMALLEST = 1e-3  # distance, world units
 
 
 class Fit(ResumableFit):
-    """One phase of surfels or 3D Gaussians on one set of views.
+    """One phase of surfels or 3D Gaussians, from raw parameters, on training views.
 
-    Args:
-        parameters: raw, where the phase starts.
-        shading: of the model.
-        images: training views.
-        phase: what to do.
-        seed: of the order of views and of splits; with the same one, machine and versions results are equal.
+    With the same seed of the order of views and of splits, machine and versions results are equal.
     """
 
     unit = "view"
@@ -101,3 +100,28 @@ class Fit(ResumableFit):
         device = self.parameters["means"].device
         self.control.gradients = state["control.gradients"].to(device, copy=True)
         self.control.counts = state["control.counts"].to(device, copy=True)
+
+
+def extent(cameras: Sequence[Camera], means: Tensor) -> float:
+    """Return the length that rates of means, and sizes of density control, refer to.
+
+    1.1 times the largest distance of a camera from the cameras' mean. One camera, or some inside of the
+    object, have none to speak of: they count as far away as an object is usually seen from.
+    """
+    around = spread(torch.stack([camera.position for camera in cameras]))
+    radius = spread(means)
+    return 1.1 * max(around if around > radius else USUAL_DISTANCE * radius, SMALLEST)
+
+
+def spread(points: Tensor) -> float:
+    """Return the largest distance of points [N, 3] from their mean; 0 for none."""
+    return float((points - points.mean(dim=0)).norm(dim=1).max()) if len(points) else 0.0
+
+
+def rates(names: Iterable[str], r: Rates, size: float) -> dict[str, Rate]:
+    """Return the rate of each parameter that learns; `size` is the extent of the cameras."""
+    starts = {"quats": r.quats, "scales": r.scales, "opacities": r.opacities, "colors": r.colors}
+    starts |= {"sh": r.sh, "sh_rest": r.sh_rest, **dict.fromkeys(MATERIAL, r.material)}
+    chosen = {name: Rate(starts[name], r.final) for name in names if name in starts}
+    chosen["means"] = Rate(size * r.means, r.means_final)
+    return {name: rate for name, rate in chosen.items() if rate.start > 0}

@@ -57,8 +57,8 @@ def view_loss(
     if weights.alpha > 0:
         loss = loss + weights.alpha * alpha_loss(render.alpha, target.alpha, weights)
     if has_normals:
-        drawn = (render.normal, render.depth, render.alpha)
-        loss = loss + weights.normal * normal_consistency(*drawn, camera.viewmat, camera.K)  # type: ignore[arg-type]
+        drawn = cast(tuple[Tensor, Tensor, Tensor], (render.normal, render.depth, render.alpha))
+        loss = loss + weights.normal * normal_consistency(*drawn, camera.viewmat, camera.K)
     if attributes:
         smoothness = bilateral_smoothness(attributes[0], target.color, target.alpha)
         loss = loss + weights.smoothness * SMOOTHED * smoothness

@@ -14,12 +14,11 @@ from torch import Tensor
 
 from texgs.fields.optimizer import Optimizer, Rate
 from texgs.fields.palette.model import PaletteField
-from texgs.fields.palette.networks import new_networks
-from texgs.fields.palette.rendering import Geometry
+from texgs.fields.palette.networks import Parameters, base_color, density, light, new_networks, palette_color
+from texgs.fields.palette.rendering import Geometry, Shown, blending_weights, points_on, shown, view_harmonics
 from texgs.fit.checkpoint import ResumableFit
 from texgs.fit.kinds.palette import PaletteKeys
 from texgs.fit.palette_colors import object_palette
-from texgs.fit.palette_losses import base_loss, grid_loss, palette_loss
 from texgs.fit.voxels import VoxelFit
 from texgs.raster.hash_encoding import HashLevels
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, voxel_grid
@@ -30,6 +29,7 @@ BETAS = (0.9, 0.99)  # of Adam
 MIXED = ("palette", "mixture", "trunk", "light")  # networks that learn in the last part
 TRUSTED = 0.5  # of the grid's densities, for where rays may end
 LEAST_DENSITY = 0.1  # of its voxels, so that points of rays are there
+SEEDS = 16_384  # of these voxels, in a step in which density learns that of the grid
 
 
 @dataclass(frozen=True)
@@ -43,15 +43,9 @@ class Part:
 
 
 class PaletteFit(ResumableFit):
-    """Networks on one set of views.
+    """Networks on training views with alpha, over white.
 
-    Args:
-        images: training views with alpha, over white.
-        settings: what to do.
-        seed: of the start and of rays; with the same one, machine and versions results are equal.
-
-    Raises:
-        ArgumentError: if settings do not fit each other, or the views show nothing.
+    With the same seed of the start and of rays, machine and versions results are equal.
     """
 
     def __init__(self, images: Images, settings: PaletteKeys, seed: int = 0) -> None:
@@ -124,7 +118,9 @@ class PaletteFit(ResumableFit):
         """Compute what a part makes small, and what of it is reported, of random voxels or rays."""
         s, networks = self.settings, self.parameters
         if "trunk" not in part.networks:
-            loss = grid_loss(self.seeds, self.geometry, networks, self.generator)
+            drawn = torch.randint(len(self.seeds), (SEEDS,), generator=self.generator)
+            sigma, _ = density(self.seeds[drawn], networks, self.levels)
+            loss = (sigma.log() - self.geometry.grid.density[1:][drawn].log()).square().mean()
             return loss, loss
         rays, target = self.rays.draw(s.rays, NEIGHBOURS, self.generator)
         if "base" in part.networks:
@@ -162,3 +158,50 @@ def places(fit: VoxelFit, levels: HashLevels, step: float) -> Geometry:
 def _under(prefix: str, state: Mapping[str, Tensor]) -> dict[str, Tensor]:
     """Return values whose names have a prefix, without it."""
     return {name.removeprefix(prefix): x for name, x in state.items() if name.startswith(prefix)}
+
+
+def base_loss(
+    rays: Tensor, target: Tensor, geometry: Geometry, parameters: Parameters, weight_min: float
+) -> Tensor:
+    """Compute the mean squared error [] of rays [N, 6] with density and base colour over white.
+
+    All points are looked at, and those with a weight above `weight_min` learn.
+    """
+    with torch.no_grad():
+        points = points_on(rays, geometry, parameters)
+        chosen = shown(points, weight_min).chosen.nonzero()[:, 0]
+    sigma, features = density(points.at[chosen], parameters, geometry.levels)
+    depth = points.depth.index_copy(0, chosen, geometry.length * sigma)
+    weights = blending_weights(depth, points.ray)[chosen]
+    shows = Shown(points.take(chosen), weights, chosen)
+    color = base_color(features, view_harmonics(rays)[shows.points.ray], parameters)
+    return error_over_white(shows, color, target)
+
+
+def palette_loss(
+    rays: Tensor,
+    target: Tensor,
+    geometry: Geometry,
+    parameters: Parameters,
+    start: Tensor,
+    settings: PaletteKeys,
+) -> tuple[Tensor, Tensor]:
+    """Compute the loss [] of rays [N, 6] with palette colours and light, and the mean squared error in it.
+
+    Offsets of colours are held down, and the palette stays near its start [P, 3].
+    """
+    with torch.no_grad():
+        shows = shown(points_on(rays, geometry, parameters), settings.weight_min)
+    mixed = palette_color(shows.points.at, parameters, geometry.levels)
+    lit = light(shows.points.features, view_harmonics(rays)[shows.points.ray], parameters)
+    error = error_over_white(shows, mixed.color + lit, target)
+    offsets = shows.blend(mixed.offsets.flatten(1), len(rays)).square().mean()
+    moved = (parameters["palette.colors"] - start).square().mean()
+    return error + settings.offset_weight * offsets + settings.palette_weight * moved, error
+
+
+def error_over_white(shows: Shown, colors: Tensor, target: Tensor) -> Tensor:
+    """Compare blended colours of points with those of their rays, [N, 3] over white: mean square []."""
+    values = torch.cat([colors, torch.ones_like(colors[:, :1])], dim=1)
+    color, alpha = shows.blend(values, len(target)).split([3, 1], dim=1)
+    return (color + 1 - alpha - target).square().mean()

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 from torch.nn.functional import avg_pool2d, normalize
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, located
 from texgs.core.names import POINTS
 from texgs.core.ply_file import read_vertices
 from texgs.fields.ply_columns import take
@@ -144,17 +144,14 @@ def read_points(path: Path) -> tuple[Tensor, Tensor | None]:
     if not path.exists():
         raise ArgumentError(f"{path}: no such file; seeds.kind=visible needs no points")
     vertices = read_vertices(path)
-    names = vertices.dtype.names or ()
-    if missing := [name for name in "xyz" if name not in names]:
-        raise ArgumentError(f"{path}: expected vertices with x, y and z, found no {', '.join(missing)}")
-    if text := [name for name in names if vertices.dtype[name].kind not in "iuf"]:
-        raise ArgumentError(f"{path}: expected vertices with numbers, got lists: {', '.join(text)}")
-    points = take(vertices, "x", "y", "z")
+    with located(path):
+        points = take(vertices, "x", "y", "z")
+        is_colored = {"red", "green", "blue"} <= set(vertices.dtype.names or ())
+        colors = take(vertices, "red", "green", "blue") if is_colored else None
     if not bool(points.isfinite().all()):
         raise ArgumentError(f"{path}: expected finite x, y and z, got NaN or infinity; remove those points")
-    if not {"red", "green", "blue"} <= set(names):
+    if colors is None:
         return points, None
-    colors = take(vertices, "red", "green", "blue")
     most = 1.0 if vertices.dtype["red"].kind == "f" else 255.0
     if not bool(((colors >= 0) & (colors <= most)).all()):
         raise ArgumentError(
@@ -184,17 +181,10 @@ def surfels_at(points: Tensor, opacity: float, generator: torch.Generator) -> di
 def most_seen(
     surfels: Mapping[str, Tensor], colors: Tensor, images: Images, count: int, seed: int
 ) -> tuple[dict[str, Tensor], Tensor]:
-    """Fit surfels for a moment and keep those that contribute most to all views together.
-
-    Args:
-        surfels: raw geometry, of more surfels than are wanted.
-        colors: [N, 3] of the surfels.
-        images: training views.
-        count: of surfels to keep; all if there are not so many.
-        seed: of the order of views.
+    """Fit surfels for a moment and keep the `count` that contribute most to all views together.
 
     Returns:
-        Raw geometry as fitted, and colours in [0, 1].
+        Raw geometry as fitted, and colours in [0, 1]; fewer if there are not so many.
     """
     small = shrunk(images, max(images.planes.shape[2:]) // PIXELS)
     start = {**surfels, "colors": colors, **raw_material(0.5, 0.5, 0.1, 20.0, "bounded")}

@@ -57,13 +57,7 @@ def texturize(
 
 
 def textured(model: Surfels, palette: Tensor, sizes: Tensor) -> Surfels:
-    """Return the model with texels 0 and its colours as offsets from the palette: it looks as before.
-
-    Args:
-        model: of stage shading.
-        palette: [3].
-        sizes: texels along u and v [N, 2], int32.
-    """
+    """Give a model texels 0, of sizes [N, 2] int32, and offsets from a palette [3]: it looks as before."""
     p = model.parameters
     texels = palette.new_zeros(int(sizes.long().prod(dim=1).sum()), 3)
     texture = {"palette": palette, "texels": texels, "sizes": sizes, "offsets": offsets_of(sizes)}

@@ -35,14 +35,7 @@ def solve(
     A step divides the gradient by an estimate of the row sums A'A 1 of the Hessian in one view, A being the
     weights of texels in its pixels: by the row sums themselves, no eigenvalue would exceed 1. To the estimate
     `keys.ridge` times its median is added, which keeps texels that are hardly seen in place.
-
-    Args:
-        model: textured, texels where to start.
-        images: training views.
-        of_surfels: curvature [N] of the model, see `texels.Sight`.
-        keys: of the phase.
-        seed: of the order of views.
-        title: of the progress bar.
+    `of_surfels` is the curvature [N] of the model, see `texels.Sight`.
 
     Returns:
         The model with new texels; the one given, if these would not lower the squared error.
@@ -106,14 +99,8 @@ def refine(model: Surfels, images: Images, keys: TextureKeys, seed: int, title: 
     """Fit the texels, and the palette with them, to one view after the other by L1 + D-SSIM and sparsity.
 
     As the paper fits them. A colour without light is palette + offset + texel. The palette has the gradients
-    of all colours together and takes up what they have in common; texels take up how they differ.
-
-    Args:
-        model: textured, texels and palette where to start.
-        images: training views.
-        keys: of the phase. The palette remains a colour in [0, 1]; without a rate it stays.
-        seed: of the order of views.
-        title: of the progress bar.
+    of all colours together and takes up what they have in common; texels take up how they differ. The palette
+    remains a colour in [0, 1]; without a rate it stays.
     """
     rates = {"texels": Rate(keys.rate, keys.final)}
     if keys.palette_rate:

@@ -24,15 +24,9 @@ SIDE = 8  # voxels that the sides of the coarsest grid are multiples of
 
 
 class VoxelFit(ResumableFit):
-    """A grid on one set of views.
+    """A grid on training views with alpha, over white.
 
-    Args:
-        images: training views with alpha, over white.
-        settings: what to do.
-        seed: of rays and blocks; with the same one, machine and versions results are equal.
-
-    Raises:
-        ArgumentError: if settings do not fit each other, or the views show nothing.
+    With the same seed of rays and blocks, machine and versions results are equal.
     """
 
     def __init__(self, images: Images, settings: VoxelKeys, seed: int = 0) -> None:

@@ -55,18 +55,12 @@ class FitSpec(Generic[Settings]):
     """How fields of one kind are fitted. Its module imports nothing heavy before `fit` is called."""
 
     field: Kind
-    summary: str
-    """What the fit does, in `texgs --help`."""
-    phases: tuple[str, ...]
-    """Stages of the fit, in their order; the last makes what scenes are composed of."""
-    settings: type[Settings] | None = None
-    """Dataclass of the keys `fit.NAME`; None for surfels, whose keys are `fit` itself."""
-    fit: Callable[[FitTask[Settings]], Fitted] | None = None
-    """Fits a field in one phase; None for surfels, each phase of which is a stage of its own."""
-    check: Callable[[Settings], None] = lambda settings: None
-    """Requires settings that fit each other: ArgumentError, with the key, if they do not."""
-    devices: frozenset[str] = frozenset({"cpu", "cuda"})
-    """Where it can be fitted."""
+    summary: str  # what the fit does, in `texgs --help`
+    phases: tuple[str, ...]  # stages in their order; the last makes what scenes are composed of
+    settings: type[Settings] | None = None  # of the keys `fit.NAME`; None for surfels, whose keys are `fit`
+    fit: Callable[[FitTask[Settings]], Fitted] | None = None  # None for surfels: each phase is a stage
+    check: Callable[[Settings], None] = lambda settings: None  # that they fit each other
+    devices: frozenset[str] = frozenset({"cpu", "cuda"})  # where it can be fitted
 
     @property
     def name(self) -> str:

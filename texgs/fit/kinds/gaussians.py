@@ -1,7 +1,5 @@
 """The fit of 3D Gaussians: one phase of the loop that surfels are fitted by."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 
 from texgs.core.errors import ArgumentError

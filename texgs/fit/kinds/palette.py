@@ -1,7 +1,5 @@
 """The fit of a palette field: its settings, and what runs it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from texgs.core.errors import ArgumentError, DeviceError

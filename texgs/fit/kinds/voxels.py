@@ -1,7 +1,5 @@
 """The fit of a voxel grid: its settings, the schedule of its rates, and what runs it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from itertools import pairwise
 from math import pi, sin
