@@ -86,7 +86,7 @@ class Origins:
     def frame(self, view: View, scene: Scene, scale: float) -> np.ndarray:
         """Return the training view that is nearest to a camera, or by how much the scene differs from it.
 
-        One model of the scene is visible. The view is in the middle [H, W, 3], uint8, of a frame of this scale.
+        One model of the scene is visible. The view is in the middle of a frame [H, W, 3] of this scale.
         """
         camera = view.camera.camera(scale)
         visible = [name for name, entry in scene.models.items() if entry.edit.visible]
