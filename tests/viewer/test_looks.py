@@ -16,9 +16,9 @@ from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
 from texgs.core.lens import Lens
 from texgs.scene.scene_file import read_scene
-from texgs.viewer.jobs import Jobs, Stopped, Watch
 from texgs.viewer.looks import Looks, ScratchFolders, Styles, ThrottledPreview
 from texgs.viewer.messages import Look
+from texgs.viewer.work import Jobs, Stopped, Watch
 
 SHOT = {**VIEW, "mode": "shaded", "camera": asdict(FRONT) | {"target": [0, 0, 0]}}
 

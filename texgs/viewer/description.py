@@ -11,7 +11,6 @@ import torch
 from torch import Tensor
 
 from texgs.core.lens import Lens
-from texgs.core.light import Light
 from texgs.fields.field import Composed
 from texgs.fields.files import kind_of
 from texgs.fields.gaussians.model import JoinedGaussians
@@ -35,17 +34,19 @@ def describe(
     kind = kind_of(next(iter(scene.models.values())).file)
     segments = ["segments"] if "segments" in kind.can else []
     keys = [each.name for each in fields(PartEdit) if NEEDS.get(each.name, "relight") in kind.can]
-    palettes = zip(composed.palettes, has_palette(composed), strict=True)
-    models = [
-        describe_model(model, entry, kind.name, palette, [*abilities(keys, has), *segments])
-        for (model, entry), (palette, has) in zip(scene.models.items(), palettes, strict=True)
-    ]
-    center, radius = bounds_of(composed) if bounds is None else bounds
+    models = []
+    for (model, entry), palette, is_textured in zip(
+        scene.models.items(), composed.palettes, have_palette(composed), strict=True
+    ):
+        # Only what has a palette has a texture, which can get a new look.
+        can = [*keys, "look"] if is_textured else [key for key in keys if key != "palette"]
+        models.append(describe_model(model, entry, kind.name, palette, [*can, *segments]))
+    light, (center, radius) = scene.light, bounds_of(composed) if bounds is None else bounds
     distance = MARGIN * radius / sin(radians(LENS.fov_y / 2))
     return {
         "name": name,
         "background": list(scene.background),
-        "light": describe_light(scene.light),
+        "light": {"azimuth": light.azimuth, "polar": light.polar} if light.kind == "directional" else None,
         "models": models,
         "modes": modes_of(kind),
         "bounds": {"center": center, "radius": radius},
@@ -70,16 +71,6 @@ def describe_model(
     }
 
 
-def abilities(keys: list[str], has_palette: bool) -> list[str]:
-    """Return what can be edited of a model; only one with a palette has a texture, which gets new looks."""
-    return [*keys, "look"] if has_palette else [key for key in keys if key != "palette"]
-
-
-def describe_light(light: Light) -> dict[str, float] | None:
-    """Return the angles of a directional light, degrees; None for the headlight."""
-    return None if light.kind == "headlight" else {"azimuth": light.azimuth, "polar": light.polar}
-
-
 def modes_of(kind: Kind) -> list[str]:
     """Return what frames of a kind of field can show."""
     needs = {"unshaded": "unlit", "normal": "normals", "texture": "texture", "discs": "texture"}
@@ -87,7 +78,7 @@ def modes_of(kind: Kind) -> list[str]:
     return [mode for mode in get_args(Mode) if mode not in needs or needs[mode] in kind.can]
 
 
-def has_palette(composed: Composed) -> list[bool]:
+def have_palette(composed: Composed) -> list[bool]:
     """Return of each model whether its palette can be replaced: surfels without texture have none."""
     if isinstance(composed, Composition):
         return [part.palette is not None for part in composed.parts]

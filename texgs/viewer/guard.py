@@ -9,6 +9,7 @@ import re
 import secrets
 import socket
 from collections.abc import Collection
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -48,7 +49,8 @@ def guard(token: str, host: str) -> Middleware:
             raise web.HTTPForbidden(text="Wrong token: open the address that texgs view printed.")
         if not is_own_host(name, host, names):
             raise web.HTTPForbidden(text="Wrong host: open the address that texgs view printed.")
-        needs_origin = is_socket(request) or request.method != "GET"
+        is_socket = request.headers.get("Upgrade", "").lower() == "websocket"
+        needs_origin = is_socket or request.method != "GET"
         if not is_own_origin(request.headers.get("Origin"), name, needs_origin):
             raise web.HTTPForbidden(text="Wrong origin: open the address that texgs view printed.")
         response = await handler(request)
@@ -66,7 +68,9 @@ def is_own_host(header: str, host: str, names: Collection[str]) -> bool:
     A server on the loopback interface has its names only. Another one has addresses, which no foreign site
     can have as its name, and `names`: the one that it was given, and the machine's.
     """
-    name = hostname(f"//{header}") if HOST.fullmatch(header) else None
+    name = None
+    with suppress(ValueError):
+        name = urlsplit(f"//{header}").hostname if HOST.fullmatch(header) else None
     if name is None:
         return False
     if name == "localhost" or is_loopback(name):
@@ -80,32 +84,16 @@ def is_own_origin(origin: str | None, header: str, required: bool) -> bool:
     """Return whether a page of this server asks; browsers send no origin with simple requests."""
     if origin is None:
         return not required
-    try:
+    with suppress(ValueError):
         return urlsplit(origin).netloc.lower() == header.lower()
-    except ValueError:
-        return False
-
-
-def is_socket(request: web.Request) -> bool:
-    """Return whether a request opens a WebSocket."""
-    return request.headers.get("Upgrade", "").lower() == "websocket"
-
-
-def hostname(address: str) -> str | None:
-    """Return the lower-case name in an address; None where there is none."""
-    try:
-        return urlsplit(address).hostname
-    except ValueError:
-        return None
+    return False
 
 
 def is_address(name: str) -> bool:
     """Return whether a name is an IP address."""
-    try:
-        ipaddress.ip_address(name)
-    except ValueError:
-        return False
-    return True
+    with suppress(ValueError):
+        return bool(ipaddress.ip_address(name))
+    return False
 
 
 def is_loopback(name: str) -> bool:

@@ -155,11 +155,6 @@ class Rename:
     name: str  # of the segment
     type: Literal["rename"] = tag("rename")
 
-    @property
-    def title(self) -> str:
-        """Return what the list of steps calls it."""
-        return f"{self.part} renamed to {self.name}"
-
 
 @dataclass(frozen=True, config=STRICT)
 class Remove:
@@ -167,11 +162,6 @@ class Remove:
 
     part: str  # MODEL/SEGMENT
     type: Literal["remove"] = tag("remove")
-
-    @property
-    def title(self) -> str:
-        """Return what the list of steps calls it."""
-        return f"{self.part} removed"
 
 
 @dataclass(frozen=True, config=STRICT)

@@ -8,19 +8,16 @@ import logging
 from collections import deque
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from aiohttp import web
 
 from texgs.core.errors import TexgsError, first_line
 from texgs.scene.scene import Scene
 from texgs.viewer.frames import Frames, Pace
-from texgs.viewer.jobs import Stopped
 from texgs.viewer.messages import Mask, View
 from texgs.viewer.shared_edits import SharedEdits
-
-if TYPE_CHECKING:
-    from texgs.viewer.work import Work
+from texgs.viewer.work import Stopped, Work
 
 log = logging.getLogger("texgs.viewer")
 MOST_NOTICES = 8  # that wait for a page which does not listen

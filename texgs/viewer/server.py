@@ -5,29 +5,32 @@ from __future__ import annotations
 import asyncio
 import secrets
 from collections.abc import AsyncIterator
+from pathlib import Path
 from typing import Any
 
 import torch
 from aiohttp import WSCloseCode, WSMsgType, web
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.edit.pictures import PICTURES
 from texgs.fields.files import kind_of
 from texgs.models.instruction import WORDS
 from texgs.scene.scene import Scene
 from texgs.scene.session import Session
+from texgs.viewer import messages
 from texgs.viewer.description import bounds_of, describe
 from texgs.viewer.downloads import exports_of
 from texgs.viewer.frames import Frames
 from texgs.viewer.guard import guard
-from texgs.viewer.looks import LARGEST as LARGEST_FILE
-from texgs.viewer.messages import LARGEST, Cancel, Export, Look, Mask, Message, Save, Segment, View, parse
+from texgs.viewer.looks import LARGEST, thumbnail
+from texgs.viewer.messages import Cancel, Export, Look, Mask, Message, Save, Segment, View, parse
 from texgs.viewer.origins import Origins
 from texgs.viewer.page import Page
-from texgs.viewer.requests import Requests
 from texgs.viewer.shared_edits import Opened, SharedEdits
 from texgs.viewer.work import Work
 
+WEB = Path(__file__).parent / "web"
+SERVED = (".js", ".css", ".svg")
 MOST_PAGES = 16
 PATIENCE = 2.0  # seconds for a page to close its connection
 HEARTBEAT = 20.0  # seconds, after which a page that is gone is noticed
@@ -53,9 +56,17 @@ class Server:
 
     def application(self, token: str, host: str = "127.0.0.1") -> web.Application:
         """Return the application to serve on a host; the token is the first part of every path."""
-        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST_FILE)
-        app.router.add_get(f"/{token}/socket", self.socket)
-        app.router.add_routes(Requests(self.edits, self.frames, self.work, self._shown).routes(token))
+        app = web.Application(middlewares=[guard(token, host)], client_max_size=LARGEST)
+        handlers = {
+            "": self.index,
+            "socket": self.socket,
+            "still.png": self.still,
+            "styles/{name}.jpg": self.style,
+            "files/{name}": self.file,
+            "{name}": self.module,
+        }
+        app.router.add_routes([web.get(f"/{token}/{path}", each) for path, each in handlers.items()])
+        app.router.add_post(f"/{token}/styles", self.new_style)
         app.on_shutdown.append(self._say_goodbye)
         app.cleanup_ctx.append(self._closing)
         return app
@@ -63,7 +74,7 @@ class Server:
     async def socket(self, request: web.Request) -> web.StreamResponse:
         """Return one page: what it asks for is done until it is gone."""
         socket = web.WebSocketResponse(
-            max_msg_size=LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
+            max_msg_size=messages.LARGEST, heartbeat=HEARTBEAT, timeout=PATIENCE, compress=False
         )
         await socket.prepare(request)
         if len(self._pages) >= MOST_PAGES:  # a browser tells a page nothing of a refused handshake
@@ -83,6 +94,52 @@ class Server:
             sending.cancel()
             await asyncio.gather(sending, return_exceptions=True)
         return socket
+
+    async def index(self, request: web.Request) -> web.StreamResponse:
+        """Return the page itself."""
+        return web.FileResponse(WEB / "page.html")
+
+    async def module(self, request: web.Request) -> web.StreamResponse:
+        """Return a module or a style sheet of the page, by its name in a list of those that there are."""
+        files = {path.name: path for path in WEB.iterdir() if path.suffix in SERVED}
+        path = files.get(request.match_info["name"])
+        if path is None:
+            raise web.HTTPNotFound
+        return web.FileResponse(path)
+
+    async def still(self, request: web.Request) -> web.StreamResponse:
+        """Return a PNG file of the view in the query on its page, as `texgs render` writes it."""
+        try:
+            view = parse(request.query.get("view", ""), messages.VIEWS)
+            png = await self.frames.still(view, self._shown(view, request.query.get("page", "")))
+        except TexgsError as error:
+            raise web.HTTPBadRequest(text=str(error)) from error
+        saved = {"Content-Disposition": f'attachment; filename="{Path(self.edits.name).stem}.png"'}
+        return web.Response(body=png, content_type="image/png", headers=saved)
+
+    async def style(self, request: web.Request) -> web.StreamResponse:
+        """Return a small view of a picture that texgs has."""
+        try:
+            picture = await asyncio.to_thread(thumbnail, request.match_info["name"])
+        except TexgsError as error:
+            raise web.HTTPNotFound(text=str(error)) from error
+        return web.Response(body=picture, content_type="image/jpeg")
+
+    async def new_style(self, request: web.Request) -> web.StreamResponse:
+        """Take in a picture of the page's user; return the name that it has from then on."""
+        content = await request.read()
+        try:
+            name = await asyncio.to_thread(self.work.styles.add, request.query.get("name", ""), content)
+        except TexgsError as error:
+            raise web.HTTPBadRequest(text=str(error)) from error
+        return web.Response(text=name)
+
+    async def file(self, request: web.Request) -> web.StreamResponse:
+        """Return a file that was written for a page."""
+        path = self.work.downloads.file(request.match_info["name"])
+        if path is None:
+            raise web.HTTPNotFound
+        return web.FileResponse(path)
 
     async def _listen(self, socket: web.WebSocketResponse, page: Page) -> None:
         """Answer the messages of a page until it is gone."""

@@ -122,16 +122,19 @@ class SharedEdits:
 
     def change(self, asked: Change, author: int) -> None:
         """Make a change; edits with the same number by the same author are one step."""
-        session, step, before = self._session, None, self.scene
+        session, step, title, before = self._session, None, "", self.scene
         if isinstance(asked, Undo):
             session.undo()
         elif isinstance(asked, Redo):
             session.redo()
         elif isinstance(asked, Rename):
+            title = f"{asked.part} renamed to {asked.name}"
             session.rename_segment(asked.part, asked.name)
         elif isinstance(asked, Remove):
+            title = f"{asked.part} removed"
             session.remove_segment(asked.part)
         else:
+            title = asked.title
             step = (author, asked.step, asked.part, asked.key) if asked.step else None
             goes_on = step is not None and step == self._latest and session.undo()
             try:
@@ -140,8 +143,8 @@ class SharedEdits:
                 if goes_on:
                     session.redo()
                 raise
-        if not isinstance(asked, Undo | Redo) and self.scene is not before:
-            session.name_step(asked.title)
+        if title and self.scene is not before:
+            session.name_step(title)
         self._latest = step
 
     def make_segment(self, part: str, mask: Tensor, facts: Mapping[str, Any]) -> None:

@@ -5,27 +5,75 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from shutil import rmtree
 from time import monotonic
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import torch
 
-from texgs.core.errors import ArgumentError
+from texgs.core.errors import ArgumentError, TexgsError
 from texgs.core.names import part_file, require_name
+from texgs.core.progress import watched
 from texgs.edit.task import parts_with_surfels
 from texgs.scene.parts import entry_of, require_new, split
 from texgs.viewer.downloads import Downloads, require_kind
 from texgs.viewer.frames import Frames
-from texgs.viewer.jobs import Jobs, Watch
 from texgs.viewer.looks import Looks, Styles
 from texgs.viewer.messages import Export, Look, Mask, Segment
-from texgs.viewer.page import Page
 from texgs.viewer.segments import Segmenter
 from texgs.viewer.shared_edits import SharedEdits
+
+if TYPE_CHECKING:
+    from texgs.viewer.page import Page
+
+T = TypeVar("T")
+
+
+class Stopped(TexgsError):
+    """Somebody has asked to stop."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Who is told about a job, and whether it has to stop."""
+
+    tell: Callable[[str, float], None] = lambda title, done: None  # what is done, and the part of it
+    stop: threading.Event = field(default_factory=threading.Event)
+
+
+class Jobs:
+    """A thread that works with half of the threads of the machine: the others are for frames."""
+
+    def __init__(self) -> None:
+        half = max(1, torch.get_num_threads() // 2)
+        self._thread = ThreadPoolExecutor(1, "job", torch.set_num_threads, (half,))
+
+    async def run(self, work: Callable[[], T], watch: Watch) -> T:
+        """Return what work returns; who watches it is told in this thread about the loops in the other."""
+        loop = asyncio.get_running_loop()
+
+        def step(title: str, done: int, total: int | None) -> None:
+            if watch.stop.is_set():
+                raise Stopped(f"{title}: it was cancelled; nothing has changed.")
+            if total:
+                loop.call_soon_threadsafe(watch.tell, title, done / total)
+
+        def watched_work() -> T:
+            with watched(step):
+                result = work()
+            if watch.stop.is_set():  # after the last step, or there was none
+                raise Stopped("It was cancelled; nothing has changed.")
+            return result
+
+        return await loop.run_in_executor(self._thread, watched_work)
+
+    def close(self) -> None:
+        """End the thread, once what it does has ended."""
+        self._thread.shutdown(wait=True, cancel_futures=True)
 
 
 class Work:
