@@ -44,6 +44,12 @@ class Browser:
             if values["type"] == kind:
                 return values
 
+    async def past(self, *steps):
+        """The scene once these steps were made."""
+        while (news := await self.next("scene"))["past"] != [*steps]:
+            pass
+        return news
+
 
 @asynccontextmanager
 async def served(scene_file):
@@ -67,32 +73,21 @@ async def page(client):
         yield Browser(socket)
 
 
-def with_page(scene_file, work):
-    """Run work(browser, client) with a page that has got its scene."""
-
-    async def run():
-        async with served(scene_file) as client, page(client) as browser:
-            await browser.next("scene")
-            await work(browser, client)
-
-    asyncio.run(run())
-
-
 def on_page(test):
     """Make an asynchronous test one of a page that has got its scene: of `browser`, `client` and fixtures."""
     names = inspect.signature(test).parameters
-    fixtures = {"scene_file": None, **names}
     kind = inspect.Parameter.POSITIONAL_OR_KEYWORD
 
     @wraps(test)
     def run(**given):
-        async def work(browser, client):
-            known = {**given, "browser": browser, "client": client}
-            await test(**{name: known[name] for name in names})
+        async def work():
+            async with served(given["scene_file"]) as client, page(client) as browser:
+                await browser.next("scene")
+                known = {**given, "browser": browser, "client": client}
+                await test(**{name: known[name] for name in names})
 
-        with_page(given["scene_file"], work)
+        asyncio.run(work())
 
-    run.__signature__ = inspect.Signature(
-        [inspect.Parameter(name, kind) for name in fixtures if name not in ("browser", "client")]
-    )
+    fixtures = [name for name in {"scene_file": None, **names} if name not in ("browser", "client")]
+    run.__signature__ = inspect.Signature([inspect.Parameter(name, kind) for name in fixtures])
     return run

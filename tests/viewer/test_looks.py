@@ -11,7 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.fields.surfels.test_composition import ball
-from tests.viewer.pages import TOKEN, on_page, origin, page, with_page
+from tests.viewer.pages import TOKEN, on_page, origin, page
 from tests.viewer.test_messages import VIEW
 from tests.viewer.test_segments import FRONT, ended
 from texgs.core.lens import Lens
@@ -47,48 +47,43 @@ def look(**values):
     return {"type": "look", "parts": [], "style": "", "instruction": "", "preview": False, **values}
 
 
-def test_a_preview_shows_on_its_page_alone_and_changes_nothing(scene_file):
-    async def work(browser, client):
-        async with page(client) as other:
-            await other.next("scene")
-            before = await picture(browser)
-            await browser.send(**look(style="glass", preview=True))
-            assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
-            await ended(browser)
-            assert np.abs(await picture(browser) - before).mean() > 3
-            assert (await picture(browser, before=True) == before).all()
-            assert (await picture(other) == before).all()
-            query = {"view": json.dumps({"camera": SHOT["camera"], "mode": "shaded"})}
-            stills = [await still(client, **query, page=number) for number in ("1", "2", "none")]
-            assert stills[0] != stills[1] == stills[2], "the other page and strangers see what all share"
-            assert client.server_side.edits.state()["past"] == []
-            await browser.send(type="cancel")
-            assert (await browser.next("trial"))["parts"] == []
-            assert (await picture(browser) == before).all()
-
-    with_page(scene_file, work)
-    assert sorted(path.name for path in scene_file.parent.iterdir() if path.is_dir()) == []
-
-
-def test_a_look_is_one_step_and_written_beside_the_scene(scene_file):
-    async def work(browser, client):
+@on_page
+async def test_a_preview_shows_on_its_page_alone_and_changes_nothing(browser, client, scene_file):
+    async with page(client) as other:
+        await other.next("scene")
         before = await picture(browser)
-        await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
-        news = await browser.next("notice")
-        assert news["level"] == "info"
-        assert "turn it into gold: procedural filters" in news["text"]
-        while (news := await browser.next("scene"))["past"] != ["TF01 turn it into gold"]:
-            pass
-        after = await picture(browser)
-        assert np.abs(after - before).mean() > 1
-        await browser.send(type="save", name="gold.yaml")
-        await browser.next("notice")
-        await browser.send(type="undo")
+        await browser.send(**look(style="glass", preview=True))
+        assert (await browser.next("trial"))["parts"] == ["TF01", "TF02"]
+        await ended(browser)
+        assert np.abs(await picture(browser) - before).mean() > 3
+        assert (await picture(browser, before=True) == before).all()
+        assert (await picture(other) == before).all()
+        query = {"view": json.dumps({"camera": SHOT["camera"], "mode": "shaded"})}
+        stills = [await still(client, **query, page=number) for number in ("1", "2", "none")]
+        assert stills[0] != stills[1] == stills[2], "the other page and strangers see what all share"
+        assert client.server_side.edits.state()["past"] == []
+        await browser.send(type="cancel")
+        assert (await browser.next("trial"))["parts"] == []
         assert (await picture(browser) == before).all()
-        await browser.send(type="redo")
-        assert (await picture(browser) == after).all()
+    assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
 
-    with_page(scene_file, work)
+
+@on_page
+async def test_a_look_is_one_step_and_written_beside_the_scene(browser, scene_file):
+    before = await picture(browser)
+    await browser.send(**look(parts=["TF01"], instruction="turn it into gold"))
+    news = await browser.next("notice")
+    assert news["level"] == "info"
+    assert "turn it into gold: procedural filters" in news["text"]
+    await browser.past("TF01 turn it into gold")
+    after = await picture(browser)
+    assert np.abs(after - before).mean() > 1
+    await browser.send(type="save", name="gold.yaml")
+    await browser.next("notice")
+    await browser.send(type="undo")
+    assert (await picture(browser) == before).all()
+    await browser.send(type="redo")
+    assert (await picture(browser) == after).all()
     models = read_scene(scene_file.parent / "gold.yaml").models
     assert models["TF01"].texture.parent.name == "scene-text-1"
     assert models["TF02"].texture is None
@@ -132,9 +127,8 @@ def test_a_look_that_fails_leaves_folders_that_were_there(scene_file, tmp_path):
 
 @on_page
 async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
-    Image.fromarray(np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)).save(
-        tmp_path / "noise.png"
-    )
+    pixels = np.random.default_rng(0).integers(0, 255, (64, 64, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "noise.png")
     path, headers = f"/{TOKEN}/styles", origin(client)
     content = (tmp_path / "noise.png").read_bytes()
     async with client.post(path, params={"name": "noise.png"}, data=content, headers=headers) as answer:
@@ -176,7 +170,8 @@ async def test_what_cannot_be_is_told_before_a_job_begins(browser, values, messa
     assert message in (await browser.next("notice"))["text"]
 
 
-def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
+@on_page
+async def test_a_look_is_cancelled_and_leaves_nothing(browser, scene_file, monkeypatch):
     reached, go_on = threading.Event(), threading.Event()
 
     def wait(self, part, model):
@@ -184,20 +179,15 @@ def test_a_look_is_cancelled_and_leaves_nothing(scene_file, monkeypatch):
         go_on.wait(30)
 
     monkeypatch.setattr("texgs.viewer.looks.ThrottledPreview.__call__", wait)
-
-    async def work(browser, _):
-        await browser.send(**look(parts=["TF01"], style="dots"))
-        await asyncio.to_thread(reached.wait, 30)
-        await browser.send(type="edit", part="TF01", key="opacity", value=0.5)
-        while not (await browser.next("scene"))["past"]:
-            pass  # edits go on meanwhile
-        await browser.send(type="cancel")
-        await browser.next("trial")
-        go_on.set()
-        assert "it was cancelled" in (await browser.next("notice"))["text"]
-        await ended(browser)
-
-    with_page(scene_file, work)
+    await browser.send(**look(parts=["TF01"], style="dots"))
+    await asyncio.to_thread(reached.wait, 30)
+    await browser.send(type="edit", part="TF01", key="opacity", value=0.5)
+    await browser.past("TF01 opacity 0.5")  # edits go on meanwhile
+    await browser.send(type="cancel")
+    await browser.next("trial")
+    go_on.set()
+    assert "it was cancelled" in (await browser.next("notice"))["text"]
+    await ended(browser)
     assert not [path for path in scene_file.parent.iterdir() if path.is_dir()]
 
 
@@ -245,12 +235,6 @@ async def test_a_preview_that_is_cancelled_as_it_ends_is_not_shown(browser, monk
     assert "It was cancelled" in (await browser.next("notice"))["text"]
     await ended(browser)
     assert (await picture(browser) == before).all()
-
-
-@on_page
-async def test_only_a_segment_gets_another_name(browser):
-    await browser.send(type="rename", part="TF01", name="x")
-    assert "expected a segment to rename, got the model TF01" in (await browser.next("notice"))["text"]
 
 
 @on_page

@@ -12,7 +12,7 @@ import torch
 from PIL import Image
 
 from tests.edit.lift_scenes import two_balls
-from tests.viewer.pages import on_page, with_page
+from tests.viewer.pages import on_page
 from texgs.edit.clicks import Clicks
 from texgs.edit.lift import lift
 from texgs.fields.part_edit import PartEdit
@@ -51,10 +51,8 @@ def at(place):
 
 
 def clicked(*points):
-    return {
-        "camera": asdict(FRONT) | {"target": [0, 0, 0]},
-        "points": [[*at(place), is_on] for place, is_on in points],
-    }
+    points = [[*at(place), is_on] for place, is_on in points]
+    return {"camera": asdict(FRONT) | {"target": [0, 0, 0]}, "points": points}
 
 
 async def ended(browser):
@@ -63,13 +61,18 @@ async def ended(browser):
         pass
 
 
-@on_page
-async def test_clicks_show_their_mask(browser):
+async def masked(browser):
+    """What a click selects [H, W]."""
     await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
     message = await browser.next("mask")
     assert (message["id"], message["by"]) == (3, "GrabCut")
     png = base64.b64decode(message["picture"].removeprefix("data:image/png;base64,"))
-    mask = np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0
+    return np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0
+
+
+@on_page
+async def test_clicks_show_their_mask(browser):
+    mask = await masked(browser)
     rows, columns = mask.nonzero()
     assert mask.shape == (120, 120)
     middle, (x, y) = (columns.mean(), rows.mean()), at(RED)
@@ -81,58 +84,48 @@ async def test_clicks_show_their_mask(browser):
 
 @on_page
 async def test_clicks_see_a_model_that_was_written_again(browser, scene_file):
-
-    async def covered():
-        await browser.send(type="mask", id=3, model="balls", **clicked((RED, True)))
-        png = base64.b64decode((await browser.next("mask"))["picture"].split(",")[1])
-        return int((np.asarray(Image.open(io.BytesIO(png)))[..., 3] > 0).sum())
-
-    before = await covered()
+    before = await masked(browser)
     model = two_balls()[0]
     smaller = {**model.parameters, "means": model.parameters["means"] * 0.9}
     write_model(scene_file.with_name("balls.safetensors"), Surfels(smaller, model.shading))
-    assert await covered() != before
+    assert (await masked(browser)).sum() != before.sum()
 
 
-def test_clicks_make_a_segment_that_is_edited_undone_and_saved(scene_file):
-    red = two_balls()[1] == 0
-
-    async def work(browser, client):
-        await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
-        await ended(browser)
-        await browser.send(type="edit", part="balls/red", key="opacity", value=0.5)
-        while len((news := await browser.next("scene"))["past"]) < 2:
-            pass
-        assert news["past"] == ["balls/red new", "balls/red opacity 0.5"]
-        await browser.send(type="save", name="scene.yaml")
-        await browser.next("notice")
-        await browser.send(type="undo")
-        await browser.send(type="remove", part="balls/red")
-        while (news := await browser.next("scene"))["past"] != ["balls/red new", "balls/red removed"]:
-            pass
-        assert news["scene"]["models"][0]["segments"] == []
-        await browser.send(type="undo")
-        (segment,) = (await browser.next("scene"))["scene"]["models"][0]["segments"]
-        assert segment["name"] == "red"
-
-    with_page(scene_file, work)
+@on_page
+async def test_clicks_make_a_segment_that_is_edited_renamed_removed_undone_and_saved(browser, scene_file):
+    await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
+    await ended(browser)
+    await browser.send(type="edit", part="balls/red", key="opacity", value=0.5)
+    await browser.past("balls/red new", "balls/red opacity 0.5")
+    await browser.send(type="save", name="scene.yaml")
+    await browser.next("notice")
+    await browser.send(type="undo")
+    await browser.send(type="rename", part="balls", name="x")
+    assert "expected a segment to rename, got the model balls" in (await browser.next("notice"))["text"]
+    await browser.send(type="rename", part="balls/red", name="sea")
+    news = await browser.past("balls/red new", "balls/red renamed to sea")
+    assert [each["name"] for each in news["scene"]["models"][0]["segments"]] == ["sea"]
+    await browser.send(type="undo")
+    await browser.send(type="remove", part="balls/red")
+    news = await browser.past("balls/red new", "balls/red removed")
+    assert news["scene"]["models"][0]["segments"] == []
+    await browser.send(type="undo")
+    (segment,) = (await browser.next("scene"))["scene"]["models"][0]["segments"]
+    assert segment["name"] == "red"
     saved = read_scene(scene_file).models["balls"]
     assert saved.segments["red"].edit == PartEdit(opacity=0.5)
-    model, _ = two_balls()
+    model, red = two_balls()
     mask = read_segment(saved.segments["red"].file, model)
     clicks = Clicks(FRONT.camera(), torch.tensor([at(RED)]), torch.tensor([True]))
     assert mask.equal(lift(model, clicks, icosphere_of(VIEWS, LENS), GrabCut()).mask)
-    assert bool(mask[red].all())
+    assert bool(mask[red == 0].all())
 
 
-def test_a_segment_replaces_no_file(scene_file):
+@on_page
+async def test_a_segment_replaces_no_file(browser, scene_file):
     (taken := scene_file.parent / "scene-balls-red.safetensors").write_bytes(b"mine")
-
-    async def work(browser, client):
-        await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
-        await ended(browser)
-
-    with_page(scene_file, work)
+    await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
+    await ended(browser)
     assert taken.read_bytes() == b"mine"
     assert (scene_file.parent / "scene-balls-red-2.safetensors").exists()
 
@@ -168,27 +161,22 @@ class Waiting(GrabCut):
         return super().__call__(image, points, positive)
 
 
-def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(scene_file, monkeypatch):
+@on_page
+async def test_a_segment_is_cancelled_and_only_one_is_made_at_a_time(browser, scene_file, monkeypatch):
     masks = Waiting()
     monkeypatch.setattr("texgs.viewer.segments.mask_model", lambda name, device: masks)
-
-    async def work(browser, client):
-        await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
-        await asyncio.to_thread(masks.reached.wait, 30)
-        await browser.send(type="segment", part="balls/other", **clicked((RED, True)))
-        assert "a job is at work already" in (await browser.next("notice"))["text"]
-        await browser.send(type="edit", part="balls", key="opacity", value=0.5)
-        while not (await browser.next("scene"))["past"]:
-            pass  # edits go on meanwhile
-        await browser.send(type="cancel")
-        await browser.send(type="undo")
-        while (await browser.next("scene"))["past"]:
-            pass  # the server has read what came before
-        masks.go_on.set()
-        assert "it was cancelled" in (await browser.next("notice"))["text"]
-        await ended(browser)
-
-    with_page(scene_file, work)
+    await browser.send(type="segment", part="balls/red", **clicked((RED, True)))
+    await asyncio.to_thread(masks.reached.wait, 30)
+    await browser.send(type="segment", part="balls/other", **clicked((RED, True)))
+    assert "a job is at work already" in (await browser.next("notice"))["text"]
+    await browser.send(type="edit", part="balls", key="opacity", value=0.5)
+    await browser.past("balls opacity 0.5")  # edits go on meanwhile
+    await browser.send(type="cancel")
+    await browser.send(type="undo")
+    await browser.past()  # the server has read what came before
+    masks.go_on.set()
+    assert "it was cancelled" in (await browser.next("notice"))["text"]
+    await ended(browser)
     assert masks.calls == 2
     assert not list(scene_file.parent.glob("scene-*"))
 

@@ -8,7 +8,7 @@ import pytest
 from aiohttp import WSCloseCode, WSMsgType, WSServerHandshakeError
 from PIL import Image
 
-from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page, served, with_page
+from tests.viewer.pages import TOKEN, WAIT, on_page, origin, page
 from tests.viewer.test_messages import CAMERA, VIEW
 from texgs.cli.main import main
 from texgs.scene.scene_file import read_scene
@@ -33,13 +33,11 @@ from texgs.viewer import guard
         (f"/{TOKEN}/../x", {}),
     ],
 )
-def test_strangers_get_403(scene_file, path, headers):
-    async def run():
-        async with served(scene_file) as client, client.get(path, headers=headers) as answer:
-            assert answer.status == 403
-            assert "open the address that texgs view printed" in await answer.text()
-
-    asyncio.run(run())
+@on_page
+async def test_strangers_get_403(client, path, headers):
+    async with client.get(path, headers=headers) as answer:
+        assert answer.status == 403
+        assert "open the address that texgs view printed" in await answer.text()
 
 
 @pytest.mark.parametrize(
@@ -51,14 +49,11 @@ def test_strangers_get_403(scene_file, path, headers):
         (f"/{TOKEN}/socket", {"Host": "evil.example", "Origin": "http://evil.example"}),
     ],
 )
-def test_sockets_of_strangers_get_403(scene_file, path, headers):
-    async def run():
-        async with served(scene_file) as client:
-            with pytest.raises(WSServerHandshakeError) as error:
-                await client.ws_connect(path, headers=origin(client) if headers is None else headers)
-            assert error.value.status == 403
-
-    asyncio.run(run())
+@on_page
+async def test_sockets_of_strangers_get_403(client, path, headers):
+    with pytest.raises(WSServerHandshakeError) as error:
+        await client.ws_connect(path, headers=origin(client) if headers is None else headers)
+    assert error.value.status == 403
 
 
 @pytest.mark.parametrize(
@@ -78,18 +73,15 @@ def test_hosts(name, host, is_own):
     assert guard.is_own_host(name, host, (host,)) is is_own
 
 
-def test_pages_are_served_with_a_strict_policy_and_nothing_else(scene_file):
-    async def run():
-        async with served(scene_file) as client:
-            async with client.get(f"/{TOKEN}/") as answer:
-                assert answer.status == 200
-                assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
-                assert answer.headers["Referrer-Policy"] == "no-referrer"
-            for name in ("page.html", "server.py", "..%2Fserver.py", "%2e%2e%2fserver.py", "x.js"):
-                async with client.get(f"/{TOKEN}/{name}") as answer:
-                    assert answer.status in (403, 404), name
-
-    asyncio.run(run())
+@on_page
+async def test_pages_are_served_with_a_strict_policy_and_nothing_else(client):
+    async with client.get(f"/{TOKEN}/") as answer:
+        assert answer.status == 200
+        assert "default-src 'none'" in answer.headers["Content-Security-Policy"]
+        assert answer.headers["Referrer-Policy"] == "no-referrer"
+    for name in ("page.html", "server.py", "..%2Fserver.py", "%2e%2e%2fserver.py", "x.js"):
+        async with client.get(f"/{TOKEN}/{name}") as answer:
+            assert answer.status in (403, 404), name
 
 
 def test_a_token_is_kept_where_only_its_owner_reads_it(tmp_path):
@@ -165,47 +157,38 @@ async def test_an_error_of_a_frame_is_a_notice(browser, client, scene_file):
 # ---- Edits ------------------------------------------------------------------
 
 
-def test_pages_share_edits_and_their_history(scene_file):
-    async def run():
-        async with served(scene_file) as client, page(client) as one, page(client) as other:
-            for each in (one, other):
-                assert (await each.next("scene"))["saved"]
-            await one.send(type="edit", part="TF01", key="palette", value="#ff0000")
-            for each in (one, other):
-                news = await each.next("scene")
-                assert news["scene"]["models"][0]["edit"]["palette"] == [1, 0, 0]
-                assert news["past"] == ["TF01 palette #ff0000"]
-                assert not news["saved"]
-            await other.send(type="undo")
-            news = await one.next("scene")
-            assert news["scene"]["models"][0]["edit"]["palette"] is None
-            assert (news["past"], news["future"]) == ([], ["TF01 palette #ff0000"])
-            assert news["saved"]
-            await one.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
-            await other.send(type="redo")
-            await other.send(type="edit", part="", key="background", value=None)
-            steps = ["light azimuth 30°, polar 40°", "background reset"]
-            while (news := await one.next("scene"))["past"] != steps:
-                pass
-            assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
-
-    asyncio.run(run())
+@on_page
+async def test_pages_share_edits_and_their_history(browser, client):
+    async with page(client) as other:
+        assert (await other.next("scene"))["saved"]
+        await browser.send(type="edit", part="TF01", key="palette", value="#ff0000")
+        for each in (browser, other):
+            news = await each.next("scene")
+            assert news["scene"]["models"][0]["edit"]["palette"] == [1, 0, 0]
+            assert news["past"] == ["TF01 palette #ff0000"]
+            assert not news["saved"]
+        await other.send(type="undo")
+        news = await browser.next("scene")
+        assert news["scene"]["models"][0]["edit"]["palette"] is None
+        assert (news["past"], news["future"]) == ([], ["TF01 palette #ff0000"])
+        assert news["saved"]
+        await browser.send(type="edit", part="", key="light", value={"azimuth": 30, "polar": 40})
+        await other.send(type="redo")
+        await other.send(type="edit", part="", key="background", value=None)
+        news = await browser.past("light azimuth 30°, polar 40°", "background reset")
+        assert news["scene"]["light"] == {"azimuth": 30, "polar": 40}
 
 
 @on_page
-async def test_edits_of_one_movement_are_one_step(browser, client):
+async def test_edits_of_one_movement_are_one_step(browser):
     for value in (0.9, 0.5, -1, 0.2):
         await browser.send(type="edit", part="TF01", key="opacity", value=value, step=1)
     await browser.send(type="edit", part="TF01", key="opacity", value=0.1, step=2)
-    while len((news := await browser.next("scene"))["past"]) < 2:
-        pass
+    news = await browser.past("TF01 opacity 0.2", "TF01 opacity 0.1")
     assert news["scene"]["models"][0]["edit"]["opacity"] == 0.1
-    await browser.send(type="undo")
-    assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
-    await browser.send(type="undo")
-    assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 1
-    await browser.send(type="redo")
-    assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == 0.2
+    for step, opacity in (("undo", 0.2), ("undo", 1), ("redo", 0.2)):
+        await browser.send(type=step)
+        assert (await browser.next("scene"))["scene"]["models"][0]["edit"]["opacity"] == opacity
 
 
 @pytest.mark.parametrize(
@@ -213,65 +196,61 @@ async def test_edits_of_one_movement_are_one_step(browser, client):
     [
         (
             {"part": "TF03", "key": "opacity", "value": 1},
-            "expected a model of the scene (TF01, TF02), got TF03",
+            "a model of the scene (TF01, TF02), got TF03",
         ),
-        ({"part": "TF01", "key": "opasity", "value": 1}, "no such key 'opasity', did you mean opacity?"),
-        ({"part": "TF01", "key": "opacity", "value": -1}, "expected a factor from 0 to 1000, got -1"),
         ({"part": "TF01", "key": "palette", "value": {"a": 1}}, "expected three numbers from 0 to 1"),
-        ({"part": "TF01/x", "key": "opacity", "value": 1}, "expected a segment of TF01 (it has none), got x"),
         ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
         ({"part": "", "key": "models", "value": 1}, "the scene: no such key 'models'"),
     ],
 )
 @on_page
-async def test_edits_that_cannot_be_made_are_notices(browser, client, edit, message):
+async def test_edits_that_cannot_be_made_are_notices(browser, edit, message):
     await browser.send(type="edit", **edit)
     assert message in (await browser.next("notice"))["text"]
     assert (await browser.next("scene"))["past"] == []
 
 
-def test_scenes_are_saved_in_their_folder_only(scene_file):
-    async def work(browser, client):
-        await browser.send(type="edit", part="TF02", key="visible", value=False)
-        for name in ("../a.yaml", "/tmp/a.yaml", "a\\b.yaml", ".a.yaml", "", "a.txt", "a\0.yaml"):
-            await browser.send(type="save", name=name, replace=True)
-            assert "save as: expected a name" in (await browser.next("notice"))["text"]
-        await browser.send(type="save", name="new.yaml")
-        notice = await browser.next("notice")
-        assert notice["level"] == "info"
-        news = await browser.next("scene")
-        assert news["saved"]
-        assert news["file"] == "new.yaml"
-        await browser.send(type="save", name="scene.yaml")
-        assert (await browser.next("notice"))["level"] == "info", "it is what was opened"
-
-    with_page(scene_file, work)
+@on_page
+async def test_scenes_are_saved_in_their_folder_only(browser, scene_file):
+    await browser.send(type="edit", part="TF02", key="visible", value=False)
+    for name in ("../a.yaml", "/tmp/a.yaml", "a\\b.yaml", ".a.yaml", "", "a.txt", "a\0.yaml"):
+        await browser.send(type="save", name=name, replace=True)
+        assert "save as: expected a name" in (await browser.next("notice"))["text"]
+    await browser.send(type="save", name="new.yaml")
+    assert (await browser.next("notice"))["level"] == "info"
+    news = await browser.next("scene")
+    assert (news["saved"], news["file"]) == (True, "new.yaml")
+    await browser.send(type="save", name="scene.yaml")
+    assert (await browser.next("notice"))["level"] == "info", "it is what was opened"
     for name in ("scene.yaml", "new.yaml"):
         assert not read_scene(scene_file.parent / name).models["TF02"].edit.visible
 
 
-def test_other_files_are_replaced_after_a_question_only(scene_file, monkeypatch):
+@pytest.fixture
+def earlier(scene_file, monkeypatch):
+    """What somebody has saved of a scene that a job wrote."""
     monkeypatch.chdir(scene_file.parent)
-    (scene_file.parent / "metrics.json").write_text("{}")  # a job wrote the scene
-    (earlier := scene_file.parent / "edited.yaml").write_text(scene_file.read_text())
+    (scene_file.parent / "metrics.json").write_text("{}")
+    (path := scene_file.parent / "edited.yaml").write_text(scene_file.read_text())
+    return path
 
-    async def work(browser, client):
-        await browser.send(type="edit", part="TF02", key="visible", value=False)
-        for name in ("edited.yaml", "scene.yaml"):
-            await browser.send(type="save", name=name)
-            notice = await browser.next("notice")
-            assert (notice["level"], notice["name"]) == ("question", name)
-        assert read_scene(earlier).models["TF02"].edit.visible
-        await browser.send(type="save", name="edited.yaml", replace=True)
-        assert (await browser.next("notice"))["level"] == "info"
 
-    with_page(scene_file, work)
+@on_page
+async def test_other_files_are_replaced_after_a_question_only(browser, scene_file, earlier):
+    await browser.send(type="edit", part="TF02", key="visible", value=False)
+    for name in ("edited.yaml", "scene.yaml"):
+        await browser.send(type="save", name=name)
+        notice = await browser.next("notice")
+        assert (notice["level"], notice["name"]) == ("question", name)
+    assert read_scene(earlier).models["TF02"].edit.visible
+    await browser.send(type="save", name="edited.yaml", replace=True)
+    assert (await browser.next("notice"))["level"] == "info"
     assert not read_scene(earlier).models["TF02"].edit.visible
     assert read_scene(scene_file).models["TF02"].edit.visible
 
 
 @on_page
-async def test_a_file_that_others_have_written_is_replaced_after_a_question_only(browser, client, scene_file):
+async def test_a_file_that_others_have_written_is_replaced_after_a_question_only(browser, scene_file):
     await browser.send(type="edit", part="TF02", key="visible", value=False)
     await browser.send(type="save", name="scene.yaml")
     assert (await browser.next("notice"))["level"] == "info"
@@ -281,25 +260,21 @@ async def test_a_file_that_others_have_written_is_replaced_after_a_question_only
     assert read_scene(scene_file).models["TF01"].edit.opacity == 0.25
 
 
-def test_a_thousand_malformed_messages(scene_file, caplog):
-    rng = np.random.default_rng(0)
-    whole = json.dumps(VIEW)
-
-    async def work(browser, client):
-        for number in range(1000):
-            if number % 3 == 0:
-                await browser.socket.send_bytes(rng.bytes(20))
-            elif number % 3 == 1:
-                await browser.socket.send_str(whole[: rng.integers(len(whole))])
-            else:
-                letters = list(whole)
-                letters[rng.integers(len(whole))] = chr(rng.integers(1, 0x250))
-                await browser.socket.send_str("".join(letters).replace("view", "edit", int(number % 2)))
-        assert (await browser.next("notice"))["level"] == "error"
-        await browser.send(**VIEW)
-        await browser.next("frame")
-
-    with_page(scene_file, work)
+@on_page
+async def test_a_thousand_malformed_messages(browser, caplog):
+    rng, whole = np.random.default_rng(0), json.dumps(VIEW)
+    for number in range(1000):
+        if number % 3 == 0:
+            await browser.socket.send_bytes(rng.bytes(20))
+        elif number % 3 == 1:
+            await browser.socket.send_str(whole[: rng.integers(len(whole))])
+        else:
+            letters = list(whole)
+            letters[rng.integers(len(whole))] = chr(rng.integers(1, 0x250))
+            await browser.socket.send_str("".join(letters).replace("view", "edit", int(number % 2)))
+    assert (await browser.next("notice"))["level"] == "error"
+    await browser.send(**VIEW)
+    await browser.next("frame")
     assert "Traceback" not in caplog.text
 
 
