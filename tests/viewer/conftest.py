@@ -1,10 +1,32 @@
-"""A scene of two small balls in a folder of its own."""
+"""A scene of two small balls, and a browser that draws WebGL2 in software; tests skip where there is none."""
+
+import shutil
 
 import pytest
 
 from tests.scene.balls import write_balls
 
+MISSING = "needs Playwright: pip install '.[browser]'"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
+
 
 @pytest.fixture
 def scene_file(tmp_path):
     return write_balls(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def chromium():
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="needs Playwright: pip install '.[browser]'"
+    )
+    path = next(filter(None, map(shutil.which, BROWSERS)), None)
+    if path is None:
+        pytest.skip(f"needs a browser on the PATH: {', '.join(BROWSERS)}")
+    with playwright.sync_playwright() as started:
+        launched = started.chromium.launch(executable_path=path, args=SOFTWARE)
+        try:
+            yield launched
+        finally:
+            launched.close()

@@ -14,25 +14,18 @@ import torch
 from PIL import Image
 
 from tests.edit.lift_scenes import two_balls
-from tests.viewer.browser import MISSING, browser
 from texgs.cli.main import main
 from texgs.core.camera import orbit
 from texgs.fields.surfels.model_file import write_model
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
 
-expect = pytest.importorskip("playwright.sync_api", reason=MISSING).expect
+expect = pytest.importorskip("playwright.sync_api", reason="needs Playwright").expect
 
 PLACE = {"azimuth": 40, "polar": 10, "distance": 3.5, "fov_y": 35}
 LINK = "#" + "&".join(f"{key}={value}" for key, value in PLACE.items()) + "&target=0,0,0"
 WAIT = 60_000  # milliseconds, on a busy machine
 JPEG = 1.5  # levels of 255: what quality 95 costs on average
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as launched:
-        yield launched
 
 
 @contextmanager

@@ -13,7 +13,6 @@ from PIL import Image
 from tests.fields.gaussians.samples import sample as gaussians
 from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
-from tests.viewer.browser import browser
 from tests.viewer.drawing import rendered
 from texgs.cli.main import main
 from texgs.core.camera import orbit
@@ -53,12 +52,6 @@ def scene(folder):
 def file(scene, folder):
     assert main(["export", str(scene), "--to", str(folder / "scene.html")]) == 0
     return folder / "scene.html"
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as launched:
-        yield launched
 
 
 @pytest.fixture

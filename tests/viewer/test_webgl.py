@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tests.fields.surfels.test_composition import ball
-from tests.viewer.browser import browser
 from tests.viewer.drawing import drawn, open_renderer, rendered
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError
@@ -64,12 +63,6 @@ def packed(scene, tmp_path_factory):
 def description(scene):
     composed = scene.open()
     return describe("test", scene, composed)
-
-
-@pytest.fixture(scope="module")
-def chromium():
-    with browser() as launched:
-        yield launched
 
 
 @pytest.fixture(scope="module")
