@@ -111,14 +111,6 @@ def gradients(rasterize, scene, cotangents, options=DEFAULT_OPTIONS, wanted=None
     }
 
 
-def evaluate(loss, image, *constants):
-    """Value of a loss, and its gradient with respect to its first argument."""
-    image = image.detach().requires_grad_()
-    value = loss(image, *constants)
-    (gradient,) = torch.autograd.grad(value, image)
-    return value.detach(), gradient
-
-
 @remembered
 def true_images(scene, outputs=(), options=DEFAULT_OPTIONS):
     """The images of the definition, by name."""

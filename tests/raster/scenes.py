@@ -12,6 +12,7 @@ from torch import Tensor
 from texgs.raster.types import DEFAULT_OPTIONS, OUTPUTS, Options, Render, Texture
 
 SURFEL_TENSORS = ("means", "quats", "scales", "opacities", "shift", "features")
+GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
 TEXTURE_TENSORS = ("base", "gain", "texels")
 TEXTURE_SIZES = ((1, 1), (2, 3), (4, 4), (8, 2), (5, 7), (16, 16), (1, 200), (33, 7), (60, 50))
 
@@ -47,6 +48,10 @@ class Scene:
     def arguments(self) -> dict:
         """Keyword arguments of rasterize."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    def geometry(self) -> dict:
+        """What splat takes: primitives and camera."""
+        return {name: getattr(self, name) for name in GEOMETRY}
 
     def render(self, rasterize: Callable, outputs=(), options: Options = DEFAULT_OPTIONS) -> Render:
         """Call a rasterizer on this scene."""

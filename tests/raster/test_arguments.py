@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
+from tests.raster.requirements import refuses
 from tests.raster.scenes import gaussians, random_scene, textured, textured_with_features
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import autograd, native
@@ -32,8 +33,7 @@ WRONG_SHAPES = {
 @pytest.mark.parametrize("name", WRONG_SHAPES)
 def test_wrong_shape(device, name):
     scene = replace(random_scene(), **{name: WRONG_SHAPES[name]}).to(device)
-    with pytest.raises(ShapeError, match=rf"(?i)\b{name}: expected \[.*\], got \["):
-        scene.render(rasterize)
+    refuses(ShapeError, rf"(?i)\b{name}: expected \[.*\], got \[", scene.render, rasterize)
 
 
 @pytest.mark.parametrize("name", WRONG_SHAPES)
@@ -41,8 +41,7 @@ def test_wrong_shape(device, name):
 def test_wrong_dtype(device, name, dtype):
     scene = replace(random_scene(), shift=torch.zeros(N, 2))
     scene = replace(scene, **{name: getattr(scene, name).to(dtype)}).to(device)
-    with pytest.raises(ArgumentError, match=rf"\b{name}: expected float32, got {str(dtype)[6:]}"):
-        scene.render(rasterize)
+    refuses(ArgumentError, rf"\b{name}: expected float32, got {str(dtype)[6:]}", scene.render, rasterize)
 
 
 @pytest.mark.parametrize(
@@ -62,8 +61,7 @@ def test_wrong_dtype(device, name, dtype):
 def test_wrong_texture(name, value, error):
     scene = textured(random_scene())
     scene = replace(scene, texture=replace(scene.texture, **{name: value}))
-    with pytest.raises(TexgsError, match=error):
-        scene.render(rasterize)
+    refuses(TexgsError, error, scene.render, rasterize)
 
 
 @pytest.mark.parametrize("order", ["one after the other", "mixed, with gaps"])
@@ -83,8 +81,7 @@ def test_textures_must_not_overlap(order):
 def test_camera_and_background_are_constants(device, name):
     scene = random_scene().to(device)
     scene = replace(scene, **{name: getattr(scene, name).clone().requires_grad_()})
-    with pytest.raises(ArgumentError, match=rf"{name}: not differentiable .* pass {name}.detach\(\)"):
-        scene.render(rasterize)
+    refuses(ArgumentError, rf"{name}: not differentiable .* pass {name}.detach\(\)", scene.render, rasterize)
     with torch.no_grad():
         scene.render(rasterize)
 
@@ -123,8 +120,7 @@ def test_what_gaussians_do_not_have(render):
 def test_scales_of_nothing(render, columns):
     scene = replace(random_scene(), scales=torch.rand(N, columns))
     expected = r"scales: expected \[N, 2\] or \[N, 3\], got \[200, .*; 2 draw surfels, 3 draw 3D Gaussians"
-    with pytest.raises(ShapeError, match=expected):
-        scene.render(render)
+    refuses(ShapeError, expected, scene.render, render)
     with pytest.raises(
         ShapeError, match=r"scales: expected \[200, 2\|3\], got \[3, 200\]; did you transpose"
     ):
@@ -153,8 +149,7 @@ def test_library_refuses_what_gaussians_do_not_have():
     with pytest.raises(ArgumentError, match="normal: 3D Gaussians have none"):
         forward(SurfelTensors(*geometry, features=scene.features), normal=torch.zeros(3, 8, 8))
     five = SurfelTensors(*geometry, features=scene.features)._replace(scales=torch.rand(N, 5))
-    with pytest.raises(ArgumentError, match="surfels: expected 2 scales of surfels or 3 of 3D Gaussians"):
-        forward(five)
+    refuses(ArgumentError, "surfels: expected 2 scales of surfels or 3 of 3D Gaussians", forward, five)
 
 
 def test_library_refuses_what_is_not_of_the_forward_call():
@@ -195,12 +190,10 @@ def test_library_refuses_colours_that_do_not_add_up():
         handle = ctypes.byref(ctypes.c_void_p())
         native.call("texgs_forward", *structures, autograd.Image(), handle, device=torch.device("cpu"))
 
-    with pytest.raises(ArgumentError, match="features: expected C - 3 beside a texture"):
-        forward(colored, 3)
+    refuses(ArgumentError, "features: expected C - 3 beside a texture", forward, colored, 3)
     with pytest.raises(ArgumentError, match="features: expected C - 3 beside a texture"):
         forward(colored._replace(features=None), 5)
-    with pytest.raises(ArgumentError, match=r"texture: .* are needed, with 3 channels at least"):
-        forward(colored, 2)
+    refuses(ArgumentError, r"texture: .* are needed, with 3 channels at least", forward, colored, 2)
     with pytest.raises(ArgumentError, match="surfels: features or a texture are needed"):
         forward(tensors._replace(features=None), 2)
 
@@ -209,8 +202,7 @@ def test_wrong_device():
     scene = random_scene()
     with pytest.raises(DeviceError, match="features: expected device cpu"):
         replace(scene, features=scene.features.to("meta")).render(rasterize)
-    with pytest.raises(DeviceError, match="cpu or cuda, got meta"):
-        scene.to("meta").render(rasterize)
+    refuses(DeviceError, "cpu or cuda, got meta", scene.to("meta").render, rasterize)
 
 
 @pytest.mark.parametrize("size", [(0, 5), (5, -1), (2**31, 5), (2**20 - 15, 1), (1, 2**20 - 15)])
@@ -232,8 +224,7 @@ def test_wrong_number_of_channels(channels):
 
 
 def test_unknown_output():
-    with pytest.raises(ArgumentError, match="'depths'"):
-        random_scene().render(rasterize, ("depths",))
+    refuses(ArgumentError, "'depths'", random_scene().render, rasterize, ("depths",))
 
 
 @pytest.mark.parametrize(
@@ -257,8 +248,7 @@ def test_unknown_output():
     ids=str,
 )
 def test_wrong_options(wrong):
-    with pytest.raises(ArgumentError, match=next(iter(wrong))):
-        random_scene().render(rasterize, options=Options(**wrong))
+    refuses(ArgumentError, next(iter(wrong)), random_scene().render, rasterize, options=Options(**wrong))
 
 
 def test_memory_layout_does_not_matter(device, drawn):
@@ -309,8 +299,7 @@ def test_camera_changed_before_backward():
     scene = replace(scene, viewmat=scene.viewmat.clone(), means=scene.means.clone().requires_grad_())
     color = scene.render(rasterize).color
     scene.viewmat[0, 3] += 0.1
-    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
-        color.sum().backward()
+    refuses(RuntimeError, "modified by an inplace operation", color.sum().backward)
 
 
 def test_outputs_as_a_string_and_fractional_sizes():

@@ -11,8 +11,6 @@ from texgs.raster.api import rasterize, splat
 from texgs.raster.reference.render import kind_of, statistics
 from texgs.raster.types import DEFAULT_OPTIONS, Options
 
-GEOMETRY = ("means", "quats", "scales", "opacities", "viewmat", "K")
-
 
 @remembered
 def explicit(scene, options=DEFAULT_OPTIONS):
@@ -62,7 +60,7 @@ def test_splat_sums_the_image_by_weight(device, drawn, channels):
     image = torch.randn(scene.height, scene.width, channels, generator=torch.Generator().manual_seed(0))
     image = image * decided(scene)[..., None]
     weights, _ = explicit(scene)
-    sums, total = splat(image.to(device), **{name: getattr(scene.to(device), name) for name in GEOMETRY})
+    sums, total = splat(image.to(device), **scene.to(device).geometry())
     expected = weights.T @ image.double().reshape(-1, channels)
     assert sums.shape == (250, channels)
     torch.testing.assert_close(sums.cpu().double(), expected, rtol=1e-4, atol=1e-4)
@@ -74,7 +72,7 @@ def test_splat_is_the_adjoint_of_rendering(device, drawn):
     options = Options(low_pass=6.0, filter_sigma=1.0, dilation=0.5, antialiased=True)
     image = torch.randn(scene.height, scene.width, 3, generator=torch.Generator().manual_seed(0)).to(device)
     rendered = scene.render(rasterize, options=options).color
-    sums, _ = splat(image, **{name: getattr(scene, name) for name in GEOMETRY}, options=options)
+    sums, _ = splat(image, **scene.geometry(), options=options)
     forward, backward = (rendered.double() * image).sum(), (sums.double() * scene.features).sum()
     assert float(forward) == pytest.approx(float(backward), rel=1e-5)
 
@@ -82,7 +80,7 @@ def test_splat_is_the_adjoint_of_rendering(device, drawn):
 def test_splat_of_ones_gives_the_weights(device, drawn):
     scene = drawn(random_scene(4)).to(device)
     ones = torch.ones(scene.height, scene.width, 1, device=device)
-    sums, weights = splat(ones, **{name: getattr(scene, name) for name in GEOMETRY})
+    sums, weights = splat(ones, **scene.geometry())
     torch.testing.assert_close(sums[:, 0], weights, rtol=1e-5, atol=1e-6)
     counted = scene.render(rasterize, ("statistics",)).statistics
     torch.testing.assert_close(counted.weight_sum, weights, rtol=1e-5, atol=1e-6)

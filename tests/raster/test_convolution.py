@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from torch.nn import functional as F
 
-from tests.raster.threads import require_same_bits
+from tests.raster.requirements import refuses, require_same_bits
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.convolution import RectifiedConvolution
 
@@ -105,26 +105,19 @@ def test_a_second_derivative_is_refused():
     convolution, images = case((1, 3, 16, 8, 8))
     images.requires_grad_()
     (gradient,) = torch.autograd.grad(convolution(images).square().sum(), images, create_graph=True)
-    with pytest.raises(RuntimeError, match="once_differentiable"):
-        gradient.sum().backward()
+    refuses(RuntimeError, "once_differentiable", gradient.sum().backward)
 
 
 def test_errors_name_the_argument():
     convolution, images = case((1, 3, 16, 8, 8))
     weight, bias = convolution.weight, convolution.bias
-    with pytest.raises(ShapeError, match="weight: expected"):
-        RectifiedConvolution(weight[..., :2], bias)
-    with pytest.raises(ShapeError, match="bias: expected"):
-        RectifiedConvolution(weight, bias[1:])
+    refuses(ShapeError, "weight: expected", RectifiedConvolution, weight[..., :2], bias)
+    refuses(ShapeError, "bias: expected", RectifiedConvolution, weight, bias[1:])
     with pytest.raises(ArgumentError, match="weight: expected float32, got float64"):
         RectifiedConvolution(weight.double(), bias)
     with pytest.raises(ArgumentError, match="bias: not differentiable here"):
         RectifiedConvolution(weight, bias.clone().requires_grad_())
-    with pytest.raises(ShapeError, match="images: expected"):
-        convolution(images[:, :2])
-    with pytest.raises(ArgumentError, match="image: expected at least one pixel"):
-        convolution(images[..., :0])
-    with pytest.raises(ArgumentError, match="images: expected float32, got bfloat16"):
-        convolution(images.bfloat16())
-    with pytest.raises(DeviceError, match="images: expected a tensor on cpu, got meta"):
-        convolution(images.to("meta"))
+    refuses(ShapeError, "images: expected", convolution, images[:, :2])
+    refuses(ArgumentError, "image: expected at least one pixel", convolution, images[..., :0])
+    refuses(ArgumentError, "images: expected float32, got bfloat16", convolution, images.bfloat16())
+    refuses(DeviceError, "images: expected a tensor on cpu, got meta", convolution, images.to("meta"))

@@ -7,8 +7,8 @@ import torch
 
 from benchmarks.scenes import camera, surfels
 from tests.raster.agreement import gradients, images, names_of, random_cotangents
+from tests.raster.requirements import require_same_bits
 from tests.raster.scenes import Scene, gaussians, random_scene, textured, textured_with_features
-from tests.raster.threads import require_same_bits
 from tests.raster.voxel_scenes import voxel_scene
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
@@ -21,12 +21,16 @@ def everything(scene):
     render = scene.render(rasterize, scene.outputs)
     results = images(render) | vars(render.statistics)
     image = torch.linspace(-1, 1, scene.height * scene.width * 2, device=scene.means.device)
-    geometry = {
-        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
-    }
-    results["sums"], results["weights"] = splat(image.reshape(scene.height, scene.width, 2), **geometry)
+    image = image.reshape(scene.height, scene.width, 2)
+    results["sums"], results["weights"] = splat(image, **scene.geometry())
     cotangents = random_cotangents(scene, names_of(scene))
     return results | {f"gradient of {name}": x for name, x in gradients(rasterize, scene, cotangents).items()}
+
+
+def require_equal(results, expected):
+    """Require the same tensors by name."""
+    for quantity, value in expected.items():
+        assert torch.equal(results[quantity], value), quantity
 
 
 def generated(n=8000, size=200):
@@ -57,9 +61,7 @@ def test_threads(name):
 )
 def test_runs(device, name):
     scene = SCENES[name]().to(device)
-    first = everything(scene)
-    for quantity, value in everything(scene).items():
-        assert torch.equal(value, first[quantity]), quantity
+    require_equal(everything(scene), everything(scene))
 
 
 def test_more_pairs_of_surfels_and_tiles_than_in_the_view_before(device, drawn):
@@ -68,8 +70,7 @@ def test_more_pairs_of_surfels_and_tiles_than_in_the_view_before(device, drawn):
     expected = everything(scene)
     native.release_memory(device.type)
     replace(scene, scales=0.05 * scene.scales).render(rasterize)
-    for quantity, value in everything(scene).items():
-        assert torch.equal(value, expected[quantity]), quantity
+    require_equal(everything(scene), expected)
 
 
 def test_other_work_in_between_changes_nothing(device):
@@ -101,16 +102,9 @@ def voxels(degree, size=(64, 40, 36), n_rays=20_000):
 
 
 @pytest.mark.parametrize("degree", [0, 2])
-def test_threads_of_voxels(degree):
+def test_voxels(degree):
     require_same_bits(voxels, degree)
-
-
-def test_runs_of_voxels():
-    assert all(map(torch.equal, voxels(1), voxels(1)))
-
-
-def test_memory_of_voxels_is_given_back():
-    voxels(0)
+    assert all(map(torch.equal, voxels(degree), voxels(degree)))
     native.release_memory()
     native.peak_memory(reset=True)
     assert native.peak_memory() == 0

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from tests.raster.requirements import refuses
 from texgs.core.errors import DeviceError, NativeError, OutOfMemoryError
 from texgs.raster import native
 
@@ -21,36 +22,30 @@ def replaced(monkeypatch):
 
 def test_missing_library(replaced, tmp_path):
     replaced(tmp_path / "libtexgs.so")
-    with pytest.raises(NativeError, match=r"libtexgs\.so: not found in .*; install texgs again"):
-        open_library("cpu")
-    with pytest.raises(NativeError, match="install a CUDA compiler and install texgs again"):
-        open_library("cuda")
+    refuses(NativeError, r"libtexgs\.so: not found in .*; install texgs again", open_library, "cpu")
+    refuses(NativeError, "install a CUDA compiler and install texgs again", open_library, "cuda")
 
 
 def test_file_that_is_no_library(replaced, tmp_path):
     (tmp_path / "libtexgs.so").write_text("not a library")
     replaced(tmp_path / "libtexgs.so")
-    with pytest.raises(NativeError, match=r"libtexgs\.so: cannot be loaded: .*; install texgs again"):
-        open_library("cpu")
+    refuses(NativeError, r"libtexgs\.so: cannot be loaded: .*; install texgs again", open_library, "cpu")
 
 
 def test_library_that_lacks_a_function(replaced):
     native.library("cpu")
     replaced(_ctypes.__file__)  # a shared library that every Python has
-    with pytest.raises(NativeError, match="has no function texgs_abi_version; install texgs again"):
-        open_library("cpu")
+    refuses(NativeError, "has no function texgs_abi_version; install texgs again", open_library, "cpu")
     with pytest.raises(NativeError, match="has no function texgs_paint; install texgs again"):
         native.call("texgs_paint", device=torch.device("cpu"))
 
 
 def test_device_without_a_library():
-    with pytest.raises(DeviceError, match="expected tensors on cpu or cuda, got meta"):
-        native.library("meta")
+    refuses(DeviceError, "expected tensors on cpu or cuda, got meta", native.library, "meta")
 
 
 def test_out_of_memory_on_a_gpu_tells_of_what_torch_keeps(monkeypatch):
-    with pytest.raises(OutOfMemoryError, match=r"needs \d+ bytes more$"):
-        native.require_memory(2**60, torch.device("cpu"))
+    refuses(OutOfMemoryError, r"needs \d+ bytes more$", native.require_memory, 2**60, torch.device("cpu"))
     library = native.library()
     monkeypatch.setattr(native, "library", lambda device_type: library)
     monkeypatch.setattr(torch.cuda, "device", lambda device: nullcontext())

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from tests.raster.threads import require_same_bits
+from tests.raster.requirements import require_same_bits
 from tests.raster.voxel_scenes import SPACING, voxel_scene
 from texgs.core.errors import DeviceError
 from texgs.raster.voxel_grid import interpolate_rows

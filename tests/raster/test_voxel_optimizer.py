@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from tests.raster.requirements import refuses
 from tests.raster.voxel_scenes import voxel_scene
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster.voxel_grid import voxel_grid
@@ -120,8 +121,7 @@ def test_a_backward_pass_after_a_step_is_refused():
     optimizer = VoxelOptimizer(grid)
     color = render_rays(grid, scene.rays).color
     optimizer.step(RATES)
-    with pytest.raises(RuntimeError, match="modified by an inplace operation"):
-        color.sum().backward()
+    refuses(RuntimeError, "modified by an inplace operation", color.sum().backward)
 
 
 def test_a_grid_without_voxels_has_no_variation():
@@ -133,8 +133,7 @@ def test_a_grid_without_voxels_has_no_variation():
 
 def test_errors_name_the_argument():
     grid = voxel_scene().grid
-    with pytest.raises(ArgumentError, match="optimizer: expected rmsprop or adam, got 'sgd'"):
-        VoxelOptimizer(grid, "sgd")
+    refuses(ArgumentError, "optimizer: expected rmsprop or adam, got 'sgd'", VoxelOptimizer, grid, "sgd")
     other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
     with pytest.raises(ShapeError, match=r"into: expected the gradient of .* make a new one for each grid"):
         add_total_variation(grid, torch.tensor([0]), 1.0, 1.0, other)

@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 import torch
 
+from tests.raster.requirements import refuses
 from tests.raster.voxel_scenes import LOWER, SPACING, voxel_scene
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
@@ -242,16 +243,12 @@ def test_errors_name_the_argument():
     grid, rays = scene.grid, scene.rays
     with pytest.raises(ShapeError, match=r"rays: expected \[N, 6\], got \[6, 300\]; did you transpose"):
         render_rays(grid, rays.T)
-    with pytest.raises(ArgumentError, match="rays: expected float32, got float64"):
-        render_rays(grid, rays.double())
-    with pytest.raises(ArgumentError, match="rays: not differentiable here"):
-        render_rays(grid, rays.clone().requires_grad_())
-    with pytest.raises(ArgumentError, match=r"step: expected 0\.1 to 8 spacings"):
-        render_rays(grid, rays, March(step=0.01))
+    refuses(ArgumentError, "rays: expected float32, got float64", render_rays, grid, rays.double())
+    refuses(ArgumentError, "rays: not differentiable here", render_rays, grid, rays.clone().requires_grad_())
+    refuses(ArgumentError, r"step: expected 0\.1 to 8 spacings", render_rays, grid, rays, March(step=0.01))
     with pytest.raises(ArgumentError, match="transmittance_min: expected 0 to 1, without 1"):
         render_rays(grid, rays, March(transmittance_min=1.0))
-    with pytest.raises(DeviceError, match="rows: expected device meta as rays, got cpu"):
-        render_rays(grid, rays.to("meta"))
+    refuses(DeviceError, "rows: expected device meta as rays, got cpu", render_rays, grid, rays.to("meta"))
     with pytest.raises(DeviceError, match="expected tensors on cpu or cuda, got meta; move them"):
         render_rays(replace(grid, rows=grid.rows.to("meta")), rays.to("meta"))
     other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
@@ -260,8 +257,7 @@ def test_errors_name_the_argument():
     ):
         render_rays(grid, rays, into=other)
     samples = Samples(grid, scene.march, rays)
-    with pytest.raises(ShapeError, match="into: expected the gradient of"):
-        samples.add_gradient(None, None, other)
+    refuses(ShapeError, "into: expected the gradient of", samples.add_gradient, None, None, other)
     with pytest.raises(ShapeError, match=r"color: expected \[300, 3\], got \[299, 3\]"):
         samples.add_gradient(rays[1:, :3], None, RowGradient(grid))
     with pytest.raises(DeviceError, match="color: expected device cpu as rays, got meta"):
@@ -270,31 +266,24 @@ def test_errors_name_the_argument():
         render_rays(grid, rays, into=RowGradient(grid.to("meta")))
     with pytest.raises(ArgumentError, match="alpha: expected float32, got float64"):
         samples.add_gradient(None, rays[:, 0].double(), RowGradient(grid))
-    with pytest.raises(ShapeError, match=r"weights: expected \[\d+\], got \[3\]"):
-        samples.mark(torch.zeros(3))
+    refuses(ShapeError, r"weights: expected \[\d+\], got \[3\]", samples.mark, torch.zeros(3))
     with pytest.raises(ArgumentError, match="weights: expected float32, got float64"):
         samples.mark(torch.zeros(len(grid.rows)).double())
     with pytest.raises(ArgumentError, match="weights: expected a dense tensor"):
         samples.mark(torch.zeros(2 * len(grid.rows))[::2])
-    with pytest.raises(DeviceError, match="rows: expected device cpu as masks, got meta"):
-        grid.with_rows(grid.rows.to("meta"))
-    with pytest.raises(ShapeError, match=r"rows: expected \[\d+, K\], got \[3, 32\]"):
-        grid.with_rows(torch.zeros(3, 32))
-    with pytest.raises(ShapeError, match="rows: expected 4, 16 or 32 floats"):
-        grid.with_rows(torch.zeros(len(grid.rows), 8))
+    refuses(DeviceError, "rows: expected device cpu as masks, got meta", grid.with_rows, grid.rows.to("meta"))
+    refuses(ShapeError, r"rows: expected \[\d+, K\], got \[3, 32\]", grid.with_rows, torch.zeros(3, 32))
+    refuses(ShapeError, "rows: expected 4, 16 or 32 floats", grid.with_rows, torch.zeros(len(grid.rows), 8))
 
 
 def test_grids_that_cannot_be():
     mask = torch.ones(8, 8, 8, dtype=torch.bool)
     with pytest.raises(ShapeError, match=r"multiples of 4 from 8 to 1024, got \[8, 6, 8\] bool; pad it"):
         voxel_grid(mask[:, :6], LOWER, SPACING)
-    with pytest.raises(ShapeError, match="expected bool"):
-        voxel_grid(mask.float(), LOWER, SPACING)
-    with pytest.raises(ArgumentError, match="degree: expected 0, 1 or 2, got 3"):
-        voxel_grid(mask, LOWER, SPACING, 3)
+    refuses(ShapeError, "expected bool", voxel_grid, mask.float(), LOWER, SPACING)
+    refuses(ArgumentError, "degree: expected 0, 1 or 2, got 3", voxel_grid, mask, LOWER, SPACING, 3)
     for spacing in (0, -1, math.inf, math.nan):
         with pytest.raises(ArgumentError, match=f"spacing: expected a length above 0, got {spacing}"):
             voxel_grid(mask, LOWER, spacing)
     for lower in (LOWER[:2], (0, 0, math.nan)):
-        with pytest.raises(ArgumentError, match="lower: expected 3 finite numbers, got"):
-            voxel_grid(mask, lower, SPACING)
+        refuses(ArgumentError, "lower: expected 3 finite numbers, got", voxel_grid, mask, lower, SPACING)

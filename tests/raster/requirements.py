@@ -1,7 +1,8 @@
-"""Running a function on a number of threads."""
+"""What tests require: the same bits on any number of threads, and one sentence for what is refused."""
 
 from collections.abc import Mapping
 
+import pytest
 import torch
 
 
@@ -10,19 +11,21 @@ def with_threads(n, function, *arguments):
     before = torch.get_num_threads()
     torch.set_num_threads(n)
     try:
-        return function(*arguments)
+        results = function(*arguments)
     finally:
         torch.set_num_threads(before)
+    return results if isinstance(results, Mapping) else dict(enumerate(results))
 
 
 def require_same_bits(function, *arguments, threads=(2, 7)):
     """Require that a function gives the same tensors, in a list or by name, for any number of threads."""
-    alone = by_name(with_threads(1, function, *arguments))
+    alone = with_threads(1, function, *arguments)
     for n in threads:
-        for name, value in by_name(with_threads(n, function, *arguments)).items():
+        for name, value in with_threads(n, function, *arguments).items():
             assert torch.equal(value, alone[name]), f"{name} with {n} threads"
 
 
-def by_name(tensors):
-    """Return tensors by their names, or by their numbers."""
-    return tensors if isinstance(tensors, Mapping) else dict(enumerate(tensors))
+def refuses(error, message, function, *arguments, **settings):
+    """Require that a call raises an error whose message matches."""
+    with pytest.raises(error, match=message):
+        function(*arguments, **settings)
