@@ -229,11 +229,7 @@ def test_mistakes_are_named_before_any_work(vgg, style):
         ({"model": Surfels(shading)}, ArgumentError, "model: expected stage texture, got shading"),
         ({"lights": lights[:2]}, ArgumentError, "expected one for each of some cameras, got 2 for 6"),
         ({"cameras": [], "lights": []}, ArgumentError, "got 0 for 0"),
-        (
-            {"vgg": None},
-            ArgumentError,
-            "vgg: expected a VGG for this recipe, got none",
-        ),
+        ({"vgg": None}, ArgumentError, "vgg: expected a VGG for this recipe, got none"),
         ({"recipe": short(lambda_s=0.5)}, ArgumentError, "clip: expected a CLIP term for lambda_s = 0.5"),
         ({"surfels": torch.ones(3, dtype=torch.bool)}, ShapeError, r"surfels: expected \[400\]"),
         ({"surfels": torch.zeros(400, dtype=torch.bool)}, ArgumentError, "surfels: expected at least one"),

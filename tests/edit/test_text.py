@@ -219,11 +219,7 @@ def broken(views):
         ({"model": sample("shading")}, ArgumentError, "expected stage texture, got shading"),
         ({"surfels": torch.zeros(160) > 0}, ArgumentError, "at least one that may change as bool, got 0"),
         ({"surfels": torch.ones(3) > 0}, ShapeError, "surfels"),
-        (
-            {"recipe": RECIPES["paper"]},
-            ArgumentError,
-            "cameras: expected 6 at least .*, got 2; .*views=axes",
-        ),
+        ({"recipe": RECIPES["paper"]}, ArgumentError, "cameras: expected 6 at least .*, got 2; .*views=axes"),
         (
             {"cameras": [replace(camera, viewmat=TURNED @ camera.viewmat) for camera in around(2)]},
             ArgumentError,

@@ -14,13 +14,7 @@ from texgs.edit.pictures import picture
 from texgs.edit.recipe import Recipe
 from texgs.edit.style_loop import image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
-from texgs.edit.voxels import (
-    VoxelPainting,
-    moved,
-    object_colors,
-    recolored_images,
-    stylize_voxels,
-)
+from texgs.edit.voxels import VoxelPainting, moved, object_colors, recolored_images, stylize_voxels
 from texgs.raster.voxel_grid import drop_sh, unpack_rows
 from texgs.raster.voxels import render_view
 from texgs.volume.images import Images

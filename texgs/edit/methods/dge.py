@@ -29,8 +29,7 @@ class DgeKeys(UpdateKeys):
     every: int = key(500, "iterations of a round", least=1)
     views: int = key(20, "views edited in a round, drawn at random", least=1)
     noise: list[float] = key(
-        [0.998, 0.3, 0.3, 0.021],
-        "levels of noise of the rounds' edits, as shares; the last one holds on",
+        [0.998, 0.3, 0.3, 0.021], "levels of noise of the rounds' edits, as shares; the last one holds on"
     )
     prune: bool = key(True, "Gaussians that are faint or large are removed, if geometry learns")
     rates: CommonRates = field(

@@ -109,11 +109,7 @@ Stylize = Callable[[Look[FeatureKeysType], str, Any, "Sequence[View]"], tuple[An
 
 
 def look_method(
-    name: str,
-    summary: str,
-    settings: type[FeatureKeysType],
-    stylize: Stylize[FeatureKeysType],
-    kind: str,
+    name: str, summary: str, settings: type[FeatureKeysType], stylize: Stylize[FeatureKeysType], kind: str
 ) -> Method[FeatureKeysType]:
     """Return the specification of a method that gives models of one kind of field the style of a picture.
 

@@ -25,9 +25,7 @@ class TextKeys(InstructionKeys):
     """What to do, what edits the views, and how texels follow."""
 
     recipe: str = key(
-        "default",
-        "how texels follow: solved, or as in the paper",
-        choices=("default", "paper"),
+        "default", "how texels follow: solved, or as in the paper", choices=("default", "paper")
     )
     views: str | None = key(
         None,
