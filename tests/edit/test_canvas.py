@@ -1,8 +1,11 @@
+from dataclasses import replace
+
 import pytest
 import torch
 
 from tests.edit.scenes import ball, views
 from texgs.edit.canvas import mean_alpha, paint, visible_part, visible_range
+from texgs.edit.recipe import Recipe
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.composition import Composition
 from texgs.fields.surfels.model import Surfels
@@ -38,19 +41,13 @@ def test_a_part_is_what_the_scene_renders_there(scene, is_lit, look, opacity):
     full = Composition([scene]).render(
         cameras[0], lights[0], [PartEdit(opacity=opacity)], look=look, background=torch.zeros(3)
     )
-    canvas = paint(scene, scene.parameters["texels"], cameras[0], lights[0], opacity=opacity, is_lit=is_lit)
+    recipe = Recipe(opacity=opacity, is_lit=is_lit)
+    canvas = paint(scene, scene.parameters["texels"], cameras[0], lights[0], recipe)
     assert canvas.alpha.numel() < full.alpha.numel()
     assert len(pasted(canvas, full.color)) == 1
     torch.testing.assert_close(canvas.alpha.sum(), full.alpha.sum())
-    whole = paint(
-        scene,
-        scene.parameters["texels"],
-        cameras[0],
-        lights[0],
-        opacity=opacity,
-        is_lit=is_lit,
-        cropped=False,
-    )
+    recipe = replace(recipe, cropped=False)
+    whole = paint(scene, scene.parameters["texels"], cameras[0], lights[0], recipe)
     torch.testing.assert_close(whole.color.permute(1, 2, 0), full.color, atol=1e-5, rtol=0)
 
 
@@ -58,10 +55,10 @@ def test_the_share_of_chosen_surfels_and_of_the_others_make_up_alpha(scene):
     cameras, lights = views()
     chosen = scene.parameters["means"][:, 1] > 0.1
     shares = [
-        paint(scene, scene.parameters["texels"], cameras[0], lights[0], chosen=mask).share
+        paint(scene, scene.parameters["texels"], cameras[0], lights[0], Recipe(), mask).share
         for mask in (chosen, ~chosen)
     ]
-    alpha = paint(scene, scene.parameters["texels"], cameras[0], lights[0]).alpha
+    alpha = paint(scene, scene.parameters["texels"], cameras[0], lights[0], Recipe()).alpha
     torch.testing.assert_close(shares[0] + shares[1], alpha, atol=1e-5, rtol=0)
     assert min(share.max() for share in shares) > 0.9
 

@@ -7,8 +7,8 @@ from tests.edit.lift_scenes import BLUE, RED, cameras, joined, nested, overlap, 
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.light import HEADLIGHT
-from texgs.edit.clicks import Clicks, is_visible, prompts_at
-from texgs.edit.lift import Lifted, ViewMasks, components_at, lift, middle_of
+from texgs.edit.clicks import Clicks, is_visible, places_of
+from texgs.edit.lift import Lifted, components_at, lift, middle_of, view_mask
 from texgs.edit.new_segment import preview
 from texgs.models.grabcut import GrabCut
 
@@ -44,19 +44,16 @@ def clicks(*places, negative=(), camera=FRONT):
 
 def test_a_click_is_where_its_ray_meets_the_surface():
     model, _ = two_balls()
-    prompts = prompts_at(model, clicks((-0.3, 0.05, 0.0), (0.3, 0.1, 0.1), negative=[(-0.25, -0.1, 0.0)]))
+    places = places_of(model, clicks((-0.3, 0.05, 0.0), (0.3, 0.1, 0.1), negative=[(-0.25, -0.1, 0.0)]))
     middles = torch.tensor([[-0.3, 0.0, 0.0], [0.3, 0.1, 0.1], [-0.3, 0.0, 0.0]])
-    torch.testing.assert_close(
-        (prompts.places - middles).norm(dim=1), torch.full((3,), 0.25), atol=0.02, rtol=0
-    )
-    assert (prompts.places[:, 2] > middles[:, 2]).all(), "on the side that faces the camera"
-    assert prompts.positive.tolist() == [True, True, False]
+    torch.testing.assert_close((places - middles).norm(dim=1), torch.full((3,), 0.25), atol=0.02, rtol=0)
+    assert (places[:, 2] > middles[:, 2]).all(), "on the side that faces the camera"
 
 
 def test_a_click_through_a_thin_layer_is_on_what_shows_through():
     for opacity, distance in ((0.08, 0.2), (0.9, 0.4)):
         model, _ = nested(opacity)
-        place = prompts_at(model, clicks((0.0, 0.0, 0.0))).places[0]
+        place = places_of(model, clicks((0.0, 0.0, 0.0)))[0]
         assert float(place.norm()) == pytest.approx(distance, abs=0.03)
         assert place[2] > 0
 
@@ -122,7 +119,7 @@ def test_the_mask_model_sees_what_the_view_shows_and_clicks_move_along():
     model, _ = two_balls()
     masks = Alike()
     click = clicks((0.3, 0.1, 0.35))
-    mask = ViewMasks(model, HEADLIGHT, masks).mask(click)
+    mask = view_mask(model, click, masks, HEADLIGHT)
     image, ((point,), _) = masks.images[0], masks.clicked[0]
     assert image.shape[0] * image.shape[1] < 0.7 * SIZE * SIZE
     x, y = point.long().tolist()

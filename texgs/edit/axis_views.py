@@ -32,12 +32,7 @@ def axis_cameras(like: Camera, points: Tensor) -> dict[str, Camera]:
     They look at the middle of the scene from as far as another camera does, with the narrowest field of view
     that shows all of it in all six: a guidance works best on a large object, and pixels become texels.
 
-    Args:
-        like: its distance from the middle of the scene and the size of its image are taken over.
-        points: [N, 3] of the scene, world units, such as means of surfels; at least one.
-
-    Returns:
-        Camera by name, in the order of `ANGLES`, on the device of `like`.
+    The scene is points [N, 3], such as means of surfels. Cameras are in the order of `ANGLES`.
     """
     center = _center(points)
     radius = float((like.position.cpu().double() - center).norm())
@@ -55,14 +50,8 @@ def axis_cameras(like: Camera, points: Tensor) -> dict[str, Camera]:
 def nearest_to_axes(cameras: Sequence[Camera], points: Tensor) -> dict[str, Camera]:
     """Choose the six different cameras whose directions from a scene are nearest to its axes.
 
-    The sum of the cosines of the angles between cameras and axes is largest.
-
-    Args:
-        cameras: to choose from, six at least.
-        points: [N, 3] of the scene, world units; its middle is that of their box.
-
-    Returns:
-        Camera by name, in the order of `ANGLES`.
+    The sum of the cosines of the angles between cameras and axes is largest. The middle of the scene is that
+    of the box around points [N, 3].
     """
     from scipy.optimize import linear_sum_assignment
 

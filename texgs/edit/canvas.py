@@ -12,6 +12,7 @@ from texgs.core import check
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
+from texgs.edit.recipe import Recipe
 from texgs.fields.splats import geometry, screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.raster import Render, Texture, rasterize
@@ -51,43 +52,29 @@ class Canvas(NamedTuple):
 
     color: Tensor  # [3, h, w] premultiplied, over black
     alpha: Tensor  # [h, w]
-    share: Tensor | None  # [h, w] of alpha that is of the surfels to be changed; None: all of it
+    share: Tensor  # [h, w] of alpha that is of the surfels to be changed
 
 
 def paint(
-    model: Surfels,
-    texels: Tensor,
-    camera: Camera,
-    light: Light,
-    *,
-    opacity: float = 1.0,
-    is_lit: bool = True,
-    cropped: bool = True,
-    chosen: Tensor | None = None,
+    model: Surfels, texels: Tensor, camera: Camera, light: Light, recipe: Recipe, chosen: Tensor | None = None
 ) -> Canvas:
-    """Render a view, or the part of it that may show the model; differentiable in the texels.
+    """Render a view, or the part of it that shows the model, as a recipe says; differentiable in the texels.
 
-    Args:
-        model: textured.
-        texels: [T, 3] in place of its own.
-        camera: on the model's device.
-        light: of the view.
-        opacity: factor on opacities, which stay at most 1.
-        is_lit: or colours without light.
-        cropped: whether what cannot show the model is left out.
-        chosen: [N] bool, surfels whose share in alpha is wanted.
+    Texels [T, 3] are in place of the model's own. Of chosen surfels [N] bool the share in alpha is wanted.
     """
     p = {**model.parameters, "texels": texels}
-    part = around(model, camera) if cropped else camera
-    if is_lit:
+    part = around(model, camera) if recipe.cropped else camera
+    if recipe.is_lit:
         texture = model.shading.colors(p, part, light)
     else:
         gain = torch.ones_like(p["opacities"])
         texture = Texture(p["colors"] + p["palette"], gain, texels, p["sizes"], p["offsets"])
     features = None if chosen is None else chosen.to(texels)[:, None]  # blended, they are the share
-    render = rasterized(model, part, opacity, texture=texture, features=features)
-    color = render.color.permute(2, 0, 1)
-    return Canvas(color[:3], render.alpha, None if chosen is None else color[3].detach())
+    render = rasterized(model, part, recipe.opacity, texture=texture, features=features)
+    planes, alpha = render.color.permute(2, 0, 1), render.alpha
+    rows, columns = visible_part(alpha) if recipe.cropped else (slice(None), slice(None))
+    planes, alpha = planes[:, rows, columns], alpha[rows, columns]
+    return Canvas(planes[:3], alpha, alpha if chosen is None else planes[3].detach())
 
 
 def around(model: Surfels, camera: Camera) -> Camera:

@@ -21,11 +21,7 @@ TOLERANCE = 0.02  # of the model's extent, by which a point may be behind what h
 
 @dataclass(frozen=True, eq=False)
 class Clicks:
-    """What a user clicked on in a rendered view; all tensors on the model's device.
-
-    Raises:
-        ArgumentError, ShapeError: if points and signs do not fit each other, or no point is positive.
-    """
+    """What a user clicked on in a rendered view; all tensors on the model's device."""
 
     camera: Camera  # of the view
     points: Tensor  # [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5)
@@ -38,17 +34,9 @@ class Clicks:
             raise ArgumentError("points: expected a positive one at least, got none; click on the object")
 
 
-@dataclass(frozen=True, eq=False)
-class Prompts:
-    """Places that belong to what is looked for, and places that do not."""
-
-    places: Tensor  # [P, 3] world units
-    positive: Tensor  # [P] bool
-
-
 @torch.no_grad()
-def prompts_at(model: Surfels, clicks: Clicks) -> Prompts:
-    """Lift clicks to the surface that they are on: the layer of surfels that makes up most of the pixel.
+def places_of(model: Surfels, clicks: Clicks) -> Tensor:
+    """Return where in the world [P, 3] clicks are: on the layer of surfels that makes up most of the pixel.
 
     Behind a layer that lets through more than it shows, a click is on what shows through.
 
@@ -56,8 +44,7 @@ def prompts_at(model: Surfels, clicks: Clicks) -> Prompts:
         ArgumentError: if a point is outside of the view or on the background.
     """
     thickness = TOLERANCE * extent(model)
-    places = [_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()]
-    return Prompts(torch.stack(places), clicks.positive)
+    return torch.stack([_place(model, clicks.camera, x, y, thickness) for x, y in clicks.points.tolist()])
 
 
 def _place(model: Surfels, camera: Camera, x: float, y: float, thickness: float) -> Tensor:
@@ -108,12 +95,8 @@ def met(model: Surfels, camera: Camera, x: float, y: float, surfels: Tensor) -> 
 def is_visible(pixels: Tensor, depths: Tensor, median: Tensor, tolerance: float) -> Tensor:
     """Return which places in a view more than half of the light reaches, [P] bool.
 
-    Args:
-        pixels: [P, 2] of the places.
-        depths: [P] their camera z.
-        median: [H, W] camera z of the last fragment that more than half of the light reaches, 0 where none
-            is: the rasterizer's median depth.
-        tolerance: world units, by which a place may be behind it.
+    They have pixels [P, 2] and camera z [P], which may be behind the rasterizer's median depth [H, W] by a
+    tolerance in world units.
     """
     height, width = median.shape
     x, y = pixels.floor().unbind(1)

@@ -53,11 +53,9 @@ class PhotometricLoss:
     network: Lpips | None = None  # for LPIPS
 
     def __call__(self, image: Tensor, wanted: Tensor) -> Tensor:
-        """Return the weighted sum of mean differences [], differentiable in the image.
+        """Return the weighted sum of mean differences [] to a wanted image, differentiable in the image.
 
-        Args:
-            image: [H, W, 3], planar memory; or patches [N, H, W, 3] where D-SSIM has no weight.
-            wanted: the same shape.
+        Both are [H, W, 3] in planar memory; or patches [N, H, W, 3] where D-SSIM has no weight.
         """
         pixels = self.l1 + self.dssim
         loss = image.new_zeros(())
@@ -109,19 +107,14 @@ def update_steps(schedule: UpdateSchedule, count: int, generator: torch.Generato
         yield UpdateStep(edited, level, learned[schedule.learned])
 
 
-@dataclass(frozen=True, eq=False)
-class Updated:
+class Updated(NamedTuple):
     """What an edit gives."""
 
     field: Field
-    views: list[tuple[Tensor, Tensor]]
-    """Some views that were edited, apart from each other, [H, W, 3]: as they were, and as they are."""
-    losses: list[float]
-    """In each iteration."""
-    edits: int
-    """Of single views."""
-    guided: float
-    """Seconds that edits of views took, of all."""
+    views: list[tuple[Tensor, Tensor]]  # some that were edited, [H, W, 3]: as they were, and as they are
+    losses: list[float]  # in each iteration
+    edits: int  # of single views
+    guided: float  # seconds that edits of views took
 
 
 def update_field(

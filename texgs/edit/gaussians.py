@@ -12,7 +12,7 @@ from texgs.core.camera import Camera
 from texgs.edit.dataset_update import PhotometricLoss
 from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
-from texgs.edit.style_loop import Painting, learn_style
+from texgs.edit.style_loop import Losses, Painting, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.gaussians.model import Gaussians
 from texgs.fields.optimizer import Optimizer
@@ -35,20 +35,8 @@ def stylize_gaussians(
     recipe: Recipe,
     vgg: Vgg | None = None,
     title: str = "style",
-) -> tuple[Gaussians, dict[str, list[float]]]:
-    """Give Gaussians the style of a picture; only their spherical harmonics change.
-
-    Args:
-        model: fitted.
-        cameras: of its training views, of one size, on any device.
-        style: the picture.
-        recipe: of the distance to the style; a view in each iteration.
-        vgg: for NNFM, if the recipe wants it.
-        title: of the progress bar.
-
-    Returns:
-        The Gaussians, and the weighted terms of the loss by name, a value for each iteration.
-    """
+) -> tuple[Gaussians, Losses]:
+    """Give Gaussians the style of a picture by training views; only their spherical harmonics change."""
     run = GaussianPainting(model, cameras, style, recipe, vgg)
     losses = learn_style(run, len(cameras), recipe, title)
     harmonics = {name: x.detach() for name, x in run.harmonics.items()}
@@ -96,17 +84,10 @@ class GaussianPainting:
 
 
 class GaussianLearner:
-    """Gaussians that learn from whole views by Adam.
+    """Gaussians that learn from whole views by Adam, in so many iterations; the model given stays as it is.
 
-    Args:
-        model: to start from; it stays as it is.
-        images: its training views.
-        learning: rates of Adam.
-        loss: on views.
-        iterations: in all.
-        is_frozen: only harmonics learn.
-        prunes: whether Gaussians that are faint, or large in the scene or on screen, are removed now and
-            then, as DGE does.
+    Frozen, only harmonics learn. Else Gaussians that are faint, or large in the scene or on screen, can be
+    removed now and then, as DGE does.
     """
 
     def __init__(
@@ -165,13 +146,7 @@ class GaussianLearner:
 
 
 def radii(means: Tensor, scales: Tensor, camera: Camera) -> Tensor:
-    """Return radii [N] in pixels: `SIGMAS` of the largest scale of Gaussians; 0 behind the camera.
-
-    Args:
-        means: [N, 3].
-        scales: [N, 3], natural logarithm.
-        camera: of the view.
-    """
+    """Return radii [N] in pixels of Gaussians by their means and raw scales [N, 3]; 0 behind the camera."""
     _, z = camera.project(means)
     sides = SIGMAS * scales.exp().amax(dim=1) * camera.K[1, 1]
     return torch.where(z > 0, sides / z.clamp_min(1e-6), 0.0)

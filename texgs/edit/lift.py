@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -13,8 +14,8 @@ from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
 from texgs.core.progress import progress
-from texgs.edit.clicks import TOLERANCE, Clicks, Prompts, extent, is_visible, prompts_at
-from texgs.edit.votes import ContributionVotes, Vote, votes_of
+from texgs.edit.clicks import TOLERANCE, Clicks, extent, is_visible, places_of
+from texgs.edit.votes import CentreVotes, ContributionVotes, Vote
 from texgs.fields.splats import screen_box
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
@@ -79,17 +80,18 @@ def lift(
     Raises:
         ArgumentError: if a click is outside of the view or on the background, or no surfel is selected.
     """
-    prompts, camera = prompts_at(model, clicks), clicks.camera
-    views = ViewMasks(model, light, masks)
-    reference = views.mask(clicks)
-    votes = votes_of(vote, model, threshold)
+    places, camera = places_of(model, clicks), clicks.camera
+    find = partial(view_mask, model, masks=masks, light=light)
+    reference = find(clicks)
+    votes = (ContributionVotes if vote == "contribution" else CentreVotes)(model, threshold)
     so_far = votes if isinstance(votes, ContributionVotes) else ContributionVotes(model, rounds=0)
     counted = [votes] if so_far is votes else [votes, so_far]
     for each in counted:
         each.add(camera, reference)
     used = 1
-    for other in progress(by_angle(camera, cameras), title=title, unit="view"):
-        mask = _mask(views, so_far, prompts, other)
+    outwards = sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
+    for other in progress(outwards, title=title, unit="view"):
+        mask = _mask(find, so_far, places, clicks.positive, other)
         if mask is not None:
             for each in counted:
                 each.add(other, mask)
@@ -101,55 +103,50 @@ def lift(
             "the object, or lower the threshold"
         )
     if connected:
-        selected = components_at(model, selected, prompts.places[prompts.positive])
+        selected = components_at(model, selected, places[clicks.positive])
     return Lifted(selected, reference, used, 1 + len(cameras) - used)
 
 
-class ViewMasks:
-    """Images of a model as the mask model sees them: cut out around what they show, which then is larger."""
+@torch.no_grad()
+def view_mask(model: Surfels, clicks: Clicks, masks: MaskModel, light: Light) -> Tensor:
+    """Return the mask [H, W] bool of a view; clicks outside of what it shows are dropped.
 
-    def __init__(self, model: Surfels, light: Light, masks: MaskModel) -> None:
-        self.model, self.light, self.masks = model, light, masks
-
-    @torch.no_grad()
-    def mask(self, clicks: Clicks) -> Tensor:
-        """Return the mask [H, W] bool of a view; clicks outside of what it shows are dropped."""
-        camera = clicks.camera
-        box = screen_box(self.model.parameters, self.model.shading.options, camera).within(
-            camera.width, camera.height
-        )
-        cut = camera.crop(*box)
-        image = self.model.render(cut, self.light).color.clamp(0, 1)
-        moved = clicks.points.to(image) - image.new_tensor(box[:2])
-        inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
-        mask = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
-        if bool(clicks.positive[inside].any()):
-            part = self.masks(image, moved[inside], clicks.positive[inside])
-            mask[box.top : box.bottom, box.left : box.right] = part
-        return mask
+    The mask model sees the image cut out around what it shows, which then is larger.
+    """
+    camera = clicks.camera
+    box = screen_box(model.parameters, model.shading.options, camera).within(camera.width, camera.height)
+    cut = camera.crop(*box)
+    image = model.render(cut, light).color.clamp(0, 1)
+    moved = clicks.points.to(image) - image.new_tensor(box[:2])
+    inside = (moved >= 0).all(1) & (moved < moved.new_tensor([cut.width, cut.height])).all(1)
+    mask = torch.zeros(camera.height, camera.width, dtype=torch.bool, device=image.device)
+    if bool(clicks.positive[inside].any()):
+        part = masks(image, moved[inside], clicks.positive[inside])
+        mask[box.top : box.bottom, box.left : box.right] = part
+    return mask
 
 
-def by_angle(camera: Camera, cameras: Sequence[Camera]) -> list[Camera]:
-    """Sort cameras by the angle between their directions of view and that of one, the smallest first."""
-    return sorted(cameras, key=lambda other: -float(camera.viewmat[2, :3] @ other.viewmat[2, :3]))
-
-
-def _mask(views: ViewMasks, so_far: ContributionVotes, prompts: Prompts, camera: Camera) -> Tensor | None:
+def _mask(
+    find: Callable[[Clicks], Tensor],
+    so_far: ContributionVotes,
+    places: Tensor,
+    positive: Tensor,
+    camera: Camera,
+) -> Tensor | None:
     """Return the mask of a view; None where it sees nothing of the object or contradicts the views before."""
-    model = views.model
     values = torch.stack([so_far.seen.float(), so_far.shares], dim=1)
     shown = so_far.shown(camera, values, ("median",))
     (has_votes, is_object), alpha = shown.color.unbind(2), shown.alpha
-    pixels, depths = camera.project(prompts.places)
-    seen = is_visible(pixels, depths, shown.median, TOLERANCE * extent(model))  # type: ignore[arg-type]
-    points, positive = pixels[seen], prompts.positive[seen]
+    pixels, depths = camera.project(places)
+    seen = is_visible(pixels, depths, shown.median, TOLERANCE * extent(so_far.model))  # type: ignore[arg-type]
+    points, positive = pixels[seen], positive[seen]
     if not bool(positive.any()):
         inner = middle_of((is_object > CERTAIN * alpha) & (alpha > 0.5))
         if inner is None:
             return None
         points = torch.cat([points, points.new_tensor([inner])])
         positive = torch.cat([positive, positive.new_ones(1)])
-    mask = views.mask(Clicks(camera, points, positive))
+    mask = find(Clicks(camera, points, positive))
     known = has_votes > 0.5 * alpha.clamp_min(1e-6)
     expected = (is_object > 0.5 * has_votes) & known
     overlap = (mask & expected).sum() / (mask & known | expected).sum().clamp_min(1)

@@ -13,8 +13,8 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import HEADLIGHT, Light
-from texgs.edit.clicks import Clicks, prompts_at
-from texgs.edit.lift import Lifted, ViewMasks, lift
+from texgs.edit.clicks import Clicks, places_of
+from texgs.edit.lift import Lifted, lift, view_mask
 from texgs.edit.votes import Vote
 from texgs.fields.surfels.model import Surfels
 from texgs.models.masks import MaskModel
@@ -51,21 +51,8 @@ def new_segment(
 ) -> Segmented:
     """Find a segment of a model by clicks, write its file, and add it to the scene.
 
-    Args:
-        scene: whose light is in all views.
-        part: MODEL/SEGMENT, a new name.
-        clicks: on a view of the model as `clicked_model` has it.
-        cameras: of the other views, on the device of the clicks.
-        masks: finds the object in a view.
-        file: of the segment, to be written.
-        facts: what the segment comes from, JSON.
-        vote: see `lift`, as for what follows.
-        threshold: of the votes.
-        connected: whether only connected components with a click are kept.
-        title: of the progress bar.
-
-    Raises:
-        ArgumentError: as `lift` and `Session.make_segment`.
+    MODEL/SEGMENT is a new name, and clicks are on a view of the model as `clicked_model` has it; for what
+    else finds the segment, see `lift`. The file tells the facts that the segment comes from, JSON.
     """
     require_new(scene, part)
     model = clicked_model(scene, split(scene, part)[0], clicks.points.device)
@@ -111,8 +98,8 @@ def preview(
     Raises:
         ArgumentError: if a click is outside of the view or on the background.
     """
-    prompts_at(model, clicks)
-    mask = ViewMasks(model, light, masks).mask(clicks)
+    places_of(model, clicks)  # they have to be on the model
+    mask = view_mask(model, clicks, masks, light)
     image = model.render(clicks.camera, light).color.clamp(0, 1)
     return mask, overlay(image, mask, clicks)
 

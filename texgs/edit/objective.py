@@ -61,14 +61,9 @@ class Objective:
     def of(
         cls, recipe: Recipe, style: StylePicture, reduce: int, vgg: Vgg | None, clip: FeatureTerm | None
     ) -> Objective:
-        """Compute once what the losses need to know about a style.
+        """Compute once what the losses need to know about a style, which has the size at which it is to show.
 
-        Args:
-            recipe: weights of the losses.
-            style: at the size at which it is to show.
-            reduce: pixels each way that features see as one.
-            vgg: needed by NNFM.
-            clip: a differentiable loss of an image [H, W, 3], needed where lambda_s is below 1.
+        Features see `reduce` pixels each way as one. NNFM needs a VGG, and a lambda_s below 1 a CLIP term.
         """
         if recipe.needs_vgg and vgg is None:
             raise ArgumentError(
@@ -102,12 +97,10 @@ class Objective:
         return cls.of(recipe, scaled, recipe.reduction(*size), vgg, None)
 
     def terms(self, image: Tensor, share: Tensor, iteration: int) -> dict[str, Tensor]:
-        """Return weighted losses [] by name, differentiable in the image.
+        """Return weighted losses [] by name, differentiable in the image [3, h, w] in [0, 1].
 
-        Args:
-            image: [3, h, w] in [0, 1].
-            share: [h, w] how much of each pixel is to look like the style.
-            iteration: chooses the directions and the draw of patches.
+        The share [h, w] is how much of each pixel is to look like the style. The iteration chooses the
+        directions and the draw of patches.
         """
         recipe, terms = self.recipe, self.feature_terms(image, share, iteration)
         if recipe.needs_clip and self.clip is not None:

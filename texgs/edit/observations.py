@@ -33,12 +33,7 @@ def edit_views(
     """Return what a guidance sees of renders over white, with depth.
 
     Points are those of the mean depth. Fields without normals get those of the surface that these make.
-
-    Args:
-        renders: one for each camera.
-        cameras: of one size.
-        conditions: [V, H, W, 3] what edits stay close to; None: the renders.
-        level: of noise, see `EditViews`.
+    Edits stay close to the conditions [V, H, W, 3], by default to the renders. The level is of noise.
     """
     images, alphas, points, normals = [], [], [], []
     for camera, seen in zip(cameras, renders, strict=True):
@@ -132,13 +127,9 @@ def observe(
     An edited view says which colours surfels should have where they are seen. At another opacity the same
     colours are wanted, at the alpha of that opacity, so that nothing gets darker or paler to make up for it.
 
-    Args:
-        model: textured.
-        views: as the guidance saw them.
-        edited: [V, H, W, 3] over white.
-        light: that views were rendered with; None for bare colours.
-        opacities: factors on the opacities of the model.
-        surfels: [N] which may change; all by default.
+    Views are as the guidance saw them, with this light or bare colours, and [V, H, W, 3] over white as it
+    edited them. Opacities are factors on those of the textured model, of which all surfels [N] may change,
+    or some.
     """
     own = model.parameters["opacities"]
     changing = torch.ones_like(own) if surfels is None else surfels.to(own)
@@ -183,14 +174,10 @@ def content(cover: Tensor) -> tuple[int, int, int, int]:
 
 
 def straight_colors(image: Tensor, alpha: Tensor) -> Tensor:
-    """Return colours [H, W, 3] in [0, 1] that an image over white shows where it is not transparent.
+    """Return colours [H, W, 3] in [0, 1] that an image over white shows, whose alpha is [H, W].
 
     Where alpha is small, and nothing could be divided by it, they go over to the mean of what is around, and
     so they continue beyond the silhouette.
-
-    Args:
-        image: [H, W, 3] over white.
-        alpha: [H, W].
     """
     own = (image - (1 - alpha[..., None])).clamp_min(0).minimum(alpha[..., None])  # premultiplied
     overall = own.sum(dim=(0, 1)) / alpha.sum().clamp_min(1e-6)

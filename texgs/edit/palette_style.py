@@ -15,7 +15,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.progress import progress
 from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
-from texgs.edit.style_loop import Painting, Terms, image_variation, learn_style
+from texgs.edit.style_loop import Losses, Painting, Terms, image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.fields.palette.model import PaletteField
 from texgs.fields.palette.networks import free_color, light, new_networks, palette_color
@@ -37,14 +37,6 @@ BETAS = (0.9, 0.99)
 LEAST_WEIGHT = 1e-3  # of points that learn
 
 
-class Stylized(NamedTuple):
-    """What came of it."""
-
-    field: PaletteField
-    losses: dict[str, list[float]]  # weighted terms by name, a value for each iteration
-    distillation: float  # RMS difference of free and palette colours in its last step; 0 without steps
-
-
 def stylize_palette(
     field: PaletteField,
     images: Images,
@@ -53,20 +45,15 @@ def stylize_palette(
     keys: StyleRfKeys,
     vgg: Vgg | None = None,
     title: str = "style",
-) -> Stylized:
+) -> tuple[PaletteField, Losses, float]:
     """Give each palette colour of a field the style of a picture; density and light stay.
 
     Palette colours become the dominant ones of their styles, and free colours learn these. Then they follow
     the distance to the styles: of what has most of a palette colour, alone over the grey of its style.
 
-    Args:
-        field: fitted.
-        images: its training views.
-        styles: one for each palette colour.
-        recipe: of the distance to the styles; a view in each iteration.
-        keys: weight of what is added to it, and steps before.
-        vgg: for NNFM, if the recipe wants it.
-        title: of progress bars.
+    Returns:
+        The field, the losses, and the RMS difference of free and palette colours in the last step before; 0
+        without steps.
     """
     if len(styles) != len(field.colors):
         raise ArgumentError(
@@ -80,7 +67,7 @@ def stylize_palette(
     greys = [float(style.mean @ torch.tensor(LUMINANCE)) for style in styles]
     run.follow(images.cameras, objectives, greys, keys.variation, recipe.rate)
     losses = learn_style(run, len(images), recipe, title)
-    return Stylized(run.field, losses, error)
+    return run.field, losses, error
 
 
 class Layer(NamedTuple):
@@ -91,18 +78,16 @@ class Layer(NamedTuple):
     n_rays: int
 
     def values(self, color: Tensor) -> Tensor:
-        """Colours and alpha [N, 4] of rays, from free colours [n, 3]."""
+        """Return colours and alpha [N, 4] of rays, from free colours [n, 3]."""
         return self.shows.blend(
             torch.cat([color + self.light, torch.ones_like(self.light)], dim=1), self.n_rays
         )
 
 
 class PalettePainting:
-    """A field whose free colours are on their way to styles.
+    """A recoloured field whose free colours are on their way to styles.
 
-    Args:
-        field: recoloured; its free colours begin with the features of the palette's hash grid.
-        generator: of networks and rays.
+    They begin with the features of the palette's hash grid; networks and rays are drawn at random.
     """
 
     def __init__(self, field: PaletteField, generator: torch.Generator) -> None:
@@ -114,12 +99,12 @@ class PalettePainting:
 
     @property
     def field(self) -> PaletteField:
-        """The field with the free colours of now."""
+        """Return the field with the free colours of now."""
         free = {name: x.detach() for name, x in self.free.items()}
         return replace(self.recolored, parameters={**self.recolored.parameters, **free})
 
     def distil(self, images: Images, steps: int, title: str) -> float:
-        """Learn the colours of the recoloured palette at points of training rays; their RMS difference."""
+        """Learn the colours of the recoloured palette at points of training rays; return the RMS error."""
         rays, adam, loss = training_rays(images), self.adam(RATE), torch.zeros(())
         for step in progress(range(steps), title=f"{title}, recoloured", unit="step"):
             drawn, _ = rays.draw(DRAWN, RUN, self.generator)
@@ -182,12 +167,12 @@ class PalettePainting:
         self.optimizer.zero_grad()
 
     def colors(self, layer: Layer) -> Tensor:
-        """Free colours [n, 3] of the points of a layer."""
+        """Return the free colours [n, 3] of the points of a layer."""
         return free_color(layer.shows.points.at, self.free, self.levels)
 
     @torch.no_grad()
     def layers(self, camera: Camera) -> list[list[Layer]]:
-        """What a view shows of each palette colour, in pieces of rays."""
+        """Return what a view shows of each palette colour, in pieces of rays."""
         geometry, parameters = self.recolored.geometry, self.recolored.parameters
         colors = len(self.recolored.colors)
         pieces: list[list[Layer]] = [[] for _ in range(colors)]
@@ -202,5 +187,5 @@ class PalettePainting:
         return pieces
 
     def adam(self, rate: float) -> torch.optim.Adam:
-        """An optimiser of free colours at its start."""
+        """Return an optimiser of free colours at its start."""
         return torch.optim.Adam([*self.free.values()], rate, BETAS, eps=1e-15, fused=True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
-
-from texgs.core.errors import ArgumentError
+from typing import Any, Literal
 
 Start = Literal["projected", "mean", "random", "transfer"]
 OPAQUE = 0.8  # mean alpha from which on a scene is taken for opaque
@@ -18,9 +16,6 @@ class Recipe:
 
     The loss is features * (lambda_s * (NNFM + distribution * D) + (1 - lambda_s) * CLIP) + patches * P, with
     the sliced Wasserstein distances D of features and P of patches of pixels.
-
-    Raises:
-        ArgumentError: naming the value that is out of range.
     """
 
     iterations: int = 100  # one view each
@@ -33,9 +28,7 @@ class Recipe:
     distribution: float = 0.25  # weight of the sliced Wasserstein distance of features
     patches: float = 50.0  # weight of that of patches of pixels
     pattern: float = 1.0  # size of the style's pattern: its longer side, in longer sides of a view
-    behind: Literal["style", "white"] = (
-        "style"  # what is behind the object: another part of the style, or white
-    )
+    behind: Literal["style", "white"] = "style"  # what is behind the object: more of the style, or white
     cropped: bool = True  # whether losses see only the part of a view that shows the object
     foreground: bool = True  # whether only features on the object have to match
     queries: int | None = 2048  # features of a view that have to match, drawn at random; None: all
@@ -49,51 +42,22 @@ class Recipe:
     is_lit: bool = True  # whether the losses see the light of the views, or colours without any
     seed: int = 0
 
-    def __post_init__(self) -> None:
-        for name in ("iterations", "rate", "features", "distribution", "patches"):
-            if not getattr(self, name) >= 0:
-                raise ArgumentError(f"{name}: expected 0 or more, got {getattr(self, name)}")
-        for name in (
-            "last_rate",
-            "pattern",
-            "opacity",
-            "chroma",
-            "queries",
-            "positions",
-            "dimensions",
-            "reduce",
-        ):
-            value = getattr(self, name)
-            if value is not None and not value > 0:
-                raise ArgumentError(f"{name}: expected more than 0, got {value}")
-        if self.iterations > 0 and self.features == self.patches == 0:
-            raise ArgumentError(
-                "features, patches: expected a weight above 0 for one of them, got 0 for both"
-            )
-        if not 0 <= self.lambda_s <= 1:
-            raise ArgumentError(f"lambda_s: expected a share from 0 to 1, got {self.lambda_s}")
-        for name, known in (("start", get_args(Start)), ("behind", ("style", "white"))):
-            if getattr(self, name) not in known:
-                raise ArgumentError(
-                    f"{name}: expected one of {', '.join(known)}, got {getattr(self, name)!r}"
-                )
-
     @property
     def needs_vgg(self) -> bool:
-        """Whether VGG is used at all."""
+        """Return whether VGG is used at all."""
         return self.iterations > 0 and self.features > 0 and self.lambda_s > 0
 
     @property
     def needs_clip(self) -> bool:
-        """Whether a CLIP term is used."""
+        """Return whether a CLIP term is used."""
         return self.iterations > 0 and self.features > 0 and self.lambda_s < 1
 
     def reduction(self, width: int, height: int) -> int:
-        """Pixels each way that features see as one, for views of this size."""
+        """Return how many pixels each way features see as one, for views of this size."""
         return self.reduce or max(1, round(max(width, height) / FULL_RESOLUTION))
 
     def adapted(self, alpha: float) -> Recipe:
-        """The recipe for a scene of which pixels have this alpha, see `canvas.mean_alpha`.
+        """Return the recipe for a scene of which pixels have this alpha, see `canvas.mean_alpha`.
 
         Layers are averaged in a pixel of a translucent scene. Each learns as if it were opaque. A pixel shows
         the share alpha of the differences between its colours, so these are divided by it beforehand.
@@ -137,19 +101,5 @@ PRESETS = {
 
 
 def preset(name: str, **changes: Any) -> Recipe:
-    """A recipe by name, with some of its numbers changed.
-
-    Args:
-        name: of PRESETS.
-        changes: fields of `Recipe`.
-
-    Raises:
-        ArgumentError: if there is none of that name, or no such field.
-    """
-    if name not in PRESETS:
-        raise ArgumentError(f"recipe: expected one of {', '.join(PRESETS)}, got {name!r}")
-    if unknown := [key for key in changes if key not in Recipe.__dataclass_fields__]:
-        raise ArgumentError(
-            f"recipe: expected one of {', '.join(Recipe.__dataclass_fields__)}, got {unknown[0]!r}"
-        )
+    """Return a recipe of `PRESETS` by name, with some of its numbers changed."""
     return replace(PRESETS[name], **changes)

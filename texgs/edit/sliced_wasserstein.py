@@ -35,12 +35,9 @@ class PatchStatistics:
 
     @classmethod
     def of(cls, picture: Tensor, region: Tensor | None = None, seed: int = 0) -> PatchStatistics:
-        """Project the patches of a picture.
+        """Project the patches of a picture [3, h, w], centred in a region [h, w] bool, by default anywhere.
 
-        Args:
-            picture: [3, h, w], at least 7 pixels each way; levels that would be smaller are left out.
-            region: [h, w] bool, where patches have to be centred; by default everywhere.
-            seed: of the directions.
+        It has at least 7 pixels each way; levels that would be smaller are left out.
         """
         size = check.shape("picture", picture, "3 h w")
         generator = torch.Generator().manual_seed(seed)
@@ -56,13 +53,9 @@ class PatchStatistics:
     def distance(self, image: Tensor, where: Tensor | None = None, bank: int = 0, seed: int = 0) -> Tensor:
         """Return the mean squared distance [] of sorted projections of patches to the style's, over levels.
 
-        Differentiable in the image. 0 where no patch counts.
-
-        Args:
-            image: [3, H, W].
-            where: [H, W], patches centred where it is above 1/2 count; by default all.
-            bank: set of directions, any number: it is taken modulo their count.
-            seed: of the draw of patches, where there are more than 4,096.
+        Differentiable in the image [3, H, W]. Patches count that are centred where a mask [H, W] is above
+        1/2, by default all; 0 where none does. The bank of directions is taken modulo their count. The seed
+        is of the draw of 4,096 patches where there are more.
         """
         size = check.shape("image", image, "3 H W")
         where = image.new_ones(size["H"], size["W"]) if where is None else where.to(image)
@@ -87,12 +80,9 @@ class FeatureDistribution:
 
     @classmethod
     def of(cls, features: Tensor, region: Tensor | None = None, seed: int = 0) -> FeatureDistribution:
-        """Project the features of a picture.
+        """Project the features [C, h, w] of a picture, those of a region [h, w] bool, by default all.
 
-        Args:
-            features: [C, h, w].
-            region: [h, w] bool, what of the picture counts; by default all.
-            seed: of the directions, and of the draw of 16,384 features where there are more.
+        The seed is of the directions, and of the draw of 16,384 features where there are more.
         """
         generator = torch.Generator().manual_seed(seed)
         rows = drawn(features.detach(), region, STYLE_MOST, generator)
@@ -103,13 +93,9 @@ class FeatureDistribution:
     def distance(self, features: Tensor, where: Tensor | None = None, bank: int = 0, seed: int = 0) -> Tensor:
         """Return the mean squared distance [] of sorted projections of features to the style's, by variance.
 
-        1 for features that are all alike and of the right mean. Differentiable in them; 0 where none counts.
-
-        Args:
-            features: [C, h, w] of an image, from the same layer.
-            where: [h, w] bool, positions that count; by default all.
-            bank: set of directions, any number: it is taken modulo their count.
-            seed: of the draw of 2,048 features where there are more.
+        1 for features [C, h, w] that are all alike and of the right mean. Differentiable in them. They count
+        at positions [h, w] bool, by default at all; 0 where none does. The bank of directions is taken modulo
+        their count. The seed is of the draw of 2,048 features where there are more.
         """
         check.shape("features", features, "C h w", C=self.directions.shape[2])
         rows = drawn(features, where, MOST_FEATURES, torch.Generator().manual_seed(seed))

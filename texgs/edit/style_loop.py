@@ -19,6 +19,7 @@ from texgs.edit.objective import LOSS_SCALE, Objective
 from texgs.edit.recipe import Recipe
 
 Terms = Mapping[str, Tensor]  # weighted losses [] by name
+Losses = dict[str, list[float]]  # weighted terms by name, a value for each iteration
 
 
 class Painting(NamedTuple):
@@ -66,25 +67,16 @@ def learn_style(
     *,
     watch: Stopwatch | None = None,
     show: Callable[[], None] = lambda: None,
-) -> dict[str, list[float]]:
-    """Bring a field closer to its styles, by one view in each iteration.
+) -> Losses:
+    """Bring a field closer to its styles, by one of its views in each iteration.
 
-    Args:
-        paintable: that learns.
-        views: how many it has.
-        recipe: of the losses.
-        title: of the progress bar.
-        watch: that measures the parts of iterations.
-        show: is called after each iteration.
-
-    Returns:
-        The weighted terms of the loss by name, a value for each iteration.
+    The watch measures the parts of iterations; `show` is called after each.
 
     Raises:
         FitError: if the loss is no longer finite.
     """
     watch = watch or Stopwatch(torch.device("cpu"))
-    losses: dict[str, list[float]] = defaultdict(list)
+    losses: Losses = defaultdict(list)
     for iteration, view in enumerate(progress(view_order(views, recipe), title=title, unit="iteration")):
         sums: dict[str, float] = defaultdict(float)
         with watch.part("render"):
@@ -109,7 +101,7 @@ def learn_style(
 
 
 def view_order(views: int, recipe: Recipe) -> list[int]:
-    """Which view each iteration looks at: all of them in random order once before any again."""
+    """Return which view each iteration looks at: all of them in random order once before any again."""
     generator = torch.Generator().manual_seed(recipe.seed)
     order: list[int] = []
     while len(order) < recipe.iterations:
@@ -118,7 +110,7 @@ def view_order(views: int, recipe: Recipe) -> list[int]:
 
 
 def finite_values(terms: Terms, iteration: int) -> dict[str, float]:
-    """Values of the terms of a loss."""
+    """Return the values of the terms of a loss."""
     values = {name: float(term.detach()) for name, term in terms.items()}
     if not all(map(isfinite, values.values())):
         raise FitError(
@@ -129,6 +121,6 @@ def finite_values(terms: Terms, iteration: int) -> dict[str, float]:
 
 
 def image_variation(image: Tensor) -> Tensor:
-    """Mean squared difference [] of neighbouring pixels of [3, h, w], along both sides."""
+    """Return the mean squared difference [] of neighbouring pixels of [3, h, w], along both sides."""
     down, right = image.diff(dim=1), image.diff(dim=2)
     return (down.square().mean() + right.square().mean()) / 2

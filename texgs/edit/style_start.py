@@ -24,15 +24,10 @@ CHUNK = 1 << 18  # texels at a time
 def start_colors(
     kind: Start, model: Surfels, style: StylePicture, pixel: float, seed: int, changing: Tensor | None = None
 ) -> Tensor:
-    """Colours of all texels [T, 3] in [0, 1], without light.
+    """Return colours of all texels [T, 3] in [0, 1], without light.
 
-    Args:
-        kind: see `Recipe`.
-        model: textured.
-        style: at the size at which it is laid onto the surface.
-        pixel: side of one of its pixels there, world units.
-        seed: of random pixels.
-        changing: texels [T] bool whose colours are moved to those of the style; all by default.
+    The style has the size at which it is laid onto the surface, where a pixel of it has a side in world
+    units. Colours that are moved to those of the style are those of changing texels [T], by default of all.
     """
     p = model.parameters
     if kind == "projected":
@@ -50,7 +45,7 @@ def start_colors(
 
 
 def pixel_side(model: Surfels, cameras: Sequence[Camera]) -> float:
-    """Side of a pixel at the model's middle, mean over cameras, world units."""
+    """Return the side of a pixel at the model's middle, mean over cameras, world units."""
     middle = model.parameters["means"].mean(0)
     sides = []
     for camera in cameras:
@@ -60,17 +55,10 @@ def pixel_side(model: Surfels, cameras: Sequence[Camera]) -> float:
 
 
 def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
-    """The affine map x -> A x + b that gives colours the mean and covariance of a style's.
+    """Return the affine map x -> A x + b that gives colours [N, 3] mean and covariance of a style's [M, 3].
 
     With S the covariances and m the means, A = S_style^(1/2) S_colors^(-1/2) and b = m_style - A m_colors
-    (Zhang et al. 2022, supplement; symmetric square roots). Not differentiable.
-
-    Args:
-        colors: [N, 3].
-        style: [M, 3].
-
-    Returns:
-        A [3, 3] and b [3], float64.
+    (Zhang et al. 2022, supplement; symmetric square roots), float64. Not differentiable.
     """
     from kornia.enhance import zca_mean
 
@@ -85,18 +73,11 @@ def color_map(colors: Tensor, style: Tensor) -> tuple[Tensor, Tensor]:
 
 @torch.no_grad()
 def project(parameters: Mapping[str, Tensor], picture: Tensor, pixel: float) -> Tensor:
-    """Colour of every texel [T, 3], in the list's order, from a picture that is mirrored beyond its edges.
+    """Return the colour of every texel [T, 3] from a picture [3, h, w] that is mirrored beyond its edges.
 
     Blended around the picture's mean by weights divided by the root of the sum of their squares, so that
-    contrast is as high where projections meet as elsewhere (Heitz and Neyret 2018).
-
-    Args:
-        parameters: of a textured model.
-        picture: [3, h, w] in [0, 1].
-        pixel: side of one of its pixels on the surface, world units.
-
-    Returns:
-        Colours in [0, 1]; black where the list has texels that no surfel owns.
+    contrast is as high where projections meet as elsewhere (Heitz and Neyret 2018). A pixel has a side in
+    world units. Texels that no surfel owns are black.
     """
     check.shape("picture", picture, "3 h w")
     p = parameters
@@ -116,7 +97,7 @@ def project(parameters: Mapping[str, Tensor], picture: Tensor, pixel: float) -> 
 
 
 def centres(parameters: Mapping[str, Tensor], place: Tensor, surfel: Tensor, tangents: Tensor) -> Tensor:
-    """Centres [n, 3] in the world of the texels at `place` [n] in the list, which belong to `surfel` [n]."""
+    """Return centres [n, 3] in the world of texels at `place` [n] in the list, which are of `surfel` [n]."""
     p = parameters
     sizes, within = p["sizes"].long()[surfel], place - p["offsets"][surfel]
     cells = torch.stack([within % sizes[:, 0], within // sizes[:, 0]], dim=1)
@@ -125,15 +106,13 @@ def centres(parameters: Mapping[str, Tensor], place: Tensor, surfel: Tensor, tan
 
 
 def sample(picture: Tensor, points: Tensor) -> Tensor:
-    """Colours [3, n, 3] of points [n, 3], in pixels around the picture's middle, along each of the axes.
+    """Return colours [3, n, 3] of points [n, 3], in pixels around the picture's middle, along each axis.
 
     Seen along x the picture shows z and y, along y it shows x and z, along z it shows x and y; up is +y.
     """
     x, y, z = points.unbind(1)
     size = points.new_tensor(picture.shape[:0:-1])  # width and height
     planes = torch.stack([torch.stack(pair, 1) for pair in ((z, -y), (x, z), (x, -y))])  # [3, n, 2]
-    grid = planes * 2 / size
-    sampled = F.grid_sample(
-        picture.expand(3, -1, -1, -1), grid[:, None], padding_mode="reflection", align_corners=False
-    )
+    grid, pictures = (planes * 2 / size)[:, None], picture.expand(3, -1, -1, -1)
+    sampled = F.grid_sample(pictures, grid, padding_mode="reflection", align_corners=False)
     return sampled[:, :, 0].transpose(1, 2)

@@ -12,7 +12,7 @@ from torch import Tensor
 from texgs.core.camera import Camera
 from texgs.core.errors import ArgumentError
 from texgs.core.light import Light
-from texgs.edit.canvas import mean_alpha, paint, require_editable, visible_part
+from texgs.edit.canvas import mean_alpha, paint, require_editable
 from texgs.edit.objective import FeatureTerm, Objective
 from texgs.edit.recipe import DEFAULT, Recipe
 from texgs.edit.style_loop import Painting, Stopwatch, learn_style
@@ -124,21 +124,9 @@ class SurfelPainting:
 
     def render(self, view: int) -> list[Painting]:
         """Show a view over the style or white."""
-        recipe = self.recipe
-        canvas = paint(
-            self.model,
-            self.texels,
-            self.cameras[view].to(self.model.device),
-            self.lights[view],
-            opacity=recipe.opacity,
-            is_lit=recipe.is_lit,
-            cropped=recipe.cropped,
-            chosen=self.surfels,
-        )
-        part = visible_part(canvas.alpha) if recipe.cropped else (slice(None), slice(None))
-        color, alpha = canvas.color[:, *part], canvas.alpha[part]
+        camera, light = self.cameras[view].to(self.model.device), self.lights[view]
+        color, alpha, share = paint(self.model, self.texels, camera, light, self.recipe, self.surfels)
         image = (color.detach() + (1 - alpha) * self.behind(alpha)).clamp(0, 1).requires_grad_()
-        share = alpha if canvas.share is None else canvas.share[part]
         return [Painting(image, share, self.objective, color.backward)]
 
     def behind(self, alpha: Tensor) -> Tensor:

@@ -27,11 +27,7 @@ Settings = TypeVar("Settings")
 
 
 def parts_of(scene: Scene, names: Sequence[str]) -> list[str]:
-    """Return the parts of these names, MODEL or MODEL/SEGMENT, that an edit is of; all models by default.
-
-    Raises:
-        ArgumentError: naming the one that is not in the scene, or there twice.
-    """
+    """Return the parts of these names, MODEL or MODEL/SEGMENT, that an edit is of; all models by default."""
     known = part_names(scene)
     for name in names:
         if name not in known:
@@ -101,11 +97,7 @@ class Task(Generic[Settings]):
         return f"{self.title} {self.edit.name}, {part}"
 
     def training_views(self, model: str) -> Sequence[View]:
-        """Return the training views of a model.
-
-        Raises:
-            ArgumentError: if the model is none of the data set's.
-        """
+        """Return the training views of a model, one of the data set's."""
         if model not in self.views:
             raise ArgumentError(
                 f"scene: expected models named after basic TFs of the data set ({', '.join(self.views)}), "
@@ -114,15 +106,11 @@ class Task(Generic[Settings]):
         return read_views(self.views[model].parent).train
 
     def each_part(self, one: Callable[[str, Surfels, Tensor | None, Sequence[View]], Surfels]) -> Scene:
-        """Edit the parts one after the other, each alone, and write their textures.
+        """Edit the parts one after the other, each alone, and return the scene with their new textures.
 
-        Args:
-            one: from the name of a part, its model with the textures that it has, the surfels that may change
-                (None: all) and training views, to the edited model.
-
-        Returns:
-            The scene with the new textures, without palettes that were edited before: these were of other
-            texels.
+        Palettes that were edited before are gone: these were of other texels. The edit of one part is from
+        its name, its model with the textures that it has, the surfels that may change (None: all) and
+        training views, to the edited model.
         """
         scene = self.scene
         for part in parts_of(scene, self.edit.parts):
@@ -135,11 +123,7 @@ class Task(Generic[Settings]):
         return scene
 
     def each_model(self, one: Callable[[str, Field, Sequence[View]], Field]) -> Scene:
-        """Edit whole models of any kind one after the other, each alone; return the scene with the new ones.
-
-        Args:
-            one: from the name of a model, the model and training views, to the edited model.
-        """
+        """Edit whole models of any kind one after the other, each alone, and return the scene with them."""
         scene = self.scene
         for name in parts_of(scene, self.edit.parts):
             entry, file = scene.models[split(scene, name)[0]], self.output / part_file("edit.parts", name)

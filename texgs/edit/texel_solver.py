@@ -119,14 +119,7 @@ def solve(
 
     Opacities take turns instead of following each other: the problem is one, not a schedule. Texels that are
     not seen keep their colours of the start.
-
-    Args:
-        observations: of all views at all opacities.
-        curvature: [T], see `back_project`.
-        start: [T, 3] bare colours.
-        sweeps: passes over all observations.
-        generator: of their order.
-        title: of the progress bar.
+    The order is random in each sweep over all of them. The curvature [T] is that of `back_project`.
     """
     scale = _inverse(curvature)[:, None]
     colors = start.clone().requires_grad_()
@@ -161,14 +154,6 @@ def learn(
     """Learn bare colours [T, 3] in [0, 1] by Adam on L1 + D-SSIM, one observation per step.
 
     Over all steps the opacity goes from the first row of observations to the last.
-
-    Args:
-        observations: for each opacity those of all views.
-        start: [T, 3] bare colours.
-        rate: of Adam, over all steps.
-        steps: how many.
-        generator: of the order of views.
-        title: of the progress bar.
     """
     texels = start.clone().requires_grad_()
     adam = torch.optim.Adam([texels], eps=1e-15, fused=True)

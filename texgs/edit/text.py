@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import torch
 from torch import Tensor
@@ -49,18 +49,13 @@ RECIPES = {
 }
 
 
-@dataclass(frozen=True, eq=False)
-class Edited:
+class Edited(NamedTuple):
     """What an edit gives."""
 
-    model: Surfels
-    """With new texels and offsets of surfels; the rest is that of the model edited, bit for bit."""
-    views: EditViews
-    """As the guidance saw them."""
-    images: Tensor
-    """[V, H, W, 3] as the guidance edited them."""
-    seen: float
-    """Share of the texels that may change that edited views show at some opacity; others are made up."""
+    model: Surfels  # with new texels and offsets of surfels; the rest stays as it was, bit for bit
+    views: EditViews  # as the guidance saw them
+    images: Tensor  # [V, H, W, 3] as the guidance edited them
+    seen: float  # share of the texels that may change that edited views show; others are made up
 
 
 def edit_by_text(

@@ -31,16 +31,13 @@ class ContributionVotes:
     first step; they move towards the least-squares solution, and few of them do not yet fit the noise of
     masks.
 
-    A surfel that no view shows gets the mean share of its nearest neighbours.
-
-    Args:
-        model: of any stage.
-        threshold: least share of what belongs to the object.
-        rounds: of votes on what is left; 0 for plain votes.
+    A surfel that no view shows gets the mean share of its nearest neighbours. More than the threshold, 1/2 by
+    default, belongs to the object. Without rounds of votes on what is left, votes are plain.
     """
 
-    def __init__(self, model: Surfels, threshold: float = 0.5, rounds: int = ROUNDS) -> None:
-        self.model, self.threshold, self.rounds = model, threshold, rounds
+    def __init__(self, model: Surfels, threshold: float | None = None, rounds: int = ROUNDS) -> None:
+        self.model, self.rounds = model, rounds
+        self.threshold = 0.5 if threshold is None else threshold
         self.sums, self.weights = model.parameters["means"].new_zeros(2, len(model))
         self.views: list[tuple[Camera, Tensor]] = []
 
@@ -106,16 +103,13 @@ class CentreVotes:
     """Each view votes once for each surfel, by the pixel that its mean projects to: the paper's way.
 
     A surfel is 1 or 0 as the mask there, -1 outside of the view; neither size nor opacity nor what is in
-    front of it counts. It belongs to the object if 1 is the most frequent of all views, and frequent enough
-    (Hu et al. 2024, SAGD).
-
-    Args:
-        model: of any stage.
-        threshold: share of the views counted that must say 1, exceeded.
+    front of it counts. It belongs to the object if 1 is the most frequent of all views, and of a larger share
+    of them than the threshold, 0.7 by default (Hu et al. 2024, SAGD).
     """
 
-    def __init__(self, model: Surfels, threshold: float = 0.7) -> None:
-        self.means, self.threshold, self.views = model.parameters["means"], threshold, 0
+    def __init__(self, model: Surfels, threshold: float | None = None) -> None:
+        self.means, self.views = model.parameters["means"], 0
+        self.threshold = 0.7 if threshold is None else threshold
         self.inside, self.outside = self.means.new_zeros(2, len(model))
 
     def add(self, camera: Camera, mask: Tensor) -> None:
@@ -134,9 +128,3 @@ class CentreVotes:
         absent = self.views - self.inside - self.outside
         is_mode = (self.inside > self.outside) & (self.inside > absent)
         return is_mode & (self.inside > self.threshold * self.views)
-
-
-def votes_of(kind: Vote, model: Surfels, threshold: float | None = None) -> ContributionVotes | CentreVotes:
-    """Return votes of a kind, with its own threshold unless one is given."""
-    make = ContributionVotes if kind == "contribution" else CentreVotes
-    return make(model) if threshold is None else make(model, threshold)

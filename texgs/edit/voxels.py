@@ -14,7 +14,7 @@ from texgs.core.progress import progress
 from texgs.edit.dataset_update import PhotometricLoss
 from texgs.edit.objective import Objective
 from texgs.edit.recipe import Recipe
-from texgs.edit.style_loop import Painting, Terms, image_variation, learn_style
+from texgs.edit.style_loop import Losses, Painting, Terms, image_variation, learn_style
 from texgs.edit.style_picture import StylePicture
 from texgs.edit.style_start import color_map
 from texgs.fields.voxels.model import Voxels
@@ -45,23 +45,11 @@ def stylize_voxels(
     keys: ArfKeys,
     vgg: Vgg | None = None,
     title: str = "style",
-) -> tuple[Voxels, dict[str, list[float]]]:
+) -> tuple[Voxels, Losses]:
     """Give a grid the style of a picture; densities stay, and colours no longer depend on the direction.
 
     Colours are moved to those of the style, learned from the recoloured views, then from the distance of
     rendered views to the style, and moved once more.
-
-    Args:
-        field: fitted.
-        images: its training views.
-        style: the picture.
-        recipe: of the distance to the style; a view in each iteration.
-        keys: weights of what is added to it.
-        vgg: for NNFM, if the recipe wants it.
-        title: of progress bars.
-
-    Returns:
-        The grid, and the weighted terms of the loss by name, a value for each iteration.
     """
     generator = torch.Generator().manual_seed(recipe.seed)
     stride = max(1, round((images.planes[:, 0].numel() / COUNTED) ** 0.5))
@@ -113,14 +101,7 @@ def sampled(grid: VoxelGrid, field: Voxels, rays: Tensor) -> tuple[Samples, Rays
 
 
 class VoxelPainting:
-    """A grid on its way to a style.
-
-    Args:
-        grid: that learns, of degree 0.
-        field: it is from.
-        keys: weights of what is added to the distance to the style.
-        generator: of rays and blocks.
-    """
+    """A grid of degree 0 on its way to a style; rays and blocks are drawn at random."""
 
     def __init__(self, grid: VoxelGrid, field: Voxels, keys: ArfKeys, generator: torch.Generator) -> None:
         self.grid, self.original, self.keys, self.generator = grid, field, keys, generator
@@ -180,13 +161,7 @@ class VoxelPainting:
 
 
 class VoxelLearner:
-    """A grid that learns from patches of views by RMSProp.
-
-    Args:
-        field: to start from; it stays as it is.
-        keys: rates and patches.
-        loss: on patches, without D-SSIM.
-    """
+    """A grid that learns from patches of views by RMSProp; the field given stays as it is."""
 
     def __init__(self, field: Voxels, keys: In2nKeys, loss: PhotometricLoss) -> None:
         self.original, self.keys, self.loss = field, keys, loss

@@ -15,8 +15,8 @@ from torch import Tensor
 
 from texgs.core.errors import TexgsError
 from texgs.core.lens import Lens
-from texgs.edit.clicks import Clicks, prompts_at
-from texgs.edit.lift import Lifted, ViewMasks, lift
+from texgs.edit.clicks import Clicks, places_of
+from texgs.edit.lift import Lifted, lift, view_mask
 from texgs.edit.new_segment import clicked_model
 from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model import Surfels
@@ -44,8 +44,8 @@ class Segmenter:
     def mask(self, scene: Scene, asked: Mask) -> dict[str, Any]:
         """Return the mask of a view as a message with a PNG picture, which is transparent elsewhere."""
         model, clicks = self._model(scene, asked.model), self._clicks(asked)
-        prompts_at(model, clicks)
-        mask = ViewMasks(model, scene.light, self._mask_model()).mask(clicks)
+        places_of(model, clicks)  # they have to be on the model
+        mask = view_mask(model, clicks, self._mask_model(), scene.light)
         return {"type": "mask", "id": asked.id, "picture": picture_of(mask), "by": self._mask_model().name}
 
     def lift(self, scene: Scene, asked: Segment) -> Lifted:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from texgs.core.keys import key
-from texgs.edit.methods.style import FeatureKeys, Look, Losses, look_method
+from texgs.edit.methods.style import FeatureKeys, Look, look_method
 
 if TYPE_CHECKING:
+    from texgs.edit.style_loop import Losses
     from texgs.fields.voxels.model import Voxels
     from texgs.volume.view_set import View
 

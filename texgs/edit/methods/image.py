@@ -86,7 +86,8 @@ def run(task: Task[ImageKeys]) -> EditedScene:
         adapted.append(result.recipe)
         return result.model
 
-    scene, lambda_s = task.each_part(one), recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
+    scene = task.each_part(one)
+    lambda_s = recipe.lambda_s if recipe.needs_vgg or recipe.needs_clip else None
     notes = {"seconds": seconds}
     return EditedScene(scene, how(adapted, keys.clip), look.write_pictures(), lambda_s, notes, look.losses)
 
@@ -95,14 +96,11 @@ def recipe_of(settings: ImageKeys, seed: int = 0) -> Recipe:
     """Return the recipe of an edit, with what the configuration changes about it."""
     from texgs.edit.recipe import preset
 
-    changes: dict[str, Any] = {
-        name: value
-        for name in ("iterations", "lambda_s", "start")
-        if (value := getattr(settings, name)) is not None
-    }
-    return preset(
-        settings.recipe, pattern=settings.pattern, is_textured=settings.textured, seed=seed, **changes
-    )
+    changes: dict[str, Any] = {"pattern": settings.pattern, "is_textured": settings.textured, "seed": seed}
+    for name in ("iterations", "lambda_s", "start"):
+        if (value := getattr(settings, name)) is not None:
+            changes[name] = value
+    return preset(settings.recipe, **changes)
 
 
 def how(recipes: Sequence[Recipe], clip: str) -> str:
@@ -115,12 +113,6 @@ def how(recipes: Sequence[Recipe], clip: str) -> str:
     used = [name for name, is_used in names.items() if is_used] or ["projection"]
     words = " + ".join(used) + ("" if {"VGG-16", clip} & {*used} else " (no weights)")
     return words if recipes[0].is_textured else f"{words}, without texture"
-
-
-def check(settings: ImageKeys) -> None:
-    """Require numbers that a recipe can have, and a picture."""
-    recipe_of(settings)
-    style.check(settings, KEYS)
 
 
 def weights(settings: ImageKeys) -> Mapping[str, str]:
@@ -136,7 +128,7 @@ METHOD = Method(
     "give a scene the style of a picture",
     ImageKeys,
     run,
-    check,
+    lambda settings: style.check(settings, KEYS),
     weights,
     needs=frozenset({"texture", "relight"}),
     files=style.files,

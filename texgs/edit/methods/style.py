@@ -17,13 +17,12 @@ if TYPE_CHECKING:
     from torch import Tensor
 
     from texgs.edit.recipe import Recipe
+    from texgs.edit.style_loop import Losses
     from texgs.edit.style_picture import Find, StylePicture
     from texgs.edit.task import EditedScene, Task
     from texgs.fields.field import Field
     from texgs.models.vgg import Vgg
     from texgs.volume.view_set import View
-
-Losses = dict[str, list[float]]  # weighted terms by name, a value for each iteration
 
 
 @dataclass(frozen=True)
@@ -105,22 +104,14 @@ class Look(Generic[Keys]):
         return shown
 
 
-Stylize = Callable[[Look[FeatureKeysType], str, Any, "Sequence[View]"], tuple[Any, Losses]]
+# From a look, the name of a model, the model and its training views to the edited model and the losses.
+Stylize = Callable[[Look[FeatureKeysType], str, Any, "Sequence[View]"], "tuple[Any, Losses]"]
 
 
 def look_method(
     name: str, summary: str, settings: type[FeatureKeysType], stylize: Stylize[FeatureKeysType], kind: str
 ) -> Method[FeatureKeysType]:
-    """Return the specification of a method that gives models of one kind of field the style of a picture.
-
-    Args:
-        name: of the method.
-        summary: what it does.
-        settings: its keys.
-        stylize: from a look, the name of a model, the model and its training views to the edited model and
-            the losses.
-        kind: of field.
-    """
+    """Return the specification of a method that gives models of one kind of field the style of a picture."""
     where = f"edit.{name}"
     return Method(
         name,
@@ -182,12 +173,9 @@ def weights(settings: StyleKeys) -> dict[str, str]:
 
 
 def picture_of(name: str, key: str, find: Find | None = None) -> StylePicture:
-    """Return the picture of texgs that has this name, or of a file.
+    """Return the picture of texgs of this name, or of a file; it is the value of a key.
 
-    Args:
-        name: or path.
-        key: that it is the value of, such as edit.image.style.
-        find: returns the part that counts, see `read_style`; by default all.
+    Of it counts what `find` returns, see `read_style`; by default all.
     """
     from texgs.edit.pictures import PICTURES, picture
     from texgs.edit.style_picture import StylePicture, read_style

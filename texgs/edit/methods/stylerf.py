@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from texgs.core.errors import ArgumentError
 from texgs.core.keys import key
 from texgs.edit.methods import style
-from texgs.edit.methods.style import FeatureKeys, Look, Losses, look_method
+from texgs.edit.methods.style import FeatureKeys, Look, look_method
 
 if TYPE_CHECKING:
+    from texgs.edit.style_loop import Losses
     from texgs.fields.palette.model import PaletteField
     from texgs.volume.view_set import View
 

@@ -89,14 +89,9 @@ def update_method(
 ) -> Method[Keys]:
     """Return the specification of a method that edits training views while a kind of field learns from them.
 
-    Args:
-        name: of the method.
-        summary: what it does.
-        settings: its keys.
-        schedule: from the keys and a number of views to when which are edited.
-        learner: from the keys, a model, its training views and the loss on views to what learns.
-        kind: of field.
-        keeps_renders: edits stay close to views of the fitted model, not to the training views.
+    From its keys and a number of views follows the schedule, and from its keys, a model, the training views
+    and the loss on them what learns. Where renders are kept, edits stay close to views of the fitted model
+    and not to the training views.
     """
     return Method(
         name,
