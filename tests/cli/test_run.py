@@ -1,5 +1,6 @@
 """`texgs run`: which words are of the configuration and which of snakemake, exit codes, Ctrl-C."""
 
+import errno
 import os
 import shlex
 import signal
@@ -8,10 +9,11 @@ import sys
 import time
 
 import pytest
+from snakemake.api import SnakemakeApi
 from snakemake.cli import parse_config
 
 from tests.workflow.project import TINY
-from texgs.cli.run import WORD, overrides
+from texgs.cli.run import WORD, file_errors, overrides, snakemake
 from texgs.core.errors import ArgumentError
 
 TEXGS = [sys.executable, "-m", "texgs.cli.main"]
@@ -132,10 +134,27 @@ def test_a_run_that_is_interrupted_says_that_it_goes_on(tmp_path):
     assert "Traceback" not in err
 
 
+def test_a_user_without_a_home_folder_is_told_so(monkeypatch):
+    monkeypatch.setattr("pwd.getpwuid", {}.__getitem__)
+    for name in ("HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.delenv(name, raising=False)
+    with pytest.raises(ArgumentError, match=r"HOME: snakemake needs a home folder .*; set HOME to one"):
+        snakemake(["-n"])
+
+
+def test_a_full_temporary_folder_is_named():
+    told = r"the temporary folder: the run cannot work there \(No space left on device\); make room"
+    with pytest.raises(ArgumentError, match=told), file_errors():
+        SnakemakeApi.print_exception(None, OSError(errno.ENOSPC, "No space left on device"))
+
+
 @pytest.mark.workflow
 def test_a_run_for_one_target_names_no_report(tmp_path):
-    words = ["run", "--cores", "1", "tracking=none", *TINY.split(), "volumes"]
-    done = texgs(tmp_path, *words)
+    """In a project whose path has what shells, addresses and SQL take for something else."""
+    project = tmp_path / """it's of "both" kinds?"""
+    project.mkdir()
+    words = ["run", "--cores", "1", "tracking=mlflow", *TINY.split(), "volumes"]
+    done = texgs(project, *words)
     assert done.returncode == 0, done.stderr
     assert "Done: what was asked for" in done.stdout
     assert "report.html" not in done.stdout

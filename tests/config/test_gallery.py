@@ -91,19 +91,33 @@ def test_a_sweep_shows_its_variants_once():
 
 
 @pytest.mark.parametrize(
-    ("words", "applies"),
+    ("stage", "words", "applies"),
     [
-        (("fit=quick",), True),
-        (("fit=gaussians_quick",), False),  # the first one stands for all
-        (("fit=quick", "edits=[glass]"), False),
-        (("fit=quick", "edits=[glass]", grid("[{edit: glass}]")), True),
-        (("fit=quick", "edit=glass"), False),
-        (("fit=quick", "tf=TF01"), False),
+        ("gallery", ("fit=quick",), True),
+        ("gallery", ("fit=gaussians_quick",), False),  # the first one stands for all
+        ("gallery", ("fit=quick", "edits=[glass]"), False),
+        ("gallery", ("fit=quick", "edits=[glass]", grid("[{edit: glass}]")), True),
+        ("gallery", ("fit=quick", "edit=glass"), False),
+        ("gallery", ("fit=quick", "tf=TF01"), False),
+        ("comparison", ("tf=TF01", "fit=quick"), True),
+        ("comparison", ("tf=TF01", "fit=gaussians_quick"), False),
+        ("comparison", ("tf=TF01", "fit=quick", "fits=[quick]"), False),
+        ("comparison", ("tf=TF01", "fit=quick", "sweep=views"), False),
+        ("comparison", ("tf=TF01", "fit=quick", "edit=glass"), False),
     ],
 )
-def test_one_configuration_stands_for_all(words, applies):
+def test_one_configuration_stands_for_all(stage, words, applies):
     given = ("dataset=engine", "fits=[quick,gaussians_quick]", "edits=[glass,stylesplat]")
-    assert GALLERY.applies(compose((*given, *words))) is applies
+    assert STAGES[stage].applies(compose((*given, *words))) is applies
+
+
+def test_models_of_a_comparison_are_those_of_the_last_phases_of_all_recipes():
+    words = ("dataset=engine", "tf=TF01", "fits=[quick,gaussians_quick]", "fit=gaussians_quick", "fit.seed=3")
+    assert {name: path.as_posix() for name, path in STAGES["comparison"].inputs(compose(words)).items()} == {
+        "quick": "results/engine/TF01/quick-s3/texture/model.safetensors",
+        "gaussians_quick": "results/engine/TF01/gaussians_quick-s3/gaussians/model.safetensors",
+        "views": "results/engine/TF01/views/transforms_train.json",
+    }
 
 
 @pytest.mark.parametrize(

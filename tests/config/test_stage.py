@@ -4,10 +4,28 @@ import pytest
 import yaml
 
 from texgs.config.compose import compose
+from texgs.config.project import members
 from texgs.core.errors import ConfigError
+from texgs.core.keys import typed
 from texgs.workflow.locate import source_file, tf_names, views_folder
 from texgs.workflow.settings_files import settings_digest, settings_file
+from texgs.workflow.stage import plain
 from texgs.workflow.stage_table import STAGES
+
+TF = ("dataset=turbulence", "tf=TF01")
+WORDS = {  # of stages that read more than the data set
+    **dict.fromkeys(("views", "sheet", "surfels", "shading", "texture", "figure", "mesh"), TF),
+    "comparison": (*TF, "fits=[quick,demo]"),
+    "gaussians": (*TF, "fit=gaussians_quick"),
+    "voxels": (*TF, "fit=plenoxels_quick"),
+    "palette": (*TF, "fit=stylerf_quick"),
+    **{
+        f"edit_{compose((f'edit={name}',)).edit.method}": ("dataset=turbulence", f"edit={name}")
+        for name in members("edit")
+    },
+    "gallery": ("dataset=turbulence", "edits=[gold]"),
+    "edit_metrics": ("dataset=turbulence", "edit=gold"),
+}
 
 
 def digest(stage, *overrides):
@@ -49,7 +67,9 @@ def test_settings_file_is_named_after_its_contents(tmp_path, monkeypatch):
     assert settings_digest(settings) in path
 
 
-def test_an_unknown_tf_is_named():
+def test_basic_tfs_are_those_of_the_data_set_or_the_one_that_is_named():
+    assert tf_names(compose(("dataset=turbulence",))) == ["TF01", "TF02"]
+    assert tf_names(compose(("dataset=turbulence", "tf=TF02"))) == ["TF02"]
     with pytest.raises(
         ConfigError, match=r"tf: expected a basic TF of data set turbulence \(TF01, TF02\), got TF07"
     ):
@@ -78,6 +98,18 @@ def test_a_data_set_may_start_from_views(tmp_path):
     assert STAGES["sheet"].inputs(compose((*words, "tf=TF01")))["views"].parent == tmp_path / "mine" / "TF01"
 
 
-def test_tf_names():
-    assert tf_names(compose(("dataset=turbulence",))) == ["TF01", "TF02"]
-    assert tf_names(compose(("dataset=turbulence", "tf=TF02"))) == ["TF02"]
+def is_part(some, whole):
+    """Return whether tables, lists and values are those of another table, which may have more keys."""
+    if isinstance(some, dict):
+        return all(is_part(value, whole[key]) for key, value in some.items())
+    if isinstance(some, list):
+        return len(some) == len(whole) and all(map(is_part, some, whole))
+    return some == whole and type(some) is type(whole)
+
+
+@pytest.mark.parametrize("name", list(STAGES))
+def test_all_settings_have_a_field_of_their_dataclass(name):
+    settings = STAGES[name].settings(compose(WORDS.get(name, ("dataset=turbulence",))))
+    if STAGES[name].place in ("edit", "edit_metrics"):
+        settings["weights"] = {"vgg16": "0123", "lpips_vgg": None}
+    assert is_part(settings, plain(typed(STAGES[name].schema, settings)))

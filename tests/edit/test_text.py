@@ -1,6 +1,7 @@
 """Text-driven editing, offline: what it changes and leaves, which views it edits, and what it refuses."""
 
 from dataclasses import replace
+from functools import partial
 
 import pytest
 import torch
@@ -9,6 +10,7 @@ from torch.testing import assert_close
 from tests.edit.guidances import Identity, NoisyTint, Returns, Tint, Watching
 from tests.edit.textured import around, shell
 from tests.fields.surfels.samples import sample
+from tests.raster.threads import require_same_bits
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light
@@ -32,9 +34,9 @@ def model():
     return shell()
 
 
-def edited(model, guidance, recipe=QUICK, **options):
+def edited(model, guidance, recipe=QUICK, instruction="x", **options):
     """The model after an edit of six views from all sides."""
-    return edit_by_text(model, around(6), guidance, "x", recipe, **options).model
+    return edit_by_text(model, around(6), guidance, instruction, recipe, **options).model
 
 
 def seen(model, count=5):
@@ -54,6 +56,12 @@ def test_a_tint_is_seen_from_everywhere_and_the_rest_stays(model, recipe):
         assert torch.equal(x, done.parameters[name]) == (name not in CHANGES), name
     assert done.metadata == model.metadata
     assert missed(seen(done), BLUE) < 0.01
+
+
+@pytest.mark.parametrize("recipe", [QUICK, replace(ADAM, iterations=20)], ids=["solve", "adam"])
+def test_threads_change_nothing(model, recipe):
+    edit = partial(edited, model, ProceduralFilters(), recipe, "turn it into an oil painting")
+    require_same_bits(lambda: edit().parameters, threads=(3,))
 
 
 def test_light_falls_on_what_was_edited_bare(model):

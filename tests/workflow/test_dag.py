@@ -1,6 +1,5 @@
 """The workflow on a tiny volume: what runs, what reruns after which change, and what a mistake looks like."""
 
-import json
 import re
 import shutil
 
@@ -24,29 +23,18 @@ def project(tmp_path_factory):
     return project
 
 
-def test_results_are_complete(project):
-    results = project.work / "results" / "turbulence"
-    assert sorted(path.name for path in results.glob("[!.]*")) == ["TF01", "TF02", "transfer", "volume"]
+def test_jobs_have_logs_and_leave_no_scratch_files(project):
+    results = project.work / "results"
     for tf in ("TF01", "TF02"):
-        assert len(list((results / tf / "views" / "train").glob("*.png"))) == 12
-        assert len(list((results / tf / "views" / "test").glob("*.png"))) == 3
-        assert (results / tf / "sheet" / "sheet.png").stat().st_size > 1000
-    metrics = json.loads((results / "TF01" / "views" / "metrics.json").read_text())
-    assert metrics["numbers"]["frame_ms"] > 0
-    assert {"seconds", "peak_memory_mib", "device", "config_sha", "code_sha", "git_sha", "versions"} <= set(
-        metrics
-    )
-    assert (project.work / "results" / "logs" / "turbulence" / "TF01" / "views.log").stat().st_size > 0
+        assert len(list((results / "turbulence" / tf / "views" / "train").glob("*.png"))) == 12
+        assert (results / "turbulence" / tf / "sheet" / "sheet.png").stat().st_size > 1000
+        assert (results / "logs" / "turbulence" / tf / "views.log").stat().st_size > 0
     assert half_written(project.work) == []
 
 
-def test_a_changed_tf_reruns_only_its_views(project):
+def test_a_changed_tf_reruns_only_its_views_and_names_what_it_replaces(project):
     changed = "dataset.basic_tfs.TF01.color=[[0.3,1,0,0]]"
     assert project.planned(overrides=changed) == ["sheet TF01", "transfer", "views TF01"]
-
-
-def test_results_of_other_settings_are_named_before_they_are_replaced(project):
-    changed = "dataset.basic_tfs.TF01.color=[[0.3,1,0,0]]"
     said = "results of other settings, which this run replaces; results=FOLDER keeps both"
     told = project.snakemake("-n", overrides=changed).stderr.splitlines()
     assert [line for line in told if said in line] == [

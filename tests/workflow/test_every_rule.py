@@ -37,19 +37,10 @@ AFTER_FITS = {
 }
 TABLES = {"tables", "report"}
 RULES = {"volume", "transfer", "views", "sheet", "ball"} | FITS | AFTER_FITS | TABLES
-GROUPS = {
-    "all",
-    "volumes",
-    "sheets",
-    "figures",
-    "fits",
-    "comparisons",
-    "meshes",
-    "scenes",
-    "edits",
-    "galleries",
+GROUPS = {  # only names
+    *("all", "volumes", "sheets", "figures", "fits", "comparisons", "meshes", "scenes", "edits", "galleries"),
     "phase",
-}  # only names
+}
 
 
 def changed(project, extra=""):
@@ -205,6 +196,17 @@ def test_what_is_damaged_is_made_again_and_nothing_else(project):
     assert other.stat().st_mtime_ns == written, "the other views are those of before"
     phases = {f"sphere/TF01/demo/{path.parent.name}" for path in models}
     assert made_again(before, metrics(project)) == {"sphere/TF01/views", *phases}
+    assert changed(project) == set()
+
+
+def test_a_truncated_report_and_a_changed_table_are_made_again(project):
+    results = project.work / "results"
+    for path, rule in ((results / "report.html", "report"), (results / "tables" / "fitting.csv", "tables")):
+        whole = path.read_bytes()
+        path.write_bytes(whole[: len(whole) // 2])
+        assert changed(project) == {rule}
+        run(project)
+        assert len(path.read_bytes()) == len(whole)
     assert changed(project) == set()
 
 

@@ -50,8 +50,10 @@ def test_jobs_share_a_submission_only_with_those_that_they_wait_for():
     assert "group-components" not in profile
     config = compose(("dataset=turbulence", "tf=TF01"))
     whole = compose(("dataset=turbulence",))
+    told = re.search(r"\*\*Groups\.\*\*(.*)", PAGE)[1]
     for group in set(profile["groups"].values()):
         rules = [rule for rule in RULES if profile["groups"].get(rule) == group]
+        assert " and ".join(f"`{rule}`" for rule in rules) in told, "the page tells which"
         for before, after in pairwise(rules):
             each = config if STAGES[after].per_tf else whole
             read = {path.parent for path in STAGES[after].inputs(each).values()}

@@ -58,9 +58,10 @@ def snakemake(words: Sequence[str]) -> bool:
     """Run the workflow of texgs in this process; return whether it ended well."""
     try:
         from snakemake.cli import args_to_api, get_argument_parser, parse_args, parse_cores, print_exception
+
+        given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
     except RuntimeError as error:  # it looks for its own configuration in the user's home
         raise ArgumentError(f"HOME: snakemake needs a home folder ({error}); set HOME to one") from error
-    given, _ = get_argument_parser().parse_known_intermixed_args(list(words))
     require_pairs([word for word in words if word in given.targets])
     chosen = [word for word in given.targets if WORD.fullmatch(word)]
     rest = [word for word in words if word not in chosen]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -174,18 +174,16 @@ def plain(job: Job, results: str) -> dict[str, Any]:
     }
 
 
-def wildcards(configs: Iterable[Config]) -> dict[str, list[str]]:
+def wildcards(configs: Sequence[Config]) -> dict[str, list[str]]:
     """Return what the wildcards of rules stand for in these configurations."""
-    values: dict[str, set[str]] = {
+    values = {
+        "dataset": {each.dataset.name for each in configs},
+        "views": {each.views.name for each in configs},
+        "fit": {fit_folder(each) for each in configs},
+        "edit": {edit_folder(each) for each in configs},
+        "gallery": {each.gallery.name for each in configs},
         "phase": {stage.name for stage in STAGES.values() if stage.place == "phase"},
-        **{name: set() for name in ("dataset", "views", "fit", "edit", "gallery")},
     }
-    for each in configs:
-        values["dataset"].add(each.dataset.name)
-        values["views"].add(each.views.name)
-        values["fit"].add(fit_folder(each))
-        values["edit"].add(edit_folder(each))
-        values["gallery"].add(each.gallery.name)
     return {name: sorted(own) for name, own in values.items()}
 
 

@@ -9,6 +9,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -36,13 +37,11 @@ def record(
         seconds: that its work took.
     """
     return {
-        **{key: settings[key] for key in ("stage", "dataset", "stand_in", "tf") if key in settings},
-        **recipe(settings),
-        **edit(settings),
+        **facts(settings),
+        "stand_in": settings.get("stand_in", ""),
         "seconds": seconds,
         "peak_memory_mib": peak_memory() / MIB,
         "device": device(settings),
-        "seed": seed(settings),
         "config_sha": identity["settings"],
         "code_sha": identity["code"],
         "git_sha": git_revision(),
@@ -54,18 +53,16 @@ def record(
     }
 
 
-def recipe(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the recipe of the fit and what tells it from others, where the stage is of a fit or later."""
+def facts(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what tells a job from others: its stage, data set, recipe of the fit, edit and seed."""
+    told = {key: settings[key] for key in ("stage", "dataset", "tf") if key in settings}
     fit = settings.get("fit", {})
-    if "variant" not in fit:
-        return {}
-    names = {"recipe": "name", "recipe_changed": "changed", "fit_seed": "seed"}
-    return {name: fit[names.get(name, name)] for name in (*names, "field", "variant", "sweep")}
-
-
-def edit(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Return the edit, where the stage is of one."""
-    return {"edit": settings["edit"]["name"]} if "edit" in settings else {}
+    if "variant" in fit:
+        names = {"recipe": "name", "recipe_changed": "changed", "fit_seed": "seed"}
+        told |= {name: fit[names.get(name, name)] for name in (*names, "field", "variant", "sweep")}
+    if "edit" in settings:
+        told["edit"] = settings["edit"]["name"]
+    return {**told, "seed": seed(settings)}
 
 
 def device(settings: Mapping[str, Any]) -> str:
@@ -93,10 +90,8 @@ def versions() -> dict[str, str]:
     """Return versions of Python, texgs and what results depend on most."""
     versions = {"python": platform.python_version(), "texgs": __version__}
     for package in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             versions[package] = version(package)
-        except PackageNotFoundError:
-            continue
     return versions
 
 

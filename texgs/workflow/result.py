@@ -82,18 +82,13 @@ def claim(output: Path, identity: dict[str, Any], *, is_fresh: bool = False) -> 
     if is_fresh or stamped(work) != identity:
         shutil.rmtree(work, ignore_errors=True)
         if not is_fresh and stamped(output) == identity:
-            _take_back(output, work)
+            lost = damaged(output, None)
+            output.rename(work)  # first: a folder without its records is taken for somebody else's
+            for name in (*lost, METRICS, FILES):
+                (work / name).unlink(missing_ok=True)
     write_json(work / STAMP, identity)
     remove_scratch(work)
     return work
-
-
-def _take_back(output: Path, work: Path) -> None:
-    """Turn a damaged result into work that goes on, without its damaged files."""
-    lost = damaged(output, None)
-    output.rename(work)  # first: a folder without its records is taken for somebody else's
-    for name in (*lost, METRICS, FILES):
-        (work / name).unlink(missing_ok=True)
 
 
 def publish(output: Path) -> None:
@@ -121,21 +116,19 @@ def recover(output: Path) -> None:
 
 def stamped(folder: Path) -> Any:
     """Return the identity of the job that a folder is of; None where there is none that can be read."""
-    return _content(folder / STAMP)
+    try:
+        return read_json(folder / STAMP)
+    except ArgumentError:
+        return None
 
 
 def recorded(folder: Path) -> dict[str, str]:
     """Return checksums of the files of a complete result, by their names; none where they cannot be read."""
-    known = _content(folder / FILES)
-    return known if isinstance(known, dict) else {}
-
-
-def _content(path: Path) -> Any:
-    """Return what a JSON file holds; None where it is missing or damaged: then its folder is of no job."""
     try:
-        return read_json(path)
+        known = read_json(folder / FILES)
     except ArgumentError:
-        return None
+        return {}
+    return known if isinstance(known, dict) else {}
 
 
 def damaged(output: Path, checksums: Checksums | None) -> list[str]:

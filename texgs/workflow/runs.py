@@ -10,7 +10,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -152,12 +152,7 @@ def run(uri: str | None, **job: Any) -> Iterator[Run]:
 
 
 def flatten(values: Mapping[str, object], prefix: str = "") -> dict[str, str]:
-    """Return parameters of a nested mapping: keys joined by dots, lists and such as JSON.
-
-    Example:
-        >>> flatten({"fit": {"steps": 3, "rates": [0.1, 0.2]}})
-        {'fit.steps': '3', 'fit.rates': '[0.1, 0.2]'}
-    """
+    """Return parameters of a nested mapping: keys joined by dots, lists and such as JSON."""
     flat: dict[str, str] = {}
     for key, value in values.items():
         if isinstance(value, Mapping) and value:
@@ -194,7 +189,10 @@ def end_killed(client: MlflowClient) -> None:
         id, tags = each.info.run_id, each.data.tags
         if is_alive(tags.get(PROCESS, "")) or client.get_run(id).info.status != "RUNNING":
             continue  # it may have ended since the search
-        client.set_terminated(id, "FINISHED" if is_recorded(id, tags.get(METRICS, "")) else "KILLED")
+        is_finished = False
+        with suppress(OSError, ValueError, AttributeError):  # of metrics that are not there, or damaged
+            is_finished = json.loads(Path(tags.get(METRICS, "")).read_text()).get("run") == id
+        client.set_terminated(id, "FINISHED" if is_finished else "KILLED")
 
 
 def is_alive(process: str) -> bool:
@@ -205,12 +203,4 @@ def is_alive(process: str) -> bool:
     try:
         return str(psutil.Process(int(number)).create_time()) == started
     except (psutil.NoSuchProcess, ValueError):
-        return False
-
-
-def is_recorded(id: str, metrics: str) -> bool:
-    """Return whether the metrics of a run's job are in place and name this run."""
-    try:
-        return bool(json.loads(Path(metrics).read_text()).get("run") == id)
-    except (OSError, ValueError, AttributeError):
         return False

@@ -16,7 +16,7 @@ from texgs.core.checksum import digest
 from texgs.core.io import write_json
 from texgs.report.metrics_files import label
 from texgs.workflow import result
-from texgs.workflow.provenance import edit, git_revision, recipe, seed, user
+from texgs.workflow.provenance import facts, git_revision, user
 from texgs.workflow.runs import PARENT, Run, begin, process_tags
 
 if TYPE_CHECKING:
@@ -51,24 +51,19 @@ def name(job: Job) -> str:
     Jobs before a fit, which know of no variant, have the values that tell theirs from others.
     """
     settings, swept = job.settings, [f"{key}={value}" for key, value in job.swept.items()]
-    facts = {**recipe(settings), **edit(settings), "seed": seed(settings)}
-    words = (settings["dataset"], settings.get("tf"), label(facts), facts.get("edit"), settings["stage"])
-    return " ".join(filter(None, [*words, *([] if label(facts) else swept)]))
+    own = facts(settings)
+    fit = label(own)
+    words = (settings["dataset"], settings.get("tf"), fit, own.get("edit"), settings["stage"])
+    return " ".join(filter(None, [*words, *([] if fit else swept)]))
 
 
 def tags(job: Job, identity: Mapping[str, Any], parent: str | None) -> dict[str, str]:
     """Return what runs are found and compared by."""
-    facts: dict[str, Any] = {
-        **{key: job.settings[key] for key in ("stage", "dataset", "tf") if key in job.settings},
-        **recipe(job.settings),
-        **edit(job.settings),
-        "seed": seed(job.settings),
-        "device": job.settings.get("fit", {}).get("device"),
-    }
+    own = {**facts(job.settings), "device": job.settings.get("fit", {}).get("device")}
     return {
         "mlflow.user": user(),
         **({PARENT: parent} if parent else {}),
-        **{key: str(value) for key, value in facts.items() if value not in (None, "", NO_SWEEP)},
+        **{key: str(value) for key, value in own.items() if value not in (None, "", NO_SWEEP)},
         "config.sha": identity["settings"],
         "code.sha": identity["code"],
         "git.sha": git_revision(),
