@@ -106,15 +106,24 @@ def test_points_of_a_scene(scene, tmp_path):
     assert reds["red"].mean() > 240 > 3 * reds["blue"].mean()
 
 
-@pytest.mark.parametrize("kind", ["scene", "model", "surfels"])
+@pytest.mark.parametrize("kind", ["scene", "model", "surfels", "gaussians", "scene of gaussians"])
 def test_a_mesh(scene, model, tmp_path, kind):
     surfels = write_model(tmp_path / "s.safetensors", sample("surfels", n=400))
-    source = {"scene": scene, "model": model, "surfels": surfels}[kind]
+    ball = write_gaussians(tmp_path / "ball.safetensors", sphere_of_gaussians())
+    of_balls = write_scene(tmp_path / "balls.yaml", Scene({"A": SceneModel(ball)}))
+    sources = {"scene": scene, "model": model, "surfels": surfels}
+    source = {**sources, "gaussians": ball, "scene of gaussians": of_balls}[kind]
     words = ["--views", "12", "--size", "128", "--voxel", "0.02", "--kind", "mesh"]
     assert export(source, tmp_path / "mesh.ply", *words) == 0
     vertices, faces = (PlyData.read(tmp_path / "mesh.ply")[name] for name in ("vertex", "face"))
-    assert len(faces) > 500
-    assert vertices["red"].max() > 25
+    if kind not in sources:
+        radii = np.linalg.norm([vertices[axis] for axis in "xyz"], axis=0)
+        assert 0.36 < np.median(radii) < 0.46
+        with pytest.raises(ArgumentError, match=r"mesh.ply: expected"):
+            open_field(tmp_path / "mesh.ply")  # a cloud of points is no field
+    else:
+        assert len(faces) > 500
+        assert vertices["red"].max() > 25
 
 
 @pytest.mark.parametrize(
@@ -177,29 +186,10 @@ def test_a_scene_of_gaussians_is_exported_as_edited(tmp_path):
     assert len(open_field(tmp_path / "one.ply")) == 50
 
 
-def test_a_mesh_of_gaussians(tmp_path):
-    source = write_gaussians(tmp_path / "ball.safetensors", sphere_of_gaussians())
-    words = ["--kind", "mesh", "--views", "12", "--size", "128", "--voxel", "0.02"]
-    scene = write_scene(tmp_path / "scene.yaml", Scene({"A": SceneModel(source)}))
-    for each in (source, scene):
-        assert export(each, tmp_path / "mesh.ply", *words) == 0
-        vertices = PlyData.read(tmp_path / "mesh.ply")["vertex"]
-        radii = np.linalg.norm([vertices[axis] for axis in "xyz"], axis=0)
-        assert 0.36 < np.median(radii) < 0.46
-
-
 @pytest.mark.parametrize("flavour", ["2dgs", "release"])
 def test_surfels_of_other_programs_open_as_surfels(tmp_path, flavour):
     model = sample("shading", material="paper") if flavour == "release" else sample("surfels")
     assert isinstance(open_field(write_ply(tmp_path / "model.ply", model, flavour)), Surfels)
-
-
-def test_a_cloud_of_points_is_no_field(tmp_path):
-    source = write_gaussians(tmp_path / "ball.safetensors", sphere_of_gaussians())
-    words = ["--kind", "mesh", "--views", "12", "--size", "128", "--voxel", "0.02"]
-    assert export(source, tmp_path / "mesh.ply", *words) == 0
-    with pytest.raises(ArgumentError, match=r"mesh.ply: expected"):
-        open_field(tmp_path / "mesh.ply")
 
 
 @pytest.mark.parametrize("kind", ["2dgs", "release", "points"])

@@ -1,4 +1,4 @@
-"""The three phases by hand, on views of a small sphere."""
+"""The three phases by hand, and a fit of 3D Gaussians, on views of a small sphere."""
 
 import json
 import shutil
@@ -8,10 +8,20 @@ from pathlib import Path
 import pytest
 import torch
 
-from tests.cli.conftest import TINY, copied
+from tests.cli.conftest import GAUSSIANS, SPHERE, TINY, copied
 from texgs.cli.main import main
+from texgs.core.camera import orbit
+from texgs.core.errors import ArgumentError
 from texgs.core.geometry import z_order_of
+from texgs.fields.files import open_field
+from texgs.fields.gaussians.model import JoinedGaussians
+from texgs.fields.part_edit import PartEdit
 from texgs.fields.surfels.model_file import read_model
+from texgs.fit import checkpoint
+from texgs.fit.loop import Fit
+from texgs.report import fit_figure
+from texgs.scene.scene_file import read_scene
+from texgs.volume import view_set
 from texgs.volume.view_set import read_views
 
 
@@ -48,6 +58,10 @@ def numbers(folder, phase):
     return json.loads((folder / phase / "metrics.json").read_text())["numbers"]
 
 
+def shown_files(folder):
+    return sorted(path.name for path in folder.iterdir() if path.name[0] != ".")
+
+
 def test_texture_makes_what_it_needs_first(fitted_sphere):
     folder = fitted_sphere / "sphere" / "TF01" / "demo"
     models = {
@@ -57,19 +71,14 @@ def test_texture_makes_what_it_needs_first(fitted_sphere):
     assert models["texture"].metadata["dataset"] == "sphere"
     assert models["texture"].shading.local_viewer is False, "the CPU's volume mapper has a distant viewer"
     shading, texture = numbers(folder, "shading"), numbers(folder, "texture")
-    assert shading["psnr"] > 25
+    for phase, model in models.items():
+        order = z_order_of(model.parameters["means"])
+        assert order.equal(torch.arange(400)), f"{phase}: along a curve, with all that is theirs"
+    assert shading["psnr"] > 25, "measured on surfels in this order"
     assert texture["psnr"] >= shading["psnr"] - 0.1
     assert texture["notes"]["texels"] == len(models["texture"].parameters["texels"])
     assert texture["sizes"]["total_mib"] > 0
     assert shading["losses"][-1] < 0.1
-
-
-def test_surfels_lie_along_a_curve_with_all_that_is_theirs(fitted_sphere):
-    folder = fitted_sphere / "sphere" / "TF01" / "demo"
-    for phase in ("surfels", "shading", "texture"):
-        means = read_model(folder / phase / "model.safetensors").parameters["means"]
-        assert z_order_of(means).equal(torch.arange(400)), phase
-    assert numbers(folder, "shading")["psnr"] > 25, "measured on surfels in this order"
 
 
 def test_harmonics_first_as_in_the_paper(viewed):
@@ -100,9 +109,6 @@ def test_same_seed_same_model(seeded):
 
 
 def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
-    from texgs.fit import checkpoint
-    from texgs.fit.loop import Fit
-
     run = Fit.run
 
     def interrupted(fit):
@@ -123,8 +129,6 @@ def test_the_time_before_an_interruption_counts(seeded, monkeypatch):
 
 
 def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatch):
-    from texgs.report import fit_figure
-
     drawn = []
     write = fit_figure.write_fit_figure
     monkeypatch.setattr(fit_figure, "write_fit_figure", lambda *args: drawn.append(args) or write(*args))
@@ -140,9 +144,6 @@ def test_figure_shows_test_views_and_says_what_was_not_fitted(fitted, monkeypatc
 
 
 def test_figure_without_test_views_shows_training_views(fitted, monkeypatch):
-    from texgs.report import fit_figure
-    from texgs.volume import view_set
-
     shown = []
     read = view_set.read_views
     monkeypatch.setattr(view_set, "read_views", lambda folder: replace(read(folder), test=[]))
@@ -163,14 +164,9 @@ def test_a_gpu_that_is_not_there_is_one_sentence(seeded, capsys, monkeypatch):
 
 
 def test_a_finished_phase_leaves_no_checkpoint(seeded, monkeypatch):
-    from texgs.fit import checkpoint
-
     monkeypatch.setattr(checkpoint, "SAVED_EVERY", 0.0)
     assert main(["shading", *TINY]) == 0
-    assert sorted(path.name for path in (seeded / "shading").iterdir() if path.name[0] != ".") == [
-        "metrics.json",
-        "model.safetensors",
-    ]
+    assert shown_files(seeded / "shading") == ["metrics.json", "model.safetensors"]
 
 
 def test_test_views_may_have_lights_of_their_own(folder):
@@ -179,3 +175,42 @@ def test_test_views_may_have_lights_of_their_own(folder):
     views = read_views(folder.parent / "views")
     assert {view.light.kind for view in views.train} == {"headlight"}
     assert {(view.light.kind, view.light.azimuth) for view in views.test} == {("directional", 60.0)}
+
+
+def test_a_fit_has_a_model_and_numbers_and_leaves_no_checkpoint(gaussians):
+    folder = gaussians / "sphere" / "TF01" / "gaussians_quick" / "gaussians"
+    told = numbers(folder.parent, "gaussians")
+    assert told["psnr"] > 25
+    assert told["sizes"]["total_mib"] * 2**20 == pytest.approx(400 * 248)
+    field = open_field(folder / "model.safetensors")
+    assert (field.kind, len(field)) == ("gaussians", 400)
+    assert field.parameters["sh"][:, 9:].abs().max() > 0, "degree 3 has learned"
+    assert shown_files(folder) == ["metrics.json", "model.safetensors"]
+
+
+def test_a_scene_opens_and_fades(gaussians, tmp_path):
+    path = gaussians / "sphere" / "scene" / "gaussians_quick" / "compose" / "scene.yaml"
+    whole = read_scene(path)
+    composed = whole.open()
+    assert isinstance(composed, JoinedGaussians)
+    assert main(["edit", str(path), "TF01.opacity=0.2", "--output", str(tmp_path / "faint.yaml")]) == 0
+    faint = read_scene(tmp_path / "faint.yaml")
+    camera = orbit(30, 20, 2.5, 50, 48, 48)
+    before, after = (composed.render(camera, edits=scene.edits).alpha.sum() for scene in (whole, faint))
+    assert float(after) < 0.8 * float(before)
+    palette = ["TF01.palette=#ff0000", "--output", str(tmp_path / "red.yaml")]
+    assert main(["edit", str(path), *palette]) == 2
+    message = "palette: expected a model that can change it, got one of gaussians"
+    with pytest.raises(ArgumentError, match=message):
+        composed.render(camera, edits=[PartEdit(palette=(1, 0, 0))])
+
+
+def test_two_recipes_side_by_side_are_fitted_first(gaussians, tmp_path, monkeypatch):
+    monkeypatch.chdir(copied(gaussians, tmp_path))
+    few = ["fits=[gaussians_quick,demo]", "fit.shading.iterations=10"]
+    assert main(["comparison", *SPHERE, *GAUSSIANS, *few]) == 0
+    folder = tmp_path / "results" / "sphere" / "TF01"
+    shown = {"recipes": ["gaussians_quick", "demo"], "shown": ["test view 0", "test view 1"]}
+    assert numbers(folder / "comparison", "looks") == shown
+    assert (folder / "comparison" / "looks" / "comparison.png").stat().st_size > 1000
+    assert (folder / "demo" / "texture" / "model.safetensors").exists()

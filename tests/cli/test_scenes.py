@@ -1,6 +1,7 @@
-"""Scenes from the command line: rendered, edited, reported."""
+"""Scenes from the command line: rendered and edited; with words, files and models that mean harm."""
 
 import json
+import lzma
 from itertools import pairwise
 
 import numpy as np
@@ -8,17 +9,22 @@ import pytest
 import torch
 import yaml
 from PIL import Image
+from safetensors.torch import save, save_file
 
+from tests.edit.tasks import task
 from tests.fields.gaussians.samples import sample as gaussians
+from tests.fields.surfels.samples import sample
 from tests.fields.surfels.test_composition import ball
 from tests.scene.balls import write_balls
 from texgs.cli.main import main
+from texgs.core.errors import ArgumentError, OutOfMemoryError
 from texgs.fields.gaussians.files import write_gaussians
+from texgs.fields.surfels.compact import read_compact, write_compact
 from texgs.fields.surfels.model_file import write_model
 from texgs.fields.surfels.variants import write_texture
 from texgs.scene.scene import Scene, SceneModel
 from texgs.scene.scene_file import read_scene, write_scene
-from texgs.scene.segment_file import write_segment
+from texgs.scene.segment_file import read_segment, write_segment
 
 
 @pytest.fixture
@@ -27,18 +33,29 @@ def scene(tmp_path):
     return write_balls(tmp_path)
 
 
-def test_a_model_that_does_not_go_with_the_others_is_refused_before_a_file_is_written(
-    scene, tmp_path, capsys
-):
-    other = write_gaussians(tmp_path / "g.safetensors", gaussians())
-    words = [f"TF01.file={other}", "--output", str(tmp_path / "mix.yaml")]
-    assert main(["edit", str(scene), *words]) == 2
-    assert "expected fields of one kind, got gaussians and surfels" in capsys.readouterr().err
-    assert not (tmp_path / "mix.yaml").exists()
-
-
 def render(scene, output, *words):
     return main(["render", str(scene), "--output", str(output), "--width", "40", *words])
+
+
+def edit(scene, *words, output="new.yaml"):
+    """Write the edited scene beside the scene."""
+    return main(["edit", str(scene), *words, "--output", str(scene.parent / output)])
+
+
+def refused(capsys, *words):
+    """What the command line says about a mistake, in one line that a terminal can show."""
+    assert main([str(word) for word in words]) == 2
+    message = capsys.readouterr().err.splitlines()[0]
+    assert message.isprintable()
+    assert message.startswith(f"texgs {words[0]}: ")
+    return message
+
+
+def test_a_model_that_does_not_go_with_the_others_is_refused_before_a_file_is_written(scene, capsys):
+    other = write_gaussians(scene.with_name("g.safetensors"), gaussians())
+    assert edit(scene, f"TF01.file={other}") == 2
+    assert "expected fields of one kind, got gaussians and surfels" in capsys.readouterr().err
+    assert not scene.with_name("new.yaml").exists()
 
 
 def test_one_view_and_its_default_name(scene, tmp_path, monkeypatch):
@@ -57,14 +74,8 @@ def test_paths_are_films(scene, tmp_path, path):
 
 def test_edits_show_and_are_data(scene, tmp_path):
     edited = tmp_path / "new" / "edited.yaml"
-    words = [
-        "TF01.palette=#ff0000",
-        "TF02.visible=false",
-        "TF01.diffuse=0.5",
-        "light=30,-10",
-        "background=0,0,0",
-    ]
-    assert main(["edit", str(scene), *words, "--output", str(edited)]) == 0
+    numbers = ["TF01.palette=#ff0000", "TF02.visible=false", "TF01.diffuse=0.5"]
+    assert edit(scene, *numbers, "light=30,-10", "background=0,0,0", output="new/edited.yaml") == 0
     result = read_scene(edited)
     assert result.models["TF01"].edit.palette == (1, 0, 0)
     assert not result.models["TF02"].edit.visible
@@ -73,27 +84,25 @@ def test_edits_show_and_are_data(scene, tmp_path):
     picture = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
     assert picture[0, 0].tolist() == [0, 0, 0]
     assert picture[..., 0].sum() > 1.3 * picture[..., 2].sum()
-    back = tmp_path / "back.yaml"
     undo = ["TF01.palette=", "TF02.visible=", "TF01.diffuse=", "light=headlight", "background=#ffffff"]
-    assert main(["edit", str(edited), *undo, "--output", str(back)]) == 0
-    assert yaml.safe_load(back.read_text()) == yaml.safe_load(scene.read_text())
+    assert edit(edited, *undo, output="../back.yaml") == 0
+    assert yaml.safe_load(scene.with_name("back.yaml").read_text()) == yaml.safe_load(scene.read_text())
 
 
 @pytest.mark.parametrize(
     ("word", "message"),
     [
         ("TF03.opacity=1", "TF03.opacity=1: expected a model of the scene (TF01, TF02), got TF03"),
-        ("TF01.opasity=1", "TF01.opasity=1: models.TF01: no such key 'opasity', did you mean opacity?"),
         ("TF01.opacity=-1", "TF01.opacity=-1: models.TF01.opacity: expected a factor from 0 to 1000, got -1"),
         ("TF01.texture=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("TF01.opacity=[", "expected a number, true, false, r,g,b or #rrggbb"),
         ("visible", "expected KEY=VALUE, such as TF01.opacity=0.5"),
     ],
 )
-def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, capsys, word, message):
-    assert main(["edit", str(scene), word, "--output", str(tmp_path / "x.yaml")]) == 2
+def test_a_mistake_in_an_edit_writes_nothing(scene, capsys, word, message):
+    assert edit(scene, word) == 2
     assert message in capsys.readouterr().err
-    assert not (tmp_path / "x.yaml").exists()
+    assert not scene.with_name("new.yaml").exists()
 
 
 @pytest.mark.parametrize(
@@ -102,20 +111,21 @@ def test_a_mistake_in_an_edit_writes_nothing(scene, tmp_path, capsys, word, mess
         (["--frames", "0"], "--frames: expected at least 1, got 0"),
         (["--radius", "0"], "radius: expected more than 0, got 0"),
         (["--height", "-4"], "height: expected at least 1 pixel, got -4"),
+        (["--frames", "1000000000", "--path", "orbit"], "--frames: expected at most 100000, got 1000000000"),
+        (["--width", "300000"], "GiB of memory, but"),
+        (["--mode", "normal", "--width", "300000"], "a frame of 300000 x 300000 pixels: needs 5364 GiB"),
     ],
 )
 def test_a_mistake_in_a_rendering(scene, tmp_path, capsys, words, message):
-    assert render(scene, tmp_path / "x.png", *words) == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "x.png").exists()
+    assert message in refused(capsys, "render", scene, "--output", tmp_path / "x.mp4", *words)
+    assert not (tmp_path / "x.mp4").exists()
 
 
 def test_names_that_yaml_takes_for_numbers_or_that_have_dots(scene, tmp_path):
     values = yaml.safe_load(scene.read_text())
     values["models"] = {42: values["models"]["TF01"], "v1.2": values["models"]["TF02"]}
     scene.write_text(yaml.safe_dump(values))
-    words = ["42.opacity=0.5", "v1.2.opacity=0.25"]
-    assert main(["edit", str(scene), *words, "--output", str(tmp_path / "new.yaml")]) == 0
+    assert edit(scene, "42.opacity=5e-1", "v1.2.opacity=0.25") == 0
     assert [x.edit.opacity for x in read_scene(tmp_path / "new.yaml").models.values()] == [0.5, 0.25]
 
 
@@ -124,17 +134,13 @@ def test_a_file_is_named_from_where_one_is_and_found_through_a_link(scene, tmp_p
     write_texture(tmp_path / "styles" / "a.safetensors", ball(1))
     (tmp_path / "link").symlink_to(tmp_path / "styles" / "deep")
     monkeypatch.chdir(tmp_path / "styles")
-    assert (
-        main(
-            ["edit", str(scene), "TF01.texture=a.safetensors", "--output", str(tmp_path / "link" / "b.yaml")]
-        )
-        == 0
-    )
+    assert edit(scene, "TF01.texture=a.safetensors", output="link/b.yaml") == 0
     assert render(tmp_path / "link" / "b.yaml", tmp_path / "b.png") == 0
 
 
 def test_a_folder_is_no_file(scene, tmp_path, capsys):
-    assert main(["edit", str(scene), "--output", str(tmp_path)]) == 2
+    (tmp_path / "folder").mkdir()
+    assert edit(scene, output="folder") == 2
     assert "expected the name of a file, got a folder" in capsys.readouterr().err
 
 
@@ -144,45 +150,12 @@ def test_a_gpu_that_is_not_there(scene, tmp_path, capsys, monkeypatch):
     assert "torch sees no GPU" in capsys.readouterr().err
 
 
-def test_report_holds_pictures_and_numbers(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    assert main(["report"]) == 2
-    assert "no metrics.json below results" in capsys.readouterr().err
-    folder = tmp_path / "results" / "engine" / "scene" / "quick" / "pse"
-    folder.mkdir(parents=True)
-    Image.new("RGB", (4, 4), "red").save(folder / "pse.png")
-    numbers = {
-        "pse": [{"title": "a <b> edit", "psnr": 31.25, "ssim": 0.9}],
-        "relight": [{"title": "light"}],
-        "views": 6,
-    }
-    record = {"stage": "pse", "dataset": "engine", "recipe": "quick", "variant": "", "seconds": 1.5}
-    versions = {"versions": {"python": "3.11", "texgs": "1"}, "code_sha": "abc"}
-    pictures = {"pse.png": "Edits of colour.", "relight.png": "Not written."}
-    metrics = {**record, **versions, "result": "PseResult", "numbers": numbers}
-    metrics["pictures"] = pictures
-    (folder / "metrics.json").write_text(json.dumps(metrics))
-    assert main(["report"]) == 0
-    text = (tmp_path / "results" / "report.html").read_text()
-    assert "31.25" in text
-    assert "a &lt;b&gt; edit" in text
-    assert "not measured" in text, "the second edit was not compared"
-    assert text.count('<a href="#job-1">1</a>') == 2, "rows lead to the job that they are from"
-    assert text.count('<tr id="job-1">') == 1
-    assert text.count("data:image/webp;base64,") == 1
-    assert "http" not in text.replace("http-equiv", ""), "the report needs no other file"
-
-
 @pytest.fixture
 def dotted(tmp_path):
     """A scene of a model whose name has a dot, and a file with a segment of it."""
     path = write_model(tmp_path / "model.safetensors", ball(1))
     write_segment(tmp_path / "half.safetensors", ball(1), torch.arange(150) % 2 == 0)
     return write_scene(tmp_path / "scene.yaml", Scene({"v1.2": SceneModel(path)}))
-
-
-def edit(dotted, *words, output="new.yaml"):
-    return main(["edit", str(dotted), *words, "--output", str(dotted.with_name(output))])
 
 
 def test_a_segment_is_added_edited_and_removed(dotted):
@@ -203,7 +176,6 @@ def test_a_segment_is_added_edited_and_removed(dotted):
     ("word", "message"),
     [
         ("v1.2/shell.opacity=1", "expected a segment of v1.2 (it has none), got shell"),
-        ("v1.2/shell=", "expected a segment of v1.2 (it has none), got shell"),
         ("TF01/shell.opacity=1", "expected a model of the scene (v1.2), got TF01"),
         ("v1.2/shell=none.safetensors", "expected a file that is there, got none.safetensors"),
         ("v1.2/=scene.yaml", "expected a file that is there"),
@@ -213,3 +185,60 @@ def test_a_mistake_in_an_edit_of_a_segment_writes_nothing(dotted, capsys, word, 
     assert edit(dotted, word) == 2
     assert f"{word}: {message}" in capsys.readouterr().err
     assert not dotted.with_name("new.yaml").exists()
+
+
+def test_a_name_of_a_model_is_no_way_out_of_the_folder(tmp_path):
+    path = write_model(tmp_path / "m.safetensors", ball(1))
+    hostile = Scene({"../../outside": SceneModel(path)})
+    folder = tmp_path / "a" / "b"
+    with pytest.raises(ArgumentError, match=r"edit.parts: expected a name that a file can have"):
+        task(hostile, folder).each_part(lambda part, model, surfels, views: model)
+    assert sorted(x.name for x in tmp_path.rglob("*.safetensors")) == ["m.safetensors"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"models": {"a\x1b[2J": {"file": "x"}}}, "models: expected a name of 1 to 100"),
+        ({"models": {"a": {"file": "x", "opacity": 10**400}}}, "models.a.opacity: expected a factor from 0"),
+        ({"light": {"azimuth": 10**400, "polar": 0}}, "light: expected headlight"),
+        ({"background": [[[0]]] * 9}, "background: expected three numbers"),
+    ],
+)
+def test_values_that_no_scene_has(scene, capsys, change, message):
+    scene.write_text(json.dumps({**yaml.safe_load(scene.read_text()), **change}))  # YAML without aliases
+    assert message in refused(capsys, "render", scene)
+
+
+def test_an_edit_that_could_not_be_opened_writes_nothing(scene, tmp_path, capsys):
+    (tmp_path / "foreign").write_text("root:x:0:0")
+    for word in (f"TF01/x={tmp_path / 'foreign'}", f"TF01.texture={tmp_path / 'foreign'}"):
+        output = tmp_path / "x.yaml"
+        assert "foreign: expected a texgs-" in refused(capsys, "edit", scene, word, "--output", output)
+        assert not output.exists()
+
+
+def test_anchors_that_are_no_places_belong_to_no_model(tmp_path):
+    model = sample()
+    path = write_segment(tmp_path / "s", model, torch.arange(7) < 3)
+    header = {"texgs-segment": json.dumps({"version": 1, "metadata": {}})}
+    anchors = torch.full((7, 3), torch.nan)
+    save_file({"mask": torch.arange(7) < 3, "anchors": anchors}, path, header)
+    with pytest.raises(ArgumentError, match="expected a segment of this model"):
+        read_segment(path, model)
+
+
+def test_a_compact_file_that_unpacks_to_more_than_there_is(tmp_path):
+    path = write_compact(tmp_path / "m.texgs", sample())
+    line = path.read_bytes().partition(b"\n")[0]
+    tensors = save({"codes": torch.zeros(8, dtype=torch.uint8)})
+    start = json.dumps({"codes": {"dtype": "U8", "shape": [2**50], "data_offsets": [0, 2**50]}}).encode()
+    path.write_bytes(line + b"\n" + lzma.compress(len(start).to_bytes(8, "little") + start + tensors))
+    with pytest.raises(
+        OutOfMemoryError, match=r"m\.texgs: a model of 1125899906842624 bytes, as its header says"
+    ):
+        read_compact(path)
+    many = save({"codes": torch.zeros(8, dtype=torch.uint8)}) + bytes(300_000_000)
+    path.write_bytes(line + b"\n" + lzma.compress(many, preset=0))
+    with pytest.raises(ArgumentError, match=r"got 8 bytes of tensors, expected 8|cut short or damaged"):
+        read_compact(path)

@@ -31,8 +31,8 @@ def test_the_histogram_is_grey_and_logarithmic(tmp_path):
     assert 0.5 < small / large < 0.75  # linear: 0.5
 
 
-def test_functions_beyond_the_data_are_in_the_picture(tmp_path):
-    path = plot(tmp_path / "plot.png", [1, 2, 3], 0, 1, {"TF02": BLUE})
+def test_functions_beyond_the_data_are_in_the_picture_and_titles_are_no_mathematics(tmp_path):
+    path = plot(tmp_path / "plot.png", [1, 2, 3], 0, 1, {"$x_{$": BLUE}, "$\\frac{$ 5 $")
     assert area(path, (38, 38, 255)) > 5000
 
 
