@@ -140,7 +140,7 @@ def test_measures_without_weights_say_what_is_missing(results):
     ],
 )
 def test_a_mistake_leaves_the_earlier_result(results, capsys, monkeypatch, verb, words, message):
-    monkeypatch.setattr("texgs.models.weights._download_file", no_network)
+    monkeypatch.setattr("texgs.models.weights._download", no_network)
     folder = results / "edits" / words[0].removeprefix("edit=")
     before = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
     assert main([verb, *WORDS, *FEW, *words]) == 2

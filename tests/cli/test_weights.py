@@ -69,7 +69,7 @@ def test_a_job_works_with_the_weights_it_was_planned_with(there):
 
 
 def test_missing_weights_name_the_command_and_are_not_downloaded(there, monkeypatch):
-    monkeypatch.setattr(weights, "_download_file", lambda *_: pytest.fail("downloaded"))
+    monkeypatch.setattr(weights, "_download", lambda *_: pytest.fail("downloaded"))
     (line,) = missing_weights(compose(("dataset=orbital", "edit=style")))
     assert line == (
         "edit style: the weights of vgg16 are not on this machine; "

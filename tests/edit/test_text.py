@@ -127,9 +127,10 @@ def test_refinement_sees_the_first_result(model):
     assert missed(seen(second), RED) < 0.02
 
 
-def test_refinement_keeps_some_of_the_first_style(model):
+def test_refinement_keeps_some_of_the_first_style(model, monkeypatch):
     """Dots, then blue: the dots are blue."""
-    cameras, filters = around(4), ProceduralFilters(2.0)
+    monkeypatch.setattr("texgs.models.filters.surface.CELLS", 13.0)  # large enough for small views
+    cameras, filters = around(4), ProceduralFilters()
     dots = edit_by_text(model, cameras, filters, "as a stipple drawing", size=96).model
     both, plain = (edit_by_text(m, cameras, filters, "make it blue", size=96).model for m in (dots, model))
     shown = [render_views(m, cameras, None) for m in (dots, both, plain)]

@@ -152,7 +152,7 @@ def test_weights_that_are_missing_or_of_another_model(folder, tmp_path, monkeypa
     monkeypatch.setenv("HF_HOME", str(tmp_path / "hub"))
     monkeypatch.setattr("huggingface_hub.snapshot_download", refused)
     with pytest.raises(MissingDataError, match=r"clip-vit-large-patch14: its weights .* TEXGS_WEIGHTS"):
-        Clip.load()
+        Clip.load("clip-vit-large-patch14")
     (tmp_path / "config.json").write_text('{"model_type": "siglip"}')
     with pytest.raises(ArgumentError, match="expected a model of type clip, got siglip"):
         Clip.load(tmp_path)

@@ -99,7 +99,7 @@ def test_mistakes_are_named():
     style = made(17, 12, 4, 4)
     with pytest.raises(ArgumentError, match="region: expected a part of the style picture"):
         StyleFeatures.of(style, torch.zeros(4, 4, dtype=torch.bool))
-    with pytest.raises(ShapeError, match=r"region: expected \[4, 4\]"):
+    with pytest.raises(ShapeError, match=r"where: expected \[4, 4\]"):
         StyleFeatures.of(style, torch.ones(4, 5, dtype=torch.bool))
     with pytest.raises(ShapeError, match=r"features: expected \[12, h, w\]"):
         nnfm(made(18, 11, 4, 4), StyleFeatures.of(style))

@@ -12,20 +12,25 @@ class File:
     name: str
     megabytes: float
     sha256: str
-    url: str | None = None  # None: it can only be put into the weights folder
 
 
 @dataclass(frozen=True)
 class Single:
-    """A model whose weights are one file; the first that is found of several that hold the same ones."""
+    """A model whose weights are one file."""
 
-    files: tuple[File, ...]
-    source: str  # where a person gets it
+    file: File  # that is downloaded
+    source: str  # its address
+    same: tuple[File, ...] = ()  # which hold the same weights, looked for before it
+
+    @property
+    def files(self) -> tuple[File, ...]:
+        """Return all files to look for, in order."""
+        return (*self.same, self.file)
 
     @property
     def megabytes(self) -> float:
-        """Of the file that is downloaded, else of the first."""
-        return next((file for file in self.files if file.url), self.files[0]).megabytes
+        """Return the size of the file that is downloaded."""
+        return self.file.megabytes
 
 
 @dataclass(frozen=True)
@@ -40,77 +45,65 @@ class Snapshot:
 
     @property
     def source(self) -> str:
-        """Where a person gets it."""
+        """Return the page where a person gets it."""
         return f"https://huggingface.co/{self.repository}"
 
 
 # Backbones of CLIP to choose from, for scores and for losses; the first one is the default.
 CLIP_BACKBONES = ("clip-vit-base-patch32", "clip-vit-large-patch14")
+CLIP_FILES = (("config.json",), ("model.safetensors", "pytorch_model.bin"), ("tokenizer.json", "vocab.json"))
 TEXT_FILES = ("*.json", "*.txt")
+DIFFUSION_FILES = (
+    "unet/diffusion_pytorch_model.safetensors",
+    "vae/diffusion_pytorch_model.safetensors",
+    "text_encoder/model.safetensors",
+)
+
+VGG16_HALF = File(  # the convolutions alone
+    "vgg16_features_fp16.safetensors",
+    29.4,
+    "4226839ba20eb3835e9fa6fe2d50a2e2c3b0db26fc00a3fc21b2c892c1703b9e",
+)
 
 CATALOGUE: dict[str, Single | Snapshot] = {
     "vgg16": Single(
-        (
-            File(
-                "vgg16_features_fp16.safetensors",
-                29.4,
-                "4226839ba20eb3835e9fa6fe2d50a2e2c3b0db26fc00a3fc21b2c892c1703b9e",
-            ),
-            File(
-                "vgg16-397923af.pth",
-                553.4,
-                "397923af8e79cdbb6a7127f12361acd7a2f83e06b05044ddf496e83de57a5bf0",
-                "https://download.pytorch.org/models/vgg16-397923af.pth",
-            ),
-        ),
+        File("vgg16-397923af.pth", 553.4, "397923af8e79cdbb6a7127f12361acd7a2f83e06b05044ddf496e83de57a5bf0"),
         "https://download.pytorch.org/models/vgg16-397923af.pth",
+        (VGG16_HALF,),
     ),
     "lpips_vgg": Single(
-        (
-            File(
-                "lpips_lin_v0.1_vgg.pth",
-                0.007,
-                "a78928a0af1e5f0fcb1f3b9e8f8c3a2a5a3de244d830ad5c1feddc79b8432868",
-                "https://raw.githubusercontent.com/richzhang/PerceptualSimilarity/"
-                "082bb24f84c091ea94de2867d34c4544f68e0963/lpips/weights/v0.1/vgg.pth",
-            ),
+        File(
+            "lpips_lin_v0.1_vgg.pth",
+            0.007,
+            "a78928a0af1e5f0fcb1f3b9e8f8c3a2a5a3de244d830ad5c1feddc79b8432868",
         ),
-        "https://github.com/richzhang/PerceptualSimilarity, lpips/weights/v0.1/vgg.pth",
+        "https://raw.githubusercontent.com/richzhang/PerceptualSimilarity/"
+        "082bb24f84c091ea94de2867d34c4544f68e0963/lpips/weights/v0.1/vgg.pth",
     ),
     "mobile_sam": Single(
-        (
-            File(
-                "mobile_sam.pt",
-                40.7,
-                "6dbb90523a35330fedd7f1d3dfc66f995213d81b29a5ca8108dbcdd4e37d6c2f",
-                "https://raw.githubusercontent.com/ChaoningZhang/MobileSAM/master/weights/mobile_sam.pt",
-            ),
-        ),
-        "https://github.com/ChaoningZhang/MobileSAM, weights/mobile_sam.pt",
+        File("mobile_sam.pt", 40.7, "6dbb90523a35330fedd7f1d3dfc66f995213d81b29a5ca8108dbcdd4e37d6c2f"),
+        "https://raw.githubusercontent.com/ChaoningZhang/MobileSAM/master/weights/mobile_sam.pt",
     ),
     "sam_vit_h": Single(
-        (
-            File(
-                "sam_vit_h_4b8939.pth",
-                2564.6,
-                "a7bf3b02f3ebf1267aba913ff637d9a2d5c33d3173bb679e46d9f338c26f262e",
-                "https://dl.fbaipublicfiles.com/segment_anything/sam_vit_h_4b8939.pth",
-            ),
+        File(
+            "sam_vit_h_4b8939.pth",
+            2564.6,
+            "a7bf3b02f3ebf1267aba913ff637d9a2d5c33d3173bb679e46d9f338c26f262e",
         ),
-        "https://github.com/facebookresearch/segment-anything, the default model",
+        "https://dl.fbaipublicfiles.com/segment_anything/sam_vit_h_4b8939.pth",
     ),
     "clip-vit-base-patch32": Snapshot(
         "openai/clip-vit-base-patch32",
         "3d74acf9a28c67741b2f4f2ea7635f0aaf6f0268",
         605,
-        (("config.json",), ("model.safetensors", "pytorch_model.bin"), ("tokenizer.json", "vocab.json")),
+        CLIP_FILES,
         (*TEXT_FILES, "pytorch_model.bin"),
     ),
     "clip-vit-large-patch14": Snapshot(
         "openai/clip-vit-large-patch14",
         "32bd64288804d66eefd0ccbe215aa642df71cc41",
         1710,
-        (("config.json",), ("model.safetensors", "pytorch_model.bin"), ("tokenizer.json", "vocab.json")),
+        CLIP_FILES,
         (*TEXT_FILES, "model.safetensors"),
     ),
     "instruct-pix2pix": Snapshot(
@@ -122,15 +115,8 @@ CATALOGUE: dict[str, Single | Snapshot] = {
             *((f"{part}/config.json",) for part in ("unet", "vae", "text_encoder")),
             ("scheduler/scheduler_config.json",),
             ("tokenizer/tokenizer.json", "tokenizer/vocab.json"),
-            ("unet/diffusion_pytorch_model.safetensors",),
-            ("vae/diffusion_pytorch_model.safetensors",),
-            ("text_encoder/model.safetensors",),
+            *((file,) for file in DIFFUSION_FILES),
         ),
-        (
-            *TEXT_FILES,
-            "unet/diffusion_pytorch_model.safetensors",
-            "vae/diffusion_pytorch_model.safetensors",
-            "text_encoder/model.safetensors",
-        ),
+        (*TEXT_FILES, *DIFFUSION_FILES),
     ),
 }

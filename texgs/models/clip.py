@@ -18,7 +18,6 @@ from texgs.models.weights import locate
 
 MEAN = (0.48145466, 0.4578275, 0.40821073)  # that CLIP normalises images with, per channel
 DEVIATION = (0.26862954, 0.26130258, 0.27577711)
-DEFAULT = "clip-vit-large-patch14"  # what the metrics of InstructPix2Pix and its successors use
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,17 +29,8 @@ class Clip:
     tokenizer: Any
 
     @classmethod
-    def load(cls, weights: str | Path = DEFAULT, device: torch.device | str = "cpu") -> Clip:
-        """Read a model in float32.
-
-        Args:
-            weights: name of the catalogue, or a folder with config.json, weights and tokenizer.
-            device: that computes.
-
-        Raises:
-            ArgumentError, MissingDataError: if transformers or the weights are missing, or the folder holds
-                no CLIP or a damaged one.
-        """
+    def load(cls, weights: str | Path, device: torch.device | str = "cpu") -> Clip:
+        """Read a model in float32, by a name of the catalogue or from a folder with its tokenizer."""
         folder = Path(weights) if Path(weights).is_dir() else locate(str(weights))
         network, tokenizer = read_folder(folder, "clip", ("CLIPModel", "AutoTokenizer"))
         name = folder.name if Path(weights).is_dir() else str(weights)
@@ -48,17 +38,14 @@ class Clip:
 
     @property
     def size(self) -> int:
-        """Of the square image that the encoder takes, pixels."""
+        """Return the side of the square image that the encoder takes, pixels."""
         return int(self.network.config.vision_config.image_size)
 
     def prepared(self, images: Tensor) -> Tensor:
-        """Images as the encoder takes them [B, 3, S, S]; differentiable.
+        """Return images [B, H, W, 3] in [0, 1] as the encoder takes them [B, 3, S, S]; differentiable.
 
         The whole image is squeezed to a square by bicubic interpolation without antialiasing, nothing is cut
         off: as the metrics of InstructPix2Pix and Instruct-NeRF2NeRF do, unlike CLIP's own preprocessing.
-
-        Args:
-            images: [B, H, W, 3] in [0, 1].
         """
         from kornia.enhance import normalize
 
@@ -69,21 +56,17 @@ class Clip:
         return prepared
 
     def images(self, images: Tensor) -> Tensor:
-        """Features [B, D] of images [B, H, W, 3] in [0, 1]; differentiable in the images."""
+        """Return features [B, D] of images [B, H, W, 3] in [0, 1]; differentiable in the images."""
         return self.encoded(self.prepared(images))
 
     def encoded(self, pixels: Tensor) -> Tensor:
-        """Features [B, D] of what the encoder takes, [B, 3, S, S] normalised; differentiable."""
+        """Return features [B, D] of what the encoder takes, [B, 3, S, S] normalised; differentiable."""
         device = next(self.network.parameters()).device
         return _unit(self.network.get_image_features(pixel_values=pixels.to(device)))
 
     @torch.no_grad()
     def texts(self, texts: Sequence[str]) -> Tensor:
-        """Features [T, D] of texts, cut off where they are longer than the model can read.
-
-        Raises:
-            ArgumentError: if there is none, or one is empty.
-        """
+        """Return features [T, D] of texts, cut off where they are longer than the model can read."""
         if not texts or not all(text.strip() for text in texts):
             raise ArgumentError("texts: expected words in each, got an empty one; describe the picture")
         device = next(self.network.parameters()).device
@@ -94,14 +77,11 @@ class Clip:
             max_length=self.network.config.text_config.max_position_embeddings,
             return_tensors="pt",
         ).to(device)
-        return _unit(
-            self.network.get_text_features(
-                input_ids=tokens["input_ids"], attention_mask=tokens["attention_mask"]
-            )
-        )
+        inputs = {name: tokens[name] for name in ("input_ids", "attention_mask")}
+        return _unit(self.network.get_text_features(**inputs))
 
 
 def _unit(features: Any) -> Tensor:
-    """Features [B, D] of unit length; newer versions of transformers wrap them."""
+    """Return features [B, D] of unit length; newer versions of transformers wrap them."""
     pooled: Tensor = features if isinstance(features, Tensor) else features.pooler_output
     return F.normalize(pooled, dim=-1)

@@ -21,7 +21,7 @@ BRANCH = 1  # of the three, whose features are compared: with the image, without
 
 
 def fundamental(view: Camera, key: Camera) -> Tensor:
-    """F [3, 3], float64: a pixel x of the view is seen in the key on the line x^T F, homogeneous."""
+    """Return F [3, 3], float64: a pixel x of the view is seen in the key on the line x^T F, homogeneous."""
     K_view, K_key = view.K.double().cpu(), key.K.double().cpu()
     relative = key.viewmat.double().cpu() @ torch.linalg.inv(view.viewmat.double().cpu())  # view to key
     x, y, z = relative[:3, 3].tolist()
@@ -30,13 +30,9 @@ def fundamental(view: Camera, key: Camera) -> Tensor:
 
 
 def token_camera(camera: Camera, image: Sequence[int], rows: int, columns: int) -> Camera:
-    """A camera whose pixels are the tokens of an image scaled and padded to height and width `image`.
+    """Return a camera whose pixels are the tokens of a view in an image of a height and width.
 
-    Args:
-        camera: of the view.
-        image: height and width that the model works on; the view fills its longer side.
-        rows: of tokens.
-        columns: of tokens.
+    The view fills the longer side of the image that the model works on.
     """
     scale = max(image) / max(camera.width, camera.height)
     K = camera.K.double().clone()
@@ -46,14 +42,10 @@ def token_camera(camera: Camera, image: Sequence[int], rows: int, columns: int) 
 
 
 def epipolar_mask(view: Camera, key: Camera) -> Tensor:
-    """Which tokens of the key may match each token of the view [S, S'], bool.
+    """Return which tokens of the key may match each token of the view [S, S'], bool, see `token_camera`.
 
     Those no farther than `BAND` from the epipolar line of the token's centre. Where none is, all may; so may
     all where both cameras are at one place, and there are no lines.
-
-    Args:
-        view: camera with one pixel for each token, see `token_camera`.
-        key: likewise.
     """
     lines = _centers(view) @ fundamental(view, key)  # [S, 3]
     length = lines[:, :2].norm(dim=1, keepdim=True)
@@ -63,7 +55,7 @@ def epipolar_mask(view: Camera, key: Camera) -> Tensor:
 
 
 def _centers(camera: Camera) -> Tensor:
-    """Homogeneous pixel centres [S, 3], float64, row after row."""
+    """Return homogeneous pixel centres [S, 3], float64, row after row."""
     y, x = torch.meshgrid(
         torch.arange(camera.height, dtype=torch.float64) + 0.5,
         torch.arange(camera.width, dtype=torch.float64) + 0.5,
@@ -78,13 +70,8 @@ class Consistency:
     In each denoising step a key view is drawn from each group of `GROUP` views that follow each other. Keys
     attend to the tokens of all keys; every other view takes over the attention outputs of the tokens of the
     two nearest keys that look most alike and lie on the epipolar line (Chen et al. 2024, section 4).
-    Similarities are not masked by 0 but excluded.
-
-    Args:
-        unet: whose self-attention, of the modules named attn1, is replaced.
-
-    Raises:
-        ArgumentError: if the UNet has no self-attention.
+    Similarities are not masked by 0 but excluded. The self-attention that is replaced is of modules named
+    attn1.
     """
 
     def __init__(self, unet: Any) -> None:
@@ -109,7 +96,7 @@ class Consistency:
     def run(
         self, branches: Callable[[list[int]], Tensor], count: int, time: int, generator: torch.Generator
     ) -> Tensor:
-        """Noise [3, V, ...] of all views in one denoising step.
+        """Return the noise [3, V, ...] of all views in one denoising step.
 
         Args:
             branches: runs the UNet on some views: [3, K, ...].
@@ -134,7 +121,7 @@ class Consistency:
             self.role, self.stored = "alone", {}
 
     def mask(self, view: int, key: int, tokens: int) -> Tensor:
-        """Which of so many tokens of a key may match those of a view."""
+        """Return which of so many tokens of a key may match those of a view."""
         if (view, key, tokens) not in self.masks:
             shrink = round((self.image[0] * self.image[1] / tokens) ** 0.5)
             rows, columns = self.image[0] // shrink, self.image[1] // shrink
@@ -143,7 +130,7 @@ class Consistency:
         return self.masks[view, key, tokens]
 
     def _nearest_keys(self, view: int) -> list[tuple[int, float]]:
-        """Places among the keys of the one or two whose cameras are nearest, and their shares."""
+        """Return places among the keys of the one or two whose cameras are nearest, and their shares."""
         position = self.cameras[view].position
         distances = torch.stack([(self.cameras[key].position - position).norm() for key in self.key_ids])
         order = distances.argsort(stable=True)[:2].tolist()
@@ -155,7 +142,7 @@ class Consistency:
 
 
 def drawn_keys(count: int, generator: torch.Generator) -> list[int]:
-    """One of each group of views, of a number of views; groups are as equal as they can be."""
+    """Return one of each group of so many views, drawn at random; groups are as equal as they can be."""
     bounds = torch.linspace(0, count, max(1, count // GROUP) + 1).round().long().tolist()
     return [int(torch.randint(low, high, (), generator=generator)) for low, high in pairwise(bounds)]
 
@@ -167,7 +154,7 @@ class _SelfAttention:
         self.consistency = consistency
 
     def __call__(self, attn: Any, hidden_states: Tensor, *_: Any, **__: Any) -> Tensor:
-        """Attention output of [B, S, C] features; B is 3 branches times views."""
+        """Return the attention output of [B, S, C] features; B is 3 branches times views."""
         shared = self.consistency
         if shared.role == "alone":
             return attend(attn, hidden_states, hidden_states)
@@ -186,19 +173,16 @@ class _SelfAttention:
 
 
 def match(view: Tensor, key: Tensor, allowed: Tensor) -> Tensor:
-    """Index [S] of the token of the key most like each token of the view, by the cosine, of those allowed.
+    """Return the index [S] of the token of the key [S', C] most like each token of the view [S, C].
 
-    Args:
-        view: [S, C] features.
-        key: [S', C] features.
-        allowed: [S, S'] bool, at least one in each row.
+    By the cosine, of those that are allowed [S, S'], at least one in each row.
     """
     alike = normalize(view.float(), dim=1) @ normalize(key.float(), dim=1).T
     return alike.masked_fill(~allowed.to(alike.device), -torch.inf).argmax(dim=1)
 
 
 def attend(attn: Any, queries: Tensor, keys: Tensor) -> Tensor:
-    """What an attention module of diffusers makes of queries [B, S, C] and keys [B, S', C]."""
+    """Return what an attention module of diffusers makes of queries [B, S, C] and keys [B, S', C]."""
     q, k, v = (
         layer(x).unflatten(2, (attn.heads, -1)).transpose(1, 2)
         for layer, x in ((attn.to_q, queries), (attn.to_k, keys), (attn.to_v, keys))

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -30,9 +29,7 @@ class GrabCut:
     name = "GrabCut"
 
     def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """The object [H, W] bool in an image, on the image's device; see `MaskModel`."""
-        import cv2
-
+        """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
         check_clicks(image, points, positive)
         shape = (image.shape[0], image.shape[1])
         scale = min(SIZE / max(shape), 1.0)
@@ -42,32 +39,32 @@ class GrabCut:
         pixels = planes[0].clamp(0, 1).mul(255).round().to(torch.uint8).permute(1, 2, 0).contiguous().numpy()
         shrink = points.new_tensor([width / shape[1], height / shape[0]])
         places = np.floor((points * shrink).cpu().numpy()).astype(int).clip(0, (width - 1, height - 1))
-        foreground = cut(cv2, pixels, places, positive.cpu().numpy())
+        foreground = cut(pixels, places, positive.cpu().numpy())
         mask = torch.from_numpy(foreground).float()[None, None]
         return (F.interpolate(mask, shape, mode="bilinear")[0, 0] > 0.5).to(image.device)
 
 
-def cut(cv2: Any, pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
-    """The object [H, W] bool in an 8-bit image with clicks at pixels [P, 2]."""
-    plain = plain_border(cv2, pixels)
-    clicked = connected(cv2, ~plain, places[positive])
+def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndarray:
+    """Return the object [H, W] bool in an 8-bit image with clicks at pixels [P, 2]."""
+    plain = plain_border(pixels)
+    clicked = connected(~plain, places[positive])
     # Other objects would teach the mixture of the background their colours, which may be those of this one.
     emptied = np.where(clicked[..., None], pixels, np.median(pixels[plain], axis=0) if plain.any() else 0)
     emptied = emptied.astype(np.uint8)
-    labels = first_guess(cv2, emptied, clicked, places, positive)
+    labels = first_guess(emptied, clicked, places, positive)
     is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     if is_object.any() and not is_object.all():
         cv2.setRNGSeed(0)
         models = np.zeros((2, 1, 65))
         cv2.grabCut(emptied, labels, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
         is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
-    return connected(cv2, is_object, places[positive])
+    return connected(is_object, places[positive])
 
 
 def first_guess(
-    cv2: Any, pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray
+    pixels: np.ndarray, clicked: np.ndarray, places: np.ndarray, positive: np.ndarray
 ) -> np.ndarray:
-    """Labels [H, W] that GrabCut starts from: certain at clicks and beyond what is clicked, else probable."""
+    """Return the labels [H, W] that GrabCut starts from: certain at clicks and outside, else probable."""
     smooth = cv2.GaussianBlur(pixels, (3, 3), 0)
     labels = np.where(clicked, cv2.GC_PR_BGD, cv2.GC_BGD).astype(np.uint8)
     edge = np.concatenate([clicked[0], clicked[-1], clicked[:, 0], clicked[:, -1]])
@@ -78,7 +75,7 @@ def first_guess(
     order = np.argsort(~positive, kind="stable")  # negative clicks last: they take from positive ones
     clicks = list(zip(places[order], positive[order], strict=True))
     for place, is_positive in clicks:
-        alike = flooded(cv2, smooth, place, ALIKE) & clicked
+        alike = flooded(smooth, place, ALIKE) & clicked
         labels[alike] = cv2.GC_PR_FGD if is_positive else cv2.GC_PR_BGD
     radius = max(round(SEED * max(labels.shape)), 1)
     for place, is_positive in clicks:
@@ -87,21 +84,21 @@ def first_guess(
     return labels
 
 
-def plain_border(cv2: Any, pixels: np.ndarray) -> np.ndarray:
-    """Pixels [H, W] bool of one colour that are connected to a corner."""
+def plain_border(pixels: np.ndarray) -> np.ndarray:
+    """Return pixels [H, W] bool of one colour that are connected to a corner."""
     height, width = pixels.shape[:2]
     corners = ((0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1))
-    return np.any([flooded(cv2, pixels, corner, PLAIN) for corner in corners], axis=0)
+    return np.any([flooded(pixels, corner, PLAIN) for corner in corners], axis=0)
 
 
-def connected(cv2: Any, mask: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """The connected parts of a mask that places lie on."""
+def connected(mask: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the connected parts of a mask that places lie on."""
     _, parts = cv2.connectedComponents(mask.astype(np.uint8))
     return np.isin(parts, list({parts[y, x] for x, y in places} - {0}))
 
 
-def flooded(cv2: Any, pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
-    """Pixels [H, W] bool connected to a place whose channels differ from it by at most so much."""
+def flooded(pixels: np.ndarray, place: tuple[int, int] | np.ndarray, most: int) -> np.ndarray:
+    """Return pixels [H, W] bool connected to a place whose channels differ from it by at most so much."""
     height, width = pixels.shape[:2]
     filled = np.zeros((height + 2, width + 2), dtype=np.uint8)
     flags = 4 | cv2.FLOODFILL_MASK_ONLY | cv2.FLOODFILL_FIXED_RANGE | (1 << 8)

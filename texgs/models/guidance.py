@@ -1,4 +1,4 @@
-"""What every editor of views takes and gives, whether a diffusion model or a procedural filter."""
+"""What every editor of views takes and gives, and how one is made to disagree with itself."""
 
 from __future__ import annotations
 
@@ -54,27 +54,20 @@ class Guidance(Protocol):
     name: str
     """For reports and metadata."""
     lit: bool
-    """Whether it wants to see the scene with light, or the bare colours that light falls on."""
+    """True if it wants to see the scene with light; false for the bare colours that light falls on."""
 
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
-        """Edit the views.
+        """Return the edited images [V, H, W, 3] over white.
 
         Args:
             views: to edit.
             instruction: what to do, in words.
             generator: of all random numbers, on the CPU; the same one gives the same images.
-
-        Returns:
-            [V, H, W, 3] edited images over white.
         """
 
 
 def require_edited(edited: Tensor, views: EditViews, name: str) -> Tensor:
-    """Edited images, clamped to [0, 1] on the views' device.
-
-    Raises:
-        ArgumentError, ShapeError: naming the guidance, if they are of another size or not finite.
-    """
+    """Require edited images of the views' size, and return them clamped to [0, 1] on the views' device."""
     count, height, width, _ = views.images.shape
     check.shape(f"images edited by {name}", edited, "V H W 3", V=count, H=height, W=width)
     check.finite(**{f"images edited by {name}": edited})
@@ -84,12 +77,12 @@ def require_edited(edited: Tensor, views: EditViews, name: str) -> Tensor:
 class Disagreeing:
     """Another guidance, whose patterns lie elsewhere and whose colours are off in each view of each call.
 
+    It does what an editor of single images does to views of one scene. With it, methods that edit all views
+    again and again can be compared with those that edit a few once, without a diffusion model.
+
     Args:
         guidance: that edits.
         amount: standard deviation of shifts of patterns, world units, and of factors on colours.
-
-    Raises:
-        ArgumentError: if the amount is below 0.
     """
 
     def __init__(self, guidance: Guidance, amount: float) -> None:
@@ -99,7 +92,7 @@ class Disagreeing:
         self.name, self.lit = f"{guidance.name} that disagree by {amount:g}", guidance.lit
 
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
-        """Edited images [V, H, W, 3] over white; see `Guidance`."""
+        """Return edited images [V, H, W, 3] over white; see `Guidance`."""
         shifts, gains = self.amount * torch.randn(2, len(views), 1, 1, 3, generator=generator).to(
             views.images
         )

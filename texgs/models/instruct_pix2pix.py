@@ -39,9 +39,6 @@ class InstructPix2Pix:
         negative: what edits should not show, in words.
         epipolar: whether views are edited together, with attention across views along epipolar lines, which
             makes them agree more (DGE, Chen et al. 2024); otherwise one by one.
-
-    Raises:
-        ArgumentError: if a number is out of range.
     """
 
     name = "InstructPix2Pix"
@@ -74,16 +71,8 @@ class InstructPix2Pix:
     def open(cls, folder: str | Path, device: torch.device | str = "cpu", **options: Any) -> InstructPix2Pix:
         """Read the model from a folder in its published format, with a folder for each of its parts.
 
-        Half precision on a GPU, single on a CPU. Nothing is downloaded, nothing in the files is executed.
-
-        Args:
-            folder: such as `texgs.models.weights.locate("instruct-pix2pix")`.
-            device: to compute on.
-            options: of the constructor.
-
-        Raises:
-            MissingDataError: if the folder or a part of it is not there, or the libraries are not installed.
-            ArgumentError: if a file is damaged or of another model.
+        Half precision on a GPU, single on a CPU. Nothing is downloaded, nothing in the files is executed. The
+        options are those of the constructor.
         """
         folder = Path(folder)
         if missing := [part for part in PARTS if not (folder / part).is_dir()]:
@@ -124,7 +113,7 @@ class InstructPix2Pix:
         return unfit(edited, views.images.shape[1:3]).permute(0, 2, 3, 1).to(views.images)
 
     def embed(self, instruction: str) -> Tensor:
-        """Embeddings [3, L, E] of the three branches: the instruction, and twice what is not wanted."""
+        """Return the embeddings [3, L, E] of the branches: the instruction, and twice what is not wanted."""
         tokens = self.tokenizer(
             [instruction, self.negative],
             padding="max_length",
@@ -136,12 +125,9 @@ class InstructPix2Pix:
         return torch.stack([wanted, unwanted, unwanted])
 
     def encode(self, images: Tensor, generator: torch.Generator | None) -> Tensor:
-        """Latents [V, 4, h, w] of images [V, 3, 8h, 8w] in [0, 1].
+        """Return latents [V, 4, h, w] of images [V, 3, 8h, 8w] in [0, 1].
 
-        Args:
-            images: to encode.
-            generator: to sample and scale them, as they are denoised; without one the mode, not scaled, as
-                conditions enter.
+        With a generator they are sampled and scaled, as they are denoised; else the mode, as conditions are.
         """
         latents = self.vae.encode((2 * images - 1).to(self.vae.device, self.vae.dtype)).latent_dist
         if generator is None:
@@ -150,12 +136,12 @@ class InstructPix2Pix:
         return (latents.mean + latents.std * noise) * self.vae.config.scaling_factor
 
     def decode(self, latents: Tensor) -> Tensor:
-        """Images [V, 3, 8h, 8w] in [0, 1] of latents [V, 4, h, w]."""
+        """Return images [V, 3, 8h, 8w] in [0, 1] of latents [V, 4, h, w]."""
         scaled = (latents / self.vae.config.scaling_factor).to(self.vae.dtype)
         return (self.vae.decode(scaled).sample.float() / 2 + 0.5).clamp(0, 1)
 
     def times(self, level: float | None) -> list[int]:
-        """Timesteps that denoising visits, from that of a share of the noise schedule down to 0."""
+        """Return the timesteps that denoising visits, from a share of the noise schedule down to 0."""
         longest = len(self.alphas) - 1
         first = self.level if level is None else min(max(round(level * longest), self.steps), longest)
         return torch.linspace(first, 0, self.steps + 1).round().long().tolist()
@@ -179,13 +165,13 @@ class InstructPix2Pix:
     def predict(
         self, latents: Tensor, kept: Tensor, texts: Tensor, time: int, generator: torch.Generator
     ) -> Tensor:
-        """Guided noise [V, 4, h, w] of all views.
+        """Return the guided noise [V, 4, h, w] of all views.
 
         e(0, 0) + s_I [e(c_I, 0) - e(0, 0)] + s_T [e(c_I, c_T) - e(c_I, 0)] (Brooks et al. 2023, eq. 3)
         """
 
         def branches(ids: list[int]) -> Tensor:
-            """Noise [3, K, 4, h, w] of some views: text and image, image alone, neither."""
+            """Return the noise [3, K, 4, h, w] of some views: text and image, image alone, neither."""
             condition = torch.stack([kept[ids], kept[ids], torch.zeros_like(kept[ids])]).to(latents)
             stacked = torch.cat([latents[ids].expand(3, -1, -1, -1, -1), condition], dim=2)
             words = texts[:, None].expand(-1, len(ids), -1, -1)
@@ -202,7 +188,7 @@ class InstructPix2Pix:
 
 
 def _read(folder: Path, device: torch.device) -> tuple[dict[str, Any], Any]:
-    """Modules on the device and the scheduler, for its noise levels."""
+    """Return the modules on the device and the scheduler, for its noise levels."""
     from diffusers import AutoencoderKL, DDIMScheduler, UNet2DConditionModel
     from transformers import CLIPTextModel, CLIPTokenizer
 
@@ -222,13 +208,13 @@ def _read(folder: Path, device: torch.device) -> tuple[dict[str, Any], Any]:
 
 
 def fitted(height: int, width: int) -> tuple[int, int]:
-    """Height and width of an image scaled so that the longer side is `LONGEST`."""
+    """Return height and width of an image scaled so that the longer side is `LONGEST`."""
     scale = LONGEST / max(height, width)
     return max(1, round(height * scale)), max(1, round(width * scale))
 
 
 def fit(images: Tensor) -> Tensor:
-    """Images [V, 3, H, W] scaled to `LONGEST` and padded at the right and the bottom with their edges."""
+    """Return images [V, 3, H, W] scaled to `LONGEST` and padded at right and bottom with their edges."""
     height, width = fitted(*images.shape[2:])
     scaled = images
     if (height, width) != tuple(images.shape[2:]):
@@ -237,7 +223,7 @@ def fit(images: Tensor) -> Tensor:
 
 
 def unfit(images: Tensor, size: tuple[int, int] | torch.Size) -> Tensor:
-    """What `fit` made of images of height and width `size`, back at that size."""
+    """Return what `fit` made of images of height and width `size`, back at that size."""
     height, width = fitted(*size)
     cut = images[..., :height, :width]
     if (height, width) == tuple(size):

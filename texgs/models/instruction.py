@@ -35,11 +35,7 @@ FILLERS = """
 
 
 def require_instruction(instruction: str) -> str:
-    """The instruction without blanks around it.
-
-    Raises:
-        ArgumentError: if nothing is left.
-    """
+    """Return the instruction without blanks around it; one must be left."""
     if not isinstance(instruction, str) or not instruction.strip():
         raise ArgumentError(
             f"instruction: expected what to do in words, such as 'make it gold', got {instruction!r}"
@@ -48,16 +44,12 @@ def require_instruction(instruction: str) -> str:
 
 
 def vocabulary() -> list[str]:
-    """What can be asked for, one entry each."""
+    """Return what can be asked for, one entry each."""
     return [*WORDS, "any named colour, such as 'make it dark red' or '#8040ff'"]
 
 
 def understand(instruction: str) -> tuple[str, Color | None]:
-    """Name of the filter that an instruction asks for, in any of the usual wordings; or a colour.
-
-    Raises:
-        ArgumentError: if it is empty, or says anything that is not in the vocabulary, which is listed.
-    """
+    """Return the name of the filter or colour that an instruction asks for, in the usual wordings."""
     text = require_instruction(instruction)
     words = [word for word in re.findall(r"[#\w]+", text.lower()) if word not in FILLERS.split()]
     asked = " ".join(words)
@@ -74,7 +66,7 @@ def understand(instruction: str) -> tuple[str, Color | None]:
 
 
 def named_color(name: str) -> Color | None:
-    """Red, green and blue of a colour by its CSS name or as #rrggbb; None if there is no such colour."""
+    """Return red, green and blue of a colour by its CSS name or as #rrggbb; None if there is none."""
     from PIL import ImageColor
 
     if name not in ImageColor.colormap and not name.startswith("#"):

@@ -33,11 +33,7 @@ class Lpips:
         device: torch.device | str = "cpu",
         dtype: torch.dtype = torch.float32,
     ) -> Lpips:
-        """Read both files of weights; by default where they are found.
-
-        Raises:
-            ArgumentError, MissingDataError: if there is no such file, or it holds something else.
-        """
+        """Read both files of weights; by default where they are found."""
         heads = locate("lpips_vgg") if heads is None else heads
         names = [f"lin{index}.model.1.weight" for index in range(len(LAYERS))]
         stored = read_tensors(heads, names)
@@ -48,10 +44,9 @@ class Lpips:
         return cls(backbone, weights)
 
     def features(self, images: Tensor) -> list[Tensor]:
-        """Features [N, C, H/s, W/s] of length 1 that images are compared by, s = 1, 2, 4 ...; differentiable.
+        """Return what images [H, W, 3] or [N, H, W, 3] in [0, 1] are compared by; differentiable.
 
-        Args:
-            images: [H, W, 3] in [0, 1], at least 16 pixels each way; or [N, H, W, 3].
+        They have 16 pixels at least each way. Features are [N, C, H/s, W/s] of length 1, s = 1, 2, 4 ...
         """
         if images.ndim == 3:
             images = images[None]
@@ -59,7 +54,7 @@ class Lpips:
         return [unit(layer) for layer in self.vgg.layers(images.permute(0, 3, 1, 2))]
 
     def between(self, ours: Sequence[Tensor], others: Sequence[Tensor]) -> Tensor:
-        """How different images look [], by their features: 0 for equal ones; differentiable in both."""
+        """Return how different images look [] by their features, 0 for equal ones; differentiable in both."""
         total = ours[0].new_zeros(())
         for a, b, head in zip(ours, others, self.heads, strict=True):
             difference = (a - b).square()  # [N, C, h, w]
@@ -67,15 +62,7 @@ class Lpips:
         return total
 
     def distance(self, image: Tensor, other: Tensor) -> Tensor:
-        """How different two images look []: 0 for equal ones; differentiable in both.
-
-        Args:
-            image: [H, W, 3] in [0, 1], at least 16 pixels each way; or [N, H, W, 3], for the mean of N.
-            other: the same shape.
-
-        Raises:
-            ShapeError: if the shapes do not fit.
-        """
+        """Return how different two images of `features` look [], or N of them on average."""
         if image.ndim == 3:
             image, other = image[None], other[None]
         size = check.shape("image", image, "N H W 3")
@@ -83,12 +70,12 @@ class Lpips:
         return self.between(self.features(image), self.features(other))
 
     def to(self, image: Tensor) -> Callable[[Tensor], float]:
-        """The distance of images [H, W, 3] to this one, whose features are computed once."""
+        """Return the distance of images [H, W, 3] to this one, whose features are computed once."""
         features = self.features(image)
         return lambda other: float(self.between(features, self.features(other)))
 
 
 def unit(features: Tensor) -> Tensor:
-    """Features [N, C, h, w] of length 1 at each position, float32."""
+    """Return features [N, C, h, w] of length 1 at each position, float32."""
     features = features.float()
     return features / (features.square().sum(dim=1, keepdim=True).sqrt() + EPSILON)

@@ -1,4 +1,4 @@
-"""Models that find an object in an image from clicks: what they take and give, and what is remembered."""
+"""Models that find an object in an image from clicks: their names, what they take, give and remember."""
 
 from __future__ import annotations
 
@@ -20,23 +20,17 @@ REMEMBERED = 64  # images whose features are kept: the training views of a lift,
 class MaskModel(Protocol):
     """Finds what the positive points lie on and the negative ones do not."""
 
-    @property
-    def name(self) -> str:
-        """For tables and files."""
-        ...
+    name: str
+    """For tables and files."""
 
     def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """The object in an image.
+        """Return the object in an image, [H, W] bool, on the image's device.
 
         Args:
             image: [H, W, 3] in [0, 1], as shown on a screen.
             points: [P, 2] right and down in pixels; the centre of the first pixel is (0.5, 0.5).
             positive: [P] bool, at least one of them true.
-
-        Returns:
-            [H, W] bool.
         """
-        ...
 
 
 def check_clicks(image: Tensor, points: Tensor, positive: Tensor) -> None:
@@ -63,7 +57,7 @@ class Remembered:
         self.results: OrderedDict[bytes, Tensor] = OrderedDict()
 
     def __call__(self, image: Tensor) -> Tensor:
-        """The result for an image, computed where these pixels have not been seen."""
+        """Return the result for an image, computed where these pixels have not been seen."""
         pixels = image.detach().cpu().contiguous().numpy()
         key = blake2b(f"{pixels.dtype} {pixels.shape}".encode() + pixels.tobytes(), digest_size=16).digest()
         if key not in self.results:
@@ -75,11 +69,7 @@ class Remembered:
 
 
 def mask_model(name: str, device: torch.device) -> MaskModel:
-    """The mask model of a name, or in a folder.
-
-    Raises:
-        ArgumentError, MissingDataError: if there is neither, or its weights are missing or damaged.
-    """
+    """Return the mask model of a name, or in a folder."""
     from texgs.models.grabcut import GrabCut
     from texgs.models.sam import PUBLISHED, published_sam, sam_folder
 

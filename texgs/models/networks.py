@@ -19,7 +19,7 @@ BFLOAT16_FLAGS = {"avx512_bf16", "amx_bf16", "bf16"}  # what Linux calls instruc
 
 
 def fast_dtype(device: torch.device | str) -> torch.dtype:
-    """float16 on a GPU, bfloat16 on a CPU with instructions for it, else float32."""
+    """Return float16 on a GPU, bfloat16 on a CPU with instructions for it, else float32."""
     if torch.device(device).type == "cuda":
         return torch.float16
     return torch.bfloat16 if has_bfloat16() else torch.float32
@@ -27,7 +27,7 @@ def fast_dtype(device: torch.device | str) -> torch.dtype:
 
 @cache
 def has_bfloat16() -> bool:
-    """Whether the processor multiplies bfloat16 itself; where nothing tells, no."""
+    """Return whether the processor multiplies bfloat16 itself; where nothing tells, no."""
     if not CPUINFO.exists():
         return False
     lines = CPUINFO.read_text(encoding="utf-8", errors="replace").splitlines()
@@ -36,7 +36,7 @@ def has_bfloat16() -> bool:
 
 
 def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[str, Tensor]:
-    """Tensors of a file of weights by name, nothing else of it: safetensors, or torch's own format.
+    """Return the tensors of a file of weights by name: of safetensors, or of torch's own format.
 
     Args:
         path: with the ending .safetensors, or any other for torch's; nothing in it is executed.
@@ -54,13 +54,14 @@ def read_tensors(path: str | Path, names: Iterable[str] | None = None) -> dict[s
 
 
 def _whole(path: Path, name: str, tensor: object) -> Tensor:
-    """A tensor of which every number is in the file: few can be told to be read again and again."""
+    """Return a tensor of which every number is in the file: few can be told to be read again and again."""
     if not isinstance(tensor, Tensor) or tensor.nbytes > tensor.untyped_storage().nbytes():
         raise ArgumentError(f"{path}: {name}: expected a tensor, got something else; download it again")
     return tensor
 
 
 def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> list[str]:
+    """Return the names wanted of those in a file."""
     there = list(stored)
     wanted = there if names is None else list(names)
     if missing := [name for name in wanted if name not in set(there)]:
@@ -71,7 +72,7 @@ def _chosen(path: Path, stored: Iterable[str], names: Iterable[str] | None) -> l
 
 
 def read_folder(folder: str | Path, kind: str, names: tuple[str, ...]) -> list[Any]:
-    """What classes of transformers read from a folder; networks come frozen, in float32 and ready to use.
+    """Return what classes of transformers read from a folder; networks come frozen and in float32.
 
     Nothing is downloaded.
 

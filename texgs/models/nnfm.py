@@ -43,14 +43,8 @@ class StyleFeatures:
             positions: that are kept, drawn at random where there are more; by default all.
             dimensions: of the search, by principal components; by default all, which is exact.
             seed: of the draw.
-
-        Raises:
-            ShapeError: if the shapes do not fit.
-            ArgumentError: if the region is empty.
         """
         size = check.shape("features", features, "C h w")
-        if region is not None:
-            check.shape("region", region, "h w", h=size["h"], w=size["w"])
         rows = drawn(features.detach(), region, positions, torch.Generator().manual_seed(seed))
         if not len(rows):
             raise ArgumentError("region: expected a part of the style picture, got none of its features")
@@ -63,11 +57,7 @@ class StyleFeatures:
 
     @torch.no_grad()
     def nearest(self, queries: Tensor) -> Tensor:
-        """Index [Q] of the style feature with the largest cosine to each query.
-
-        Args:
-            queries: [Q, C], of any length but zero.
-        """
+        """Return the index [Q] of the style feature with the largest cosine to each query [Q, C]."""
         queries = queries.float()
         if self.basis is not None:
             queries = queries @ self.basis
@@ -76,7 +66,7 @@ class StyleFeatures:
 
 
 def principal(rows: Tensor, dimensions: int) -> Tensor:
-    """Directions [C, D] in which rows [S, C] differ most.
+    """Return the directions [C, D] in which rows [S, C] differ most.
 
     What they have in common does not count: it adds the same to all products with a query.
     """
@@ -85,7 +75,7 @@ def principal(rows: Tensor, dimensions: int) -> Tensor:
 
 
 def best(scores: Tensor) -> Tensor:
-    """Index [Q] of the largest of each row. On a CPU by NumPy, which is several times as fast as torch."""
+    """Return the index [Q] of the largest of each row; on a CPU by NumPy, several times as fast as torch."""
     if scores.is_cuda:
         return scores.argmax(1)
     return torch.from_numpy(scores.numpy().argmax(1))
@@ -98,7 +88,7 @@ def nnfm(
     most: int | None = None,
     seed: int = 0,
 ) -> Tensor:
-    """Mean cosine distance [] in [0, 2] of features to their nearest neighbours in the style.
+    """Return the mean cosine distance [] in [0, 2] of features to their nearest neighbours in the style.
 
     Differentiable in the features; which neighbour is nearest is constant for the gradient. 0 where no
     position counts.
@@ -109,9 +99,6 @@ def nnfm(
         where: [h, w] bool, positions that count; by default all.
         most: positions of them that are looked at, drawn at random where there are more; by default all.
         seed: of the draw.
-
-    Raises:
-        ShapeError: if the shapes do not fit.
     """
     check.shape("features", features, "C h w", C=style.unit.shape[1])
     queries = drawn(features, where, most, torch.Generator().manual_seed(seed))
@@ -122,7 +109,7 @@ def nnfm(
 
 
 def drawn(features: Tensor, where: Tensor | None, most: int | None, generator: torch.Generator) -> Tensor:
-    """Features [n, C] of [C, h, w], float32, where a mask [h, w] is true; at random `most` of them."""
+    """Return features [n, C] of [C, h, w], float32, where a mask [h, w] is true; at random `most` of them."""
     size, places = check.shape("features", features, "C h w"), None
     if where is not None:
         check.shape("where", where, "h w", h=size["h"], w=size["w"])

@@ -32,14 +32,8 @@ class Sam:
     """A mask model; the features of an image are computed once for all clicks on it.
 
     One click is ambiguous (a wheel, or the car): of the three masks that the model offers for it, the one
-    that it thinks best is taken. For several clicks it gives one mask.
-
-    Args:
-        name: of the model.
-        encode: features of an image.
-        decode: masks from features and points.
-        size: of the square image that the encoder takes, pixels.
-        device: that computes.
+    that it thinks best is taken. For several clicks it gives one mask. The encoder takes square images of so
+    many pixels a side.
     """
 
     def __init__(
@@ -50,7 +44,7 @@ class Sam:
         self._features = Remembered(lambda image: encode(self.prepared(image)))
 
     def prepared(self, image: Tensor) -> Tensor:
-        """An image [H, W, 3] as the encoder takes it [1, 3, S, S], with zeros below or at the right."""
+        """Return an image [H, W, 3] as the encoder takes it [1, 3, S, S], with zeros below or right."""
         from kornia.enhance import normalize
 
         planes = image.to(self.device).float().permute(2, 0, 1)[None]
@@ -60,13 +54,13 @@ class Sam:
         return F.pad(planes, (0, self.size - width, 0, self.size - height))
 
     def fitted(self, height: int, width: int) -> tuple[int, int]:
-        """Size of an image whose longer side fills the encoder's square."""
+        """Return the size of an image whose longer side fills the encoder's square."""
         scale = self.size / max(height, width)
         return max(int(height * scale + 0.5), 1), max(int(width * scale + 0.5), 1)
 
     @torch.no_grad()
     def __call__(self, image: Tensor, points: Tensor, positive: Tensor) -> Tensor:
-        """The object [H, W] bool in an image, on the image's device; see `MaskModel`."""
+        """Return the object [H, W] bool in an image, on the image's device; see `MaskModel`."""
         check_clicks(image, points, positive)
         shape = (image.shape[0], image.shape[1])
         height, width = self.fitted(*shape)
@@ -85,13 +79,9 @@ def published_sam(
     device: torch.device | str = "cpu",
     dtype: torch.dtype | None = None,
 ) -> Sam:
-    """A SAM from the file that its authors publish.
+    """Return a SAM of `PUBLISHED` from the file of its authors, by default where it is found.
 
-    Args:
-        name: of `PUBLISHED`.
-        path: the file; by default where it is found.
-        device: that computes.
-        dtype: of the encoder, which takes nearly all of the time; by default `fast_dtype`.
+    The dtype, by default the fastest, is that of the encoder, which takes nearly all of the time.
     """
     from kornia.models.sam import Sam as Network
     from kornia.models.sam import SamConfig
@@ -110,6 +100,8 @@ def published_sam(
 
 
 def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
+    """Return encoder and decoder of a network of kornia."""
+
     def encode(pixels: Tensor) -> Tensor:
         features: Tensor = network.image_encoder(pixels.to(dtype)).float()
         return features
@@ -126,13 +118,7 @@ def _kornia(network: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
 def sam_folder(
     folder: str | Path, device: torch.device | str = "cpu", dtype: torch.dtype | None = None
 ) -> Sam:
-    """A SAM of any size from a folder of transformers, such as a copy of facebook/sam-vit-base.
-
-    Args:
-        folder: with config.json and model.safetensors.
-        device: that computes.
-        dtype: of the encoder; by default `fast_dtype`.
-    """
+    """Return a SAM of any size from a folder of transformers, such as a copy of facebook/sam-vit-base."""
     dtype = fast_dtype(device) if dtype is None else dtype
     (model,) = read_folder(folder, "sam", ("SamModel",))
     model.to(device)
@@ -141,6 +127,8 @@ def sam_folder(
 
 
 def _transformers(model: Any, dtype: torch.dtype) -> tuple[Encode, Decode]:
+    """Return encoder and decoder of a model of transformers."""
+
     def encode(pixels: Tensor) -> Tensor:
         features: Tensor = model.get_image_embeddings(pixels.to(dtype)).float()
         return features

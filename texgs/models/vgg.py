@@ -45,9 +45,6 @@ class Vgg:
             device: that computes.
             layers: whose output is wanted, `relu1_1` to `relu5_3`, in order.
             dtype: that it computes in; by default `fast_dtype`.
-
-        Raises:
-            ArgumentError, MissingDataError: if there is no such file, or it holds something else.
         """
         path = locate("vgg16") if path is None else path
         names = [f"relu{b + 1}_{c + 1}" for b, count in enumerate(BLOCKS) for c in range(count)]
@@ -65,7 +62,7 @@ class Vgg:
         return cls(tuple(convolutions), tuple(names), tuple(layers), dtype)
 
     def layers(self, images: Tensor, wanted: Sequence[str] | None = None) -> list[Tensor]:
-        """Outputs [N, C, H/s, W/s] of some layers, s = 1, 2, 4 ... by block; differentiable.
+        """Return outputs [N, C, H/s, W/s] of some layers, s = 1, 2, 4 ... by block; differentiable.
 
         Args:
             images: [N, 3, H, W], red, green and blue in [0, 1].
@@ -86,12 +83,7 @@ class Vgg:
         return features
 
     def blocks(self, image: Tensor, wanted: Sequence[str] | None = None) -> dict[int, Tensor]:
-        """Some layers, those of a block as one [C, H/s, W/s], by s; without copying their channels' order.
-
-        Args:
-            image: [3, H, W] in [0, 1].
-            wanted: as of `layers`.
-        """
+        """Return some layers of an image [3, H, W], those of a block as one [C, H/s, W/s], by s."""
         wanted = self.wanted if wanted is None else wanted
         joined: dict[int, list[Tensor]] = {}
         for name, layer in zip(wanted, self.layers(image[None], wanted), strict=True):
@@ -99,34 +91,30 @@ class Vgg:
         return {stride: torch.cat(layers, dim=1).squeeze(0) for stride, layers in joined.items()}
 
     def features(self, image: Tensor) -> Tensor:
-        """The wanted layers, all of one block, as one [C, H/s, W/s].
-
-        Args:
-            image: [3, H, W] in [0, 1].
-        """
+        """Return the wanted layers of an image [3, H, W], all of one block, as one [C, H/s, W/s]."""
         (features,) = self.blocks(image).values()
         return features
 
 
 def rectified(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
-    """max(0, weight * x + bias) of images x [N, in, H, W] with zeros around them."""
+    """Return the function max(0, weight * x + bias) of images x [N, in, H, W] with zeros around them."""
     if weight.device.type == "cpu" and weight.dtype == torch.float32:
         return RectifiedConvolution(weight, bias)
     return by_torch(weight, bias)
 
 
 def by_torch(weight: Tensor, bias: Tensor) -> Callable[[Tensor], Tensor]:
-    """The same for any device and type of numbers."""
+    """Return the same for any device and type of numbers."""
     weight = weight.contiguous(memory_format=torch.channels_last)
     return lambda x: F.relu(F.conv2d(x, weight, bias, padding=1), inplace=True)
 
 
 def channels(name: str) -> int:
-    """Of a layer."""
+    """Return the number of channels of a layer."""
     return CHANNELS[int(name[4]) - 1]
 
 
 def place(name: str) -> int:
-    """Index of a convolution in torchvision's list of features: each has a ReLU, each block a pooling."""
+    """Return the index of a convolution in torchvision's list: each has a ReLU, each block a pooling."""
     block, conv = int(name[4]) - 1, int(name[6]) - 1
     return sum(2 * count + 1 for count in BLOCKS[:block]) + 2 * conv

@@ -9,7 +9,6 @@ from torch.testing import assert_close
 
 from tests.models.views_of import random_views
 from texgs.core.camera import orbit
-from texgs.core.errors import ArgumentError
 from texgs.models.filters import FILTERS, ProceduralFilters
 from texgs.models.filters.material import GOLD, tint
 from texgs.models.filters.noise import cell_hash, fractal_noise, neighbours, tangential, value_noise
@@ -35,7 +34,7 @@ def plane(tone=0.5, side=160, cells=14.0, normal=(0.0, 0.0, 1.0)):
     n = len(points)
     tones = torch.full((n,), tone)
     normals = torch.tensor(normal).expand(n, 3)
-    return Surface(torch.full((n, 3), 0.6), tones, tones, points, normals, cells / side, 0)
+    return Surface(torch.full((n, 3), 0.6), tones, tones, points, normals, cells / side)
 
 
 def test_every_filter_has_words():
@@ -70,15 +69,10 @@ def test_the_same_place_looks_the_same_in_another_view(name):
     assert_close(one.flatten(0, 1)[order].reshape(other.shape), other, atol=1e-5, rtol=0)
 
 
-def test_patterns_do_not_depend_on_the_call_but_on_seed_and_scale():
+def test_patterns_do_not_depend_on_the_call():
     views = plain_views()
-    edits = [
-        ProceduralFilters(**options)(views, "marble", torch.Generator().manual_seed(k))
-        for k, options in enumerate(({}, {}, {"seed": 1}, {"scale": 2.0}))
-    ]
-    assert torch.equal(edits[0], edits[1])
-    assert not torch.equal(edits[0], edits[2])
-    assert not torch.equal(edits[0], edits[3])
+    one, other = (ProceduralFilters()(views, "marble", torch.Generator().manual_seed(k)) for k in (0, 1))
+    assert torch.equal(one, other)
 
 
 @pytest.mark.parametrize("name", ["stipple drawing", "pencil hatching", "woodcut"])
@@ -138,7 +132,7 @@ def test_straight_colours_of_half_transparent_views():
     views = plain_views(color=(0.3, 0.6, 0.9))
     half = views.alphas * 0.5
     images = torch.tensor([0.3, 0.6, 0.9]) * half[..., None] + 1 - half[..., None]
-    surface, where = surface_of(replace(views, images=images, alphas=half), 1.0, 0)
+    surface, where = surface_of(replace(views, images=images, alphas=half))
     assert_close(surface.color, torch.tensor([0.3, 0.6, 0.9]).expand_as(surface.color), atol=1e-5, rtol=0)
     assert torch.equal(where, half > 0)
 
@@ -146,15 +140,10 @@ def test_straight_colours_of_half_transparent_views():
 def test_pattern_size_is_that_of_the_scene_for_any_camera():
     far = plain_views(cameras=[orbit(50 * i, 0, 9.0, 10, 96, 96) for i in range(2)])
     near = plain_views()
-    one, other = (surface_of(views, 1.0, 0)[0] for views in (far, near))
+    one, other = (surface_of(views)[0] for views in (far, near))
     size = [float((s.points.amax(0) - s.points.amin(0)).max()) for s in (one, other)]
     assert 18 < size[0] < 38
     assert size[0] == pytest.approx(size[1], rel=0.05)
-
-
-def test_scale_out_of_range():
-    with pytest.raises(ArgumentError, match="scale: expected a factor above 0, got 0"):
-        ProceduralFilters(scale=0)
 
 
 def test_hash_is_uniform_and_knows_its_seed():

@@ -8,7 +8,6 @@ from functools import partial
 import torch
 from torch import Tensor
 
-from texgs.core.errors import ArgumentError
 from texgs.models.filters import ink, material, paint
 from texgs.models.filters.surface import Surface, surface_of
 from texgs.models.guidance import EditViews
@@ -37,32 +36,20 @@ class ProceduralFilters:
 
     Every filter is a solid texture, a function of the place in the world that a pixel shows and of light
     that is fixed there, so that all views of a call agree and a texture lifted from them is crisp; the size
-    of patterns and the brightest and the mean colour are those of these views. It answers the entries of
+    of patterns and the brightest and the mean colour are those of these views. Patterns do not depend on the
+    generator of a call, so that one call goes on with what another has begun. It answers the entries of
     `vocabulary` only. It wants to see bare colours: what it paints is what light falls on.
-
-    Args:
-        scale: factor on the size of patterns; 1 gives about 26 of them along the scene.
-        seed: of patterns. They do not depend on the generator of a call, so that one call goes on with what
-            another has begun.
-
-    Raises:
-        ArgumentError: if the scale is not positive.
     """
 
     name = "procedural filters"
     lit = False
-
-    def __init__(self, scale: float = 1.0, seed: int = 0) -> None:
-        if not scale > 0:
-            raise ArgumentError(f"scale: expected a factor above 0, got {scale}")
-        self.scale, self.seed = scale, seed
 
     @torch.no_grad()
     def __call__(self, views: EditViews, instruction: str, generator: torch.Generator) -> Tensor:
         """Edit the views; see `Guidance`."""
         name, color = understand(instruction)
         function = FILTERS[name] if color is None else partial(material.tint, color=color)
-        surface, where = surface_of(views, self.scale, self.seed)
+        surface, where = surface_of(views)
         edited = views.images.clone()
         alpha = views.alphas[where][:, None]
         edited[where] = function(surface) * alpha + 1 - alpha

@@ -16,23 +16,23 @@ STEEP = 0.4  # sine between surface and hatch below which its lines would be ban
 
 
 def stipple(surface: Surface) -> Tensor:
-    """Dots [P, 3]: more and larger where it is dark, at random places one cell apart."""
+    """Draw dots [P, 3]: more and larger where it is dark, at random places one cell apart."""
     points = surface.points * 1.5
     darkness = 1 - surface.tone
     ink = torch.zeros_like(darkness)
-    for vector, cells in neighbours(points, surface.seed, jitter=0.75):
+    for vector, cells in neighbours(points, 0, jitter=0.75):
         distance = tangential(vector, surface.normals, 0.6).norm(dim=1)
-        is_there = cell_hash(cells, surface.seed + 7) < 0.25 + 1.1 * darkness
+        is_there = cell_hash(cells, 7) < 0.25 + 1.1 * darkness
         radius = 0.17 + 0.30 * darkness
         ink = torch.maximum(ink, is_there * surface.ramp((distance - radius) / 1.5))
     return _mix(PAPER, INK, ink)
 
 
 def hatching(surface: Surface) -> Tensor:
-    """Pencil lines [P, 3] in up to three directions: the darker, the more."""
+    """Draw pencil lines [P, 3] in up to three directions: the darker, the more."""
     points = surface.points * 1.6
-    wobble = value_noise(points * 0.35, surface.seed)
-    grain = fractal_noise(points * 2.5, surface.seed + 5, octaves=2)
+    wobble = value_noise(points * 0.35, 0)
+    grain = fractal_noise(points * 2.5, 5, octaves=2)
     ink = torch.zeros_like(surface.tone)
     for layer, direction in enumerate(HATCHES):
         across = points.new_tensor(direction)
@@ -47,10 +47,10 @@ def hatching(surface: Surface) -> Tensor:
 
 
 def woodcut(surface: Surface) -> Tensor:
-    """Black lines [P, 3] that swell where it is dark, along one bent direction, and nothing between."""
+    """Cut black lines [P, 3] that swell where it is dark, along one bent direction, and nothing between."""
     points = surface.points
     across = points.new_tensor((0.18, 0.97, 0.16))
-    bend = fractal_noise(points * 0.25, surface.seed, octaves=2)
+    bend = fractal_noise(points * 0.25, 0, octaves=2)
     phase = points @ (across / across.norm()) + 2.2 * bend
     wave = (phase - phase.floor() - 0.5).abs() * 2  # [0, 1], 0 in the middle of a line
     width = (1.25 - 1.35 * surface.tone).clamp(0.04, 1.1)
@@ -58,6 +58,6 @@ def woodcut(surface: Surface) -> Tensor:
 
 
 def _mix(paper: tuple[float, ...], ink: tuple[float, ...], share: Tensor) -> Tensor:
-    """Ink on paper [P, 3]."""
+    """Return ink on paper [P, 3]."""
     low, high = share.new_tensor(paper), share.new_tensor(ink)
     return low + share[:, None] * (high - low)

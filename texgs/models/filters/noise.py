@@ -13,7 +13,7 @@ MASK = 0xFFFFFFFF
 
 
 def cell_hash(cells: Tensor, seed: int) -> Tensor:
-    """Uniform numbers [..., ] in [0, 1) of integer cells [..., 3], as if random."""
+    """Return uniform numbers [...] in [0, 1) of integer cells [..., 3], as if random."""
     x, y, z = (cells[..., axis] * prime for axis, prime in enumerate(PRIMES))
     h = (x ^ y ^ z ^ (seed * 2654435761 & MASK)) & MASK
     for shift, factor in ((16, 0x7FEB352D), (15, 0x846CA68B)):  # a finaliser that mixes all 32 bits
@@ -23,7 +23,7 @@ def cell_hash(cells: Tensor, seed: int) -> Tensor:
 
 
 def value_noise(points: Tensor, seed: int) -> Tensor:
-    """Smooth noise [P] in [0, 1] at points [P, 3]; features are one unit wide."""
+    """Return smooth noise [P] in [0, 1] at points [P, 3]; features are one unit wide."""
     low = points.floor()
     t = points - low
     t = t * t * (3 - 2 * t)
@@ -37,7 +37,7 @@ def value_noise(points: Tensor, seed: int) -> Tensor:
 
 
 def fractal_noise(points: Tensor, seed: int, octaves: int = 4) -> Tensor:
-    """Noise [P] in [0, 1], about, with finer and finer detail; the coarsest is one unit wide."""
+    """Return noise [P] in [0, 1], about, with finer and finer detail; the coarsest is one unit wide."""
     total, weight, weights = torch.zeros_like(points[:, 0]), 1.0, 0.0
     for octave in range(octaves):
         total += weight * value_noise(points * 2**octave + 17.3 * octave, seed + octave)
@@ -46,11 +46,7 @@ def fractal_noise(points: Tensor, seed: int, octaves: int = 4) -> Tensor:
 
 
 def neighbours(points: Tensor, seed: int, jitter: float = 0.9) -> Iterator[tuple[Tensor, Tensor]]:
-    """One random centre in each of the 27 cells around points [P, 3].
-
-    Yields:
-        Vectors from the centre to the points [P, 3] and the integer cells [P, 3] that centres belong to.
-    """
+    """Yield vectors from a random centre to points [P, 3], and its integer cells, for the 27 cells around."""
     low = points.floor()
     for corner in product((-1, 0, 1), repeat=3):
         cells = low.long() + torch.tensor(corner, device=points.device)
@@ -60,6 +56,6 @@ def neighbours(points: Tensor, seed: int, jitter: float = 0.9) -> Iterator[tuple
 
 
 def tangential(vectors: Tensor, normals: Tensor, flat: float) -> Tensor:
-    """Vectors [P, 3] with what is along the normals scaled by `flat`: spheres become columns."""
+    """Return vectors [P, 3] with what is along the normals scaled by `flat`: spheres become columns."""
     along = (vectors * normals).sum(dim=1, keepdim=True)
     return vectors - (1 - flat) * along * normals
