@@ -10,7 +10,7 @@ from torch.testing import assert_close
 from tests.edit.guidances import Identity, NoisyTint, Returns, Tint, Watching
 from tests.edit.textured import around, shell
 from tests.fields.surfels.samples import sample
-from tests.raster.threads import require_same_bits
+from tests.raster.requirements import require_same_bits
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.core.lens import Lens
 from texgs.core.light import HEADLIGHT, Light

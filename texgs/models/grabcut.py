@@ -56,7 +56,7 @@ def cut(pixels: np.ndarray, places: np.ndarray, positive: np.ndarray) -> np.ndar
     if is_object.any() and not is_object.all():
         cv2.setRNGSeed(0)
         models = np.zeros((2, 1, 65))
-        cv2.grabCut(emptied, labels, None, models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
+        cv2.grabCut(emptied, labels, (0, 0, 0, 0), models[0], models[1], ROUNDS, cv2.GC_INIT_WITH_MASK)
         is_object = np.isin(labels, (cv2.GC_FGD, cv2.GC_PR_FGD))
     return connected(is_object, places[positive])
 
