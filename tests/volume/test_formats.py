@@ -5,9 +5,16 @@ import nrrd
 import numpy as np
 import pytest
 import tifffile
-from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
 
-from tests.volume.volume_files import HAS_SPACING, SPACING, WRITERS, image_data, sample_values, write_vti
+from tests.volume.volume_files import (
+    HAS_SPACING,
+    SPACING,
+    WRITERS,
+    image_data,
+    sample_values,
+    whole,
+    write_image,
+)
 from texgs.core.errors import ArgumentError, ShapeError
 from texgs.volume.sources import RawSource, open_source
 
@@ -34,22 +41,30 @@ def test_plain_samples_in_a_file_are_read_slab_by_slab(tmp_path, name):
     assert isinstance(open_source(tmp_path / name), RawSource)
 
 
-@pytest.mark.parametrize("codes", ["RAS", "LPS", "SRA", "PIL"])
-@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
-def test_nifti_axes_become_right_anterior_superior(tmp_path, codes, suffix):
-    values = sample_values("int16").T  # [X, Y, Z]
+ORIENTATIONS = ("RAS", "LAS", "LPS", "LPI", "SRA", "PIL", "AIR")
+
+
+def stored_as(codes):
+    """An image of right, anterior, superior, as it is stored with other axes, and what NIfTI makes of it."""
+    values = sample_values("int16")
     affine = np.diag([2.0, 3.0, 4.0, 1.0])
     affine[:3, 3] = 10, 20, 30
-    image = nibabel.Nifti1Image(values, affine)
     turn = nibabel.orientations.ornt_transform(
         nibabel.orientations.axcodes2ornt("RAS"), nibabel.orientations.axcodes2ornt(codes)
     )
-    turned = image.as_reoriented(turn)
-    assert nibabel.aff2axcodes(turned.affine) == tuple(codes)
-    nibabel.save(turned, tmp_path / f"v{suffix}")
+    image = nibabel.Nifti1Image(values.T, affine).as_reoriented(turn)
+    assert nibabel.aff2axcodes(image.affine) == tuple(codes)
+    return image, np.asarray(image.dataobj).T, image.affine, values
+
+
+@pytest.mark.parametrize("codes", ORIENTATIONS)
+@pytest.mark.parametrize("suffix", [".nii", ".nii.gz"])
+def test_nifti_axes_become_right_anterior_superior(tmp_path, codes, suffix):
+    image, _, _, expected = stored_as(codes)
+    nibabel.save(image, tmp_path / f"v{suffix}")
     source = open_source(tmp_path / f"v{suffix}")
     assert (source.spacing, source.origin) == ((2, 3, 4), (10, 20, 30))
-    np.testing.assert_array_equal(source.slices(0, 11), values.T)
+    np.testing.assert_array_equal(source.slices(0, 11), expected)
 
 
 def test_nifti_scale_and_single_fourth_axis(tmp_path):
@@ -67,15 +82,13 @@ def test_nrrd_space_directions_and_byte_skip(tmp_path):
     header += "space directions: (3,4,0) (0,0,2) (1,0,0)\nspace origin: (1,2,3)\n"
     (tmp_path / "v.nhdr").write_text(header + "data file: v.bin\nbyte skip: -1\n")
     (tmp_path / "v.bin").write_bytes(b"some header" + values.tobytes())
-    source, turned = (
-        open_source(tmp_path / "v.nhdr"),
-        values.transpose(1, 2, 0),
-    )  # x is along y, y along z, z along x
+    turned = values.transpose(1, 2, 0)  # x is along y, y along z, z along x
+    source = open_source(tmp_path / "v.nhdr")
     assert (source.spacing, source.origin) == ((1, 5, 2), (1, 2, 3))
     np.testing.assert_array_equal(source.slices(0, 12), turned)
     (tmp_path / "v.nhdr").write_text(header + "data file: v.bin\nline skip: 1\nbyte skip: 2\n")
     (tmp_path / "v.bin").write_bytes(b"line\n--" + values.tobytes())
-    np.testing.assert_array_equal(open_source(tmp_path / "v.nhdr").slices(0, 12), turned)
+    np.testing.assert_array_equal(whole(tmp_path / "v.nhdr"), turned)
     (tmp_path / "v.bin").unlink()
     with pytest.raises(ArgumentError, match=r"no such file with samples: .*v\.bin"):
         open_source(tmp_path / "v.nhdr")
@@ -90,26 +103,11 @@ def test_nrrd_spacing_by_the_ends_of_axes(tmp_path):
         np.testing.assert_allclose(open_source(tmp_path / "v.nrrd").spacing, expected)
 
 
-ORIENTATIONS = ("RAS", "LAS", "LPS", "LPI", "SRA", "PIL", "AIR")
-
-
-def stored_as(codes):
-    """An image of right, anterior, superior, as it is stored with other axes, and what NIfTI makes of it."""
-    values = sample_values("int16").T  # [X, Y, Z]
-    affine = np.diag([2.0, 3.0, 4.0, 1.0])
-    affine[:3, 3] = 10, 20, 30
-    turn = nibabel.orientations.ornt_transform(
-        nibabel.orientations.axcodes2ornt("RAS"), nibabel.orientations.axcodes2ornt(codes)
-    )
-    image = nibabel.Nifti1Image(values, affine).as_reoriented(turn)
-    return np.asarray(image.dataobj).T, image.affine, values.T
-
-
 @pytest.mark.parametrize("codes", ORIENTATIONS)
 @pytest.mark.parametrize("space", ["right-anterior-superior", "left-anterior-superior"])
 def test_nrrd_axes_become_those_of_space_and_nothing_is_mirrored(tmp_path, codes, space):
     """The same image by NIfTI and by NRRD, whichever way it is stored."""
-    stored, affine, expected = stored_as(codes)
+    _, stored, affine, expected = stored_as(codes)
     if space.startswith("left"):
         affine = np.diag([-1.0, 1, 1, 1]) @ affine
     directions, origin = affine[:3, :3].T, affine[:3, 3]
@@ -124,7 +122,7 @@ def test_nrrd_axes_become_those_of_space_and_nothing_is_mirrored(tmp_path, codes
 @pytest.mark.parametrize("codes", ORIENTATIONS)
 def test_metaimage_axes_become_those_of_space(tmp_path, codes):
     """Its space is that of DICOM, left and posterior: a half turn from that of NIfTI, and no mirror of it."""
-    stored, affine, expected = stored_as(codes)
+    _, stored, affine, expected = stored_as(codes)
     affine = np.diag([-1.0, -1, 1, 1]) @ affine
     steps = np.linalg.norm(affine[:3, :3], axis=0)
     words = {
@@ -146,10 +144,7 @@ def test_vti_axes_become_those_of_space(tmp_path):
     values = sample_values("uint8")
     image = image_data(values)
     image.SetDirectionMatrix(0, 0, -1, 1, 0, 0, 0, 1, 0)  # in columns: x is along y, y along z, z against x
-    writer = vtkXMLImageDataWriter()
-    writer.SetInputData(image)
-    writer.SetFileName(str(tmp_path / "v.vti"))
-    writer.Write()
+    write_image(tmp_path / "v.vti", image)
     source = open_source(tmp_path / "v.vti")
     assert source.spacing == (SPACING[2], SPACING[0], SPACING[1])
     np.testing.assert_array_equal(source.slices(0, 12), values.transpose(1, 2, 0)[:, :, ::-1])
@@ -157,7 +152,7 @@ def test_vti_axes_become_those_of_space(tmp_path):
 
 def test_nifti_2_is_read(tmp_path):
     nibabel.save(nibabel.Nifti2Image(sample_values("int16").T, np.eye(4)), tmp_path / "v.nii")
-    np.testing.assert_array_equal(open_source(tmp_path / "v.nii").slices(0, 11), sample_values("int16"))
+    np.testing.assert_array_equal(whole(tmp_path / "v.nii"), sample_values("int16"))
 
 
 def test_a_compressed_tiff_that_cannot_be_read_says_so_at_once(tmp_path, monkeypatch):
@@ -196,25 +191,20 @@ def test_pages_written_one_by_one(tmp_path):
     with tifffile.TiffWriter(tmp_path / "v.tif") as writer:
         for page in values:
             writer.write(page, compression="zlib", contiguous=False)
-    np.testing.assert_array_equal(open_source(tmp_path / "v.tif").slices(0, 11), values)
+    np.testing.assert_array_equal(whole(tmp_path / "v.tif"), values)
 
 
 def test_vti_with_an_extent_that_starts_elsewhere(tmp_path):
-    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
-
     image = image_data(sample_values())
     image.SetExtent(2, 14, 3, 14, 4, 14)
     image.SetOrigin(10, 20, 30)
-    writer = vtkXMLImageDataWriter()
-    writer.SetInputData(image)
-    writer.SetFileName(str(tmp_path / "v.vti"))
-    writer.Write()
+    write_image(tmp_path / "v.vti", image)
     assert open_source(tmp_path / "v.vti").origin == (10 + 2 * 0.5, 20 + 3 * 2.0, 30 + 4 * 3.0)
 
 
 def test_more_than_one_component_is_refused(tmp_path):
     colors = np.zeros((4, 5, 6, 3), np.uint8)
-    write_vti(tmp_path / "v.vti", colors)
+    WRITERS["packed.vti"](tmp_path / "v.vti", colors)
     tifffile.imwrite(tmp_path / "v.tif", colors, photometric="rgb")
     tifffile.imwrite(tmp_path / "one.tif", colors[0], photometric="rgb")
     tifffile.imwrite(tmp_path / "channels.tif", colors[..., 0][:3], imagej=True, metadata={"axes": "CYX"})
@@ -285,4 +275,4 @@ def test_vtk_files_of_other_kinds_are_refused(tmp_path):
 def test_whole_file_compression_is_told_from_the_suffix(tmp_path):
     WRITERS["plain.nii"](tmp_path / "plain.nii", sample_values())
     (tmp_path / "V.NII.GZ").write_bytes(gzip.compress((tmp_path / "plain.nii").read_bytes()))
-    np.testing.assert_array_equal(open_source(tmp_path / "V.NII.GZ").slices(0, 11), sample_values())
+    np.testing.assert_array_equal(whole(tmp_path / "V.NII.GZ"), sample_values())

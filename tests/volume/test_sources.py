@@ -6,6 +6,7 @@ import pytest
 from tests.volume.volume_files import WRITERS, sample_values
 from texgs.core.errors import ArgumentError
 from texgs.volume.grid import Grid
+from texgs.volume.headers import samples_of
 from texgs.volume.slabs import slab_bounds
 from texgs.volume.sources import ArraySource, open_source
 
@@ -136,3 +137,23 @@ def test_what_the_other_process_runs_counts_as_code_of_a_job():
             seen.add(name)
             waiting += read[1]
     assert {f"texgs.volume.{name}" for name in ("foreign", "itk_image", "vtk_image", "dicom")} <= seen
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("v.mhd", "ElementDataFile = v.raw"),
+        ("v.mha", "ElementDataFile = v.raw"),
+        ("v.mhd", "  ElementDataFile=v.raw"),
+        ("v.nhdr", "data file: v.raw"),
+        ("v.nrrd", "datafile: v.raw"),
+    ],
+)
+def test_the_file_with_the_samples_is_named(tmp_path, name, line):
+    header = tmp_path / name
+    header.write_text(f"NRRD0004\n{line}\nlast\n")
+    assert samples_of(header) is None, "it is not there"
+    (tmp_path / "v.raw").write_bytes(b"samples")
+    assert samples_of(header) == tmp_path / "v.raw"
+    header.write_text(f"NRRD0004\n{line.replace('v.raw', 'LOCAL')}\n")
+    assert samples_of(header) is None

@@ -3,8 +3,18 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import nibabel
+import nrrd
 import numpy as np
+import pyvista
+import tifffile
+from vtkmodules.vtkIOImage import vtkMetaImageWriter
+from vtkmodules.vtkIOLegacy import vtkStructuredPointsWriter
+from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
 
+from texgs.volume.sources import open_source
+
+Writer = Callable[[Path, np.ndarray], None]
 SPACING = (0.5, 2.0, 3.0)
 
 
@@ -13,99 +23,64 @@ def sample_values(dtype: str = "uint16") -> np.ndarray:
     return np.random.default_rng(0).integers(0, 100, (11, 12, 13)).astype(dtype)
 
 
-def image_data(values: np.ndarray):
-    """VTK image with one point array."""
-    from vtkmodules.util.numpy_support import numpy_to_vtk
-    from vtkmodules.vtkCommonDataModel import vtkImageData
+def whole(path: Path, **arguments) -> np.ndarray:
+    """Open a file and decode all of it."""
+    source = open_source(path, **arguments)
+    return source.slices(0, source.dims[2])
 
-    image = vtkImageData()
-    image.SetDimensions(values.shape[2], values.shape[1], values.shape[0])
-    image.SetSpacing(*SPACING)
-    array = numpy_to_vtk(values.reshape(-1, *values.shape[3:]), deep=True)
-    array.SetName("density")
-    image.GetPointData().SetScalars(array)
+
+def image_data(values: np.ndarray) -> pyvista.ImageData:
+    """VTK image with one point array."""
+    image = pyvista.ImageData(dimensions=values.shape[2::-1], spacing=SPACING)
+    image["density"] = values.reshape(-1, *values.shape[3:])
     return image
 
 
-def write_vti(path: Path, values: np.ndarray) -> None:
-    from vtkmodules.vtkIOXML import vtkXMLImageDataWriter
-
-    writer = vtkXMLImageDataWriter()
-    if path.stem == "plain":
-        writer.SetCompressorTypeToNone()
-        writer.EncodeAppendedDataOff()
-    _write(writer, path, values)
-
-
-def write_vtk(path: Path, values: np.ndarray) -> None:
-    from vtkmodules.vtkIOLegacy import vtkStructuredPointsWriter
-
-    writer = vtkStructuredPointsWriter()
-    if path.stem == "binary":
-        writer.SetFileTypeToBinary()
-    _write(writer, path, values)
-
-
-def write_meta(path: Path, values: np.ndarray) -> None:
-    from vtkmodules.vtkIOImage import vtkMetaImageWriter
-
-    writer = vtkMetaImageWriter()
-    writer.SetCompression(path.stem == "compressed")
-    _write(writer, path, values)
-
-
-def _write(writer, path: Path, values: np.ndarray) -> None:
-    writer.SetInputData(image_data(values))
+def write_image(path: Path, image: pyvista.ImageData, kind=vtkXMLImageDataWriter, **settings) -> None:
+    """Write an image by a writer of VTK; settings are the arguments of its setters."""
+    writer = kind()
+    for name, value in settings.items():
+        getattr(writer, f"Set{name}")(value)
+    writer.SetInputData(image)
     writer.SetFileName(str(path))
     writer.Write()
 
 
-def write_nrrd(path: Path, values: np.ndarray) -> None:
-    import nrrd
-
-    header = {"encoding": path.stem, "spacings": list(SPACING)}
-    nrrd.write(str(path), values, header, index_order="C")
+def by_vtk(kind, **settings) -> Writer:
+    return lambda path, values: write_image(path, image_data(values), kind, **settings)
 
 
-def write_nifti(path: Path, values: np.ndarray) -> None:
-    import nibabel
+def by_nrrd(encoding: str) -> Writer:
+    header = {"encoding": encoding, "spacings": list(SPACING)}
+    return lambda path, values: nrrd.write(str(path), values, header, index_order="C")
 
+
+def by_tifffile(**options) -> Writer:
+    return lambda path, values: tifffile.imwrite(path, values, **options)
+
+
+def by_nibabel(path: Path, values: np.ndarray) -> None:
     nibabel.save(nibabel.Nifti1Image(values.T, np.diag([*SPACING, 1.0])), path)
 
 
-def write_tiff(path: Path, values: np.ndarray) -> None:
-    import tifffile
-
-    options = {"little": {}, "big": {"byteorder": ">"}, "packed": {"compression": "zlib"}}
-    tifffile.imwrite(path, values, **options[path.stem])
-
-
-def write_npy(path: Path, values: np.ndarray) -> None:
-    np.save(path, np.asfortranarray(values) if path.stem == "columns" else values)
-
-
-# File name: how to write it. The stem chooses the variant.
-WRITERS: dict[str, Callable[[Path, np.ndarray], None]] = {
-    "packed.vti": write_vti,
-    "plain.vti": write_vti,
-    "text.vtk": write_vtk,
-    "binary.vtk": write_vtk,
-    "plain.mha": write_meta,
-    "compressed.mha": write_meta,
-    "plain.mhd": write_meta,
-    "compressed.mhd": write_meta,
-    "raw.nrrd": write_nrrd,
-    "gzip.nrrd": write_nrrd,
-    "bzip2.nrrd": write_nrrd,
-    "ascii.nrrd": write_nrrd,
-    "raw.nhdr": write_nrrd,
-    "gzip.nhdr": write_nrrd,
-    "plain.nii": write_nifti,
-    "packed.nii.gz": write_nifti,
-    "little.tif": write_tiff,
-    "big.tiff": write_tiff,
-    "packed.tif": write_tiff,
-    "rows.npy": write_npy,
-    "columns.npy": write_npy,
+WRITERS: dict[str, Writer] = {
+    "packed.vti": by_vtk(vtkXMLImageDataWriter),
+    "plain.vti": by_vtk(vtkXMLImageDataWriter, Compressor=None, EncodeAppendedData=False),
+    "text.vtk": by_vtk(vtkStructuredPointsWriter),
+    "binary.vtk": by_vtk(vtkStructuredPointsWriter, FileType=2),
+    "plain.mha": by_vtk(vtkMetaImageWriter, Compression=False),
+    "compressed.mha": by_vtk(vtkMetaImageWriter, Compression=True),
+    "plain.mhd": by_vtk(vtkMetaImageWriter, Compression=False),
+    "compressed.mhd": by_vtk(vtkMetaImageWriter, Compression=True),
+    **{f"{encoding}.nrrd": by_nrrd(encoding) for encoding in ("raw", "gzip", "bzip2", "ascii")},
+    "raw.nhdr": by_nrrd("raw"),
+    "gzip.nhdr": by_nrrd("gzip"),
+    "plain.nii": by_nibabel,
+    "packed.nii.gz": by_nibabel,
+    "little.tif": by_tifffile(),
+    "big.tiff": by_tifffile(byteorder=">"),
+    "packed.tif": by_tifffile(compression="zlib"),
+    "rows.npy": np.save,
+    "columns.npy": lambda path, values: np.save(path, np.asfortranarray(values)),
 }
 HAS_SPACING = tuple(name for name in WRITERS if not name.endswith((".tif", ".tiff", ".npy")))

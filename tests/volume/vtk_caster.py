@@ -13,21 +13,21 @@ from __future__ import annotations
 
 import ctypes
 import re
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from vtkmodules import vtkRenderingVolumeOpenGL2  # noqa: F401, registers what the mapper creates
+from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkVolume
+from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
+from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
 
 from texgs.core.camera import Camera
-from texgs.core.errors import NativeError
 from texgs.core.light import Light
-from texgs.core.memory import require_memory
 from texgs.volume.grid import Grid
 from texgs.volume.render import Appearance
 from texgs.volume.transfer import TransferFunction
 from texgs.volume.vtk_renderer import aim, image_data, point_light, volume_property
 
-BYTES = 200  # of memory for a pixel: VTK's image, the picture, and directions of rays in double precision
 FULL = 32767  # 1.0 in the mapper's fixed-point numbers
 MARGIN = 2  # pixels; the mapper may leave out the last row and column of a view that the volume fills
 
@@ -42,12 +42,6 @@ class VtkCaster:
     """
 
     def __init__(self, grid: Grid, appearance: Appearance, threads: int) -> None:
-        # The first import registers what the mapper creates when it is made.
-        from vtkmodules import vtkRenderingVolumeOpenGL2  # noqa: F401
-        from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer, vtkVolume
-        from vtkmodules.vtkRenderingOpenGL2 import vtkGenericOpenGLRenderWindow
-        from vtkmodules.vtkRenderingVolume import vtkFixedPointVolumeRayCastMapper
-
         image, self._factor = image_data(grid)
         self._appearance = appearance
         self._mapper = vtkFixedPointVolumeRayCastMapper()
@@ -68,17 +62,12 @@ class VtkCaster:
         self._window.AddRenderer(self._renderer)
 
     def render(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
-        """Premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values.
-
-        Raises:
-            OutOfMemoryError: if the view needs more memory than there is.
-        """
-        what = f"a view of {camera.width} x {camera.height} pixels"
-        require_memory(BYTES * camera.width * camera.height, what, "choose a smaller one")
-        return self._cast(tf, _with_margin(camera), light)[MARGIN:-MARGIN, MARGIN:-MARGIN]
+        """Return premultiplied RGBA [H, W, 4] in [0, 1], from a transfer function in data values."""
+        around = camera.crop(-MARGIN, -MARGIN, camera.width + MARGIN, camera.height + MARGIN)
+        return self._cast(tf, around, light)[MARGIN:-MARGIN, MARGIN:-MARGIN]
 
     def _cast(self, tf: TransferFunction, camera: Camera, light: Light) -> NDArray[np.float32]:
-        """What VTK's rays see."""
+        """Return what VTK's rays see."""
         self._volume.SetProperty(volume_property(tf, self._appearance, self._factor))
         self._window.SetSize(camera.width, camera.height)
         aim(self._renderer.GetActiveCamera(), camera)
@@ -98,24 +87,13 @@ class VtkCaster:
         return picture[::-1] / np.float32(FULL)
 
     def _pixels(self) -> tuple[NDArray[np.uint16], int, int]:
-        """The mapper's image [h, w, 4], lowest row first, and where its first pixel is in the view."""
+        """Return the mapper's image [h, w, 4], lowest row first, and where its first pixel is in the view."""
         image = self._mapper.GetRayCastImage()
         address = re.match(r"_([0-9a-fA-F]+)_p_", str(image.GetImage()))
-        if address is None:
-            raise NativeError(
-                f"VTK's ray cast image: expected a pointer, got {image.GetImage()!r}; install VTK 9.4 or "
-                "newer"
-            )
+        assert address is not None, f"expected a pointer, got {image.GetImage()!r}"
         memory_width, memory_height = image.GetImageMemorySize()
         width, height = image.GetImageInUseSize()
         x, y = image.GetImageOrigin()
         buffer = (ctypes.c_uint16 * (4 * memory_width * memory_height)).from_address(int(address[1], 16))
         pixels = np.ctypeslib.as_array(buffer).reshape(memory_height, memory_width, 4)
         return pixels[:height, :width], x, y
-
-
-def _with_margin(camera: Camera) -> Camera:
-    """The same camera with more pixels around its view."""
-    K = camera.K.clone()
-    K[:2, 2] += MARGIN
-    return replace(camera, K=K, width=camera.width + 2 * MARGIN, height=camera.height + 2 * MARGIN)
