@@ -29,15 +29,13 @@ def positions(views):
     return torch.stack([view.position for view in views]).double().numpy()
 
 
-def test_icosphere_is_the_published_training_set_view_by_view():
-    ours, theirs = camera_to_world(cameras.icosphere(3, **LENS)), published("train")
-    assert ours.shape == theirs.shape == (92, 3, 4)
-    np.testing.assert_allclose(ours, theirs, atol=2e-6)
-
-
-def test_test_path_is_the_published_test_set_view_by_view():
-    ours, theirs = camera_to_world(cameras.spiral(181, **LENS)), published("test")
-    assert ours.shape == theirs.shape == (181, 3, 4)
+@pytest.mark.parametrize(
+    ("split", "count", "ours"),
+    [("train", 92, cameras.icosphere(3, **LENS)), ("test", 181, cameras.spiral(181, **LENS))],
+)
+def test_they_are_the_published_sets_view_by_view(split, count, ours):
+    ours, theirs = camera_to_world(ours), published(split)
+    assert ours.shape == theirs.shape == (count, 3, 4)
     np.testing.assert_allclose(ours, theirs, atol=2e-6)
 
 
@@ -98,11 +96,10 @@ def test_cameras_are_spread_evenly_over_a_path():
 
 
 def test_mistakes_are_named():
-    with pytest.raises(ArgumentError, match="frequency: expected at least 1, got 0"):
-        cameras.icosphere(0, **LENS)
-    with pytest.raises(
-        ArgumentError, match="count: expected at least 2 cameras on a path from pole to pole, got 1"
-    ):
-        cameras.spiral(1, **LENS)
-    with pytest.raises(ArgumentError, match="count: expected at least 1 camera, got 0"):
-        cameras.orbit_path(0, 0, **LENS)
+    for make, message in [
+        (lambda: cameras.icosphere(0, **LENS), "frequency: expected at least 1, got 0"),
+        (lambda: cameras.spiral(1, **LENS), "count: expected at least 2 cameras on a path from pole to pole"),
+        (lambda: cameras.orbit_path(0, 0, **LENS), "count: expected at least 1 camera, got 0"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            make()

@@ -5,7 +5,7 @@ import pydicom
 import pytest
 from pydicom.uid import CTImageStorage, ExplicitVRLittleEndian, JPEG2000Lossless, RLELossless, generate_uid
 
-from tests.volume.volume_files import sample_values
+from tests.volume.volume_files import sample_values, whole
 from texgs.core.errors import ArgumentError
 from texgs.volume.sources import open_source
 
@@ -48,22 +48,16 @@ def test_slices_are_sorted_by_place_and_have_their_lattice(tmp_path):
 def test_slope_and_intercept_are_applied(tmp_path):
     write_series(tmp_path, sample_values(), RescaleSlope=2, RescaleIntercept=-1024)
     expected = 2.0 * sample_values() - 1024
-    np.testing.assert_array_equal(open_source(tmp_path).slices(0, 11), expected)
+    np.testing.assert_array_equal(whole(tmp_path), expected)
 
 
 def test_slopes_that_differ_from_slice_to_slice(tmp_path):
     """As in PET: the first slice alone would make integers of all."""
     write_series(tmp_path, sample_values()[:1], number=3)
-    write_series(
-        tmp_path,
-        sample_values()[1:4],
-        [10 + 2.5 * z * np.array([0, 0, 1]) for z in (1, 2, 3)],
-        number=4,
-        RescaleSlope=0.25,
-        RescaleIntercept=0,
-    )
+    places = [10 + 2.5 * z * np.array([0, 0, 1]) for z in (1, 2, 3)]
+    write_series(tmp_path, sample_values()[1:4], places, number=4, RescaleSlope=0.25, RescaleIntercept=0)
     expected = sample_values()[:4] * np.array([1, 0.25, 0.25, 0.25])[:, None, None]
-    np.testing.assert_array_equal(open_source(tmp_path).slices(0, 4), expected)
+    np.testing.assert_array_equal(whole(tmp_path), expected)
 
 
 @pytest.mark.parametrize(
@@ -90,36 +84,27 @@ def test_one_of_several_series_is_chosen(tmp_path):
     other = generate_uid()
     write_series(tmp_path, sample_values())
     write_series(tmp_path, sample_values()[:4] + 1, uid=other, number=5)
-    with pytest.raises(
-        ArgumentError, match=r"got several series; choose one by dataset\.volume\.series="
-    ) as e:
+    with pytest.raises(ArgumentError, match=r"got several series; choose one by dataset\.volume\.ser") as e:
         open_source(tmp_path)
     assert all(text in str(e.value) for text in (SERIES, other, "3 (Bone, 11 files", "5 (Bone, 4 files"))
     for choice in ("5", other):
-        np.testing.assert_array_equal(
-            open_source(tmp_path, series=choice).slices(0, 4), sample_values()[:4] + 1
-        )
+        np.testing.assert_array_equal(whole(tmp_path, series=choice), sample_values()[:4] + 1)
     with pytest.raises(ArgumentError, match="got 0 series for '7'"):
         open_source(tmp_path, series="7")
 
 
 @pytest.mark.parametrize(
-    ("heights", "message"),
+    ("places", "message"),
     [
-        ([0, 2, 4, 8, 10], "slices 2 mm apart, got 4 mm: 1 missing"),
-        ([0, 2, 4, 7, 9], "slices 2 mm apart, got 3 mm: another"),
-        ([0, 2, 2, 4, 6], "slices at different places, got two at one"),
+        ([(0, 0, z) for z in (0, 2, 4, 8, 10)], "slices 2 mm apart, got 4 mm: 1 missing"),
+        ([(0, 0, z) for z in (0, 2, 4, 7, 9)], "slices 2 mm apart, got 3 mm: another"),
+        ([(0, 0, z) for z in (0, 2, 2, 4, 6)], "slices at different places, got two at one"),
+        ([(0, 0.3 * z, 2.5 * z) for z in range(5)], "correct the tilt of the gantry first"),
     ],
 )
-def test_slices_that_are_no_lattice_are_refused(tmp_path, heights, message):
-    write_series(tmp_path, sample_values()[:5], [(0, 0, height) for height in heights])
+def test_slices_that_are_no_lattice_are_refused(tmp_path, places, message):
+    write_series(tmp_path, sample_values()[:5], places)
     with pytest.raises(ArgumentError, match=message):
-        open_source(tmp_path)
-
-
-def test_a_tilted_gantry_is_refused(tmp_path):
-    write_series(tmp_path, sample_values(), [(0, 0.3 * z, 2.5 * z) for z in range(11)])
-    with pytest.raises(ArgumentError, match="correct the tilt of the gantry first"):
         open_source(tmp_path)
 
 
@@ -136,7 +121,7 @@ def test_compressed_slices_are_read(tmp_path):
         data = pydicom.dcmread(path)
         data.compress(RLELossless)
         data.save_as(path)
-    np.testing.assert_array_equal(open_source(tmp_path).slices(0, 11), sample_values())
+    np.testing.assert_array_equal(whole(tmp_path), sample_values())
 
 
 def test_slices_that_cannot_be_decoded_are_refused(tmp_path, capfd):

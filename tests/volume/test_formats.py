@@ -250,26 +250,30 @@ def test_spacing_of_a_file_that_makes_no_sense_can_be_replaced(tmp_path):
 
 def test_other_types_are_refused(tmp_path):
     np.save(tmp_path / "v.npy", sample_values("complex64"))
-    with pytest.raises(ArgumentError, match="expected integers, floats or bool, got complex64"):
-        open_source(tmp_path / "v.npy")
     nibabel.save(nibabel.Nifti1Image(sample_values("complex64"), np.eye(4)), tmp_path / "v.nii")
-    with pytest.raises(ArgumentError, match="expected integers, floats or bool, got complex64"):
-        open_source(tmp_path / "v.nii")
     np.save(tmp_path / "pickle.npy", np.array([[[{}]]]), allow_pickle=True)
-    with pytest.raises(ArgumentError, match=r"expected a .npy file"):
-        open_source(tmp_path / "pickle.npy")
+    for path in sorted(tmp_path.iterdir()):
+        with pytest.raises(
+            ArgumentError, match=r"expected (integers, floats or bool, got complex64|a .npy f)"
+        ):
+            open_source(path)
 
 
-def test_vtk_files_of_other_kinds_are_refused(tmp_path):
-    head = "# vtk DataFile Version 3.0\nname\nASCII\n"
-    (tmp_path / "mesh.vtk").write_text(head + "DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n")
-    with pytest.raises(ArgumentError, match=r"expected image data .*, got PolyData"):
-        open_source(tmp_path / "mesh.vtk")
-    lattice = "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n"
-    cells = "CELL_DATA 8\nSCALARS v float\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n"
-    (tmp_path / "cells.vtk").write_text(head + lattice + cells)
-    with pytest.raises(ArgumentError, match="expected point data, found none; convert cell data"):
-        open_source(tmp_path / "cells.vtk")
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        ("DATASET POLYDATA\nPOINTS 1 float\n0 0 0\n", r"expected image data .*, got PolyData"),
+        (
+            "DATASET STRUCTURED_POINTS\nDIMENSIONS 3 3 3\nORIGIN 0 0 0\nSPACING 1 1 1\n"
+            "CELL_DATA 8\nSCALARS v float\nLOOKUP_TABLE default\n1 2 3 4 5 6 7 8\n",
+            "expected point data, found none; convert cell data",
+        ),
+    ],
+)
+def test_vtk_files_of_other_kinds_are_refused(tmp_path, content, message):
+    (tmp_path / "v.vtk").write_text(f"# vtk DataFile Version 3.0\nname\nASCII\n{content}")
+    with pytest.raises(ArgumentError, match=message):
+        open_source(tmp_path / "v.vtk")
 
 
 def test_whole_file_compression_is_told_from_the_suffix(tmp_path):

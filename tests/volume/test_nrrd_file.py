@@ -56,24 +56,19 @@ def test_header_is_padded_for_every_length():
 
 
 def test_mistakes_are_named(tmp_path):
-    with pytest.raises(ArgumentError, match=r"none.nrrd: no such file; prepare the volume first"):
-        open_grid(tmp_path / "none.nrrd")
-    (tmp_path / "foreign.nrrd").write_bytes(bytes(1000))
-    with pytest.raises(ArgumentError, match=r"foreign.nrrd: expected an NRRD file, but it does not start"):
-        open_grid(tmp_path / "foreign.nrrd")
-    path = written(tmp_path / "v.nrrd", "uint16")
-    whole = path.read_bytes()
-    path.write_bytes(whole[:-1])
-    with pytest.raises(
-        ArgumentError, match=r"v.nrrd: the file is cut off: expected 13 x 12 x 11 x 2 \(uint16"
-    ):
-        open_grid(path)
-    path.write_bytes(whole[:100])
-    with pytest.raises(ArgumentError, match=r"v.nrrd: expected an NRRD file"):
-        open_grid(path)
+    whole = written(tmp_path / "v.nrrd", "uint16").read_bytes()
     WRITERS["gzip.nrrd"](tmp_path / "gzip.nrrd", sample_values())
-    with pytest.raises(ArgumentError, match="expected a prepared volume with raw encoding, got gzip"):
-        open_grid(tmp_path / "gzip.nrrd")
+    for name, content, message in [
+        ("none.nrrd", None, r"none.nrrd: no such file; prepare the volume first"),
+        ("foreign.nrrd", bytes(1000), r"foreign.nrrd: expected an NRRD file, but it does not start"),
+        ("v.nrrd", whole[:-1], r"v.nrrd: the file is cut off: expected 13 x 12 x 11 x 2 \(uint16"),
+        ("v.nrrd", whole[:100], r"v.nrrd: expected an NRRD file"),
+        ("gzip.nrrd", None, "expected a prepared volume with raw encoding, got gzip"),
+    ]:
+        if content is not None:
+            (tmp_path / name).write_bytes(content)
+        with pytest.raises(ArgumentError, match=message):
+            open_grid(tmp_path / name)
 
 
 def test_opening_reads_nothing_but_the_header(tmp_path):

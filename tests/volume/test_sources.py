@@ -11,6 +11,7 @@ from texgs.volume.slabs import slab_bounds
 from texgs.volume.sources import ArraySource, open_source
 
 DIMS = (13, 12, 11)
+WORDS = {"dims": DIMS, "dtype": "uint16"}
 
 
 @pytest.mark.parametrize("endian", ["little", "big"])
@@ -42,22 +43,19 @@ def test_slabs_cover_the_range_in_multiples():
             r"expected 13 x 12 x 11 x 4 \(float32\) = 6864 bytes, found 3432; dtype uint16 would fit",
         ),
         (
-            {"dims": (13, 12, 10), "dtype": "uint16", "skip": 8},
+            WORDS | {"dims": (13, 12, 10), "skip": 8},
             r"\(uint16\) \+ 8 skipped = 3128 bytes, found 3432; correct dims, dtype or skip",
         ),
-        ({"dims": DIMS, "dtype": "uint16", "skip": -1}, "skip: expected at least 0 bytes, got -1"),
-        (
-            {"dims": DIMS, "dtype": "uint16", "endian": "middle"},
-            "endian: expected little or big, got 'middle'",
-        ),
-        ({"dims": DIMS, "dtype": "short int"}, "dtype: expected a name such as uint8 or float32"),
-        ({"dims": (13, 12), "dtype": "uint16"}, r"dims: expected at least 2 .* got \[13, 12\]"),
-        ({"dims": (13, 132, 1), "dtype": "uint16"}, "dims: expected at least 2"),
-        ({"dims": (-13, -12, 11), "dtype": "uint16"}, "dims: expected at least 2"),
-        ({"dims": DIMS, "dtype": "complex64"}, "expected integers, floats or bool, got complex64"),
-        ({"dims": DIMS, "dtype": "S2"}, "expected integers, floats or bool"),
-        ({"dims": DIMS, "dtype": "uint16", "spacing": (1, 1, -1)}, "spacing: expected three finite numbers"),
-        ({"dims": DIMS, "dtype": "uint16", "spacing": (1, 1, float("nan"))}, "spacing: expected three"),
+        (WORDS | {"skip": -1}, "skip: expected at least 0 bytes, got -1"),
+        (WORDS | {"endian": "middle"}, "endian: expected little or big, got 'middle'"),
+        (WORDS | {"dtype": "short int"}, "dtype: expected a name such as uint8 or float32"),
+        (WORDS | {"dims": (13, 12)}, r"dims: expected at least 2 .* got \[13, 12\]"),
+        (WORDS | {"dims": (13, 132, 1)}, "dims: expected at least 2"),
+        (WORDS | {"dims": (-13, -12, 11)}, "dims: expected at least 2"),
+        (WORDS | {"dtype": "complex64"}, "expected integers, floats or bool, got complex64"),
+        (WORDS | {"dtype": "S2"}, "expected integers, floats or bool"),
+        (WORDS | {"spacing": (1, 1, -1)}, "spacing: expected three finite numbers"),
+        (WORDS | {"spacing": (1, 1, float("nan"))}, "spacing: expected three"),
     ],
 )
 def test_mistakes_in_the_description_of_plain_samples(tmp_path, arguments, message):
@@ -79,25 +77,19 @@ def test_plain_file_that_shrinks_while_it_is_read(tmp_path):
 
 def test_mistakes_in_the_path(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(
-        ArgumentError, match=f"none.vti: no such file or folder; looked for {tmp_path}/none.vti"
-    ):
-        open_source("none.vti")
-    (tmp_path / "v.dcm").touch()
-    with pytest.raises(
-        ArgumentError, match=r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or DICOM slices"
-    ):
-        open_source("v.dcm")
-    (tmp_path / "v.raw.gz").touch()
-    with pytest.raises(ArgumentError, match=r"unknown suffix '.raw.gz'"):
-        open_source("v.raw.gz")
-    with pytest.raises(
-        ArgumentError, match=r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"
-    ):
-        open_source(tmp_path)
-    np.save(tmp_path / "v.npy", sample_values())
-    with pytest.raises(ArgumentError, match="this format has a header; leave them out"):
-        open_source("v.npy", dims=DIMS)
+    for name in ("v.dcm", "v.raw.gz"):
+        Path(name).touch()
+    np.save("v.npy", sample_values())
+    Path("empty").mkdir()
+    for name, dims, message in [
+        ("none.vti", None, f"none.vti: no such file or folder; looked for {tmp_path}/none.vti"),
+        ("v.dcm", None, r"unknown suffix '.dcm'; expected .raw, .*, .nii.gz, .* or DICOM slices"),
+        ("v.raw.gz", None, r"unknown suffix '.raw.gz'"),
+        ("empty", None, r"expected a folder of DICOM slices or TIFFs \(.tif, .tiff\), found none"),
+        ("v.npy", DIMS, "this format has a header; leave them out"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            open_source(name, dims=dims)
 
 
 @pytest.mark.parametrize("name", [*WRITERS, "v.raw", "v.slc"])

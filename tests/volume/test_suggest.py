@@ -73,16 +73,15 @@ class TestMaterials:
         assert names_at(basic, 2000) == [list(basic)[-1]]
 
 
+FALLING = {
+    "exponential": RNG.exponential(1, 300_000),
+    "lognormal": RNG.lognormal(0, 0.5, 300_000),
+    "mostly zero": np.append(np.zeros(500_000), RNG.exponential(1, 100_000)),
+}
+
+
 class TestSimulations:
-    @pytest.mark.parametrize(
-        "values",
-        [
-            RNG.exponential(1, 300_000),
-            RNG.lognormal(0, 0.5, 300_000),
-            np.append(np.zeros(500_000), RNG.exponential(1, 100_000)),
-        ],
-        ids=["exponential", "lognormal", "mostly zero"],
-    )
+    @pytest.mark.parametrize("values", FALLING.values(), ids=FALLING.keys())
     def test_a_falling_histogram_becomes_three_shells(self, values):
         counts, low, high = histogram(values)
         basic = suggest(counts, low, high)

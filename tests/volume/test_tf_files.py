@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
 
 from texgs.core.errors import ArgumentError
 from texgs.volume.tf_files import read_tf, write_paraview
@@ -45,14 +47,11 @@ class TestParaView:
         assert entry["ColorSpace"] == "RGB"
 
     def test_linear_presets_are_exact(self, tmp_path):
-        tf = read_tf(
-            preset(tmp_path, Points=[4, 1, 0.5, 0, 2, 0, 0.5, 0], ColorSpace="RGB", NanColor=[1, 1, 0])
-        )
+        points = [4, 1, 0.5, 0, 2, 0, 0.5, 0]
+        tf = read_tf(preset(tmp_path, Points=points, ColorSpace="RGB", NanColor=[1, 1, 0]))
         assert tf.opacity == ((2, 0), (4, 1))
         assert tf.color == ((0, 1, 0, 0), (1, 0, 0, 1))
-
-    def test_without_opacity_it_is_paraviews_ramp(self, tmp_path):
-        assert read_tf(preset(tmp_path)).opacity == ((0, 0), (1, 1))
+        assert read_tf(preset(tmp_path)).opacity == ((0, 0), (1, 1)), "ParaView's ramp"
 
     def test_hsv_follows_the_hue(self, tmp_path):
         tf = read_tf(preset(tmp_path, ColorSpace="HSV", RGBPoints=[0, 1, 0, 0, 1, 0, 0.5, 1]))
@@ -62,12 +61,11 @@ class TestParaView:
 
     @pytest.mark.parametrize("space", ["Lab", "Diverging", "Lab/CIEDE2000"])
     def test_other_spaces_agree_with_vtk(self, tmp_path, space):
-        vtk = pytest.importorskip("vtkmodules.vtkRenderingCore")
-        function = vtk.vtkColorTransferFunction()
+        function = vtkColorTransferFunction()
         getattr(function, f"SetColorSpaceTo{space.replace('/', '')}")()
-        function.AddRGBPoint(0, 0.23, 0.3, 0.75)
-        function.AddRGBPoint(1, 0.71, 0.02, 0.15)
         points = [0, 0.23, 0.3, 0.75, 1, 0.71, 0.02, 0.15]
+        function.AddRGBPoint(*points[:4])
+        function.AddRGBPoint(*points[4:])
         tf = read_tf(preset(tmp_path, ColorSpace=space, RGBPoints=points))
         t = np.linspace(0.02, 0.98, 12)
         np.testing.assert_allclose(tf(t)[:, :3], [function.GetColor(x) for x in t], atol=2 / 255)
@@ -89,11 +87,10 @@ class TestParaView:
 
     @given(middle=st.floats(0.1, 0.9), sharpness=st.floats(0, 1))
     def test_midpoint_and_sharpness_agree_with_vtk(self, tmp_path_factory, middle, sharpness):
-        vtk = pytest.importorskip("vtkmodules.vtkCommonDataModel")
-        function = vtk.vtkPiecewiseFunction()
-        function.AddPoint(0, 0.1, middle, sharpness)
-        function.AddPoint(2, 0.9, 0.5, 0)
-        path = preset(tmp_path_factory.getbasetemp(), Points=[0, 0.1, middle, sharpness, 2, 0.9, 0.5, 0])
+        function, points = vtkPiecewiseFunction(), [0, 0.1, middle, sharpness, 2, 0.9, 0.5, 0]
+        function.AddPoint(*points[:4])
+        function.AddPoint(*points[4:])
+        path = preset(tmp_path_factory.getbasetemp(), Points=points)
         t = np.linspace(0, 2, 41)
         np.testing.assert_allclose(read_tf(path)(t)[:, 3], [function.GetValue(x) for x in t], atol=0.02)
 
@@ -106,9 +103,7 @@ class TestParaView:
         assert read_tf(path, "b").support == (0, 7)
         with pytest.raises(ArgumentError, match="expected a name in the file, got 'c'; it holds a, b"):
             read_tf(path, "c")
-        with pytest.raises(
-            ArgumentError, match=r"two\.json: expected one preset, got 2: a, b; export the one"
-        ):
+        with pytest.raises(ArgumentError, match=r"two\.json: expected one preset, got 2: a, b; export the"):
             read_tf(path)
 
 
@@ -122,10 +117,7 @@ class TestParaView:
         ('["RGBPoints"]', "got neither"),
         ('{"format": "texgs-tf", "version": 2}', "version: expected 1, got 2; update texgs"),
         ('{"format": "texgs-tf", "version": 1, "opacity": []}', "expected the keys opacity, color"),
-        (
-            '{"format": "texgs-tf", "version": 1, "opacity": [[0]], "color": []}',
-            "opacity: expected at least 2",
-        ),
+        ('{"format": "texgs-tf", "version": 1, "opacity": [[0]], "color": []}', "opacity: expected at least"),
         ('[{"Name": "x", "IndexedColors": [1, 1, 1]}]', "preset 'x': expected RGBPoints, got a categorical"),
         ('[{"RGBPoints": [0, 0, 0]}]', "RGBPoints: expected four numbers per point, got 3 numbers"),
         ('[{"RGBPoints": []}]', "RGBPoints: expected four numbers per point, got 0"),
@@ -141,8 +133,5 @@ def test_a_wrong_file_is_named_with_its_mistake(tmp_path, content, message):
     path.write_text(content)
     with pytest.raises(ArgumentError, match=rf"wrong\.json: .*{message}"):
         read_tf(path)
-
-
-def test_a_missing_file_is_named(tmp_path):
     with pytest.raises(ArgumentError, match=r"none\.json: no such file"):
         read_tf(tmp_path / "none.json")

@@ -4,10 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
+from vtkmodules.vtkRenderingCore import vtkColorTransferFunction
 
 from tests.volume.functions import GREY, STEPS, TENT, functions
 from texgs.core.errors import ArgumentError
 from texgs.volume.transfer import TransferFunction, check_disjoint, combine, just_above
+
+RAMP = ((0, 0), (1, 1))
 
 
 class TestEvaluation:
@@ -66,9 +70,7 @@ class TestScaled:
 class TestWithoutSteps:
     @given(functions())
     def test_agrees_with_vtk_which_extends_the_ends(self, tf):
-        core = pytest.importorskip("vtkmodules.vtkRenderingCore")
-        data = pytest.importorskip("vtkmodules.vtkCommonDataModel")
-        opacity, color = data.vtkPiecewiseFunction(), core.vtkColorTransferFunction()
+        opacity, color = vtkPiecewiseFunction(), vtkColorTransferFunction()
         for point in tf.without_steps().opacity:
             opacity.AddPoint(*point)
         for point in tf.without_steps().color:
@@ -106,42 +108,36 @@ class TestDictionary:
 
 
 @pytest.mark.parametrize(
-    ("opacity", "message"),
+    ("opacity", "color", "message"),
     [
-        (5, "opacity: expected a list of points"),
-        ([], "at least 2 points, got 0"),
-        ([(0, 1)], "at least 2 points, got 1"),
-        ([(0, 0), (1, 0)], "expected a range of values with opacity above 0"),
-        ([(1, 0), (1, 1)], "expected a range of values with opacity above 0"),
-        ([(0, 0), (2, 1), (1, 0)], r"opacity\[2\]: expected values in ascending order, got 1 after 2"),
-        ([(0, 0), (1, 0), (1, 1), (1, 0)], r"opacity\[3\]: expected at most two points .* third at 1"),
-        ([(0, 0), (1, 1.5)], r"opacity\[1\]: expected opacity in \[0, 1\], got \(1.5\)"),
-        ([(0, -0.1), (1, 1)], r"opacity\[0\]: expected opacity in \[0, 1\]"),
-        ([(0, 0), (math.nan, 1)], r"opacity\[1\]: expected finite numbers, got \(nan, 1\)"),
-        ([(0, 0), (10**400, 1)], r"opacity\[1\]: expected finite numbers"),
-        ([(0, 0), (1, 1, 1)], r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 1, 1\)"),
-        ([(0, 0), 1], r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1\)"),
-        ([(0, 0), (1, "a")], r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 'a'\)"),
-        ("ab", r"opacity\[0\]: expected the numbers"),
+        (5, GREY, "opacity: expected a list of points"),
+        ([], GREY, "at least 2 points, got 0"),
+        ([(0, 1)], GREY, "at least 2 points, got 1"),
+        ([(0, 0), (1, 0)], GREY, "expected a range of values with opacity above 0"),
+        ([(1, 0), (1, 1)], GREY, "expected a range of values with opacity above 0"),
+        ([(0, 0), (2, 1), (1, 0)], GREY, r"opacity\[2\]: expected values in ascending order, got 1 after 2"),
+        ([(0, 0), (1, 0), (1, 1), (1, 0)], GREY, r"opacity\[3\]: expected at most two points .* third at 1"),
+        ([(0, 0), (1, 1.5)], GREY, r"opacity\[1\]: expected opacity in \[0, 1\], got \(1.5\)"),
+        ([(0, -0.1), (1, 1)], GREY, r"opacity\[0\]: expected opacity in \[0, 1\]"),
+        ([(0, 0), (math.nan, 1)], GREY, r"opacity\[1\]: expected finite numbers, got \(nan, 1\)"),
+        ([(0, 0), (10**400, 1)], GREY, r"opacity\[1\]: expected finite numbers"),
+        (
+            [(0, 0), (1, 1, 1)],
+            GREY,
+            r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 1, 1\)",
+        ),
+        ([(0, 0), 1], GREY, r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1\)"),
+        ([(0, 0), (1, "a")], GREY, r"opacity\[1\]: expected the numbers \(value, opacity\), got \(1, 'a'\)"),
+        ("ab", GREY, r"opacity\[0\]: expected the numbers"),
+        (RAMP, [], "color: expected at least 1 points, got 0"),
+        (RAMP, [(0, 1, 1)], r"color\[0\]: expected the numbers \(value, r, g, b\), got \(0, 1, 1\)"),
+        (RAMP, [(0, 1, 255, 1)], r"color\[0\]: expected r, g, b in \[0, 1\], got \(1, 255, 1\)"),
+        (RAMP, [(1, 0, 0, 0), (0, 0, 0, 0)], r"color\[1\]: expected values in ascending order"),
     ],
 )
-def test_wrong_opacity_is_named(opacity, message):
+def test_wrong_points_are_named(opacity, color, message):
     with pytest.raises(ArgumentError, match=message):
-        TransferFunction(opacity, GREY)
-
-
-@pytest.mark.parametrize(
-    ("color", "message"),
-    [
-        ([], "color: expected at least 1 points, got 0"),
-        ([(0, 1, 1)], r"color\[0\]: expected the numbers \(value, r, g, b\), got \(0, 1, 1\)"),
-        ([(0, 1, 255, 1)], r"color\[0\]: expected r, g, b in \[0, 1\], got \(1, 255, 1\)"),
-        ([(1, 0, 0, 0), (0, 0, 0, 0)], r"color\[1\]: expected values in ascending order"),
-    ],
-)
-def test_wrong_color_is_named(color, message):
-    with pytest.raises(ArgumentError, match=message):
-        TransferFunction(((0, 0), (1, 1)), color)
+        TransferFunction(opacity, color)
 
 
 def test_overlap_names_both_functions_and_ranges():

@@ -9,11 +9,12 @@ from PIL import Image
 from tests.real_data import real_data
 from texgs.core.camera import Camera, intrinsics, orbit, orbit_direction
 from texgs.core.errors import ArgumentError
-from texgs.core.light import Light
+from texgs.core.light import HEADLIGHT, Light
+from texgs.core.ply_file import read_vertices
 from texgs.volume.view_set import View, read_views, write_transforms
 
 SIZE = (12, 8)  # pixels, width and height
-LIGHTS = [Light("headlight"), Light("directional", 30.0, -60.0), Light("headlight")]
+LIGHTS = [HEADLIGHT, Light("directional", 30.0, -60.0), HEADLIGHT]
 METADATA = {"volume": "sphere", "tf": {"name": "shell"}, "aabb": [[-0.5, -0.5, -0.5], [0.5, 0.5, 0.5]]}
 
 
@@ -24,8 +25,7 @@ def make_views(folder, split="train", count=3):
         path.parent.mkdir(parents=True, exist_ok=True)
         pixels = np.random.default_rng(index).integers(0, 256, (SIZE[1], SIZE[0], 4), dtype=np.uint8)
         Image.fromarray(pixels).save(path)
-        camera = orbit(40 + 100 * index, 20 * index - 10, 2, 35, *SIZE)
-        views.append(View(camera, path, light))
+        views.append(View(orbit(40 + 100 * index, 20 * index - 10, 2, 35, *SIZE), path, light))
     return views
 
 
@@ -46,8 +46,7 @@ def change(folder, edit):
 def test_what_is_written_is_read(folder):
     write_transforms(folder, "test", make_views(folder, "test", count=1), {})
     views, written = read_views(folder), make_views(folder)
-    assert views.folder == folder
-    assert views.metadata == METADATA
+    assert (views.folder, views.metadata) == (folder, METADATA)
     assert [len(views.train), len(views.test)] == [3, 1]
     for ours, theirs in zip(views.train, written, strict=True):
         assert (ours.path, ours.light) == (theirs.path, theirs.light)
@@ -60,9 +59,8 @@ def test_what_is_written_is_read(folder):
 def test_an_off_centre_lens_with_oblong_pixels_survives(tmp_path):
     (view, *_) = make_views(tmp_path, count=1)
     K = torch.tensor([[31.0, 0.0, 5.25], [0.0, 27.0, 4.5], [0.0, 0.0, 1.0]])
-    write_transforms(
-        tmp_path, "train", [View(Camera(view.camera.viewmat, K, *SIZE), view.path, view.light)], {}
-    )
+    other = View(Camera(view.camera.viewmat, K, *SIZE), view.path, view.light)
+    write_transforms(tmp_path, "train", [other], {})
     assert torch.equal(read_views(tmp_path).train[0].camera.K, K)
 
 
@@ -97,41 +95,27 @@ def test_the_published_views_load_unchanged(name, size):
 def test_published_pixels_are_seen_where_the_cameras_look():
     # The object's points, projected, lie where the image is covered: axes and signs are right.
     folder = real_data("vortex/TF04_400")
-    points = read_points(folder / "points3d.ply")
+    table = read_vertices(folder / "points3d.ply")
+    points = torch.from_numpy(np.stack([table[axis] for axis in "xyz"], axis=1).astype(np.float32))
     for view in read_views(folder).train[::13]:
-        alpha = view.load()[..., 3]
-        p = points @ view.camera.viewmat[:3, :3].T + view.camera.viewmat[:3, 3]
-        u, v = ((p @ view.camera.K.T)[:, :2] / p[:, 2:]).floor().long().T
-        assert (alpha[v, u] > 0).float().mean() > 0.9
+        u, v = view.camera.project(points)[0].floor().long().T
+        assert (view.load()[..., 3][v, u] > 0).float().mean() > 0.9
 
 
-def read_points(path):
-    header, _, body = path.read_bytes().partition(b"end_header\n")
-    kinds = {b"double": "<f8", b"float": "<f4", b"uchar": "u1"}
-    lines = [line.split() for line in header.splitlines()]
-    fields = [(line[2].decode(), kinds[line[1]]) for line in lines if line[0] == b"property"]
-    table = np.frombuffer(body, np.dtype(fields))
-    return torch.from_numpy(np.stack([table[axis] for axis in "xyz"], axis=1).astype(np.float32))
-
-
-def test_pixels_are_as_stored(folder):
+def test_pixels_are_as_stored_and_opaque_without_alpha(folder):
     view = read_views(folder).train[1]
     np.testing.assert_array_equal(view.load(), np.asarray(Image.open(view.path)))
-
-
-def test_an_image_without_alpha_is_opaque(folder):
-    view = read_views(folder).train[0]
     Image.new("RGB", SIZE, (10, 20, 30)).save(view.path)
     assert view.load().unique(dim=0).unique(dim=1).flatten().tolist() == [10, 20, 30, 255]
 
 
 def test_directions_of_lights():
-    camera = orbit(30, 40, 3, 30, 8, 8)
     expected = orbit_direction(30, 40)
-    torch.testing.assert_close(Light("headlight").direction(camera), expected, atol=1e-6, rtol=0)
-    torch.testing.assert_close(
-        Light("directional", -90, 0).direction(camera), torch.tensor([0.0, 0, 1]).double()
-    )
+    torch.testing.assert_close(HEADLIGHT.direction(orbit(30, 40, 3, 30, 8, 8)), expected, atol=1e-6, rtol=0)
+    front = Light("directional", -90, 0).direction(orbit(30, 40, 3, 30, 8, 8))
+    torch.testing.assert_close(front, torch.tensor([0.0, 0, 1]).double())
+    with pytest.raises(ArgumentError, match="light: expected headlight or directional, got 'sun'"):
+        Light("sun")
 
 
 @pytest.mark.parametrize(
@@ -139,10 +123,7 @@ def test_directions_of_lights():
     [
         (lambda d: d.update(frames=[]), "transforms_train.json: expected an object with a list of frames"),
         (lambda d: d.pop("frames"), "transforms_train.json: expected an object with a list of frames"),
-        (
-            lambda d: d["frames"][1].pop("file_path"),
-            "frame 1: file_path: expected the path of an image",
-        ),
+        (lambda d: d["frames"][1].pop("file_path"), "frame 1: file_path: expected the path of an image"),
         (lambda d: d["frames"][2].pop("transform_matrix"), r"frame 2 \(r_0002\): transform_matrix: expected"),
         (lambda d: d["frames"][2].update(transform_matrix=[[1, 2], [3]]), "four rows of four numbers"),
         (lambda d: d["frames"][2].update(transform_matrix=[[1, 2]]), r"four numbers, got shape \[1, 2\]"),
@@ -166,39 +147,36 @@ def test_mistakes_in_the_file_are_named(folder, edit, message):
 
 
 def test_mistakes_in_the_folder_are_named(folder):
+    def refused(message):
+        with pytest.raises(ArgumentError, match=message):
+            read_views(folder)
+
     with pytest.raises(ArgumentError, match=r"nowhere: expected a folder of views, .*transforms_train.json"):
         read_views(folder / "nowhere")
     change(folder, lambda values: [values.pop(key) for key in ("w", "h")])
-    Image.new("RGBA", (5, 5)).save(folder / "train" / "r_0002.png")
-    with pytest.raises(
-        ArgumentError, match=r"r_0002.png: expected 12 x 8 pixels as r_0000.png has, got 5 x 5"
-    ):
-        read_views(folder)
-    (folder / "train" / "r_0001.png").write_bytes(b"no image")
-    with pytest.raises(ArgumentError, match=r"r_0001.png: expected an image"):
-        read_views(folder)
-    (folder / "train" / "r_0001.png").unlink()
-    (folder / "train" / "r_0002.png").unlink()
-    with pytest.raises(ArgumentError, match=r"r_0001.png: no such image, of 2 missing of the 3"):
-        read_views(folder)
+    images = [folder / "train" / f"r_000{index}.png" for index in range(3)]
+    Image.new("RGBA", (5, 5)).save(images[2])
+    refused(r"r_0002.png: expected 12 x 8 pixels as r_0000.png has, got 5 x 5")
+    images[1].write_bytes(b"no image")
+    refused(r"r_0001.png: expected an image")
+    images[1].unlink()
+    images[2].unlink()
+    refused(r"r_0001.png: no such image, of 2 missing of the 3")
     (folder / "transforms_train.json").write_text("{")
-    with pytest.raises(ArgumentError, match=r"transforms_train.json: expected JSON"):
-        read_views(folder)
+    refused(r"transforms_train.json: expected JSON")
 
 
 def test_mistakes_in_views_are_named_and_nothing_is_written(tmp_path):
     views = make_views(tmp_path)
-    with pytest.raises(ArgumentError, match=r"transforms_test.json: expected at least one view, got none"):
-        write_transforms(tmp_path, "test", [], {})
-    with pytest.raises(ArgumentError, match="metadata: w, frames would overwrite"):
-        write_transforms(tmp_path, "test", views, {"w": 3, "frames": []})
-    with pytest.raises(ArgumentError, match=r"expected a \.png file in"):
-        write_transforms(tmp_path / "train" / "deeper", "test", views, {})
     other = View(orbit(0, 0, 2, 36, *SIZE), views[1].path, views[1].light)
-    with pytest.raises(ArgumentError, match=r"r_0001.png: expected the size and lens of .*r_0000.png"):
-        write_transforms(tmp_path, "test", [views[0], other], {})
+    for folder, given, metadata, message in [
+        (tmp_path, [], {}, r"transforms_test.json: expected at least one view, got none"),
+        (tmp_path, views, {"w": 3, "frames": []}, "metadata: w, frames would overwrite"),
+        (tmp_path / "train" / "deeper", views, {}, r"expected a \.png file in"),
+        (tmp_path, [views[0], other], {}, r"r_0001.png: expected the size and lens of .*r_0000.png"),
+    ]:
+        with pytest.raises(ArgumentError, match=message):
+            write_transforms(folder, "test", given, metadata)
     assert not list(tmp_path.glob("**/*.json"))
-    with pytest.raises(ArgumentError, match="light: expected headlight or directional, got 'sun'"):
-        Light("sun")
     with pytest.raises(ArgumentError, match=r"none.png: no such file"):
         View(views[0].camera, tmp_path / "none.png", views[0].light).load()
