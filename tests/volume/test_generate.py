@@ -49,14 +49,6 @@ def test_an_orbital_solves_the_schrodinger_equation(numbers):
     np.testing.assert_allclose(energy, -psi / (2 * numbers[0] ** 2), atol=1e-5 * np.abs(psi).max())
 
 
-def test_orbitals_are_orthonormal():
-    axis = np.linspace(-32, 32, 65)
-    places = (axis, axis[:, None], axis[:, None, None])
-    smooth = [(n, degree, order) for n, degree, order in NUMBERS if degree >= 1 and n <= 3]
-    orbitals = np.stack([wave_function(*numbers, *places).ravel() for numbers in smooth])
-    np.testing.assert_allclose(orbitals @ orbitals.T, np.eye(len(orbitals)), atol=2e-3)
-
-
 @pytest.mark.parametrize("numbers", [(3, 2, 0), (4, 3, 0), (4, 2, -1)])
 def test_a_cube_holds_the_whole_orbital_whatever_its_size(numbers):
     small, large = orbital_cube(25, *numbers), orbital_cube(97, *numbers)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations, product
 from math import asin, atan2, degrees, isqrt, sqrt
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from texgs.core.errors import ArgumentError
 from texgs.core.lens import Lens
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
+T = TypeVar("T")
 FRONT = -90.0  # azimuth of +z, degrees
 
 
@@ -71,10 +73,10 @@ def orbit_path(
     return [orbit(azimuth, polar, radius, fov_y, width, height) for azimuth in turn]
 
 
-def spread(cameras: Sequence[Camera], count: int) -> list[Camera]:
-    """Return so many cameras of a path, evenly spread over it and in its order; all, if it has no more."""
-    count = min(count, len(cameras))
-    return [cameras[index * len(cameras) // count] for index in range(count)]
+def spread(path: Sequence[T], count: int) -> list[T]:
+    """Return so many cameras or views of a path, evenly spread and in its order; all, if it has no more."""
+    count = min(count, len(path))
+    return [path[index * len(path) // count] for index in range(count)]
 
 
 def _orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:
@@ -85,12 +87,8 @@ def _orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int
 def frequency_of(count: int, where: str = "views") -> int:
     """Return the frequency f of the icosphere that has so many vertices, 10 f^2 + 2.
 
-    Args:
-        count: of vertices.
-        where: the number comes from, for the message.
-
     Raises:
-        ArgumentError: if no icosphere has so many.
+        ArgumentError: naming `where` the number comes from, if no icosphere has so many.
     """
     frequency = isqrt(max(count - 2, 0) // 10)
     if frequency < 1 or 10 * frequency**2 + 2 != count:

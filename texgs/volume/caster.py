@@ -82,18 +82,10 @@ class Cast:
 
 
 class Caster:
-    """Renders one volume from any camera.
+    """Renders one volume from any camera; the samples go to the device that casts rays.
 
-    Args:
-        grid: the volume; samples in C order and native bytes are not copied.
-        appearance: shading and sampling.
-        device: that casts rays; the samples go there.
-
-    Attributes:
-        missing: how many samples are NaN: they are transparent, with the cells around them.
-
-    Raises:
-        ArgumentError: if the samples are of a type that is not known, or there are too many of them.
+    Samples in C order and native bytes are not copied on a CPU. `missing` of them are NaN: they are
+    transparent, with the cells around them.
     """
 
     local_viewer = False
@@ -132,13 +124,7 @@ class Caster:
         return self.cast(tf, camera, light).rgba.cpu().numpy()
 
     def cast(self, tf: TransferFunction, camera: Camera, light: Light, outputs: Collection[str] = ()) -> Cast:
-        """Cast a view, with what else is wanted of OUTPUTS, in one pass.
-
-        Raises:
-            ArgumentError: if an output is unknown, the camera has skew or requires a gradient, or rays would
-                take more than 2^24 samples.
-            OutOfMemoryError: if the view needs more memory than there is.
-        """
+        """Cast a view, with what else is wanted of OUTPUTS, in one pass; without gradients and skew."""
         if unknown := sorted(set(outputs) - set(OUTPUTS)):
             raise ArgumentError(f"outputs: expected some of {', '.join(OUTPUTS)}, got {unknown[0]}")
         height, width = camera.height, camera.width
@@ -146,9 +132,9 @@ class Caster:
         self._check(camera)
         points, distance = self._prepare(tf)
         matrices = [x.float().to(self._device).contiguous() for x in (camera.viewmat, camera.K)]
-        planes = {"rgba": [4], "normal": [3]}
+        shapes = {"rgba": (height, width, 4), "normal": (height, width, 3)}
         seen = {
-            name: torch.empty(height, width, *planes.get(name, []), device=self._device)
+            name: torch.empty(shapes.get(name, (height, width)), device=self._device)
             for name in ("rgba", *outputs)
         }
         look = self._appearance

@@ -10,29 +10,20 @@ from PIL import Image
 from texgs.core.errors import ArgumentError
 from texgs.core.io import write_atomic
 
-ROWS, COLUMNS = 2, 6  # of a contact sheet, at most
+COLUMNS = 6  # of a contact sheet, at most
 THUMBNAIL = 240  # pixels of the longer side of a picture on it: larger ones are reduced, smaller ones stay
 GUTTER = 6  # pixels between its pictures
 MILLISECONDS = 80  # of a picture of an animation
 
 
 def write_contact_sheet(path: str | Path, pictures: Sequence[Image.Image]) -> Path:
-    """Write a PNG with up to two rows of evenly spaced pictures, in reading order, over white.
-
-    Args:
-        path: target file.
-        pictures: at least one, of any mode and size.
-
-    Raises:
-        ArgumentError: if there is no picture.
-    """
+    """Write a PNG with rows of pictures of any mode and size, in reading order, over white."""
     _require_pictures(path, pictures)
-    n_shown = min(len(pictures), ROWS * COLUMNS)
-    shown = [_thumbnail(_over_white(pictures[i * len(pictures) // n_shown])) for i in range(n_shown)]
+    shown = [_thumbnail(_over_white(picture)) for picture in pictures]
     width, height = max(picture.width for picture in shown), max(picture.height for picture in shown)
-    columns = min(COLUMNS, n_shown)
+    columns = min(COLUMNS, len(shown))
     across, down = width + GUTTER, height + GUTTER  # from one picture to the next
-    size = (columns * across - GUTTER, -(-n_shown // columns) * down - GUTTER)
+    size = (columns * across - GUTTER, -(-len(shown) // columns) * down - GUTTER)
     sheet = Image.new("RGB", size, "white")
     for index, picture in enumerate(shown):
         left = index % columns * across + (width - picture.width) // 2
@@ -42,15 +33,7 @@ def write_contact_sheet(path: str | Path, pictures: Sequence[Image.Image]) -> Pa
 
 
 def write_animation(path: str | Path, pictures: Sequence[Image.Image]) -> Path:
-    """Write an animated PNG over white that repeats without end.
-
-    Args:
-        path: target file.
-        pictures: at least one; all of one size.
-
-    Raises:
-        ArgumentError: if there is no picture, or their sizes differ.
-    """
+    """Write an animated PNG of pictures of one size over white that repeats without end."""
     _require_pictures(path, pictures)
     if other := next((picture.size for picture in pictures if picture.size != pictures[0].size), None):
         raise ArgumentError(

@@ -83,13 +83,7 @@ class Images:
         return self.planes.shape[3], self.planes.shape[2]
 
     def target(self, index: int, device: torch.device | str = "cpu", around: Box | None = None) -> Target:
-        """Return one view as floats on a device.
-
-        Args:
-            index: of the view.
-            device: of the tensors.
-            around: only the part that holds these pixels and all that is not white; by default the whole.
-        """
+        """Return one view as floats: of `around` and all that is not white, or by default the whole."""
         planes, camera, share = self.planes[index], self.cameras[index], 1.0
         if around is not None:
             box = self.boxes[index].union(around).within(*self.size)
@@ -101,15 +95,12 @@ class Images:
 
 
 def load(views: Sequence[View], reduce: int = 1) -> Images:
-    """Read all images.
+    """Read all images of views of one size and lens.
 
-    Args:
-        views: of one size and lens.
-        reduce: every block of reduce x reduce pixels becomes one, the average of premultiplied colours.
+    Every block of reduce x reduce pixels becomes one, the average of premultiplied colours.
 
     Raises:
         ArgumentError: if there is no view, or the size cannot be divided.
-        OutOfMemoryError: if the views would not fit into memory.
     """
     if not views:
         raise ArgumentError("views: expected at least one, got none")

@@ -35,11 +35,7 @@ class Mesh:
 def isosurface(values: np.ndarray, level: float, spacing: Triple, origin: Triple) -> Mesh:
     """Find where values cross a level (flying edges, Schroeder et al. 2015); larger ones are inside.
 
-    Args:
-        values: [Z, Y, X], real numbers.
-        level: of the surface.
-        spacing: x, y, z between samples, world units.
-        origin: of the first sample, world units.
+    Values are [Z, Y, X]; spacing and origin x, y, z, in world units.
     """
     import pyvista  # slow to import
 
@@ -57,14 +53,8 @@ def surface_of(grid: Grid, tf: TransferFunction, opacity: float) -> Mesh:
     Where an opaque middle of its range has two sides, both are surfaces; and so are the faces of the volume's
     box, where what is opaque ends there.
 
-    Args:
-        grid: the volume.
-        tf: in units of the data.
-        opacity: in (0, 1), per opacity unit.
-
     Raises:
         ArgumentError: if the function stays below this opacity, or none of the volume reaches it.
-        OutOfMemoryError: if the volume is too large.
     """
     least, most = float(grid.values.min()), float(grid.values.max())
     span = max(most - least, 1e-30)

@@ -69,11 +69,7 @@ def directions(camera: Camera, light: Light) -> tuple[NDArray[np.float64], NDArr
 
 
 class Times:
-    """Times of all views, in a file that is written after each view, so that a killed run keeps them.
-
-    Args:
-        path: of the JSON file, in a folder above the views; what it says of earlier runs is kept.
-    """
+    """Times of all views in a JSON file above them, written after each, so that a killed run keeps them."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -107,12 +103,7 @@ def render_views(
 ) -> None:
     """Render the views whose files are missing, as PNG with straight alpha; so a killed run continues.
 
-    Args:
-        renderer: of the volume.
-        tf: in data values.
-        views: cameras, lights and files.
-        title: of the progress bar.
-        times: gets the time of each view that is rendered, without that of writing its file.
+    The title is that of the progress bar; `times` get the time of each view without writing its file.
     """
     missing = [view for view in views if not view.path.exists()]
     for view in progress(missing, title=title, unit="view"):

@@ -43,11 +43,10 @@ def suggest(
     of the bins they are taken for labels, the lowest for background. Higher values are more opaque.
 
     Args:
-        histogram: [n] counts of voxels in equal bins over [minimum, maximum].
-        minimum: smallest value, data units.
-        maximum: largest value.
-        count: number of functions, fewer where there are fewer values; by default as many as the histogram
-            shows, at most 5.
+        histogram: [n] counts of voxels in equal bins over [minimum, maximum], the range of the data.
+        minimum: in data units.
+        maximum: in data units.
+        count: of functions, fewer where there are fewer values; by default what shows, at most 5.
 
     Raises:
         ArgumentError: if the histogram is no list of counts, holds one value only, or count is below 1.

@@ -25,18 +25,13 @@ class TransferFunction:
     Opacity is 0 outside its points (a step there says nothing more: its outer point is dropped), colour is
     constant outside its points.
 
-    Attributes:
-        opacity: at least two points (value, opacity), values in data units, opacity in [0, 1] per opacity
-            unit distance.
-        color: at least one point (value, r, g, b), linear colour in [0, 1].
-
     Raises:
         ArgumentError: naming the point that is malformed, not finite, out of order or out of range; or if
             opacity is 0 everywhere.
     """
 
-    opacity: tuple[tuple[float, float], ...]
-    color: tuple[tuple[float, float, float, float], ...]
+    opacity: tuple[tuple[float, float], ...]  # at least two (value, opacity in [0, 1] per opacity unit)
+    color: tuple[tuple[float, float, float, float], ...]  # at least one (value, r, g, b), linear, in [0, 1]
 
     def __post_init__(self) -> None:
         # Lists, as they come from files, become tuples of floats.

@@ -74,15 +74,11 @@ def write_transforms(
 ) -> Path:
     """Write transforms_train.json or transforms_test.json for images in `folder`; they may come later.
 
-    Args:
-        folder: of the view set.
-        split: which of the two files.
-        views: at least one; all of one size and lens.
-        metadata: further keys of the top level, such as volume, tf, aabb and shading.
+    All views have one size and lens; `metadata` are further keys, such as volume, tf, aabb and shading.
 
     Raises:
-        ArgumentError: if views differ in size or lens, an image is no PNG file in `folder`, or `metadata`
-            has a key of the layout.
+        ArgumentError: if views differ, an image is no PNG file in `folder`, or `metadata` has a key of the
+            layout.
     """
     folder = Path(folder)
     path = folder / f"transforms_{split}.json"
@@ -179,9 +175,7 @@ def camera_to_world(viewmat: Tensor) -> Tensor:
 def world_to_camera(where: str, matrix: Any) -> Tensor:
     """Return the world-to-camera matrix [4, 4] with OpenCV axes, float64, of a frame's `transform_matrix`.
 
-    Args:
-        where: file and frame, for messages.
-        matrix: four rows of four numbers; the last row is taken as 0 0 0 1.
+    The last row is taken as 0 0 0 1.
     """
     try:
         rigid = torch.tensor(matrix, dtype=torch.float64)
@@ -205,16 +199,9 @@ def world_to_camera(where: str, matrix: Any) -> Tensor:
 
 def _lens_values(camera: Camera) -> dict[str, float]:
     """Return what the file says about size (pixels), focal lengths and principal point."""
-    K = camera.K.tolist()
-    return {
-        "camera_angle_x": 2 * atan(0.5 * camera.width / K[0][0]),
-        "w": camera.width,
-        "h": camera.height,
-        "fl_x": K[0][0],
-        "fl_y": K[1][1],
-        "cx": K[0][2],
-        "cy": K[1][2],
-    }
+    (fl_x, _, cx), (_, fl_y, cy), _ = camera.K.tolist()
+    angle = 2 * atan(0.5 * camera.width / fl_x)
+    return dict(zip(LENS_KEYS, (angle, camera.width, camera.height, fl_x, fl_y, cx, cy), strict=True))
 
 
 def _lens_matrix(where: str, values: Mapping[str, Any], width: int, height: int) -> Tensor:

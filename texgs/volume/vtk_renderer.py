@@ -17,13 +17,7 @@ from numpy.typing import NDArray
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonCore import VTK_FLOAT, vtkFloatArray
 from vtkmodules.vtkCommonDataModel import vtkPiecewiseFunction
-from vtkmodules.vtkRenderingCore import (
-    vtkCamera,
-    vtkColorTransferFunction,
-    vtkLight,
-    vtkVolume,
-    vtkVolumeProperty,
-)
+from vtkmodules.vtkRenderingCore import vtkCamera, vtkColorTransferFunction, vtkLight, vtkVolume
 from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLRenderWindow, vtkTextureObject
 from vtkmodules.vtkRenderingVolumeOpenGL2 import vtkOpenGLGPUVolumeRayCastMapper
 
@@ -107,14 +101,10 @@ def image_data(grid: Grid) -> tuple[pyvista.ImageData, float]:
 
 def volume_property(
     tf: TransferFunction, appearance: Appearance, factor: float, ramp: float | None = None
-) -> vtkVolumeProperty:
+) -> pyvista.VolumeProperty:
     """Return transfer function, shading and opacity unit for VTK.
 
-    Args:
-        tf: in data values.
-        appearance: the rest.
-        factor: of `image_data`.
-        ramp: of `TransferFunction.without_steps`.
+    The factor is that of `image_data`, the ramp that of `TransferFunction.without_steps`.
     """
     points = tf.without_steps(ramp)
     opacity, color = vtkPiecewiseFunction(), vtkColorTransferFunction()
@@ -122,16 +112,17 @@ def volume_property(
         opacity.AddPoint(value * factor, alpha)
     for value, *rgb in points.color:
         color.AddRGBPoint(value * factor, *rgb)
-    result = vtkVolumeProperty()
+    result = pyvista.VolumeProperty(
+        interpolation_type="linear",
+        shade=True,
+        ambient=appearance.ambient,
+        diffuse=appearance.diffuse,
+        specular=appearance.specular,
+        specular_power=appearance.shininess,
+        opacity_unit_distance=appearance.opacity_unit,
+    )
     result.SetScalarOpacity(opacity)
     result.SetColor(color)
-    result.SetScalarOpacityUnitDistance(appearance.opacity_unit)
-    result.SetInterpolationTypeToLinear()
-    result.ShadeOn()
-    result.SetAmbient(appearance.ambient)
-    result.SetDiffuse(appearance.diffuse)
-    result.SetSpecular(appearance.specular)
-    result.SetSpecularPower(appearance.shininess)
     return result
 
 

@@ -23,13 +23,12 @@ def work(settings: OfTF, inputs: dict[str, Path], output: Path) -> Outcome:
     """
     from PIL.Image import fromarray
 
+    from texgs.volume.cameras import spread
     from texgs.volume.contact_sheet import write_contact_sheet
     from texgs.volume.view_set import read_views
 
     views = read_views(inputs["views"].parent)
-    n_shown = min(SHOWN, len(views.train))
-    shown = [views.train[index * len(views.train) // n_shown] for index in range(n_shown)]
-    pictures = [fromarray(view.load().numpy()) for view in shown]
+    pictures = [fromarray(view.load().numpy()) for view in spread(views.train, SHOWN)]
     write_contact_sheet(output / "sheet.png", [picture.crop(common_box(pictures)) for picture in pictures])
     camera = views.train[0].camera
     return Outcome(SheetResult(len(views.train), len(views.test), camera.width, camera.height))
