@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from math import isqrt
 from typing import NamedTuple
+
+from texgs.core.errors import ArgumentError
 
 
 class Lens(NamedTuple):
@@ -16,3 +19,15 @@ class Lens(NamedTuple):
     def square(self, size: int) -> Lens:
         """Return the same for square images."""
         return self._replace(width=size, height=size)
+
+
+def frequency_of(count: int, where: str = "views") -> int:
+    """Return the frequency f of the icosphere that has so many vertices, 10 f^2 + 2.
+
+    Raises:
+        ArgumentError: naming `where` the number comes from, if no icosphere has so many.
+    """
+    frequency = isqrt(max(count - 2, 0) // 10)
+    if frequency < 1 or 10 * frequency**2 + 2 != count:
+        raise ArgumentError(f"{where}: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")
+    return frequency

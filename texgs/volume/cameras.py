@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations, product
-from math import asin, atan2, degrees, isqrt, sqrt
+from math import asin, atan2, degrees, sqrt
 from typing import TypeVar
 
 import numpy as np
 
 from texgs.core.camera import Camera, orbit
 from texgs.core.errors import ArgumentError
-from texgs.core.lens import Lens
+from texgs.core.lens import Lens, frequency_of
 
 POLE = 89.99  # degrees; the paper's views stop short of the poles, so that +y is up in every one of them
 T = TypeVar("T")
@@ -82,18 +82,6 @@ def spread(path: Sequence[T], count: int) -> list[T]:
 def _orbit(azimuth: float, polar: float, radius: float, fov_y: float, width: int, height: int) -> Camera:
     """Return a camera with +y up everywhere, as the paper has them at the poles."""
     return orbit(azimuth, max(-POLE, min(POLE, polar)), radius, fov_y, width, height)
-
-
-def frequency_of(count: int, where: str = "views") -> int:
-    """Return the frequency f of the icosphere that has so many vertices, 10 f^2 + 2.
-
-    Raises:
-        ArgumentError: naming `where` the number comes from, if no icosphere has so many.
-    """
-    frequency = isqrt(max(count - 2, 0) // 10)
-    if frequency < 1 or 10 * frequency**2 + 2 != count:
-        raise ArgumentError(f"{where}: expected 12, 42, 92, 162 or another 10 f^2 + 2, got {count}")
-    return frequency
 
 
 def geodesic_vertices(frequency: int) -> np.ndarray:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from texgs.core.errors import ArgumentError, ConfigError
 from texgs.core.keys import key
-from texgs.core.lens import Lens
+from texgs.core.lens import Lens, frequency_of
 from texgs.core.names import require_name
 from texgs.edit.method import Method
 from texgs.edit.methods.normalized_clicks import MASKS, mask_weights, normalized_clicks
@@ -148,8 +148,6 @@ def show(task: Task[SegmentKeys], clicks: Clicks, made: Segmented) -> None:
 
 def check(settings: SegmentKeys) -> None:
     """Require a name, clicks, and a number of views that an icosphere has."""
-    from texgs.volume.cameras import frequency_of
-
     require_name(settings.name, "edit.segment.name")
     places_of(settings)
     frequency_of(settings.views, "edit.segment.views")
