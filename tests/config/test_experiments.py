@@ -1,7 +1,6 @@
 """What the words of a run select: data sets, recipes, sweeps, edits, and what is left out."""
 
 import contextlib
-import itertools
 from dataclasses import replace
 
 import pytest
@@ -18,18 +17,14 @@ def nothing(_config):
     return ()
 
 
-def data_sets(*words, lacking=nothing):
-    """Names of the data sets of each sweep, "" for none."""
-    selection = selected(words, lacking)
-    return {
-        sweep: sorted({each.dataset.name for each in configs})
-        for sweep, configs in selection.by_sweep.items()
-    }
-
-
 def without(*names):
     """What lacks some data sets."""
     return lambda config: [f"{config.dataset.name} is not there"] if config.dataset.name in names else []
+
+
+def configs(*words):
+    """The configurations of no sweep."""
+    return selected(words, nothing).by_sweep[""]
 
 
 @pytest.fixture
@@ -42,70 +37,84 @@ def project(tmp_path, monkeypatch):
         "scenes": "datasets: [engine, jets, sphere]\nsweeps: {views: jets, resolution: sphere}\n",
         "pictures": "datasets: [engine, wood]\nfits: [quick, gaussians_quick]\nedits: [glass, stylesplat]\n",
         "both": "experiments: [scenes, pictures]\nmissing: skip\naimed: {wood: [dataset.image=99]}\n",
+        "more": "experiments: [demo]\nviews: {width: 99}\n",
+        "nested": "experiments: [both]\n",
+        "misaimed": "experiments: [scenes, pictures]\naimed: {woud: []}\n",
     }
     for name, text in texts.items():
         (folder / f"{name}.yaml").write_text(f"# @package _global_\n{text}")
     return folder
 
 
-def test_a_data_set_that_is_named_wins_over_the_list_of_an_experiment(project):
-    assert data_sets("experiment=pictures") == {"": ["engine", "wood"]}
-    assert data_sets("experiment=pictures", "dataset=engine") == {"": ["engine"]}
-    assert data_sets("experiment=pictures", "dataset=orbital") == {"": ["orbital"]}
-    assert data_sets("experiment=pictures", "datasets=[engine,jets]") == {"": ["engine", "jets"]}
+PICTURES, SCENES, BOTH = "experiment=pictures", "experiment=scenes", "experiment=both"
+ALL = ["engine", "jets", "sphere"]
 
 
-def test_sweeps_of_other_data_sets_are_not_run_where_one_is_named(project):
-    assert data_sets("experiment=scenes", "dataset=jets") == {"": ["jets"], "views": ["jets"]}
-    assert data_sets("experiment=scenes", "dataset=engine") == {"": ["engine"]}
-    assert data_sets("experiment=scenes", "dataset=engine", "sweeps.views=engine") == {
-        "": ["engine"],
-        "views": ["engine"],
-        "resolution": ["sphere"],
-    }
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        # A data set that is named wins over the list of an experiment.
+        ((PICTURES,), {"": ["engine", "wood"]}),
+        ((PICTURES, "dataset=engine"), {"": ["engine"]}),
+        ((PICTURES, "dataset=orbital"), {"": ["orbital"]}),
+        ((PICTURES, "datasets=[engine,jets]"), {"": ["engine", "jets"]}),
+        # Sweeps of other data sets are not run where one is named, and all can be switched off.
+        ((SCENES, "dataset=jets"), {"": ["jets"], "views": ["jets"]}),
+        ((SCENES, "dataset=engine"), {"": ["engine"]}),
+        (
+            (SCENES, "dataset=engine", "sweeps.views=engine"),
+            {"": ["engine"], "views": ["engine"], "resolution": ["sphere"]},
+        ),
+        *(((SCENES, off), {"": ALL}) for off in ("sweeps={}", "sweeps=null", "~sweeps", "sweep=none")),
+        ((SCENES, "~sweeps.views"), {"": ALL, "resolution": ["sphere"]}),
+        # Of a union those are run that have the data set that is named.
+        ((BOTH, "dataset=jets"), {"": ["jets"], "views": ["jets"]}),
+        ((BOTH, "dataset=wood"), {"": ["wood"]}),
+    ],
+)
+def test_data_sets_of_a_run_and_of_its_sweeps(project, words, expected):
+    by_sweep = selected(words, nothing).by_sweep.items()
+    assert {sweep: sorted({each.dataset.name for each in some}) for sweep, some in by_sweep} == expected
 
 
-@pytest.mark.parametrize("off", ["sweeps={}", "sweeps=null", "~sweeps", "sweep=none"])
-def test_sweeps_can_be_switched_off(off, project):
-    assert list(data_sets("experiment=scenes", off)) == [""]
-
-
-def test_one_sweep_can_be_switched_off(project):
-    assert list(data_sets("experiment=scenes", "~sweeps.views")) == ["", "resolution"]
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("dataset=engine", "dataset.wood.image=99"), r"dataset\.wood: expected one of the data sets of"),
+        (("dataset=engine", "dataset.would.image=99"), r"dataset\.would"),  # there is no such key
+        (("dataset=engine", "+aimed.enginge=[]"), "aimed: expected names of data sets, got enginge"),
+        (("experiment=misaimed",), r"aimed: expected names of data sets, got woud, did you mean wood"),
+        ((BOTH, "dataset=orbital"), "dataset: expected data sets of scenes, pictures, got orbital"),
+        (("experiment=more",), "views: an experiment with `experiments` sets experiments, each"),
+        (("experiment=nested",), "expected single experiments, got both, which has several"),
+        (("datasets=[engine,engine]",), "datasets: expected different names, got engine twice"),
+    ],
+)
+def test_a_mistake_is_one_sentence(project, words, message):
+    with pytest.raises(ConfigError, match=message):
+        selected(words, nothing)
 
 
 def test_words_can_be_aimed_at_one_data_set():
     words = ("datasets=[engine,jets]", "dataset.jets.image=99", "dataset.jets.fit.seed=4", "fit=quick")
-    selection = selected(words, nothing)
-    by_name = {config.dataset.name: config for config in selection.by_sweep[""]}
-    assert (by_name["engine"].views.width, by_name["engine"].fit.seed) == (512, 0)
-    assert (by_name["jets"].views.width, by_name["jets"].fit.seed) == (99, 4)
-    (single,) = selected(("dataset=jets", "dataset.jets.image=50"), nothing).by_sweep[""]
+    by_name = {each.dataset.name: (each.views.width, each.fit.seed) for each in configs(*words)}
+    assert by_name == {"engine": (512, 0), "jets": (99, 4)}
+    (single,) = configs("dataset=jets", "dataset.jets.image=50")
     assert single.dataset.image == 50
 
 
-def test_words_aimed_at_no_data_set_of_the_run_are_told():
-    with pytest.raises(ConfigError, match=r"dataset\.wood: expected one of the data sets of this run"):
-        selected(("dataset=engine", "dataset.wood.image=99"), nothing)
-    with pytest.raises(ConfigError, match=r"dataset\.would"):  # by Hydra: there is no such key
-        selected(("dataset=engine", "dataset.would.image=99"), nothing)
-
-
-def test_an_experiment_can_aim_words():
-    selection = selected(("experiment=paper_scenes_quick",), nothing)
-    reduce = {config.dataset.name: config.fit.reduce for config in selection.by_sweep[""]}
+def test_experiments_and_unions_can_aim_words(project):
+    reduce = {each.dataset.name: each.fit.reduce for each in configs("experiment=paper_scenes_quick")}
     assert reduce.pop("vortex") == 2
     assert set(reduce.values()) == {1}
-    with pytest.raises(ConfigError, match="aimed: expected names of data sets, got enginge"):
-        selected(("dataset=engine", "+aimed.enginge=[]"), nothing)
+    for later, width in (((), 99), (("dataset.wood.image=77",), 77)):
+        listed = configs(BOTH, "fit=quick", *later)
+        assert {each.dataset.name for each in listed if each.views.width == width} == {"wood"}
 
 
 def test_a_union_runs_each_of_its_experiments(project):
-    runs = {
-        (config.dataset.name, fit_folder(config), config.edit.name)
-        for config in selected(("experiment=both", "fit=quick"), nothing).by_sweep[""]
-    }
-    assert runs == {
+    listed = configs(BOTH, "fit=quick")
+    assert {(each.dataset.name, fit_folder(each), each.edit.name) for each in listed} == {
         *((name, "quick", "none") for name in ("engine", "jets", "sphere", "wood")),
         *((name, "gaussians_quick", "none") for name in ("engine", "wood")),
         *((name, "quick", "glass") for name in ("engine", "wood")),
@@ -113,65 +122,29 @@ def test_a_union_runs_each_of_its_experiments(project):
     }
 
 
-def test_a_union_can_aim_words(project):
-    configs = selected(("experiment=both", "fit=quick"), nothing).by_sweep[""]
-    assert {config.dataset.name for config in configs if config.views.width == 99} == {"wood"}
-    later = selected(("experiment=both", "fit=quick", "dataset.wood.image=77"), nothing).by_sweep[""]
-    assert {config.dataset.name for config in later if config.views.width == 77} == {"wood"}
-    (project / "both.yaml").write_text(
-        "# @package _global_\nexperiments: [scenes, pictures]\naimed: {woud: []}\n"
-    )
-    with pytest.raises(ConfigError, match=r"aimed: expected names of data sets, got woud, did you mean wood"):
-        selected(("experiment=both", "fit=quick", "results=elsewhere"), nothing)
-
-
-def test_of_a_union_the_experiments_with_the_data_set_that_is_named_are_run(project):
-    assert data_sets("experiment=both", "dataset=jets") == {"": ["jets"], "views": ["jets"]}
-    assert data_sets("experiment=both", "dataset=wood") == {"": ["wood"]}
-    with pytest.raises(ConfigError, match="dataset: expected data sets of scenes, pictures, got orbital"):
-        selected(("experiment=both", "dataset=orbital"), nothing)
-
-
-def test_a_union_sets_nothing_else_and_has_no_union(project):
-    (project / "more.yaml").write_text("# @package _global_\nexperiments: [demo]\nviews: {width: 99}\n")
-    with pytest.raises(ConfigError, match="views: an experiment with `experiments` sets experiments, each"):
-        selected(("experiment=more",), nothing)
-    (project / "nested.yaml").write_text("# @package _global_\nexperiments: [both]\n")
-    with pytest.raises(ConfigError, match="expected single experiments, got both, which has several"):
-        selected(("experiment=nested",), nothing)
-
-
-def test_what_is_missing_is_left_out_and_told(project):
-    selection = selected(("experiment=scenes", "missing=skip"), without("engine", "jets"))
-    assert set(selection.by_sweep) == {"", "resolution"}
-    assert {config.dataset.name for config in selection.by_sweep[""]} == {"sphere"}
-    places = selection.left_out[LeftOut("data set engine", "engine is not there")]
-    assert {"views", "phase", "pse"} <= set(places)
-    assert len(selection.left_out) == 2
-
-
 @pytest.mark.parametrize(
     ("words", "skips"),
     [
-        (("experiment=scenes",), False),
-        (("experiment=both",), True),  # as its file says
-        (("experiment=both", "dataset=jets"), False),  # what is asked for by its name is not left out
-        (("experiment=both", "dataset=jets", "missing=skip"), True),
-        (("experiment=both", "missing=stop"), False),
+        ((SCENES,), False),
+        ((SCENES, "missing=skip"), True),
+        ((BOTH,), True),  # as its file says
+        ((BOTH, "dataset=jets"), False),  # what is asked for by its name is not left out
+        ((BOTH, "dataset=jets", "missing=skip"), True),
+        ((BOTH, "missing=stop"), False),
     ],
 )
-def test_what_is_missing_is_left_out_where_that_is_asked_for(words, skips, project):
+def test_what_is_missing_is_left_out_and_told_where_that_is_asked_for(project, words, skips):
     selection = selected(words, without("jets"))
-    assert bool(selection.left_out) is skips
-    assert ("jets" in {config.dataset.name for config in selection.by_sweep[""]}) is not skips
+    assert ("jets" in {each.dataset.name for each in selection.configs}) is not skips
+    assert ("views" in selection.by_sweep) is not skips
+    told = {LeftOut("data set jets", "jets is not there")} if skips else set()
+    assert set(selection.left_out) == told
+    assert all({"views", "phase", "pse"} <= set(places) for places in selection.left_out.values())
 
 
 def test_edits_that_lack_something_go_with_all_that_start_from_them():
-    def lacking(config):
-        return ["no weights"] if config.edit.name == "lobe" else []
-
     words = ("dataset=orbital", "fit=demo", "edits=[glass,gold,crimson]", "missing=skip")
-    selection = selected(words, lacking)
+    selection = selected(words, lambda config: ["no weights"] if config.edit.name == "lobe" else [])
     assert [config.edit.name for config in selection.by_sweep[""]] == ["none", "glass", "gold"]
     assert list(selection.by_sweep[""][0].edits) == ["glass", "gold"]  # what the gallery shows
     assert [each.what for each in selection.left_out] == ["edit lobe"]
@@ -193,18 +166,17 @@ def test_the_experiments_of_a_union_make_no_two_jobs_in_one_folder():
     assert {"paper", "paper_quick"} <= set(unions)
     for union in unions:
         of_folder = {}
-        selection = selected((f"experiment={union}", "missing=stop"), nothing)
-        for config in itertools.chain(*selection.by_sweep.values()):
-            for stage, each in jobs_with_all_data(config):
-                job = stage.settings(each), stage.inputs(each)
-                assert of_folder.setdefault(stage.output(each), job) == job, stage.output(each)
+        for config in selected((f"experiment={union}", "missing=stop"), nothing).configs:
+            for stage, each in stages_of(config):
+                with contextlib.suppress(MissingDataError):
+                    job = stage.settings(each), stage.inputs(each)
+                    assert of_folder.setdefault(stage.output(each), job) == job, stage.output(each)
 
 
-def jobs_with_all_data(config):
-    """The jobs of a configuration, but for those of files that are not there."""
+def stages_of(config):
+    """The stages of a configuration with those of its jobs, but for data sets that are not there."""
     for stage in STAGES.values():
         with contextlib.suppress(MissingDataError):
             for each in [replace(config, tf=name) for name in tf_names(config)] if stage.per_tf else [config]:
                 if stage.applies(each):
-                    stage.inputs(each)
                     yield stage, each

@@ -90,7 +90,8 @@ def test_a_volume_is_generated_or_a_file(tmp_path):
 
 def test_a_data_set_may_start_from_views(tmp_path):
     words = ("dataset=turbulence", "dataset.views_folder=mine", f"data_folder={tmp_path}")
-    with pytest.raises(ConfigError, match=r"no views in .*TF01"):
+    words = (*words, "dataset.volume.obtain='ask the author'")
+    with pytest.raises(ConfigError, match=r"no views in .*TF01; ask the author, or name the folder above"):
         views_folder(compose((*words, "tf=TF01")))
     (tmp_path / "mine" / "TF01").mkdir(parents=True)
     (tmp_path / "mine" / "TF01" / "transforms_train.json").touch()
