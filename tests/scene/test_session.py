@@ -20,15 +20,18 @@ def session(tmp_path):
     """Two balls, the second of which has another place."""
     models = {}
     for index, name in enumerate(("left", "v1.2/right")):
-        model = ball(index + 1)
-        path = write_model(tmp_path / f"{index}.safetensors", model)
-        models[name] = SceneModel(path)
+        models[name] = SceneModel(write_model(tmp_path / f"{index}.safetensors", ball(index + 1)))
     return Session(Scene(models))
 
 
-def half(tmp_path, index=0):
-    model = ball(index + 1)
-    return write_segment(tmp_path / "half", model, torch.arange(len(model)) % 2 == 0)
+def masks():
+    """Halves of the left ball."""
+    even = torch.arange(len(ball(1))) % 2 == 0
+    return even, ~even
+
+
+def half(tmp_path):
+    return write_segment(tmp_path / "half", ball(1), masks()[0])
 
 
 def test_frames_are_those_of_a_scene_that_was_written_so(session, tmp_path):
@@ -75,38 +78,29 @@ def test_each_change_is_undone_and_made_again(session, tmp_path):
     assert not session.redo(), "another way was taken"
 
 
-def test_an_earlier_scene_is_shown_as_it_was(session, tmp_path):
-    before, scene = session.frame(CAMERA), session.scene
-    session.set("left", "palette", (0.9, 0.1, 0.2))
-    session.add_segment("left/shell", half(tmp_path))
-    assert not np.array_equal(session.frame(CAMERA), before)
-    assert np.array_equal(session.frame(CAMERA, scene=scene), before)
-
-
-def test_a_new_segment_looks_as_its_model_does(session, tmp_path):
+def test_a_new_segment_looks_as_its_model_does_and_an_earlier_scene_as_it_was(session, tmp_path):
+    first, scene = session.frame(CAMERA), session.scene
     session.set("left", "palette", (0.9, 0.1, 0.2))
     before = session.frame(CAMERA)
+    assert not np.array_equal(before, first)
     session.add_segment("left/shell", half(tmp_path))
     assert np.array_equal(session.frame(CAMERA), before)
     session.set("left/shell", "visible", False)
     assert not np.array_equal(session.frame(CAMERA), before)
+    assert np.array_equal(session.frame(CAMERA, scene=scene), first)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (
-            lambda s: s.set("right", "opacity", 1),
-            r"expected a model of the scene \(left, v1.2/right\), got right",
-        ),
+        (lambda s: s.set("right", "opacity", 1), r"a model of the scene \(left, v1.2/right\), got right"),
         (lambda s: s.set("left/x", "opacity", 1), r"expected a segment of left \(it has none\), got x"),
         (lambda s: s.set("left", "opasity", 1), "models.left: no such key 'opasity', did you mean opacity"),
         (lambda s: s.set("left", "opacity", -1), "models.left.opacity: expected a factor from 0 to 1000"),
         (lambda s: s.set_background("red"), "background: expected three numbers"),
-        (
-            lambda s: s.set_texture("left", s.scene.models["left"].file),
-            "models.left: .*texgs-texture",
-        ),
+        (lambda s: s.set_of_scene("light", "up"), "light: expected headlight, or azimuth and polar"),
+        (lambda s: s.set_of_scene("models", 1), "the scene: no such key 'models'"),
+        (lambda s: s.set_texture("left", s.scene.models["left"].file), "models.left: .*texgs-texture"),
         (lambda s: s.add_segment("left/a.b", s.scene.models["left"].file), "expected a name without"),
         (lambda s: s.remove_segment("left"), "expected a segment to remove, got the model left"),
     ],
@@ -123,12 +117,6 @@ def test_the_file_says_what_the_session_says(session, tmp_path):
     path = session.save(tmp_path / "a.yaml")
     assert read_scene(path) == session.scene
     assert write_scene(tmp_path / "b.yaml", session.scene).read_text() == path.read_text()
-
-
-def masks():
-    """Halves of the left ball."""
-    even = torch.arange(len(ball(1))) % 2 == 0
-    return even, ~even
 
 
 def test_a_file_that_was_written_again_is_read_again(session, tmp_path):
@@ -164,17 +152,16 @@ def test_a_new_segment_replaces_the_file_of_another_session(session, tmp_path):
 
 def test_several_textures_are_one_step(session, tmp_path):
     files = {
-        "left": write_texture(tmp_path / "a", ball(1)),
-        "v1.2/right": write_texture(tmp_path / "b", ball(2)),
+        name: write_texture(tmp_path / f"texture{seed}", ball(seed))
+        for seed, name in enumerate(session.scene.models, 1)
     }
     session.set_textures(files)
     assert [entry.texture for entry in session.scene.models.values()] == list(files.values())
     assert session.undo()
     assert [entry.texture for entry in session.scene.models.values()] == [None, None]
+    files["v1.2/right"] = write_texture(tmp_path / "c", ball(3, n=9))
     with pytest.raises(ArgumentError, match="expected a texture of this model"):
-        session.set_textures(
-            {"left": files["left"], "v1.2/right": write_texture(tmp_path / "c", ball(3, n=9))}
-        )
+        session.set_textures(files)
     assert session.scene.models["left"].texture is None
 
 

@@ -28,10 +28,8 @@ async def test_a_turntable_begins_with_the_view(browser, client, monkeypatch):
     monkeypatch.setattr("texgs.viewer.downloads.FRAMES", 4)
     name, film = await saved(browser, client, "gif")
     assert name == "scene.gif"
-    frames = [
-        np.asarray(each.convert("RGB")).astype(int)
-        for each in ImageSequence.Iterator(Image.open(io.BytesIO(film)))
-    ]
+    pictures = ImageSequence.Iterator(Image.open(io.BytesIO(film)))
+    frames = [np.asarray(each.convert("RGB")).astype(int) for each in pictures]
     await browser.send(type="view", id=1, **VIEW)
     _, shown = await browser.next("frame")
     assert len(frames) == 4
@@ -43,8 +41,7 @@ async def test_a_turntable_begins_with_the_view(browser, client, monkeypatch):
 async def test_the_scene_is_written_as_it_is_shown(browser, client):
     _, whole = await saved(browser, client, "3dgs")
     await browser.send(type="edit", part="TF02", key="visible", value=False)
-    while not (await browser.next("scene"))["past"]:
-        pass
+    await browser.past("TF02 visible off")
     _, part = await saved(browser, client, "3dgs")
     counts = [len(PlyData.read(io.BytesIO(each))["vertex"]) for each in (whole, part)]
     assert counts[1] == counts[0] // 2
@@ -57,9 +54,7 @@ async def test_the_scene_is_written_as_it_is_shown(browser, client):
 @on_page
 async def test_what_a_scene_cannot_be_is_told(browser, client, kind):
     await browser.send(type="export", kind=kind, view=VIEW)
-    assert (
-        f"expected one of mp4, gif, 3dgs, 2dgs, points, mesh, html, got '{kind}'"
-        in (await browser.next("notice"))["text"]
-    )
+    said = (await browser.next("notice"))["text"]
+    assert f"expected one of mp4, gif, 3dgs, 2dgs, points, mesh, html, got '{kind}'" in said
     async with client.get(f"/{TOKEN}/files/scene.html") as answer:
         assert answer.status == 404

@@ -200,7 +200,6 @@ async def test_edits_of_one_movement_are_one_step(browser):
         ),
         ({"part": "TF01", "key": "palette", "value": {"a": 1}}, "expected three numbers from 0 to 1"),
         ({"part": "", "key": "light", "value": "up"}, "expected headlight, or azimuth and polar"),
-        ({"part": "", "key": "models", "value": 1}, "the scene: no such key 'models'"),
     ],
 )
 @on_page
