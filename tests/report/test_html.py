@@ -2,13 +2,12 @@ import base64
 import io
 import json
 import re
-from html.parser import HTMLParser
 from urllib.parse import unquote
 
 import pytest
 from PIL import Image
 
-from tests.report.written import job
+from tests.report.written import Page, job
 from tests.study.studies import study
 from texgs.report.html import write_report as write_records
 from texgs.report.metrics_files import LeftOut, read_known
@@ -26,35 +25,6 @@ from texgs.report.sections import SECTIONS
 from texgs.study.ballots import Ballot, Votes
 from texgs.study.votes import shown, study_table
 from texgs.workflow.differences import differences_of
-
-VOID = {"meta", "img", "br"}
-
-
-class Page(HTMLParser):
-    """What a browser would find: headings in order, anchors and links, and captions of figures."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.ids, self.links, self.sources, self.open, self.texts = [], [], [], [], []
-        self.feed(text)
-        assert not self.open
-
-    def handle_starttag(self, tag, attributes):
-        values = dict(attributes)
-        self.ids += [values["id"]] if "id" in values else []
-        self.links += [values["href"]] if "href" in values else []
-        self.sources += [values["src"]] if "src" in values else []
-        self.open += [] if tag in VOID else [tag]
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if data.strip() and self.open:
-            self.texts.append((self.open[-1], data.strip()))
-
-    def of(self, tag):
-        return [text for name, text in self.texts if name == tag]
 
 
 @pytest.fixture
@@ -97,12 +67,13 @@ def page(tmp_path, paths, left_out=()):
 
 def test_sections_are_in_the_papers_order_and_every_link_leads_somewhere(tmp_path, paths):
     document = page(tmp_path, paths)
-    keys = [key for key in document.ids if key in SECTIONS]
+    keys = [key for key in document.values("id") if key in SECTIONS]
     assert keys == [key for key in SECTIONS if key in keys]
     assert set(keys) == set(SECTIONS) - {"scenes", "ablations", "sizes"}, "these have nothing to show"
-    assert len(document.ids) == len(set(document.ids))
-    assert {link for link in document.links if not link.startswith("#")} == set()
-    assert {link[1:] for link in document.links} <= set(document.ids)
+    ids, links = document.values("id"), document.values("href")
+    assert len(ids) == len(set(ids))
+    assert {link for link in links if not link.startswith("#")} == set()
+    assert {link[1:] for link in links} <= set(ids)
 
 
 def test_every_figure_has_its_words_and_command(tmp_path, paths):
@@ -115,8 +86,8 @@ def test_every_figure_has_its_words_and_command(tmp_path, paths):
         "texgs comparison dataset=engine tf=TF01 fit=a 'fits=[a,b]'",
         "texgs sheet dataset=engine tf=TF01",
     }
-    assert len(document.sources) == 11, "nine pictures, the curve of the fit and the paper's votes"
-    for source in document.sources:
+    assert len(document.values("src")) == 11, "nine pictures, the curve of the fit and the paper's votes"
+    for source in document.values("src"):
         kind, data = source.split(";base64,")
         assert kind == "data:image/webp"
         assert Image.open(io.BytesIO(base64.b64decode(data))).format == "WEBP"
@@ -171,19 +142,21 @@ def test_votes_have_their_table_and_figure(tmp_path, paths):
 def test_rows_lead_to_their_jobs(tmp_path, paths):
     document = page(tmp_path, paths)
     timing = sorted(paths).index(paths[1]) + 1
-    assert document.links.count(f"#job-{timing}") == 1
-    assert [key for key in document.ids if key.startswith("job-")] == [f"job-{n}" for n in range(1, 10)]
+    assert document.values("href").count(f"#job-{timing}") == 1
+    assert [key for key in document.values("id") if key.startswith("job-")] == [
+        f"job-{n}" for n in range(1, 10)
+    ]
 
 
 def test_what_was_left_out_stands_on_top(tmp_path, paths):
     old = tmp_path / "old.json"
     old.write_text('{"stage": "texture", "dataset": "engine", "numbers": {"surfels": 9}}')
     document = page(tmp_path, [*paths, old], [LeftOut("data set wood", "no <file>", ["phase"])])
-    assert document.ids[0] == "left-out"
+    assert document.values("id")[0] == "left-out"
     first, second = document.of("li")[:2]
     assert first == "data set wood: no <file>."
     assert second.startswith("1 metrics file: of another version of texgs")
-    assert "left-out" not in page(tmp_path, paths).ids
+    assert "left-out" not in page(tmp_path, paths).values("id")
 
 
 def test_a_scene_opens_in_the_report_where_it_is_small_and_elsewhere_by_a_link(tmp_path, folder):

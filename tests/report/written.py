@@ -1,7 +1,8 @@
-"""Metrics files of jobs that were never run, and rows of tables by their headings."""
+"""Metrics files of jobs that were never run, rows of tables by their headings, and what pages hold."""
 
 import csv
 import json
+from html.parser import HTMLParser
 from importlib.resources import files
 
 from PIL import Image
@@ -59,3 +60,36 @@ def lines(name):
     text = files("texgs.report").joinpath("paper", f"{name}.csv").read_text().splitlines()
     rows = csv.DictReader(line for line in text if not line.startswith("#"))
     return [{key: number(value) for key, value in row.items()} for row in rows]
+
+
+class Page(HTMLParser):
+    """What a browser would find: tags with their attributes, and the text in each; all tags are closed."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.tags, self.texts, self.open = [], [], []
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag, attributes):
+        self.tags.append((tag, dict(attributes)))
+        self.open += [] if tag in ("meta", "img", "br", "input") else [tag]
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if data.strip() and self.open:
+            self.texts.append((self.open[-1], data.strip()))
+
+    def all(self, tag):
+        """Return the attributes of all tags of a kind."""
+        return [attributes for name, attributes in self.tags if name == tag]
+
+    def values(self, key):
+        """Return the values of an attribute."""
+        return [attributes[key] for _, attributes in self.tags if key in attributes]
+
+    def of(self, tag):
+        """Return the texts in all tags of a kind."""
+        return [text for name, text in self.texts if name == tag]

@@ -6,37 +6,18 @@ import re
 import shutil
 import subprocess
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from tests.report.written import Page
 from tests.study.studies import study
 from texgs.study.ballot_page import ballot_page, picture_uri
 
 TWO = study("xyz", "yx").questions
 TEXT = study("xy", follows="instruction").questions
 FILM = b"not a film"
-
-
-class Page(HTMLParser):
-    """Tags with their attributes, and the text of each kind of tag."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.tags, self.texts, self.inside = [], {}, ""
-        self.feed(text)
-
-    def handle_starttag(self, tag, attributes):
-        self.tags.append((tag, dict(attributes)))
-        self.inside = tag
-
-    def handle_data(self, data):
-        self.texts.setdefault(self.inside, []).append(data)
-
-    def all(self, tag):
-        return [attributes for name, attributes in self.tags if name == tag]
 
 
 @pytest.fixture
@@ -54,13 +35,11 @@ def test_every_option_has_a_radio_button_for_every_rank():
         *((f"2-{letter}", rank) for letter in "AB" for rank in "12"),
     ]
     assert [each["data-letter"] for each in page.all("fieldset")] == [*"ABC", *"AB"]
-    assert [text for text in page.texts["legend"] if text.strip()] == [
-        f"Clip {letter}" for letter in ("A", "B", "C", "A", "B")
-    ]
+    assert page.of("legend") == [f"Clip {letter}" for letter in "ABCAB"]
     places = [(each["data-column"], each["data-row"]) for each in page.all("canvas")]
     assert len(set(places[:4])) == 4, "the scene before the edits and three options"
     assert all(each["aria-label"] and each["role"] == "img" for each in page.all("canvas"))
-    assert [base64.b64decode(text) for text in page.texts["template"] if text.strip()] == [FILM, FILM]
+    assert [base64.b64decode(text) for text in page.of("template")] == [FILM, FILM]
 
 
 def test_nothing_is_loaded_and_only_its_own_style_and_script_run(picture):

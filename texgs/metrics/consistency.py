@@ -48,12 +48,9 @@ class Difference(NamedTuple):
 class ViewConsistency:
     """How much pairs of views differ where they see the same."""
 
-    rmse: float
-    """Root of the mean over pairs of the mean squared difference, in units of colour; 0 is best."""
-    perceptual: float | None
-    """Mean over pairs, or None where it was not measured."""
-    covered: float
-    """Mean share of the pixels of an object that a pair compares."""
+    rmse: float  # root of the mean over pairs of the mean squared difference, in units of colour
+    perceptual: float | None  # mean over pairs; None where it was not measured
+    covered: float  # mean share of the pixels of an object that a pair compares
     pairs: int
 
     @classmethod

@@ -25,18 +25,12 @@ if TYPE_CHECKING:
 class Measure:
     """One number of a metric and its column in tables."""
 
-    name: str
-    """Its key in metrics.json."""
-    title: str
-    """Heading of its column, with the unit where it has one."""
-    digits: int | None = None
-    """How many stand after the point; None for what is no number."""
-    better: Literal["", "up", "down"] = ""
-    """Which way is better."""
-    published: str = ""
-    """Column of the paper's tables of edits."""
-    words: Mapping[Any, str] | None = None
-    """What tables say in place of its values."""
+    name: str  # its key in metrics.json
+    title: str  # heading of its column, with the unit where it has one
+    digits: int | None = None  # how many stand after the point; None for what is no number
+    better: Literal["", "up", "down"] = ""  # which way is better
+    published: str = ""  # column of the paper's tables of edits
+    words: Mapping[Any, str] | None = None  # what tables say in place of its values
 
 
 @dataclass(frozen=True)
@@ -45,14 +39,10 @@ class Metric:
 
     name: str
     measures: tuple[Measure, ...]
-    run: Callable[[MeasuredScene], Mapping[str, Any]]
-    """Returns values by the names of measures and notes; what cannot be measured is left out."""
-    notes: Mapping[str, str] | None = None
-    """Words that it returns beside its numbers, and the sentences of captions that hold them."""
-    order: int = 100
-    """Where its columns stand; the lowest come first."""
-    is_in_paper: bool = True
-    """Whether the tables that are as in the paper have its columns, not only those of all measures."""
+    run: Callable[[MeasuredScene], Mapping[str, Any]]  # values of measures and notes, those that there are
+    notes: Mapping[str, str] | None = None  # words beside numbers, and the sentences that hold them
+    order: int = 100  # where its columns stand; the lowest come first
+    is_in_paper: bool = True  # whether tables that are as in the paper have its columns, too
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,17 +21,8 @@ from texgs.report.tables import specs, sweeps_of, tables_of
 
 JOB = ("stage", "dataset", "tf", "recipe", "edit", "variant", "seed", "seconds", "peak_memory_mib", "device")
 SOURCE = ("config_sha", "code_sha", "git_sha", "run")
+LOSSES = "Loss of single views while fields were fitted."
 SWEPT = "Means over seeds with their standard deviation, of what differs; below them the edited scenes."
-
-
-@dataclass(frozen=True)
-class Section:
-    """A part of the report."""
-
-    key: str
-    title: str
-    tables: dict[str, Table]  # by name
-    figures: dict[str, list[Figure]]  # by data set
 
 
 def write_report(
@@ -78,8 +68,8 @@ def write_report(
 
 def sections(
     records: Sequence[Record[Any]], tables: Mapping[str, Table], pictures: Mapping[str, list[Figure]]
-) -> list[Section]:
-    """Return the sections that have something to show."""
+) -> list[dict[str, Any]]:
+    """Return the sections that have something to show, with tables by name and figures by data set."""
     places = {spec.name: spec.section for spec in specs(sweeps_of(records))}
     shown = []
     for key, title in SECTIONS.items():
@@ -88,7 +78,7 @@ def sections(
         for figure in pictures[key]:
             by_dataset.setdefault(figure.dataset, []).append(figure)
         if own or by_dataset:
-            shown.append(Section(key, title, own, by_dataset))
+            shown.append({"key": key, "title": title, "tables": own, "figures": by_dataset})
     return shown
 
 
@@ -98,11 +88,8 @@ def loss_figures(records: Sequence[Record[Any]]) -> list[Figure]:
     for record in in_order(of(FitResult, records)):
         if len(record.result.losses) > 1 and not record.is_swept:
             by_dataset.setdefault(record.title, []).append(record)
-    shown = "Loss of single views while fields were fitted."
-    return [
-        Figure(title, "", shown, data_uri(curves(phases)), "", is_narrow=True)
-        for title, phases in by_dataset.items()
-    ]
+    drawn = {title: data_uri(curves(phases)) for title, phases in by_dataset.items()}
+    return [Figure(title, "", LOSSES, uri, "", is_narrow=True) for title, uri in drawn.items()]
 
 
 def curves(phases: Sequence[Record[FitResult]]) -> Image.Image:

@@ -69,16 +69,9 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
             picture = record.path.with_name(name)
             is_of_all = isinstance(record.result, GalleryResult) or not record.is_swept
             if picture.is_file() and name not in UNREPORTED and is_of_all:
-                figure = Figure(
-                    record.title,
-                    label(record),
-                    words,
-                    data_uri(Image.open(picture)),
-                    command(record),
-                    is_narrow=name in NARROW or name.startswith("style"),
-                    **page(record, folder),
-                )
-                by_section[section_of(record, name)].append(figure)
+                is_narrow, uri = name in NARROW or name.startswith("style"), data_uri(Image.open(picture))
+                told = (record.title, label(record), words, uri, command(record), is_narrow)
+                by_section[section_of(record, name)].append(Figure(*told, **page(record, folder)))
     return by_section
 
 
@@ -105,8 +98,7 @@ def section_of(record: Record[Any], picture: str) -> str:
 
 def label(record: Record[Any]) -> str:
     """Return the basic TF, fit and edit of a job, as far as it is of one."""
-    edit = edit_of(record)
-    return " ".join(filter(None, (record.tf, record.label, edit)))
+    return " ".join(filter(None, (record.tf, record.label, edit_of(record))))
 
 
 def edit_of(record: Record[Any]) -> str:
@@ -116,15 +108,11 @@ def edit_of(record: Record[Any]) -> str:
 
 
 def command(record: Record[Any]) -> str:
-    """Return the command that makes the pictures of a job, but for what its run overrode.
-
-    It is empty for galleries, whose words tell it.
-    """
-    result, fits = record.result, [record.recipe]
+    """Return the command that makes a job's pictures, but for overrides; words of a gallery tell it."""
+    result = record.result
     if isinstance(result, GalleryResult):
         return ""
-    if isinstance(result, ComparisonResult):
-        fits = result.recipes
+    fits = result.recipes if isinstance(result, ComparisonResult) else [record.recipe]
     words = {
         "tf": record.tf,
         "fit": next(iter(fits), ""),

@@ -34,10 +34,8 @@ def run(measured: MeasuredScene) -> dict[str, float]:
         )
         for style in measured.styles
     ]
-    means = {
-        "style_nnfm": fmean(each.nnfm for each in compared),
-        "style_gram": fmean(each.gram for each in compared),
-    }
+    names = {"style_nnfm": "nnfm", "style_gram": "gram"}
+    means = {name: fmean(getattr(each, key) for each in compared) for name, key in names.items()}
     return {name: value for name, value in means.items() if isfinite(value)}
 
 
