@@ -12,9 +12,9 @@ from texgs.report.results import plain
 from texgs.report.table import SOURCES
 
 
-def metrics(folder, stage, result, dataset="engine", tf=None, recipe="quick", **facts):
+def metrics(folder, stage, result, dataset="engine", tf=None, recipe="quick", name="", **facts):
     """Write the metrics file of a job; returns its path."""
-    path = folder / f"{len(list(folder.iterdir())):04}.json"
+    path = folder / (name or f"{len(list(folder.iterdir())):04}.json")
     record = {"stage": stage, "dataset": dataset, "tf": tf, "recipe": recipe, "field": "surfels"}
     record |= {"device": "CPU", "peak_memory_mib": 1024.0, "variant": "", "sweep": "none", "seed": 0}
     record |= {"seconds": 1.0, "versions": {"python": "3"}}

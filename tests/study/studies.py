@@ -1,31 +1,27 @@
 """Results with edited scenes, as the workflow leaves them, and studies of them."""
 
-import json
-
-from texgs.report.results import EditResult, FitResult, SceneResult, plain
+from tests.report.written import metrics
+from texgs.report.results import EditResult, FitResult, SceneResult
 from texgs.study.questions import Option, Question, Study
 
 STYLE = {"TF01": "waves"}
 WORDS = {"TF01": "make it gold"}
 
 
-def job(folder, stage, result, dataset="engine", recipe="quick", tf=None, pictures=(), variant=""):
+def job(folder, stage, result, pictures=(), **facts):
     """metrics.json of a job."""
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / "metrics.json"
-    record = {"stage": stage, "dataset": dataset, "recipe": recipe, "tf": tf, "peak_memory_mib": 1.0}
-    record["variant"] = variant
-    told = {"result": type(result).__name__, "numbers": plain(result)}
-    path.write_text(json.dumps({**record, **told, "pictures": dict.fromkeys(pictures, "a picture")}))
-    return path
+    facts["pictures"] = dict.fromkeys(pictures, "a picture")
+    return metrics(folder, stage, result, name="metrics.json", **facts)
 
 
 def fit(results, recipe="quick", dataset="engine", psnr=30.0):
     """A fit of one basic TF, and its scene."""
     place = results / dataset
     result = FitResult(1.0, 9, psnr=psnr)
-    job(place / "TF01" / recipe / "texture", "texture", result, dataset, recipe, tf="TF01")
-    return job(place / "scene" / recipe / "compose", "compose", SceneResult(1, 9), dataset, recipe)
+    facts = {"dataset": dataset, "recipe": recipe}
+    job(place / "TF01" / recipe / "texture", "texture", result, tf="TF01", **facts)
+    return job(place / "scene" / recipe / "compose", "compose", SceneResult(1, 9), **facts)
 
 
 def edit(results, name, recipe="quick", dataset="engine", followed=STYLE, method="image", variant=""):
@@ -34,20 +30,14 @@ def edit(results, name, recipe="quick", dataset="engine", followed=STYLE, method
     result = EditResult(name, method, "somehow", 1.0, follows=follows, followed=followed)
     pictures = ["style.png", "edit.png"] if follows == "style" else ["edit.png"]
     place = results / dataset / "scene" / recipe / "edits" / "-".join(filter(None, (name, variant)))
-    return job(place, f"edit_{method}", result, dataset, recipe, pictures=pictures, variant=variant)
+    facts = {"dataset": dataset, "recipe": recipe, "variant": variant}
+    return job(place, f"edit_{method}", result, pictures, **facts)
 
 
 def study(*orders, follows="style"):
     """A study with a question for each order of methods, which are single letters: "yxz"."""
-    questions = [
-        Question(
-            f"data{place}",
-            follows,
-            STYLE if follows == "style" else WORDS,
-            "scene.yaml",
-            [],
-            [Option("quick", f"edit_{name}", name, f"{name}/scene.yaml") for name in order],
-        )
-        for place, order in enumerate(orders, start=1)
-    ]
+    followed, questions = STYLE if follows == "style" else WORDS, []
+    for place, order in enumerate(orders, start=1):
+        options = [Option("quick", f"edit_{name}", name, f"{name}/scene.yaml") for name in order]
+        questions.append(Question(f"data{place}", follows, followed, "scene.yaml", [], options))
     return Study("0123456789ab", 0, questions)

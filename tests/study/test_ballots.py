@@ -51,24 +51,20 @@ def test_an_incomplete_ballot_is_refused(tmp_path, lines, message):
 
 
 def test_a_ballot_of_another_study_one_that_is_there_twice_and_other_files_are_refused(tmp_path):
-    with pytest.raises(
-        ArgumentError, match=r"b\.csv: expected study 0123456789ab, got ffff; count it with the key"
-    ):
-        read_ballot(STUDY, ballot(tmp_path, study="ffff", file="b.csv"))
     paths = [ballot(tmp_path, file="one.csv"), ballot(tmp_path, file="two.csv")]
-    with pytest.raises(
-        ArgumentError, match=r"two\.csv: expected another ballot than .*one\.csv, got the same"
-    ):
+    with pytest.raises(ArgumentError, match=r"two\.csv: expected another ballot than .*one\.csv, got the sa"):
         read_votes(STUDY, paths)
+    ballot(tmp_path, study="ffff", file="other.csv")
     both = paths[0].read_text() + ballot(tmp_path, name="bb").read_text().partition("\n")[2]
     (tmp_path / "both.csv").write_text(both)
-    with pytest.raises(ArgumentError, match=r"both\.csv: expected ballot aa, got bb"):
-        read_ballot(STUDY, tmp_path / "both.csv")
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\r\n\xff\xfe")
-    with pytest.raises(ArgumentError, match=r"picture\.csv: expected a ballot, got"):
-        read_ballot(STUDY, tmp_path / "picture.csv")
     (tmp_path / "long.csv").write_text("study\n" * 300_000)
-    with pytest.raises(ArgumentError, match=r"long\.csv: expected a ballot of at most 1048576 bytes"):
-        read_ballot(STUDY, tmp_path / "long.csv")
-    with pytest.raises(ArgumentError, match=r"none\.csv: no such file"):
-        read_ballot(STUDY, tmp_path / "none.csv")
+    for name, message in {
+        "other": "expected study 0123456789ab, got ffff; count it with the key",
+        "both": "expected ballot aa, got bb",
+        "picture": "expected a ballot, got",
+        "long": "expected a ballot of at most 1048576 bytes",
+        "none": "no such file",
+    }.items():
+        with pytest.raises(ArgumentError, match=rf"{name}\.csv: {message}"):
+            read_ballot(STUDY, tmp_path / f"{name}.csv")

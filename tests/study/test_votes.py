@@ -22,9 +22,8 @@ BALLOTS = [  # ranks by letter: x is the best, y is mostly second
 def test_votes_go_to_methods_whatever_their_letter():
     table = user_study(Votes(STUDY, BALLOTS))
     ours = [row for row in rows(table) if row["edit"] != "the paper"]
-    assert [
-        (row["data set"], row["method"], row["rank 1"], row["rank 2"], row["rank 3"]) for row in ours
-    ] == [
+    columns = ("data set", "method", "rank 1", "rank 2", "rank 3")
+    assert [tuple(row[title] for title in columns) for row in ours] == [
         ("data1", "x", 2, 0, 0),
         ("data1", "y", 0, 1, 1),
         ("data1", "z", 0, 1, 1),

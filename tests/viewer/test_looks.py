@@ -146,10 +146,8 @@ async def test_a_picture_of_the_user_is_taken_in(browser, client, tmp_path):
         assert answer.status == 403
     async with client.post(path, data=bytes(33 * 2**20), headers=headers) as answer:
         assert answer.status == 413
-    async with client.get(f"{path}/dots.jpg") as answer:
-        assert answer.content_type == "image/jpeg"
-    async with client.get(f"{path}/other.jpg") as answer:
-        assert answer.status == 404
+    async with client.get(f"{path}/dots.jpg") as answer, client.get(f"{path}/other.jpg") as other:
+        assert (answer.content_type, other.status) == ("image/jpeg", 404)
 
 
 @pytest.mark.parametrize(
@@ -252,7 +250,6 @@ async def test_many_previews_of_one_part_leave_that_of_another(browser, client, 
 async def test_a_folder_that_cannot_be_written_is_a_sentence(browser, client, scene_file):
     client.server_side.edits.new_folder = lambda kind: scene_file / kind
     await browser.send(**look(style="glass"))
-    notice = await browser.next("notice")
-    while notice["level"] == "info":
-        notice = await browser.next("notice")
+    while (notice := await browser.next("notice"))["level"] == "info":
+        pass
     assert "cannot be written (Not a directory); start texgs view with another --folder" in notice["text"]

@@ -42,9 +42,8 @@ def scene(tmp_path):
     """Two models in a folder of results; the first has views, which it renders itself."""
     models = {}
     for seed, name in enumerate(("TF01", "TF02"), 1):
-        models[name] = SceneModel(
-            write_model(tmp_path / name / "quick/texture/model.safetensors", ball(seed))
-        )
+        file = tmp_path / name / "quick/texture/model.safetensors"
+        models[name] = SceneModel(write_model(file, ball(seed)))
     alone = Session(Scene({"TF01": models["TF01"]}))
     folder, views = tmp_path / "TF01/views", []
     for index, place in enumerate(PLACES):
@@ -58,10 +57,8 @@ def scene(tmp_path):
 
 
 def only(scene, name):
-    hidden = {
-        each: replace(entry, edit=PartEdit(visible=each == name)) for each, entry in scene.models.items()
-    }
-    return replace(scene, models=hidden)
+    models = {key: replace(x, edit=PartEdit(visible=key == name)) for key, x in scene.models.items()}
+    return replace(scene, models=models)
 
 
 def view(mode, azimuth=80.0, polar=10.0, width=SIZE):
@@ -80,8 +77,7 @@ def test_the_view_that_is_nearest_is_shown(scene):
 
 
 def test_the_difference_is_that_of_the_scene_under_the_light_of_the_view(scene):
-    result = origins(scene)
-    shown = only(scene, "TF01")
+    result, shown = origins(scene), only(scene, "TF01")
     assert result.frame(view("difference"), shown, 1.0).max() <= GAIN
     entry = shown.models["TF01"]
     half = replace(shown, models={**shown.models, "TF01": replace(entry, edit=PartEdit(opacity=0.5))})
