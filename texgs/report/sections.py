@@ -71,18 +71,18 @@ def figures(records: Sequence[Record[Any]], folder: Path) -> dict[str, list[Figu
             if picture.is_file() and name not in UNREPORTED and is_of_all:
                 is_narrow, uri = name in NARROW or name.startswith("style"), data_uri(Image.open(picture))
                 told = (record.title, label(record), words, uri, command(record), is_narrow)
-                by_section[section_of(record, name)].append(Figure(*told, **page(record, folder)))
+                by_section[section_of(record, name)].append(Figure(*told, *page(record, folder)))
     return by_section
 
 
-def page(record: Record[Any], folder: Path) -> dict[str, str]:
-    """Return the page of a scene, or the way to it, where a job has made one."""
+def page(record: Record[Any], folder: Path) -> tuple[str, str]:
+    """Return the page of a scene, or the way to it, where a job has made one; the other is empty."""
     file = record.path.with_name("scene.html")
     if not isinstance(record.result, PageResult) or not file.is_file():
-        return {}
+        return "", ""
     if record.result.is_embedded:
-        return {"page": json.dumps(file.read_text(encoding="utf-8")).replace("</", r"<\/")}
-    return {"link": quote(Path(os.path.relpath(file, folder)).as_posix())}
+        return json.dumps(file.read_text(encoding="utf-8")).replace("</", r"<\/"), ""
+    return "", quote(Path(os.path.relpath(file, folder)).as_posix())
 
 
 def section_of(record: Record[Any], picture: str) -> str:
