@@ -1,6 +1,7 @@
 """Wrong arguments give one clear sentence; unusual but right ones work."""
 
 import ctypes
+import math
 from dataclasses import replace
 
 import pytest
@@ -12,7 +13,7 @@ from tests.raster.scenes import gaussians, random_scene, textured, textured_with
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError, TexgsError
 from texgs.raster import autograd, native
 from texgs.raster.api import rasterize, splat
-from texgs.raster.autograd import SurfelTensors, View
+from texgs.raster.autograd import SurfelTensors, View, bin_surfels
 from texgs.raster.reference import rasterize as reference
 from texgs.raster.types import Options, Texture
 
@@ -87,102 +88,95 @@ def test_camera_and_background_are_constants(device, name):
 
 
 @pytest.mark.parametrize("render", [rasterize, reference])
-def test_a_colour_is_needed(render):
-    with pytest.raises(ArgumentError, match="expected features, a texture or both, got neither"):
-        replace(random_scene(), features=None).render(render)
+def test_what_nothing_can_draw(render):
+    def refused(message, scene, outputs=()):
+        refuses((ArgumentError, ShapeError), message, scene.render, render, outputs)
+
+    scene = random_scene()
+    refused("expected features, a texture or both, got neither", replace(scene, features=None))
+    for columns in (1, 4):
+        message = r"scales: expected \[N, 2\] or \[N, 3\], got \[200, .*; 2 draw surfels, 3 draw 3D Gaussians"
+        refused(message, replace(scene, scales=torch.rand(N, columns)))
+    in_space = replace(textured(scene), scales=torch.rand(N, 3))
+    refused(r"texture: expected features for 3D Gaussians .* to draw surfels", in_space)
+    refused(r"outputs: 3D Gaussians .* have no normal; leave it out", gaussians(scene), ("depth", "normal"))
 
 
-@pytest.mark.parametrize("channels", [0, 30])
-def test_wrong_number_of_features_beside_a_texture(channels):
-    with pytest.raises(ArgumentError, match=f"features: expected 1 to 29 channels, got {channels}"):
-        textured_with_features(random_scene(), channels).render(rasterize)
+def test_wrong_sizes_cameras_and_outputs():
+    scene = random_scene()
+
+    def refused(message, outputs=(), error=ArgumentError, **changes):
+        refuses(error, message, replace(scene, **changes).render, rasterize, outputs)
+
+    for width, height in ((0, 5), (5, -1), (2**31, 5), (2**20 - 15, 1), (1, 2**20 - 15)):
+        refused("width, height: expected 1 to", width=width, height=height)
+    refused(r"width, height: expected whole numbers, got 5\.0", width=5.0)
+    refused(r"viewmat\[.*did you transpose\?", viewmat=scene.viewmat.T)
+    refused(r"K\[.*did you transpose\?", K=scene.K.T)
+    for fx, fy in ((0.0, 9.0), (-10.0, 9.0), (9.0, -1.0)):
+        message = rf"K: expected focal lengths above 0, got .*= {min(fx, fy)}"
+        refused(message, K=torch.diag(torch.tensor([fx, fy, 1.0])))
+    refused("'depths'", ("depths",))
+    refused(r"outputs: .* got a string; pass \('depth',\)", "depth")
+    refused(r"scales: .*\[200, 2\|3\], .*; did you transpose", (), ShapeError, scales=torch.rand(3, N))
+    refused("features: expected device cpu", (), DeviceError, features=torch.rand(N, 3, device="meta"))
+    refuses(DeviceError, "cpu or cuda, got meta", scene.to("meta").render, rasterize)
 
 
-def test_background_of_a_texture_with_features():
-    scene = textured_with_features(random_scene(), 2)
-    with pytest.raises(ShapeError, match=r"background: expected \[5\], got \[3\]"):
-        replace(scene, background=torch.rand(3)).render(rasterize)
+def test_wrong_numbers_of_channels():
+    scene = random_scene()
+    for channels in (0, 33):
+        message, image = f"1 to 32 channels, got {channels}", torch.zeros(5, 5, channels)
+        refuses(ArgumentError, message, random_scene(channels=channels).render, rasterize)
+        refuses(ArgumentError, message, splat, image, **scene.geometry())
+    for channels in (0, 30):
+        message = f"features: expected 1 to 29 channels, got {channels}"
+        refuses(ArgumentError, message, textured_with_features(scene, channels).render, rasterize)
+    beside = replace(textured_with_features(scene, 2), background=torch.rand(3))
+    refuses(ShapeError, r"background: expected \[5\], got \[3\]", beside.render, rasterize)
 
 
-@pytest.mark.parametrize("render", [rasterize, reference])
-def test_what_gaussians_do_not_have(render):
-    scene = gaussians(random_scene())
-    with pytest.raises(
-        ArgumentError, match=r"texture: expected features for 3D Gaussians .* to draw surfels"
-    ):
-        replace(textured(random_scene()), scales=scene.scales).render(render)
-    with pytest.raises(ArgumentError, match=r"outputs: 3D Gaussians .* have no normal; leave it out"):
-        scene.render(render, ("depth", "normal"))
-
-
-@pytest.mark.parametrize("render", [rasterize, reference])
-@pytest.mark.parametrize("columns", [1, 4])
-def test_scales_of_nothing(render, columns):
-    scene = replace(random_scene(), scales=torch.rand(N, columns))
-    expected = r"scales: expected \[N, 2\] or \[N, 3\], got \[200, .*; 2 draw surfels, 3 draw 3D Gaussians"
-    refuses(ShapeError, expected, scene.render, render)
-    with pytest.raises(
-        ShapeError, match=r"scales: expected \[200, 2\|3\], got \[3, 200\]; did you transpose"
-    ):
-        replace(scene, scales=torch.rand(3, N)).render(rasterize)
+def tensors_of(scene, **changes):
+    """Return the primitives of a scene for the library, which checks for itself, and what is around them."""
+    leaves = scene.leaves() | changes
+    layout = {} if scene.texture is None else {"sizes": scene.texture.sizes, "offsets": scene.texture.offsets}
+    return SurfelTensors(**leaves), View(scene.viewmat, scene.K, 8, 8, **layout)
 
 
 def test_library_refuses_what_gaussians_do_not_have():
     scene = gaussians(random_scene())
-    view = View(scene.viewmat, scene.K, 8, 8)
-    geometry = (scene.means, scene.quats, scene.scales, scene.opacities)
-    handle = ctypes.c_void_p()
-
-    def forward(surfels, **images):
-        image = autograd.Image(**images)
-        native.call(
-            "texgs_forward",
-            *view.structures(surfels),
-            image,
-            ctypes.byref(handle),
-            device=torch.device("cpu"),
-        )
-
-    texture = textured(random_scene()).texture
-    with pytest.raises(ArgumentError, match="texture: 3D Gaussians have none"):
-        forward(SurfelTensors(*geometry, base=texture.base, gain=texture.gain, texels=texture.texels))
-    with pytest.raises(ArgumentError, match="normal: 3D Gaussians have none"):
-        forward(SurfelTensors(*geometry, features=scene.features), normal=torch.zeros(3, 8, 8))
-    five = SurfelTensors(*geometry, features=scene.features)._replace(scales=torch.rand(N, 5))
-    refuses(ArgumentError, "surfels: expected 2 scales of surfels or 3 of 3D Gaussians", forward, five)
+    of_texture = tensors_of(replace(textured(random_scene()), scales=scene.scales))
+    refuses(ArgumentError, "texture: 3D Gaussians have none", bin_surfels, *of_texture, {})
+    normal = {"normal": torch.zeros(3, 8, 8)}
+    refuses(ArgumentError, "normal: 3D Gaussians have none", bin_surfels, *tensors_of(scene), normal)
+    five, message = (
+        tensors_of(scene, scales=torch.rand(N, 5)),
+        "surfels: expected 2 scales of surfels or 3 of",
+    )
+    refuses(ArgumentError, message, bin_surfels, *five, {})
 
 
 def test_library_refuses_what_is_not_of_the_forward_call():
-    scene = random_scene()
-    view = View(scene.viewmat, scene.K, 8, 8)
-    surfels = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
-    color, alpha = torch.empty(scene.features.shape[1], 8, 8), torch.empty(8, 8)
-    image = autograd.Image(color=color, alpha=alpha)
-    handle = ctypes.c_void_p()
+    surfels, view = tensors_of(random_scene())
+    images = {"color": torch.empty(surfels.channels, 8, 8), "alpha": torch.empty(8, 8)}
+    frame = bin_surfels(surfels, view, images)
 
-    def call(name, *arguments, of=surfels, view=view):
-        native.call(name, handle, *view.structures(of), *arguments, device=torch.device("cpu"))
+    def backward(surfels, **gradients):
+        images_and_gradients = (autograd.Image(**images), autograd.Image(**gradients), autograd.Gradients())
+        structures = (*view.structures(surfels), *images_and_gradients)
+        native.call("texgs_backward", frame.pointer, *structures, device=torch.device("cpu"))
 
-    native.call(
-        *("texgs_forward", *view.structures(surfels), image, ctypes.byref(handle)), device=torch.device("cpu")
-    )
     for name in ("depth", "median", "distortion"):
-        with pytest.raises(ArgumentError, match="a gradient of depth, median or distortion without"):
-            call("texgs_backward", image, autograd.Image(**{name: alpha}), autograd.Gradients())
+        message = "a gradient of depth, median or distortion without"
+        refuses(ArgumentError, message, backward, surfels, **{name: images["alpha"]})
     fewer = SurfelTensors(*(None if x is None else x[1:] for x in surfels))
-    with pytest.raises(ArgumentError, match="frame: expected as many surfels, scales and channels as"):
-        call("texgs_backward", image, autograd.Image(), autograd.Gradients(), of=fewer)
-    with pytest.raises(ArgumentError, match="frame: expected an image as large as in the forward call"):
-        call("texgs_contribute", autograd.Contributions(), view=replace(view, width=9))
-    native.function(native.library(), "texgs_release")(handle)
+    refuses(ArgumentError, "frame: expected as many surfels, scales and channels as", backward, fewer)
+    message = "frame: expected an image as large as in the forward call"
+    refuses(ArgumentError, message, autograd.contribute, frame, surfels, replace(view, width=9), None)
 
 
 def test_library_refuses_colours_that_do_not_add_up():
-    scene = textured_with_features(random_scene(), 2)
-    texture = scene.texture
-    tensors = SurfelTensors(scene.means, scene.quats, scene.scales, scene.opacities, features=scene.features)
-    colored = tensors._replace(base=texture.base, gain=texture.gain, texels=texture.texels)
-    view = View(scene.viewmat, scene.K, 8, 8, sizes=texture.sizes, offsets=texture.offsets)
+    colored, view = tensors_of(textured_with_features(random_scene(), 2))
 
     def forward(surfels, channels):
         structures = view.structures(surfels)
@@ -191,64 +185,27 @@ def test_library_refuses_colours_that_do_not_add_up():
         native.call("texgs_forward", *structures, autograd.Image(), handle, device=torch.device("cpu"))
 
     refuses(ArgumentError, "features: expected C - 3 beside a texture", forward, colored, 3)
-    with pytest.raises(ArgumentError, match="features: expected C - 3 beside a texture"):
-        forward(colored._replace(features=None), 5)
+    bare = colored._replace(features=None)
+    refuses(ArgumentError, "features: expected C - 3 beside a texture", forward, bare, 5)
     refuses(ArgumentError, r"texture: .* are needed, with 3 channels at least", forward, colored, 2)
-    with pytest.raises(ArgumentError, match="surfels: features or a texture are needed"):
-        forward(tensors._replace(features=None), 2)
+    bare = bare._replace(base=None, gain=None, texels=None)
+    refuses(ArgumentError, "surfels: features or a texture are needed", forward, bare, 2)
 
 
-def test_wrong_device():
-    scene = random_scene()
-    with pytest.raises(DeviceError, match="features: expected device cpu"):
-        replace(scene, features=scene.features.to("meta")).render(rasterize)
-    refuses(DeviceError, "cpu or cuda, got meta", scene.to("meta").render, rasterize)
+WRONG_OPTIONS = {
+    "alpha_min": (-0.1, 1e-38, 1.5),
+    "transmittance_min": (1.0, -1e-3),
+    "low_pass": (0.0, math.nan),
+    "filter_sigma": (-1.0,),
+    "dilation": (0.0, -0.3, math.nan),
+    "near": (0.0, -1.0, 200.0),  # the last: behind the far plane
+}
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, -1), (2**31, 5), (2**20 - 15, 1), (1, 2**20 - 15)])
-def test_wrong_size(size):
-    with pytest.raises(ArgumentError, match="width, height: expected 1 to"):
-        replace(random_scene(), width=size[0], height=size[1]).render(rasterize)
-
-
-@pytest.mark.parametrize("channels", [0, 33])
-def test_wrong_number_of_channels(channels):
-    with pytest.raises(ArgumentError, match=f"1 to 32 channels, got {channels}"):
-        random_scene(channels=channels).render(rasterize)
-    scene = random_scene()
-    geometry = {
-        name: getattr(scene, name) for name in ("means", "quats", "scales", "opacities", "viewmat", "K")
-    }
-    with pytest.raises(ArgumentError, match=f"1 to 32 channels, got {channels}"):
-        splat(torch.zeros(5, 5, channels), **geometry)
-
-
-def test_unknown_output():
-    refuses(ArgumentError, "'depths'", random_scene().render, rasterize, ("depths",))
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"alpha_min": -0.1},
-        {"alpha_min": 1e-38},
-        {"alpha_min": 1.5},
-        {"transmittance_min": 1.0},
-        {"transmittance_min": -1e-3},
-        {"low_pass": 0.0},
-        {"low_pass": float("nan")},
-        {"filter_sigma": -1.0},
-        {"dilation": 0.0},
-        {"dilation": -0.3},
-        {"dilation": float("nan")},
-        {"near": 0.0},
-        {"near": -1.0},
-        {"near": 5.0, "far": 2.0},
-    ],
-    ids=str,
-)
-def test_wrong_options(wrong):
-    refuses(ArgumentError, next(iter(wrong)), random_scene().render, rasterize, options=Options(**wrong))
+@pytest.mark.parametrize("name", WRONG_OPTIONS)
+def test_wrong_options(name):
+    for value in WRONG_OPTIONS[name]:
+        refuses(ArgumentError, name, random_scene().render, rasterize, options=Options(**{name: value}))
 
 
 def test_memory_layout_does_not_matter(device, drawn):
@@ -278,35 +235,12 @@ def test_inputs_are_left_alone(device):
         assert torch.equal(leaf, copy.leaves()[name])
 
 
-@pytest.mark.parametrize("name", ["viewmat", "K"])
-def test_transposed_matrix(name):
-    scene = random_scene()
-    with pytest.raises(ArgumentError, match=rf"{name}\[.*did you transpose\?"):
-        replace(scene, **{name: getattr(scene, name).T}).render(rasterize)
-
-
-@pytest.mark.parametrize(("axis", "focal"), [(0, 0.0), (0, -10.0), (1, -1.0)])
-def test_a_focal_length_that_is_none(axis, focal):
-    scene = random_scene()
-    K = scene.K.clone()
-    K[axis, axis] = focal
-    with pytest.raises(ArgumentError, match=rf"K: expected focal lengths above 0, got .*= {focal}"):
-        replace(scene, K=K).render(rasterize)
-
-
 def test_camera_changed_before_backward():
     scene = random_scene()
     scene = replace(scene, viewmat=scene.viewmat.clone(), means=scene.means.clone().requires_grad_())
     color = scene.render(rasterize).color
     scene.viewmat[0, 3] += 0.1
     refuses(RuntimeError, "modified by an inplace operation", color.sum().backward)
-
-
-def test_outputs_as_a_string_and_fractional_sizes():
-    with pytest.raises(ArgumentError, match=r"outputs: .* got a string; pass \('depth',\)"):
-        random_scene().render(rasterize, "depth")
-    with pytest.raises(ArgumentError, match=r"width, height: expected whole numbers, got 5\.0"):
-        replace(random_scene(), width=5.0).render(rasterize)
 
 
 def test_infinitely_far_plane(device):

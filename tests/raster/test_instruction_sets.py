@@ -14,7 +14,7 @@ pytestmark = pytest.mark.subprocess
 TESTS = Path(__file__).parents[1]
 KERNELS = ("operations", "losses", "shading", "voxels", "voxel_optimizer", "convolution")
 FILES = [
-    *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "forward", "gradients", "determinism")),
+    *(TESTS / "raster" / f"test_{name}.py" for name in (*KERNELS, "images_and_gradients", "determinism")),
     TESTS / "volume" / "test_caster.py",
 ]
 CHOSEN = "not finite_differences and not emulated and not large and not cuda"

@@ -1,0 +1,201 @@
+"""Images and gradients of the native rasterizer against the definition in float64, all thresholds on."""
+
+from dataclasses import replace
+
+import pytest
+import torch
+
+from tests.raster.agreement import (
+    IMAGES,
+    decided,
+    gradients,
+    images,
+    names_of,
+    random_cotangents,
+    relative,
+    true_gradients,
+    true_images,
+)
+from tests.raster.scenes import (
+    GAUSSIAN_OPTIONS,
+    OTHER_OPTIONS,
+    PRIMITIVES,
+    SURFEL_OPTIONS,
+    TEXTURE_SIZES,
+    described,
+    random_scene,
+    textured,
+    textured_with_features,
+)
+from texgs.raster.api import rasterize
+from texgs.raster.types import DEFAULT_OPTIONS, Options
+
+# Absolute tolerances. Colours and alpha are sums of numbers below 1 in float32, whose exponents carry the
+# rounding of the intersection; depths are around 3; the distortion is at most 0.003 in these scenes.
+TOLERANCE = {"color": 3e-5, "alpha": 3e-5, "depth": 3e-5, "median": 3e-5, "normal": 5e-5, "distortion": 1e-7}
+TEXEL = 2e-6  # more for each texel that the textures span, as their random colours change from texel to texel
+UNDECIDED = 0.15  # largest share of pixels that may sit on a threshold (or, textured, on a texel centre)
+# Relative L2 of gradients, by tensor. Colours enter linearly and only carry the rounding of the weights.
+# Geometry is a sum of terms that cancel, led by few tilted surfels whose intersections lose digits; the
+# definition itself, in float32, has errors up to 1e-4 (means) and 2e-4 (quats) on such scenes.
+GRADIENT_TOLERANCE = {
+    "means": 5e-4,
+    "quats": 1e-3,
+    "scales": 2e-4,
+    "opacities": 1e-4,
+    "shift": 2e-4,
+    "features": 5e-5,
+    "base": 5e-5,
+    "gain": 1e-4,
+    "texels": 2e-4,
+}
+
+
+def check_images(scene, device, options=DEFAULT_OPTIONS):
+    """Compare all images of a scene, pixel by pixel where the definition is sure."""
+    outputs = [name for name in scene.outputs if name != "statistics"]
+    rendered = images(scene.to(device).render(rasterize, outputs, options))
+    expected = true_images(scene, outputs, options)
+    sure = decided(scene, options)
+    assert 1 - sure.double().mean() < UNDECIDED
+    texels = 0 if scene.texture is None else int(scene.texture.sizes.max())
+    for name in names_of(scene):
+        assert rendered[name].shape == expected[name].shape
+        assert rendered[name].dtype == torch.float32
+        error = (rendered[name].cpu() - expected[name]).abs()
+        tolerance = TOLERANCE[name] + (TEXEL * texels if name == "color" else 0)
+        assert float(error[sure].max()) < tolerance, name
+        assert sure.all() or (error[~sure] < 0.02).double().mean() > 0.9, name  # a weak fragment more or less
+
+
+def check_gradients(scene, device, names=("color",), options=DEFAULT_OPTIONS, wanted=None):
+    """Compare the gradients of random combinations of the images `names` in pixels off all thresholds."""
+    names = [name for name in names if name in names_of(scene)]
+    if not names:
+        return  # Gaussians have no normal
+    cotangents = random_cotangents(scene, names, decided(scene, options))
+    derivatives = gradients(rasterize, scene.to(device), cotangents, options, wanted)
+    expected = true_gradients(scene, cotangents, options, wanted)
+    for name, gradient in expected.items():
+        assert derivatives[name].shape == gradient.shape
+        assert derivatives[name].isfinite().all()
+        if gradient.norm() < 1e-9:  # no influence but for rounding, as of the scales on the median depth
+            assert derivatives[name].norm() < 1e-2, name
+        else:
+            assert relative(derivatives[name], gradient) < GRADIENT_TOLERANCE[name], name
+
+
+def shifted(scene, length):
+    """Return the scene, shifted at random."""
+    shift = torch.randn(len(scene.means), 2, generator=torch.Generator().manual_seed(0))
+    return replace(scene, shift=length * shift)
+
+
+def with_some_behind(scene):
+    """Return the scene with every third primitive behind the camera."""
+    behind = (torch.arange(len(scene.means)) % 3 == 0)[:, None]
+    return replace(scene, means=torch.where(behind, scene.means - 10 * scene.viewmat[2, :3], scene.means))
+
+
+SIZES = ((0, 150, 53, 37), (1, 300, 64, 48), (2, 400, 33, 71))  # seed, number of primitives, of pixels
+OF_BOTH = {  # a scene, and images whose gradients are compared
+    **{f"{size}": (random_scene(*size), ("color",)) for size in SIZES},
+    **{f"{n} channels": (random_scene(5, channels=n), ("color",)) for n in (1, 2, 3, 4, 5, 6)},
+    **{f"{n} and depth": (random_scene(5, channels=n), ("color", "depth")) for n in (1, 4, 7, 16, 32)},
+    **{name: (random_scene(3), (name,)) for name in IMAGES[1:]},
+    "all images": (random_scene(4), IMAGES),
+    "shift": (shifted(random_scene(7), 1), ("color", "depth")),
+    "large shift": (shifted(random_scene(9), 3), ("color",)),
+    "no shift": (shifted(random_scene(7), 0), ("color",)),
+    "black": (replace(random_scene(8), background=None), ("color",)),
+    "behind": (with_some_behind(random_scene(13)), ("color",)),
+}
+TEXTURED = {
+    **{f"{size}": (textured(random_scene(9), [size]), ("color", "depth")) for size in TEXTURE_SIZES},
+    "mixed": (textured(random_scene(8)), ("color",)),  # geometry included, through texture coordinates
+    "all images": (replace(textured(random_scene(10)), shift=torch.zeros(200, 2)), IMAGES),
+    "black": (textured(replace(random_scene(8), background=None)), ("color",)),
+    **{f"and {n}": (textured_with_features(random_scene(10), n), ("color",)) for n in (1, 3, 4, 13, 29)},
+    "and all": (textured_with_features(random_scene(10), 4), ("color", "normal", "depth")),
+}
+
+
+@pytest.mark.parametrize("name", OF_BOTH)
+def test_scenes(device, drawn, name):
+    scene, compared = OF_BOTH[name]
+    check_images(drawn(scene), device)
+    check_gradients(drawn(scene), device, compared)
+
+
+@pytest.mark.parametrize("name", TEXTURED)
+def test_textures(device, name):
+    scene, compared = TEXTURED[name]
+    check_images(scene, device)
+    check_gradients(scene, device, compared)
+
+
+def test_one_row_of_pixels(device, drawn):
+    check_images(drawn(random_scene(3, 200, 17, 1)), device)
+
+
+OPTIONS = [("surfels", options) for options in SURFEL_OPTIONS + OTHER_OPTIONS]
+OPTIONS += [("gaussians", options) for options in GAUSSIAN_OPTIONS + OTHER_OPTIONS]
+
+
+@pytest.mark.parametrize(
+    ("kind", "options"), OPTIONS, ids=lambda x: x if isinstance(x, str) else described(x)
+)
+def test_options(device, kind, options):
+    check_images(PRIMITIVES[kind](random_scene(4)), device, options)
+    if options not in OTHER_OPTIONS:
+        check_gradients(PRIMITIVES[kind](random_scene(6)), device, ("color", "depth", "normal"), options)
+
+
+def test_texture_on_unfiltered_and_narrow_surfels(device):
+    check_images(textured(random_scene(7)), device, Options(low_pass=64.0, filter_sigma=1.0))
+
+
+def test_a_texture_has_its_colour_beside_features(device):
+    scene = textured_with_features(random_scene(6), 4)
+    alone = replace(scene, features=None, background=scene.background[:3]).to(device).render(rasterize)
+    beside = scene.to(device).render(rasterize)
+    torch.testing.assert_close(beside.color[..., :3], alone.color, rtol=0, atol=1e-6)
+
+
+def test_only_what_is_asked_for(device, drawn):
+    scene = drawn(random_scene()).to(device)
+    render = scene.render(rasterize)
+    assert render.depth is render.median is render.normal is render.distortion is render.statistics is None
+    alone = scene.render(rasterize, ("depth",))
+    together = scene.render(rasterize, scene.outputs)
+    assert alone.normal is None
+    torch.testing.assert_close(alone.depth, together.depth)
+    torch.testing.assert_close(alone.color, together.color)
+
+
+@pytest.mark.parametrize(
+    "wanted", [("features",), ("opacities",), ("means", "features"), ("quats", "scales")]
+)
+def test_some_gradients_only(device, drawn, wanted):
+    check_gradients(drawn(random_scene(11)), device, ("color", "normal"), wanted=wanted)
+
+
+@pytest.mark.parametrize("wanted", [("texels",), ("base", "gain"), ("gain", "texels", "opacities")])
+def test_some_gradients_of_textures_only(device, wanted):
+    check_gradients(textured(random_scene(12)), device, wanted=wanted)
+
+
+@pytest.mark.parametrize("wanted", [("features",), ("texels",), ("features", "texels"), ("base", "features")])
+def test_textures_and_features_on_frozen_geometry(device, wanted):
+    check_gradients(textured_with_features(random_scene(12), 2), device, wanted=wanted)
+
+
+def test_two_uses_of_one_image_and_two_images_of_one_scene(device, drawn):
+    scene = drawn(random_scene(14)).to(device)
+    means = scene.means.clone().requires_grad_()
+    first = scene.with_leaves({"means": means}).render(rasterize)
+    second = replace(scene.with_leaves({"means": means}), background=None).render(rasterize)
+    both = torch.autograd.grad(first.color.sum() + (second.color**2).sum(), means, retain_graph=True)[0]
+    one = torch.autograd.grad(first.color.sum(), means)[0]
+    other = torch.autograd.grad((second.color**2).sum(), means)[0]
+    torch.testing.assert_close(both, one + other)
