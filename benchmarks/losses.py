@@ -92,8 +92,5 @@ def surfels(settings: Settings) -> Iterator[Comparison]:
     learned = [made["features"], *material, made["means"], made["quats"]]
     yield Comparison("blinn_phong", pair, learned, (position,))
     sh = 0.2 * torch.randn(n, 16, 3, generator=generator).to(device)
-    pair = {
-        "texgs": shading.spherical_harmonics,
-        "torch": shading_definition.spherical_harmonics,
-    }
+    pair = {"texgs": shading.spherical_harmonics, "torch": shading_definition.spherical_harmonics}
     yield Comparison("spherical_harmonics, degree 3", pair, [sh, made["means"]], (position,))

@@ -48,11 +48,7 @@ FILM = ["--width", "32", "--height", "32"]
 
 # Commands that are not run as they stand: what is run instead (nothing: the command is skipped), and why.
 INSTEAD = (
-    (
-        r"make ",
-        "make --directory {root} --dry-run {words}",
-        "it installs, or runs this test again",
-    ),
+    (r"make ", "make --directory {root} --dry-run {words}", "it installs, or runs this test again"),
     (r"\./replicate", "", "it installs; test_the_script_without_parameters_runs_the_workflow reads it"),
     (r"texgs study", "texgs study --help", "it takes scenes of several methods"),
     (r"texgs view ", "texgs view --help", "it serves until it is interrupted"),

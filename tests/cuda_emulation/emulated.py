@@ -91,8 +91,5 @@ def emulated_cuda(seed: int) -> Iterator[None]:
     """Let the emulated kernels work on CPU tensors, in the order that `seed` stands for."""
     lib = library()
     lib.emulation_seed(seed)
-    with (
-        patch.object(native, "library", lambda device_type="cpu": lib),
-        patch.object(native, "call", _call),
-    ):
+    with patch.object(native, "library", lambda device_type="cpu": lib), patch.object(native, "call", _call):
         yield

@@ -4,16 +4,20 @@ import pytest
 import torch
 
 from benchmarks.scenes import KINDS, camera, surfels
-from tests.raster.load import fragments_per_pixel
+from tests.raster.scenes import Scene
+from texgs.raster import rasterize
 
 MEASURED = {"light": 21.8, "opaque": 38.6, "heavy": 62.2, "transl": 32.4, "translheavy": 109.6}
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_fragments_per_pixel(kind):
-    fragments, covered = fragments_per_pixel(surfels(kind), camera(400), stride=3)
-    assert fragments == pytest.approx(MEASURED[kind], rel=0.1)  # a ninth of the tiles
-    assert covered == pytest.approx(0.5, abs=0.06)
+    view = camera(400)
+    scene = Scene(**surfels(kind), viewmat=view.viewmat, K=view.K, width=400, height=400)
+    render = scene.render(rasterize, ("statistics",))
+    covered = (render.alpha > 0).sum()
+    assert float(render.statistics.pixels.sum() / covered) == pytest.approx(MEASURED[kind], rel=0.1)
+    assert float(covered / 400**2) == pytest.approx(0.5, abs=0.06)
 
 
 def test_scenes_are_reproducible_and_of_any_size():

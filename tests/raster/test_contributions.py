@@ -1,33 +1,21 @@
-"""Statistics of surfels, and the adjoint of rendering, against explicit sums over fragments."""
+"""Statistics of surfels, and the adjoint of rendering, against the definition."""
 
 from dataclasses import replace
 
 import pytest
 import torch
 
-from tests.raster.agreement import decided, dense, remembered
+from tests.raster.agreement import decided
 from tests.raster.scenes import HARD_CASES, random_scene
+from texgs.raster import reference
 from texgs.raster.api import rasterize, splat
-from texgs.raster.reference.render import kind_of, statistics
-from texgs.raster.types import DEFAULT_OPTIONS, Options
-
-
-@remembered
-def explicit(scene, options=DEFAULT_OPTIONS):
-    """Blending weights [H W, N] by the definition, in the order of the inputs, and its statistics."""
-    scene = scene.double()
-    projected, _, weights, _ = dense(scene, options)
-    n = len(scene.means)
-    ordered = weights.new_zeros(len(weights), n)
-    ordered[:, projected.index] = weights
-    radii = kind_of(scene.scales).visible_radii(projected, (scene.width, scene.height), options)
-    return ordered, statistics(weights, radii, projected.index, n)
+from texgs.raster.types import Options
 
 
 @pytest.mark.parametrize("seed", [0, 1])
 def test_statistics(device, drawn, seed):
     scene = drawn(random_scene(seed, n=300))
-    expected = explicit(scene)[1]
+    expected = scene.double().render(reference.rasterize, ("statistics",)).statistics
     result = scene.to(device).render(rasterize, ("statistics",)).statistics
     unsure = int((~decided(scene)).sum())
     # a pixel on a threshold gives or takes a fragment of 1/255, or what is left of the light at its end
@@ -59,12 +47,11 @@ def test_splat_sums_the_image_by_weight(device, drawn, channels):
     scene = drawn(random_scene(2, n=250))
     image = torch.randn(scene.height, scene.width, channels, generator=torch.Generator().manual_seed(0))
     image = image * decided(scene)[..., None]
-    weights, _ = explicit(scene)
+    expected, weights = reference.splat(image.double(), **scene.double().geometry())
     sums, total = splat(image.to(device), **scene.to(device).geometry())
-    expected = weights.T @ image.double().reshape(-1, channels)
     assert sums.shape == (250, channels)
     torch.testing.assert_close(sums.cpu().double(), expected, rtol=1e-4, atol=1e-4)
-    torch.testing.assert_close(total.cpu().double(), weights.sum(0), rtol=1e-4, atol=0.02)
+    torch.testing.assert_close(total.cpu().double(), weights, rtol=1e-4, atol=0.02)
 
 
 def test_splat_is_the_adjoint_of_rendering(device, drawn):

@@ -13,7 +13,7 @@ from tests.raster.voxel_scenes import voxel_scene
 from texgs.raster import native
 from texgs.raster.api import rasterize, splat
 from texgs.raster.voxel_optimizer import VoxelOptimizer, VoxelRates, add_total_variation
-from texgs.raster.voxels import Samples, render_rays
+from texgs.raster.voxels import March, Samples, ray_points, render_rays
 
 
 def everything(scene):
@@ -104,6 +104,8 @@ def voxels(degree, size=(64, 40, 36), n_rays=20_000):
 @pytest.mark.parametrize("degree", [0, 2])
 def test_voxels(degree):
     require_same_bits(voxels, degree)
+    scene = voxel_scene(degree=0, size=(64, 40, 36), n_rays=5000)
+    require_same_bits(ray_points, scene.grid, scene.rays, March())
     assert all(map(torch.equal, voxels(degree), voxels(degree)))
     native.release_memory()
     native.peak_memory(reset=True)

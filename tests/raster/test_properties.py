@@ -118,45 +118,9 @@ def test_ranges(device, scene, opaque):
 
 
 @examples
-@given(scene=of_all)
-def test_background_shows_through(device, scene):
-    scene = scene.to(device)
-    black = replace(scene, background=None).render(rasterize)
-    over = scene.render(rasterize)
-    torch.testing.assert_close(
-        over.color, black.color + (1 - over.alpha)[..., None] * scene.background, **CLOSE
-    )
-
-
-@examples
 @given(scene=of_all, factor=st.sampled_from([-1.0, 3.0, 1e-3]))
 def test_length_and_sign_of_quaternions_do_not_matter(device, scene, factor):
     first = images(scene.to(device).render(rasterize, scene.outputs))
     second = images(replace(scene, quats=factor * scene.quats).to(device).render(rasterize, scene.outputs))
     differ = sum(((image - second[name]).abs() > 1e-4).sum() for name, image in first.items())
     assert differ <= 0.02 * sum(image.numel() for image in first.values())  # thresholds
-
-
-@examples
-@given(scene=of_all, channels=st.integers(2, 32))
-def test_channels_do_not_influence_each_other(device, scene, channels):
-    features = torch.rand(len(scene.means), channels)
-    scene = replace(scene, background=None)
-    together = replace(scene, features=features).to(device).render(rasterize)
-    last = replace(scene, features=features[:, -1:]).to(device).render(rasterize)
-    torch.testing.assert_close(together.color[..., -1:], last.color, **CLOSE)
-    torch.testing.assert_close(together.alpha, last.alpha, **CLOSE)
-
-
-@examples
-@given(scene=scenes)
-def test_same_shift_of_all_moves_the_principal_point(device, scene):  # not the frustum, as Gaussians know it
-    pixels = torch.tensor([2.0, -3.0])
-    K = scene.K.clone()
-    K[:2, 2] += pixels
-    shifted = images(
-        replace(scene, shift=pixels.expand(len(scene.means), 2)).to(device).render(rasterize, scene.outputs)
-    )
-    moved = images(replace(scene, K=K).to(device).render(rasterize, scene.outputs))
-    for name, image in shifted.items():
-        assert ((image - moved[name]).abs() > 1e-4).double().mean() < 0.02  # thresholds

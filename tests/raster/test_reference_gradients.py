@@ -1,5 +1,7 @@
 """The definition's gradients, by autograd, against finite differences of itself with the thresholds off."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -38,6 +40,16 @@ CAMERA = {
 SIZE = {"width": WIDTH, "height": HEIGHT}
 
 
+def check(tensors, output, options):
+    """Compare the gradients of one image with finite differences."""
+
+    def render(*values):
+        given = dict(zip(tensors, values, strict=True))
+        return getattr(rasterize(**CAMERA, **SIZE, **given, outputs=(output,), options=options), output)
+
+    torch.autograd.gradcheck(render, tuple(tensors.values()), fast_mode=True)
+
+
 @pytest.mark.parametrize("antialiased", [False, True])
 @pytest.mark.parametrize("output", ["color", "alpha", "depth", "distortion"])
 def test_gradients_of_every_output_of_gaussians(output, antialiased):
@@ -45,26 +57,13 @@ def test_gradients_of_every_output_of_gaussians(output, antialiased):
     thickness = 0.1 + torch.arange(N, dtype=torch.float64)[:, None] / 10
     tensors["scales"] = torch.cat([tensors["scales"].detach(), thickness], 1).requires_grad_()
     tensors["means"] = (tensors["means"].detach() + torch.tensor([0.0, 1.1, 0.0])).requires_grad_()
-    options = Options(alpha_min=0.0, transmittance_min=0.0, antialiased=antialiased, dilation=0.5)
-
-    def render(*values):
-        given = dict(zip(tensors, values, strict=True))
-        return getattr(rasterize(**CAMERA, **SIZE, **given, outputs=(output,), options=options), output)
-
-    torch.autograd.gradcheck(render, tuple(tensors.values()), fast_mode=True)
+    check(tensors, output, replace(SMOOTH, antialiased=antialiased, dilation=0.5))
 
 
 @pytest.mark.parametrize("filter_sigma", [0.0, 1.0, 3.0])
 @pytest.mark.parametrize("output", ["color", "alpha", "depth", "normal", "distortion"])
 def test_gradients_of_every_output(output, filter_sigma):
-    tensors = inputs()
-    options = Options(alpha_min=0.0, transmittance_min=0.0, filter_sigma=filter_sigma)
-
-    def render(*values):
-        given = dict(zip(tensors, values, strict=True))
-        return getattr(rasterize(**CAMERA, **SIZE, **given, outputs=(output,), options=options), output)
-
-    torch.autograd.gradcheck(render, tuple(tensors.values()), fast_mode=True)
+    check(inputs(), output, replace(SMOOTH, filter_sigma=filter_sigma))
 
 
 def test_median_passes_its_gradient_to_the_depth_of_one_fragment():

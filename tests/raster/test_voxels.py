@@ -1,6 +1,5 @@
 """Voxel grids against the dense definition: images, gradients, memory, errors."""
 
-import math
 from dataclasses import replace
 
 import pytest
@@ -11,9 +10,17 @@ from tests.raster.voxel_scenes import LOWER, SPACING, voxel_scene
 from texgs.core.camera import orbit
 from texgs.core.errors import ArgumentError, DeviceError, ShapeError
 from texgs.raster import voxels
-from texgs.raster.reference.voxels import interpolate
 from texgs.raster.voxel_grid import interpolate_rows, pack_rows, unpack_rows, voxel_grid
-from texgs.raster.voxels import March, Rays, RowGradient, Samples, camera_rays, render_rays, render_view
+from texgs.raster.voxels import (
+    March,
+    Rays,
+    RowGradient,
+    Samples,
+    camera_rays,
+    ray_points,
+    render_rays,
+    render_view,
+)
 
 
 def gradients(scene, outputs, inputs, seed=1):
@@ -165,46 +172,6 @@ def test_a_view_is_its_rays():
     torch.testing.assert_close(view.depth[y, x], depth)
 
 
-def test_rows_are_packed_and_unpacked():
-    for count in (1, 4, 9):
-        density, sh = torch.rand(5), torch.rand(5, count, 3)
-        for a, b in zip(unpack_rows(pack_rows(density, sh)), (density, sh), strict=True):
-            assert torch.equal(a, b)
-
-
-def test_links_and_points_agree_with_the_mask():
-    mask = torch.rand(8, 12, 16, generator=torch.Generator().manual_seed(0)) < 0.3
-    grid = voxel_grid(mask, LOWER, SPACING)
-    links = grid.links()
-    assert torch.equal(links > 0, mask)
-    assert torch.equal(links[mask].sort().values, torch.arange(1, len(grid) + 1, dtype=torch.int32))
-    places = ((grid.points() - torch.tensor(LOWER)) / SPACING).round().long()
-    assert torch.equal(links[tuple(places.T)], torch.arange(1, len(grid) + 1, dtype=torch.int32))
-
-
-def test_interpolated_rows():
-    scene = voxel_scene()
-    grid = scene.grid
-    at = torch.rand(50, 3) * (torch.tensor(grid.size) - 1)
-    points = torch.tensor(LOWER) + SPACING * at
-    expected = interpolate(grid.rows[grid.links().long()], at[None])[0]
-    torch.testing.assert_close(interpolate_rows(grid, points), expected, rtol=1e-4, atol=1e-5)
-    assert not interpolate_rows(grid, torch.tensor([[9.0, 9.0, 9.0]])).any()
-
-
-def test_occupied_cells_and_distances(device):
-    grid = voxel_scene(size=(32, 8, 16), filled=0.003).grid.to(device)
-    grid.refresh_occupancy()
-    grid = grid.to("cpu")
-    dense = (grid.density[grid.links().long()] > 0).double()
-    cells = torch.nn.functional.max_pool3d(torch.nn.functional.pad(dense, (0, 1) * 3)[None], 2, 1)[0] > 0
-    assert torch.equal(voxel_grid(cells, LOWER, SPACING).masks, grid.occupied)
-    some = (grid.occupied != 0).nonzero()
-    place = torch.stack(torch.meshgrid(*map(torch.arange, grid.masks.shape), indexing="ij"), -1)
-    distance = (place[..., None, :] - some).abs().amax(-1).amin(-1)
-    assert torch.equal(grid.distance, distance.to(torch.uint8))
-
-
 def test_an_empty_grid_shows_the_background(device):
     grid = voxel_grid(torch.zeros(8, 8, 8, dtype=torch.bool, device=device), LOWER, SPACING)
     grid.rows.requires_grad_()
@@ -238,52 +205,67 @@ def test_rays_from_far_away_stay_inside_of_the_lattice(away, device):
     assert torch.autograd.grad(rendered.color.sum(), rows)[0].isfinite().all()
 
 
-def test_errors_name_the_argument():
+@pytest.mark.parametrize("transmittance_min", [0.0, 0.1])
+def test_points_have_the_alpha_of_the_grid(transmittance_min):
+    scene = voxel_scene(degree=0)
+    march = March(step=0.4, transmittance_min=transmittance_min)
+    points, ray = ray_points(scene.grid, scene.rays, march)
+    density = interpolate_rows(scene.grid, points)[:, 3]
+    depth = torch.zeros(len(scene.rays)).index_add_(0, ray, density * 0.4 * SPACING)
+    alpha = render_rays(scene.grid, scene.rays, march).alpha
+    torch.testing.assert_close(1 - torch.exp(-depth), alpha, atol=1e-4, rtol=1e-4)
+
+
+def test_points_are_on_their_rays_front_to_back():
+    scene = voxel_scene(degree=0)
+    points, ray = ray_points(scene.grid, scene.rays, March(transmittance_min=0.0))
+    origin, direction = scene.rays[ray, :3], torch.nn.functional.normalize(scene.rays[ray, 3:], dim=1)
+    distance = ((points - origin) * direction).sum(1)
+    torch.testing.assert_close(points, origin + distance[:, None] * direction, atol=1e-5, rtol=0)
+    same = ray.diff() == 0
+    assert bool((ray.diff() >= 0).all())
+    assert bool((distance.diff()[same] > 0.49 * SPACING).all())
+
+
+def test_rays_may_be_a_view_with_gaps():
+    scene = voxel_scene(degree=0)
+    strided, expected = (
+        ray_points(scene.grid, rays, March()) for rays in (scene.rays[::2], scene.rays[::2].clone())
+    )
+    assert len(expected.points) > 0
+    assert all(map(torch.equal, strided, expected))
+
+
+def test_rays_and_marches_that_are_refused():
     scene = voxel_scene()
     grid, rays = scene.grid, scene.rays
-    with pytest.raises(ShapeError, match=r"rays: expected \[N, 6\], got \[6, 300\]; did you transpose"):
-        render_rays(grid, rays.T)
-    refuses(ArgumentError, "rays: expected float32, got float64", render_rays, grid, rays.double())
-    refuses(ArgumentError, "rays: not differentiable here", render_rays, grid, rays.clone().requires_grad_())
-    refuses(ArgumentError, r"step: expected 0\.1 to 8 spacings", render_rays, grid, rays, March(step=0.01))
-    with pytest.raises(ArgumentError, match="transmittance_min: expected 0 to 1, without 1"):
-        render_rays(grid, rays, March(transmittance_min=1.0))
-    refuses(DeviceError, "rows: expected device meta as rays, got cpu", render_rays, grid, rays.to("meta"))
-    with pytest.raises(DeviceError, match="expected tensors on cpu or cuda, got meta; move them"):
-        render_rays(replace(grid, rows=grid.rows.to("meta")), rays.to("meta"))
     other = RowGradient(voxel_scene(size=(8, 8, 8)).grid)
-    with pytest.raises(
-        ShapeError, match=r"into: expected the gradient of \[\d+, 32\] rows in 60 blocks, got"
-    ):
-        render_rays(grid, rays, into=other)
-    samples = Samples(grid, scene.march, rays)
-    refuses(ShapeError, "into: expected the gradient of", samples.add_gradient, None, None, other)
-    with pytest.raises(ShapeError, match=r"color: expected \[300, 3\], got \[299, 3\]"):
-        samples.add_gradient(rays[1:, :3], None, RowGradient(grid))
-    with pytest.raises(DeviceError, match="color: expected device cpu as rays, got meta"):
-        samples.add_gradient(rays[:, :3].to("meta"), None, RowGradient(grid))
-    with pytest.raises(DeviceError, match="into: expected device cpu as rows, got meta"):
-        render_rays(grid, rays, into=RowGradient(grid.to("meta")))
-    with pytest.raises(ArgumentError, match="alpha: expected float32, got float64"):
-        samples.add_gradient(None, rays[:, 0].double(), RowGradient(grid))
-    refuses(ShapeError, r"weights: expected \[\d+\], got \[3\]", samples.mark, torch.zeros(3))
-    with pytest.raises(ArgumentError, match="weights: expected float32, got float64"):
-        samples.mark(torch.zeros(len(grid.rows)).double())
-    with pytest.raises(ArgumentError, match="weights: expected a dense tensor"):
-        samples.mark(torch.zeros(2 * len(grid.rows))[::2])
-    refuses(DeviceError, "rows: expected device cpu as masks, got meta", grid.with_rows, grid.rows.to("meta"))
-    refuses(ShapeError, r"rows: expected \[\d+, K\], got \[3, 32\]", grid.with_rows, torch.zeros(3, 32))
-    refuses(ShapeError, "rows: expected 4, 16 or 32 floats", grid.with_rows, torch.zeros(len(grid.rows), 8))
+    not_of_the_grid = r"into: expected the gradient of \[\d+, 32\] rows in 60 blocks, got"
+    refuses(ShapeError, r"rays: expected \[N, 6\], .*; did you transpose", render_rays, grid, rays.T)
+    refuses(ArgumentError, "rays: expected float32, got float64", render_rays, grid, rays.double())
+    refuses(ArgumentError, "rays: not differentiable", render_rays, grid, rays.clone().requires_grad_())
+    refuses(ArgumentError, r"step: expected 0\.1 to 8 spacings", render_rays, grid, rays, March(step=0.01))
+    refuses(
+        ArgumentError, "transmittance_min: expected 0 to 1", render_rays, grid, rays, March((1, 1, 1), 1, 1)
+    )
+    refuses(DeviceError, "rows: expected device meta as rays, got cpu", render_rays, grid, rays.to("meta"))
+    refuses(DeviceError, "rays: expected a tensor on cpu", ray_points, grid, rays.to("meta"), March())
+    elsewhere = replace(grid, rows=grid.rows.to("meta"))
+    refuses(DeviceError, "expected tensors on cpu or cuda, got meta", render_rays, elsewhere, rays.to("meta"))
+    refuses(ShapeError, not_of_the_grid, render_rays, grid, rays, into=other)
+    message, into = "into: expected device cpu as rows, got meta", RowGradient(grid.to("meta"))
+    refuses(DeviceError, message, render_rays, grid, rays, into=into)
 
 
-def test_grids_that_cannot_be():
-    mask = torch.ones(8, 8, 8, dtype=torch.bool)
-    with pytest.raises(ShapeError, match=r"multiples of 4 from 8 to 1024, got \[8, 6, 8\] bool; pad it"):
-        voxel_grid(mask[:, :6], LOWER, SPACING)
-    refuses(ShapeError, "expected bool", voxel_grid, mask.float(), LOWER, SPACING)
-    refuses(ArgumentError, "degree: expected 0, 1 or 2, got 3", voxel_grid, mask, LOWER, SPACING, 3)
-    for spacing in (0, -1, math.inf, math.nan):
-        with pytest.raises(ArgumentError, match=f"spacing: expected a length above 0, got {spacing}"):
-            voxel_grid(mask, LOWER, spacing)
-    for lower in (LOWER[:2], (0, 0, math.nan)):
-        refuses(ArgumentError, "lower: expected 3 finite numbers, got", voxel_grid, mask, lower, SPACING)
+def test_gradients_and_weights_that_are_refused():
+    scene = voxel_scene()
+    samples, into, rays = Samples(scene.grid, scene.march, scene.rays), RowGradient(scene.grid), scene.rays
+    other, n = RowGradient(voxel_scene(size=(8, 8, 8)).grid), len(scene.grid.rows)
+    add, mark = samples.add_gradient, samples.mark
+    refuses(ShapeError, "into: expected the gradient of", add, None, None, other)
+    refuses(ShapeError, r"color: expected \[300, 3\], got \[299, 3\]", add, rays[1:, :3], None, into)
+    refuses(DeviceError, "color: expected device cpu as rays", add, rays[:, :3].to("meta"), None, into)
+    refuses(ArgumentError, "alpha: expected float32, got float64", add, None, rays[:, 0].double(), into)
+    refuses(ShapeError, r"weights: expected \[\d+\], got \[3\]", mark, torch.zeros(3))
+    refuses(ArgumentError, "weights: expected float32, got float64", mark, torch.zeros(n).double())
+    refuses(ArgumentError, "weights: expected a dense tensor", mark, torch.zeros(2 * n)[::2])
